@@ -1,0 +1,263 @@
+//! Finds MuJoCo, checks that it is one of the two supported lines, and generates the bindings.
+//!
+//! Where it looks: `MUJOCO_DIR` (a folder with `include/mujoco/mujoco.h` and `libmujoco.so*`, as in the PyPI wheel), else
+//! the system's include folders (Debian's `libmujoco-dev`).
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+const SUPPORTED: &str = "supported are MuJoCo 2.2.2 (Debian 12: apt-get install libmujoco-dev) and MuJoCo 4.x \
+    (set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so*, for example the unpacked PyPI wheel mujoco-core)";
+
+fn main() {
+    println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-check-cfg=cfg(mj4)");
+    let installation = Installation::find().unwrap_or_else(|message| {
+        println!("cargo::error={message}");
+        std::process::exit(1);
+    });
+    println!("cargo::rerun-if-changed={}", installation.header("mujoco.h").display());
+    println!("cargo::metadata=version_header={}", installation.version_header);
+    if installation.major() >= 4 {
+        println!("cargo::rustc-cfg=mj4");
+    }
+    installation.link();
+
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    write_bindings(&installation, &out.join("bindings.rs"));
+    write_fields(&installation, &out.join("fields.rs"));
+}
+
+struct Installation {
+    include: PathBuf,
+    /// The library file, when `MUJOCO_DIR` names one; else the linker's default search finds it.
+    library: Option<PathBuf>,
+    version_header: u32,
+}
+
+impl Installation {
+    fn find() -> Result<Self, String> {
+        let (include, library) = match env::var_os("MUJOCO_DIR").map(PathBuf::from) {
+            Some(dir) => {
+                let dir =
+                    fs::canonicalize(&dir).map_err(|e| format!("MUJOCO_DIR={}: {e}; {SUPPORTED}", dir.display()))?;
+                let library = find_library(&dir).ok_or_else(|| {
+                    format!("MUJOCO_DIR={}: no libmujoco.so* in it, nor in its lib/; {SUPPORTED}", dir.display())
+                })?;
+                (dir.join("include"), Some(library))
+            }
+            None => {
+                let include = ["/usr/include", "/usr/local/include"]
+                    .iter()
+                    .map(PathBuf::from)
+                    .find(|dir| dir.join("mujoco/mujoco.h").exists())
+                    .ok_or_else(|| {
+                        format!("MuJoCo's headers were not found in the system's include folders; {SUPPORTED}")
+                    })?;
+                (include, None)
+            }
+        };
+        let header = include.join("mujoco/mujoco.h");
+        let text = fs::read_to_string(&header).map_err(|e| format!("{}: {e}; {SUPPORTED}", header.display()))?;
+        let version_header = text
+            .lines()
+            .find_map(|line| line.trim().strip_prefix("#define mjVERSION_HEADER")?.trim().parse().ok())
+            .ok_or_else(|| format!("{}: no mjVERSION_HEADER in it; {SUPPORTED}", header.display()))?;
+        let found = Self { include, library, version_header };
+        if version_header != 222 && found.major() != 4 {
+            return Err(format!(
+                "{} is of MuJoCo version {version_header}, which is not supported; {SUPPORTED}",
+                header.display()
+            ));
+        }
+        Ok(found)
+    }
+
+    fn header(&self, name: &str) -> PathBuf {
+        self.include.join("mujoco").join(name)
+    }
+
+    /// 222 is 2.2.2; since 3.5 the number is major * 10^6 + minor * 10^3 + patch.
+    fn major(&self) -> u32 {
+        if self.version_header < 1000 { self.version_header / 100 } else { self.version_header / 1_000_000 }
+    }
+
+    fn link(&self) {
+        let Some(library) = &self.library else {
+            println!("cargo::rustc-link-lib=dylib=mujoco");
+            return;
+        };
+        let name = library.file_name().and_then(|n| n.to_str()).expect("find_library returns a UTF-8 file name");
+        // Cargo puts link-search folders below OUT_DIR on the library path of `cargo run` and `cargo test`, other
+        // folders not: a symlink there makes tests and examples find a library that the system does not know.
+        let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+        let link = out.join(name);
+        let _ = fs::remove_file(&link);
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
+        println!("cargo::rustc-link-search=native={}", out.display());
+        println!("cargo::rustc-link-lib=dylib:+verbatim={name}");
+    }
+}
+
+fn find_library(dir: &Path) -> Option<PathBuf> {
+    let mut found: Vec<PathBuf> = [dir.to_path_buf(), dir.join("lib")]
+        .iter()
+        .filter_map(|d| fs::read_dir(d).ok())
+        .flatten()
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| p.file_name().and_then(|n| n.to_str()).is_some_and(|n| n.starts_with("libmujoco.so")))
+        .collect();
+    found.sort();
+    found.into_iter().next()
+}
+
+#[derive(Debug)]
+struct StripTrailingUnderscore;
+
+impl bindgen::callbacks::ParseCallbacks for StripTrailingUnderscore {
+    /// 2.2.2 writes `typedef struct mjModel_ {..} mjModel;`, 4.x `typedef struct mjModel {..} mjModel;`.
+    fn item_name(&self, item: bindgen::callbacks::ItemInfo<'_>) -> Option<String> {
+        (item.name.starts_with("mj") && item.name.ends_with('_')).then(|| item.name.trim_end_matches('_').to_string())
+    }
+}
+
+fn write_bindings(installation: &Installation, path: &Path) {
+    bindgen::Builder::default()
+        .header_contents("wrapper.h", "#include <mujoco/mujoco.h>\n")
+        .clang_arg(format!("-I{}", installation.include.display()))
+        .parse_callbacks(Box::new(StripTrailingUnderscore))
+        .allowlist_function("mj_.*|mju_.*")
+        .allowlist_var("mj.*")
+        .allowlist_type("mjt.*|mjModel|mjData|mjVFS|mjContact|mjOption")
+        // Values of C enums come from the library: a Rust enum would make an unknown one undefined behaviour.
+        .default_enum_style(bindgen::EnumVariation::Consts)
+        .prepend_enum_name(false)
+        .default_macro_constant_type(bindgen::MacroTypeVariation::Signed)
+        // Structs of up to 2 MB that own memory must not be copied by an assignment.
+        .no_copy("mj(Model|Data|VFS|vScene|UI|vFigure|rContext)_?")
+        .derive_debug(false)
+        .generate_comments(false)
+        .size_t_is_usize(true)
+        .layout_tests(true)
+        // The error handler leaves engine functions by unwinding.
+        .override_abi(bindgen::Abi::CUnwind, ".*")
+        .generate()
+        .expect("bindgen on MuJoCo's headers")
+        .write_to_file(path)
+        .expect("OUT_DIR is writable");
+}
+
+/// One array of `mjModel` or `mjData` as `mjxmacro.h` declares it.
+struct Field {
+    name: String,
+    rows: String,
+    cols: String,
+}
+
+/// Widths of all arrays of `mjModel` and `mjData`, from MuJoCo's own X-macros: no stride is typed by hand.
+fn write_fields(installation: &Installation, path: &Path) {
+    let text = fs::read_to_string(installation.header("mjxmacro.h")).expect("mjxmacro.h stands beside mujoco.h");
+    let lists = x_macros(&text);
+    let mut out = String::new();
+    for (module, prefixes, doc) in [
+        ("model", &["MJMODEL_POINTERS"][..], "Arrays of `mjModel`."),
+        ("data", &["MJDATA_POINTERS", "MJDATA_ARENA_POINTERS"][..], "Arrays of `mjData`."),
+    ] {
+        let mut fields: BTreeMap<String, Field> = BTreeMap::new();
+        for (list, entries) in &lists {
+            if prefixes.iter().any(|p| list.starts_with(p)) {
+                for args in entries {
+                    // X(type, name, rows, cols)
+                    let [_, name, rows, cols] = args.as_slice() else { continue };
+                    let field = Field { name: name.clone(), rows: rows.clone(), cols: cols.clone() };
+                    fields.insert(field.name.clone(), field);
+                }
+            }
+        }
+        assert!(fields.len() > 50, "mjxmacro.h: only {} arrays found for {module}", fields.len());
+        writeln!(out, "/// {doc}\npub mod {module} {{").unwrap();
+        for field in fields.values() {
+            writeln!(
+                out,
+                "    /// `{0}`: rows `{1}`, columns `{2}`.\n    pub const {3}: super::Field = super::Field {{ name: \"{0}\", rows: \"{1}\", cols: \"{2}\" }};",
+                field.name,
+                field.rows,
+                field.cols,
+                field.name.to_uppercase()
+            )
+            .unwrap();
+        }
+        writeln!(out, "}}").unwrap();
+    }
+    fs::write(path, out).expect("OUT_DIR is writable");
+}
+
+/// `#define NAME \ X(a, b, ...) \ XMJV(a, ...)` -> (NAME, [[a, b, ...], ...]).
+fn x_macros(text: &str) -> BTreeMap<String, Vec<Vec<String>>> {
+    let joined = text.replace("\\\r\n", " ").replace("\\\n", " ");
+    let mut lists: BTreeMap<String, Vec<Vec<String>>> = BTreeMap::new();
+    for line in joined.lines() {
+        let Some(rest) = line.trim().strip_prefix("#define ") else { continue };
+        let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        let entries = calls(&rest[name.len()..]);
+        if !entries.is_empty() {
+            lists.entry(name).or_default().extend(entries);
+        }
+    }
+    lists
+}
+
+/// Argument lists of all calls `X...(..)` in `text`; nested parentheses (`MJ_M(n)`) belong to the argument.
+fn calls(text: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    while at < bytes.len() {
+        if bytes[at] == b'X' && (at == 0 || !bytes[at - 1].is_ascii_alphanumeric() && bytes[at - 1] != b'_') {
+            let word_end = at + text[at..].find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len() - at);
+            let open = word_end + text[word_end..].len() - text[word_end..].trim_start().len();
+            if bytes.get(open) == Some(&b'(') {
+                let (mut depth, mut end) = (0, open);
+                for (i, &b) in bytes.iter().enumerate().skip(open) {
+                    match b {
+                        b'(' => depth += 1,
+                        b')' => depth -= 1,
+                        _ => {}
+                    }
+                    if depth == 0 {
+                        end = i;
+                        break;
+                    }
+                }
+                found.push(split_arguments(&text[open + 1..end]));
+                at = end + 1;
+                continue;
+            }
+        }
+        at += 1;
+    }
+    found
+}
+
+fn split_arguments(text: &str) -> Vec<String> {
+    let (mut depth, mut current, mut out) = (0, String::new(), Vec::new());
+    for c in text.chars() {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            ',' if depth == 0 => {
+                out.push(current.trim().to_string());
+                current.clear();
+                continue;
+            }
+            _ => {}
+        }
+        current.push(c);
+    }
+    out.push(current.trim().to_string());
+    out
+}

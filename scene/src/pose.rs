@@ -1,0 +1,39 @@
+//! Poses and the only place where quaternion orders meet.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// A rigid transform: translation \[m\] and rotation.
+///
+/// Variables are named as algebra, `world_from_link * link_from_camera`.
+pub type Pose = Isometry3<f64>;
+
+/// A unit quaternion from `[w, x, y, z]`, normalised.
+pub fn from_wxyz(q: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
+}
+
+/// A unit quaternion from `[x, y, z, w]` (ROS, SciPy), normalised.
+pub fn from_xyzw(q: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
+}
+
+/// `[w, x, y, z]` of a rotation.
+pub fn to_wxyz(q: &UnitQuaternion<f64>) -> [f64; 4] {
+    [q.w, q.i, q.j, q.k]
+}
+
+/// A pose from fixed-axis roll, pitch, yaw \[rad\] (URDF `rpy`) and a translation \[m\] (URDF `xyz`).
+pub fn from_xyz_rpy(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
+    Pose::from_parts(Translation3::from(Vector3::from(xyz)), UnitQuaternion::from_euler_angles(rpy[0], rpy[1], rpy[2]))
+}
+
+/// The pose row `[x, y, z, qw, qx, qy, qz]`.
+pub fn to_row(pose: &Pose) -> [f64; 7] {
+    let (t, q) = (pose.translation.vector, pose.rotation);
+    [t.x, t.y, t.z, q.w, q.i, q.j, q.k]
+}
+
+/// The pose of a row `[x, y, z, qw, qx, qy, qz]`; the quaternion is normalised.
+pub fn from_row(row: &[f64; 7]) -> Pose {
+    Pose::from_parts(Translation3::new(row[0], row[1], row[2]), from_wxyz([row[3], row[4], row[5], row[6]]))
+}

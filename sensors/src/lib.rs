@@ -1,0 +1,2 @@
+//! Sensors that have never heard of MuJoCo.
+#![forbid(unsafe_code)]

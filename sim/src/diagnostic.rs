@@ -1,0 +1,103 @@
+//! Warnings: what was repaired, ignored or unusual in a user's input. Collected, never printed behind the user's back.
+
+use crate::source::Source;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// What kind of thing a [`Diagnostic`] reports. The name is stable: reports count by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum DiagnosticKind {
+    /// An inertia tensor that no rigid body can have was repaired in the MJCF (the description keeps what the file says).
+    InertiaRepaired,
+    /// A movable link without mass got minimal values, so that MuJoCo accepts it; they stay out of `total_mass`.
+    MasslessLink,
+    /// Lower limit above upper limit: the limit is ignored.
+    LimitIgnored,
+    /// Effort 0 or absent: the joint's effort is not limited.
+    EffortUnlimited,
+    /// A mimic joint's implied range exceeds its own limits: the driver's usable range is the intersection.
+    MimicRangeClipped,
+    /// A file named by a visual does not exist: the visual is left out.
+    VisualMeshMissing,
+    /// A visual mesh could not be read: the visual is left out.
+    VisualMeshInvalid,
+    /// A name was used by two components and got a prefix or suffix.
+    NameClash,
+    /// A material is referenced but defined nowhere.
+    MaterialUndefined,
+    /// A texture file does not exist or cannot be read; the colour is used.
+    TextureMissing,
+    /// An element of the file has no meaning for the simulation and was skipped.
+    ElementIgnored,
+    /// A transmission, mimic or plugin names something that does not exist.
+    ReferenceUnknown,
+    /// The native actuator drive is outside the range where it is stable.
+    ActuatorUnstable,
+    /// Two geoms overlap in the initial pose and were excluded from self-collision.
+    InitialOverlap,
+    /// The initial position was outside the joint's limits and was moved to the nearest one.
+    InitialPositionClamped,
+    /// A unit axis was expected; the axis was normalised.
+    AxisNormalized,
+}
+
+impl DiagnosticKind {
+    /// Stable kebab-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::InertiaRepaired => "inertia-repaired",
+            Self::MasslessLink => "massless-link",
+            Self::LimitIgnored => "limit-ignored",
+            Self::EffortUnlimited => "effort-unlimited",
+            Self::MimicRangeClipped => "mimic-range-clipped",
+            Self::VisualMeshMissing => "visual-mesh-missing",
+            Self::VisualMeshInvalid => "visual-mesh-invalid",
+            Self::NameClash => "name-clash",
+            Self::MaterialUndefined => "material-undefined",
+            Self::TextureMissing => "texture-missing",
+            Self::ElementIgnored => "element-ignored",
+            Self::ReferenceUnknown => "reference-unknown",
+            Self::ActuatorUnstable => "actuator-unstable",
+            Self::InitialOverlap => "initial-overlap",
+            Self::InitialPositionClamped => "initial-position-clamped",
+            Self::AxisNormalized => "axis-normalized",
+        }
+    }
+}
+
+/// One warning: kind, place, and a sentence that says what was found and what was done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// What kind of thing this is.
+    pub kind: DiagnosticKind,
+    /// Where it was found, if in a file.
+    pub source: Option<Source>,
+    /// A full sentence that names the element: `link "LF_HIP": ...`.
+    pub message: String,
+}
+
+impl Diagnostic {
+    /// A warning at `source`.
+    pub fn new(kind: DiagnosticKind, source: impl Into<Option<Source>>, message: impl Into<String>) -> Self {
+        Self { kind, source: source.into(), message: message.into() }
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(source) = &self.source {
+            write!(f, "{source}: ")?;
+        }
+        write!(f, "{} [{}]", self.message, self.kind.name())
+    }
+}
+
+/// Number of diagnostics of each kind, by name.
+pub fn count_by_name(diagnostics: &[Diagnostic]) -> BTreeMap<&'static str, usize> {
+    let mut counts = BTreeMap::new();
+    for d in diagnostics {
+        *counts.entry(d.kind.name()).or_insert(0) += 1;
+    }
+    counts
+}

@@ -1,0 +1,33 @@
+//! Where a thing was said: file and line, carried from the URDF to MuJoCo's compile errors.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A place in a user's file.
+#[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Source {
+    /// The file as the user named it.
+    pub file: Arc<PathBuf>,
+    /// Line, counted from 1.
+    pub line: u32,
+}
+
+impl Source {
+    /// A place in `file`.
+    pub fn new(file: impl AsRef<Path>, line: u32) -> Self {
+        Self { file: Arc::new(file.as_ref().to_path_buf()), line }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.file.display(), self.line)
+    }
+}
+
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
