@@ -151,49 +151,79 @@ fn write_bindings(installation: &Installation, path: &Path) {
         .expect("OUT_DIR is writable");
 }
 
-/// One array of `mjModel` or `mjData` as `mjxmacro.h` declares it.
-struct Field {
-    name: String,
-    rows: String,
-    cols: String,
-}
-
-/// Widths of all arrays of `mjModel` and `mjData`, from MuJoCo's own X-macros: no stride is typed by hand.
+/// Accessors of all arrays of `mjModel` and `mjData`, generated from MuJoCo's own X-macros: no stride is typed by hand.
+///
+/// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements.
 fn write_fields(installation: &Installation, path: &Path) {
     let text = fs::read_to_string(installation.header("mjxmacro.h")).expect("mjxmacro.h stands beside mujoco.h");
     let lists = x_macros(&text);
     let mut out = String::new();
-    for (module, prefixes, doc) in [
-        ("model", &["MJMODEL_POINTERS"][..], "Arrays of `mjModel`."),
-        ("data", &["MJDATA_POINTERS", "MJDATA_ARENA_POINTERS"][..], "Arrays of `mjData`."),
-    ] {
-        let mut fields: BTreeMap<String, Field> = BTreeMap::new();
-        for (list, entries) in &lists {
-            if prefixes.iter().any(|p| list.starts_with(p)) {
-                for args in entries {
-                    // X(type, name, rows, cols)
-                    let [_, name, rows, cols] = args.as_slice() else { continue };
-                    let field = Field { name: name.clone(), rows: rows.clone(), cols: cols.clone() };
-                    fields.insert(field.name.clone(), field);
+    for (module, prefixes) in
+        [("model", &["MJMODEL_POINTERS"][..]), ("data", &["MJDATA_POINTERS", "MJDATA_ARENA_POINTERS"][..])]
+    {
+        let mut arrays: BTreeMap<&str, (&str, &str, &str)> = BTreeMap::new();
+        for (_, entries) in lists.iter().filter(|(list, _)| prefixes.iter().any(|p| list.starts_with(p))) {
+            for entry in entries {
+                if let [kind, name, rows, cols] = entry.as_slice() {
+                    arrays.insert(name, (kind, rows, cols));
                 }
             }
         }
-        assert!(fields.len() > 50, "mjxmacro.h: only {} arrays found for {module}", fields.len());
-        writeln!(out, "/// {doc}\npub mod {module} {{").unwrap();
-        for field in fields.values() {
+        assert!(arrays.len() > 50, "mjxmacro.h: only {} arrays found for {module}", arrays.len());
+        writeln!(out, "pub mod {module} {{\n    use crate::*;").unwrap();
+        for (name, (kind, rows, cols)) in arrays {
+            let kind = rust_type(kind);
+            let (rows, cols) = (size_expression(rows), size_expression(cols));
+            let (arguments, owner) =
+                if module == "model" { ("m: *const mjModel", "m") } else { ("m: *const mjModel, d: *const mjData", "d") };
             writeln!(
                 out,
-                "    /// `{0}`: rows `{1}`, columns `{2}`.\n    pub const {3}: super::Field = super::Field {{ name: \"{0}\", rows: \"{1}\", cols: \"{2}\" }};",
-                field.name,
-                field.rows,
-                field.cols,
-                field.name.to_uppercase()
+                "    pub unsafe fn {name}<'a>({arguments}) -> &'a [{kind}] {{ unsafe {{ super::slice((*{owner}).{name}, ({rows}) * ({cols})) }} }}"
+            )
+            .unwrap();
+            let arguments = arguments.replace("d: *const", "d: *mut").replace("m: *const mjModel", if module == "model" { "m: *mut mjModel" } else { "m: *const mjModel" });
+            writeln!(
+                out,
+                "    pub unsafe fn {name}_mut<'a>({arguments}) -> &'a mut [{kind}] {{ unsafe {{ super::slice_mut((*{owner}).{name}, ({rows}) * ({cols})) }} }}"
             )
             .unwrap();
         }
         writeln!(out, "}}").unwrap();
     }
     fs::write(path, out).expect("OUT_DIR is writable");
+}
+
+/// The Rust spelling of a C element type; bindgen knows MuJoCo's own types.
+fn rust_type(c: &str) -> &str {
+    match c {
+        "int" => "::std::os::raw::c_int",
+        "float" => "f32",
+        "double" => "f64",
+        "char" => "::std::os::raw::c_char",
+        "uint64_t" => "u64",
+        "uintptr_t" => "usize",
+        mujoco => mujoco,
+    }
+}
+
+/// A size in `mjxmacro.h`: a number, a constant, a size field of the model, or `MJ_D(..)`, a size field of the data.
+///
+/// Rows `njmax` and `nconmax` (2.2.2) are what is allocated; only the first `nefc` and `ncon` are filled, as in 4.x,
+/// where those are the sizes.
+fn size_expression(c: &str) -> String {
+    let inner = |c: &str| c[c.find('(').map_or(0, |i| i + 1)..c.rfind(')').unwrap_or(c.len())].trim().to_string();
+    if let Some((a, b)) = c.split_once('*') {
+        return format!("{} * {}", size_expression(a.trim()), size_expression(b.trim()));
+    }
+    match c {
+        "njmax" | "MJ_M(njmax)" => "(*d).nefc as usize".into(),
+        "nconmax" => "(*d).ncon as usize".into(),
+        _ if c.starts_with("MJ_D") => format!("(*d).{} as usize", inner(c)),
+        _ if c.starts_with("MJ_M") => format!("(*m).{} as usize", inner(c)),
+        _ if c.starts_with("mj") => format!("{c} as usize"),
+        _ if c.bytes().all(|b| b.is_ascii_digit()) => c.into(),
+        _ => format!("(*m).{c} as usize"),
+    }
 }
 
 /// `#define NAME \ X(a, b, ...) \ XMJV(a, ...)` -> (NAME, [[a, b, ...], ...]).

@@ -8,6 +8,7 @@
     non_upper_case_globals,
     missing_docs,
     missing_debug_implementations,
+    unused_variables,
     unreachable_pub,
     clippy::all,
     reason = "generated from C headers"
@@ -15,17 +16,19 @@
 
 include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
 
-/// Rows and columns of the arrays of `mjModel` and `mjData`.
+/// Every array of `mjModel` and `mjData` as a slice with the size that `mjxmacro.h` declares.
+///
+/// # Safety
+/// All functions: `m` points to a model made by MuJoCo, `d` to a data made from a model of the same sizes, both alive
+/// for `'a`; nothing writes (shared) or touches (`_mut`) the array during `'a`. Constraint and contact arrays hold
+/// values only after the stage that fills them.
 pub mod fields {
-    /// One array: its name and the C expressions for its size.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Field {
-        /// Name in the C struct.
-        pub name: &'static str,
-        /// Number of rows: a size field of `mjModel` or `mjData`.
-        pub rows: &'static str,
-        /// Number of columns: a number, a constant or a size field.
-        pub cols: &'static str,
+    unsafe fn slice<'a, T>(pointer: *const T, len: usize) -> &'a [T] {
+        if len == 0 || pointer.is_null() { &[] } else { unsafe { std::slice::from_raw_parts(pointer, len) } }
+    }
+
+    unsafe fn slice_mut<'a, T>(pointer: *mut T, len: usize) -> &'a mut [T] {
+        if len == 0 || pointer.is_null() { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(pointer, len) } }
     }
 
     include!(concat!(env!("OUT_DIR"), "/fields.rs"));

@@ -2,6 +2,8 @@
 
 pub mod description;
 pub mod diagnostic;
+#[allow(unsafe_code, reason = "the wall to MuJoCo")]
+pub mod mj;
 pub mod source;
 
 pub use description::RobotDescription;

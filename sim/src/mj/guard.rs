@@ -1,0 +1,54 @@
+//! MuJoCo's errors as values: the error handler unwinds out of C to [`guarded`].
+//!
+//! Only calls whose C frames hold no C++ landing pads may be guarded: in the 4.x wheel, unwinding through such a frame
+//! crashes. Those are the engine functions (step, forward, makeData, ...); the XML and VFS functions report through
+//! buffers and are never guarded.
+
+use super::error::EngineError;
+use mujoco_sys as mj;
+use std::cell::Cell;
+use std::ffi::{CStr, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+thread_local! {
+    /// True while a guarded engine call runs on this thread.
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The payload that carries MuJoCo's message from the handler to [`guarded`].
+struct EngineStopped(String);
+
+unsafe extern "C-unwind" fn on_error(message: *const c_char) {
+    // SAFETY: MuJoCo passes a NUL-terminated message that lives until this handler ends.
+    let text = unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned();
+    if GUARDED.get() {
+        resume_unwind(Box::new(EngineStopped(text)));
+    }
+    // MuJoCo exits the process when a handler returns. Every engine call in this module is guarded, so a message that
+    // arrives here is a defect of ours; unwinding through unknown frames would be worse than stopping.
+    eprintln!("kinetoscope: MuJoCo error outside a guarded call: {text}");
+    std::process::abort();
+}
+
+/// Warnings are counted in `mjData.warning`; the handler keeps MuJoCo from writing to the console and to a log file.
+unsafe extern "C-unwind" fn on_warning(_message: *const c_char) {}
+
+/// Replaces MuJoCo's process-wide handlers. Called once, from `check_version`.
+pub(super) fn install_handlers() {
+    // SAFETY: the handler is a plain pointer, written once before any other MuJoCo call of this process.
+    unsafe { mj::mju_user_error = Some(on_error) };
+    // SAFETY: as above.
+    unsafe { mj::mju_user_warning = Some(on_warning) };
+}
+
+/// Runs an engine call; an `mju_error` inside becomes an `Err`.
+pub(super) fn guarded<T>(call: impl FnOnce() -> T) -> Result<T, EngineError> {
+    let outer = GUARDED.replace(true);
+    // AssertUnwindSafe: the caller treats the data it passed as lost when this returns an error.
+    let result = catch_unwind(AssertUnwindSafe(call));
+    GUARDED.set(outer);
+    result.map_err(|payload| match payload.downcast::<EngineStopped>() {
+        Ok(stopped) => EngineError { message: stopped.0 },
+        Err(other) => resume_unwind(other),
+    })
+}

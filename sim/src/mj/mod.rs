@@ -1,0 +1,33 @@
+//! The unsafe wall: owned MuJoCo models and data with checked slices, for MuJoCo 2.2.2 and 4.x.
+//!
+//! This is the only place of hand-written unsafe code and the only one that knows MuJoCo versions. What it guarantees:
+//!
+//! * No input makes MuJoCo end the process: its error handler unwinds to [`guard`](self), which returns an
+//!   [`EngineError`]; its console and log file stay silent.
+//! * A model never changes while it is shared; [`Data`] keeps its model alive.
+//! * A slice has the length that MuJoCo's own `mjxmacro.h` declares (`mujoco_sys::fields`).
+//!
+//! Names are MuJoCo's own (`qpos`, `geom`, `efc_aref`) in this module and in `mjcf` only.
+
+mod arrays;
+mod data;
+mod error;
+mod guard;
+mod model;
+mod name;
+mod state;
+mod version;
+mod vfs;
+
+pub use data::{Data, Overflow, Warning, WarningCounts};
+pub use error::{CompileError, EngineError};
+pub use model::{Buffers, Compiled, Model};
+pub use name::ObjectKind;
+pub use state::{Inputs, Motion};
+pub use version::{TARGET, Target, VersionError, check_version, version_string};
+pub use vfs::{Asset, LoadError, compile, compile_file};
+
+pub use mujoco_sys::{
+    mjCNSTR_FRICTION_DOF, mjCNSTR_FRICTION_TENDON, mjINT_EULER, mjINT_IMPLICIT, mjINT_RK4, mjJNT_BALL, mjJNT_FREE,
+    mjJNT_HINGE, mjJNT_SLIDE,
+};

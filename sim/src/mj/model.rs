@@ -1,0 +1,239 @@
+//! Compiled models: mutable until shared, then immutable.
+
+use mujoco_sys as mj;
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+/// Owns what `mj_loadXML` returned; freed when the last [`Model`] is gone.
+#[derive(Debug)]
+struct Storage(NonNull<mj::mjModel>);
+
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled`, which is its only
+// owner then.
+unsafe impl Send for Storage {}
+// SAFETY: once shared in a `Model`, nothing writes to it.
+unsafe impl Sync for Storage {}
+
+impl Drop for Storage {
+    fn drop(&mut self) {
+        // SAFETY: made by mj_loadXML, deleted once.
+        unsafe { mj::mj_deleteModel(self.0.as_ptr()) };
+    }
+}
+
+/// A freshly compiled model that may still be edited.
+#[derive(Debug)]
+pub struct Compiled(Storage);
+
+impl Compiled {
+    /// # Safety
+    /// `raw` is a model made by MuJoCo that nobody else owns.
+    pub(super) unsafe fn from_raw(raw: NonNull<mj::mjModel>) -> Self {
+        Self(Storage(raw))
+    }
+
+    pub(super) fn raw_mut(&mut self) -> *mut mj::mjModel {
+        self.0.0.as_ptr()
+    }
+
+    /// Ends editing.
+    pub fn into_model(self) -> Model {
+        // SAFETY: a bitwise copy of the struct: its pointers lead into `storage`, which outlives it, and the copy is
+        // never freed as a model (mjModel has no destructor of its own).
+        let header = unsafe { std::ptr::read(self.0.0.as_ptr()) };
+        Model(Arc::new(Header { header, storage: Arc::new(self.0) }))
+    }
+}
+
+/// A shallow `mjModel`: sizes and options of its own, arrays shared with the storage.
+struct Header {
+    header: mj::mjModel,
+    storage: Arc<Storage>,
+}
+
+impl std::fmt::Debug for Header {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("mjModel").field("nq", &self.header.nq).field("nv", &self.header.nv).finish_non_exhaustive()
+    }
+}
+
+// SAFETY: the pointers in `header` lead into `storage`, which is Send + Sync; nothing writes through them.
+unsafe impl Send for Header {}
+// SAFETY: as above.
+unsafe impl Sync for Header {}
+
+/// An immutable model, cheap to clone, shared by all environments and threads.
+#[derive(Clone, Debug)]
+pub struct Model(Arc<Header>);
+
+/// How much room a [`Data`](super::Data) has for contacts and constraints.
+///
+/// On 2.2.2 memory grows with the square of `constraints`, so both start small and grow on demand; on 4.x contacts and
+/// constraints share one arena.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Buffers {
+    /// Contacts (2.2.2).
+    pub contacts: usize,
+    /// Constraint rows (2.2.2).
+    pub constraints: usize,
+    /// Arena \[bytes\] (4.x).
+    pub arena_bytes: usize,
+}
+
+impl Buffers {
+    /// Twice as much of everything.
+    pub fn doubled(self) -> Self {
+        Self {
+            contacts: self.contacts * 2,
+            constraints: self.constraints * 2,
+            arena_bytes: self.arena_bytes * 2,
+        }
+    }
+}
+
+impl Model {
+    pub(super) fn raw(&self) -> *const mj::mjModel {
+        &self.0.header
+    }
+
+    pub(super) fn header(&self) -> &mj::mjModel {
+        &self.0.header
+    }
+
+    /// The same model with other buffer sizes: only the struct is copied, the arrays are shared.
+    #[must_use]
+    pub fn with_buffers(&self, buffers: Buffers) -> Self {
+        // SAFETY: bitwise copy of a plain C struct; its pointers lead into `storage`, which the copy keeps alive.
+        let mut header = unsafe { std::ptr::read(&self.0.header) };
+        set_buffers(&mut header, buffers);
+        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage) }))
+    }
+
+    /// The buffer sizes a [`Data`](super::Data) of this model is made with.
+    pub fn buffers(&self) -> Buffers {
+        let m = self.header();
+        #[cfg(mj4)]
+        let arena_bytes = m.narena as usize;
+        #[cfg(not(mj4))]
+        let arena_bytes = 0;
+        Buffers { contacts: m.nconmax.max(0) as usize, constraints: m.njmax.max(0) as usize, arena_bytes }
+    }
+
+    /// Small starting sizes: room for every constraint that is always there (equalities, drives, friction, limits) and
+    /// for a few contacts.
+    pub fn small_buffers(&self) -> Buffers {
+        const CONTACTS: usize = 16;
+        /// Rows of a contact with a pyramidal cone of dimension 3.
+        const ROWS_PER_CONTACT: usize = 4;
+        let m = self.header();
+        let count = |n: i64| n.max(0) as usize;
+        let always = 6 * count(m.neq as i64) + 2 * count(m.nv as i64) + 2 * count(m.ntendon as i64);
+        // The arena holds Jacobians, the solver's Hessian and its stack; found to fit the bundled robots without
+        // growing. A scene that needs more grows at its first step.
+        let rows = always + CONTACTS * ROWS_PER_CONTACT;
+        let nv = count(m.nv as i64);
+        Buffers {
+            contacts: CONTACTS,
+            constraints: rows,
+            arena_bytes: (1 << 18) + 8 * (4 * rows * nv + 8 * nv * nv + 64 * rows) + 4096 * CONTACTS,
+        }
+    }
+
+    /// Number of generalised positions.
+    pub fn nq(&self) -> usize {
+        self.header().nq as usize
+    }
+
+    /// Number of degrees of freedom.
+    pub fn nv(&self) -> usize {
+        self.header().nv as usize
+    }
+
+    /// Number of control inputs.
+    pub fn nu(&self) -> usize {
+        self.header().nu as usize
+    }
+
+    /// Number of bodies, the world included.
+    pub fn nbody(&self) -> usize {
+        self.header().nbody as usize
+    }
+
+    /// Number of joints.
+    pub fn njnt(&self) -> usize {
+        self.header().njnt as usize
+    }
+
+    /// Number of geoms.
+    pub fn ngeom(&self) -> usize {
+        self.header().ngeom as usize
+    }
+
+    /// Number of tendons.
+    pub fn ntendon(&self) -> usize {
+        self.header().ntendon as usize
+    }
+
+    /// Physics step \[s\].
+    pub fn timestep(&self) -> f64 {
+        self.header().opt.timestep
+    }
+
+    /// The integrator's code (`mjINT_EULER`, ...).
+    pub fn integrator(&self) -> u32 {
+        self.header().opt.integrator as u32
+    }
+
+    /// Size of one `mjData` \[bytes\]: struct, buffer, and (2.2.2) the part of the stack that a step has touched is not
+    /// included.
+    pub fn data_bytes(&self) -> Result<usize, super::EngineError> {
+        Ok(super::Data::new(self)?.bytes())
+    }
+}
+
+#[cfg(mj4)]
+fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
+    header.narena = buffers.arena_bytes as i64;
+}
+
+#[cfg(not(mj4))]
+fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
+    let as_int = |n: usize| i32::try_from(n).unwrap_or(i32::MAX);
+    header.nconmax = as_int(buffers.contacts);
+    header.njmax = as_int(buffers.constraints);
+    // MuJoCo's own rule for nstack (user_model.cc, 2.2.2): 5 squares of all rows and degrees of freedom, plus a linear
+    // part; in numbers of 8 bytes.
+    let square = buffers.constraints + header.neq as usize + header.nv as usize;
+    let linear = [
+        header.nq, header.nv, header.nu, header.na, header.nbody, header.njnt, header.ngeom, header.nsite, header.neq,
+        header.ntendon, header.nwrap,
+    ]
+    .iter()
+    .map(|&n| n as usize)
+    .sum::<usize>();
+    header.nstack = as_int((5 * square * square + 20 * linear).max(1000));
+}
+
+impl Compiled {
+    /// Never let MuJoCo reset a diverged environment by itself, and solve all constraints in one system: the drive rows
+    /// are rewritten there, and 4.x would otherwise solve a copy made before they are.
+    pub fn prepare_for_stepping(&mut self, has_drive_rows: bool) {
+        #[cfg(mj4)]
+        {
+            // SAFETY: `Compiled` is the only owner of the model.
+            let model = unsafe { self.0.0.as_mut() };
+            model.opt.disableflags |= mj::mjDSBL_AUTORESET as i32;
+            if has_drive_rows {
+                model.opt.disableflags |= mj::mjDSBL_ISLAND as i32;
+            }
+        }
+        #[cfg(not(mj4))]
+        let _ = has_drive_rows;
+    }
+
+    /// Physics step \[s\].
+    pub fn timestep(&self) -> f64 {
+        // SAFETY: the model is alive and `Compiled` its only owner.
+        unsafe { self.0.0.as_ref() }.opt.timestep
+    }
+}

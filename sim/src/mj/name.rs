@@ -1,0 +1,63 @@
+//! Names of MuJoCo objects.
+
+use super::model::Model;
+use mujoco_sys as mj;
+use std::ffi::CStr;
+
+/// Kinds of named objects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "MuJoCo's own names")]
+pub enum ObjectKind {
+    Body,
+    Joint,
+    Geom,
+    Site,
+    Camera,
+    Light,
+    Mesh,
+    Equality,
+    Tendon,
+    Actuator,
+    Sensor,
+}
+
+impl ObjectKind {
+    fn code(self) -> i32 {
+        (match self {
+            Self::Body => mj::mjOBJ_BODY,
+            Self::Joint => mj::mjOBJ_JOINT,
+            Self::Geom => mj::mjOBJ_GEOM,
+            Self::Site => mj::mjOBJ_SITE,
+            Self::Camera => mj::mjOBJ_CAMERA,
+            Self::Light => mj::mjOBJ_LIGHT,
+            Self::Mesh => mj::mjOBJ_MESH,
+            Self::Equality => mj::mjOBJ_EQUALITY,
+            Self::Tendon => mj::mjOBJ_TENDON,
+            Self::Actuator => mj::mjOBJ_ACTUATOR,
+            Self::Sensor => mj::mjOBJ_SENSOR,
+        }) as i32
+    }
+}
+
+impl Model {
+    /// Index of the object called `name`.
+    pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
+        let name = std::ffi::CString::new(name).ok()?;
+        // SAFETY: the model is alive; the name is NUL-terminated; an unknown name gives -1.
+        let id = unsafe { mj::mj_name2id(self.raw(), kind.code(), name.as_ptr()) };
+        usize::try_from(id).ok()
+    }
+
+    /// Name of object `id`; `None` for an unnamed one or an index out of range.
+    pub fn name(&self, kind: ObjectKind, id: usize) -> Option<String> {
+        let id = i32::try_from(id).ok()?;
+        // SAFETY: the model is alive; MuJoCo returns null for an index out of range.
+        let name = unsafe { mj::mj_id2name(self.raw(), kind.code(), id) };
+        if name.is_null() {
+            return None;
+        }
+        // SAFETY: the name is NUL-terminated and lives in the model.
+        let name = unsafe { CStr::from_ptr(name) };
+        Some(name.to_string_lossy().into_owned()).filter(|n| !n.is_empty())
+    }
+}
