@@ -1,9 +1,13 @@
 //! URDF to MJCF to batched MuJoCo.
 
+pub mod batch;
 pub mod description;
 pub mod diagnostic;
+pub mod drive;
+pub mod env;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
+pub mod pattern;
 pub mod source;
 
 pub use description::RobotDescription;

@@ -4,6 +4,12 @@ use super::data::Data;
 use super::model::{Compiled, Model};
 use mujoco_sys::fields;
 
+/// MuJoCo's flags: bytes on 2.2.2, booleans on 4.x.
+#[cfg(not(mj4))]
+pub(super) type Flag = u8;
+#[cfg(mj4)]
+pub(super) type Flag = bool;
+
 macro_rules! model_arrays {
     ($($name:ident: $element:ty, $doc:literal;)*) => {
         impl Model {
@@ -23,7 +29,7 @@ macro_rules! model_arrays_mut {
         impl Compiled {
             $(
                 #[doc = concat!("MuJoCo's `", stringify!($field), "`, while the model may still be edited.")]
-                pub fn $name(&mut self) -> &mut [$element] {
+                pub(crate) fn $name(&mut self) -> &mut [$element] {
                     // SAFETY: `Compiled` is the only owner of the model and is borrowed mutably.
                     unsafe { fields::model::$field(self.raw_mut()) }
                 }
@@ -91,6 +97,9 @@ model_arrays! {
     actuator_gainprm: f64, "Gain parameters, (nu, mjNGAIN).";
     actuator_biasprm: f64, "Bias parameters, (nu, mjNBIAS).";
     actuator_forcerange: f64, "Force limits, (nu, 2).";
+    body_jntnum: i32, "Number of joints of each body, (nbody,).";
+    body_geomadr: i32, "First geom of each body or -1, (nbody,).";
+    body_geomnum: i32, "Number of geoms of each body, (nbody,).";
 }
 
 model_arrays_mut! {
@@ -99,6 +108,7 @@ model_arrays_mut! {
     dof_frictionloss_mut = dof_frictionloss_mut: f64;
     actuator_gainprm_mut = actuator_gainprm_mut: f64;
     actuator_biasprm_mut = actuator_biasprm_mut: f64;
+    actuator_ctrllimited_mut = actuator_ctrllimited_mut: Flag;
 }
 
 data_arrays! {
@@ -108,6 +118,7 @@ data_arrays! {
     ctrl: f64, "Control inputs, (nu,).";
     qfrc_applied: f64, "Applied generalised forces, (nv,).";
     xfrc_applied: f64, "Applied forces and torques on bodies, (nbody, 6).";
+    actuator_force: f64, "Force of each actuator, (nu,).";
     qfrc_actuator: f64, "Actuator forces, (nv,).";
     qfrc_bias: f64, "Coriolis, centrifugal and gravity forces, (nv,).";
     qfrc_constraint: f64, "Constraint forces, (nv,).";

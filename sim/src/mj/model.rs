@@ -236,4 +236,22 @@ impl Compiled {
         // SAFETY: the model is alive and `Compiled` its only owner.
         unsafe { self.0.0.as_ref() }.opt.timestep
     }
+
+    /// Gain and bias of `actuators` become zero and their controls are not clamped: they only hold targets.
+    pub fn clear_actuator_gains(&mut self, actuators: &[usize]) {
+        let gains = mj::mjNGAIN as usize;
+        let biases = mj::mjNBIAS as usize;
+        for &i in actuators {
+            self.actuator_gainprm_mut()[i * gains..(i + 1) * gains].fill(0.0);
+            self.actuator_biasprm_mut()[i * biases..(i + 1) * biases].fill(0.0);
+        }
+        self.unlimit_controls(actuators);
+    }
+
+    /// Controls of `actuators` are not clamped: the drive's targets are, and a control may also carry a feed-forward.
+    pub fn unlimit_controls(&mut self, actuators: &[usize]) {
+        for &i in actuators {
+            self.actuator_ctrllimited_mut()[i] = Default::default();
+        }
+    }
 }

@@ -1,0 +1,258 @@
+//! N environments on worker threads: the same bits for any number of threads and environments.
+//!
+//! Environments are grouped in chunks; workers take chunks from a counter. Which thread steps an environment decides
+//! nothing, since environments share only the immutable model.
+
+use crate::drive::table::DriveTable;
+use crate::env::Env;
+use crate::mj::{EngineError, Model};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
+
+/// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
+const SPINS_BEFORE_SLEEP: u32 = 20_000;
+
+/// An error of [`Batch::new`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// `num_envs` is zero.
+    #[error("num_envs is 0; a simulation needs at least 1 environment")]
+    NoEnvironments,
+    /// `threads` is zero.
+    #[error("threads is 0; use at least 1, or leave it out to use every core")]
+    NoThreads,
+    /// An environment could not be made.
+    #[error("environment {index}: {error}")]
+    Environment {
+        /// Which one.
+        index: usize,
+        /// Why.
+        #[source]
+        error: EngineError,
+    },
+    /// The operating system gives no thread.
+    #[error("cannot start a worker thread: {0}")]
+    Thread(String),
+}
+
+/// N environments of one model.
+#[derive(Debug)]
+pub struct Batch {
+    shared: Arc<Shared>,
+    workers: Vec<JoinHandle<()>>,
+    model: Model,
+    num_envs: usize,
+}
+
+struct Shared {
+    chunks: Vec<Mutex<Vec<Env>>>,
+    chunk_size: usize,
+    /// The next chunk to take.
+    next: AtomicUsize,
+    /// Workers that have finished the current job.
+    finished: AtomicUsize,
+    /// Counts jobs; a worker waits for the next number.
+    epoch: AtomicU64,
+    job: Mutex<JobSlot>,
+    wake: Condvar,
+    panicked: AtomicBool,
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").field("chunks", &self.chunks.len()).finish_non_exhaustive()
+    }
+}
+
+#[derive(Default)]
+struct JobSlot {
+    epoch: u64,
+    job: Option<Job>,
+    stop: bool,
+}
+
+/// A mutex of ours is poisoned only when a job panicked, and then `run` has raised that panic already.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Batch {
+    /// `num_envs` environments of `model` in its initial state; `threads` threads step them, this one included.
+    ///
+    /// # Errors
+    /// A number is zero, or memory or threads are not to be had.
+    pub fn new(model: &Model, drives: &Arc<DriveTable>, num_envs: usize, threads: usize) -> Result<Self, BatchError> {
+        if num_envs == 0 {
+            return Err(BatchError::NoEnvironments);
+        }
+        if threads == 0 {
+            return Err(BatchError::NoThreads);
+        }
+        // Several chunks per thread even out environments that take longer; more than 16 environments in one gain
+        // nothing.
+        let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 16);
+        let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
+        for first in (0..num_envs).step_by(chunk_size) {
+            let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
+                .map(|index| Env::new(model, drives).map_err(|error| BatchError::Environment { index, error }))
+                .collect();
+            chunks.push(Mutex::new(chunk?));
+        }
+        let helpers = (threads - 1).min(chunks.len().saturating_sub(1));
+        let shared = Arc::new(Shared {
+            chunks,
+            chunk_size,
+            next: AtomicUsize::new(0),
+            finished: AtomicUsize::new(0),
+            epoch: AtomicU64::new(0),
+            job: Mutex::default(),
+            wake: Condvar::new(),
+            panicked: AtomicBool::new(false),
+        });
+        let workers = (0..helpers)
+            .map(|i| {
+                let shared = Arc::clone(&shared);
+                std::thread::Builder::new()
+                    .name(format!("kinetoscope-{i}"))
+                    .spawn(move || work(&shared))
+                    .map_err(|e| BatchError::Thread(e.to_string()))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { shared, workers, model: model.clone(), num_envs })
+    }
+
+    /// The model all environments were made from.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Number of environments.
+    pub fn num_envs(&self) -> usize {
+        self.num_envs
+    }
+
+    /// Number of threads that step, the calling one included.
+    pub fn threads(&self) -> usize {
+        self.workers.len() + 1
+    }
+
+    /// Does `count` steps in every environment.
+    pub fn step(&mut self, count: u32) {
+        self.run(Arc::new(move |_, env: &mut Env| env.step(count)));
+    }
+
+    /// Runs `job` once for every environment, in parallel.
+    ///
+    /// # Panics
+    /// `job` panicked.
+    pub fn run(&mut self, job: Arc<dyn Fn(usize, &mut Env) + Send + Sync>) {
+        let shared = &*self.shared;
+        shared.next.store(0, Ordering::Relaxed);
+        shared.finished.store(0, Ordering::Relaxed);
+        if !self.workers.is_empty() {
+            let mut slot = lock(&shared.job);
+            slot.epoch += 1;
+            slot.job = Some(Arc::clone(&job));
+            shared.epoch.store(slot.epoch, Ordering::Release);
+            drop(slot);
+            shared.wake.notify_all();
+        }
+        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(&*job)));
+        let mut spins = 0_u32;
+        while shared.finished.load(Ordering::Acquire) < self.workers.len() {
+            spins += 1;
+            if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::yield_now() }
+        }
+        if let Err(panic) = mine {
+            resume_unwind(panic);
+        }
+        assert!(!shared.panicked.swap(false, Ordering::Relaxed), "a batch job panicked on a worker thread");
+    }
+
+    /// Reads environment `index`.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub fn read<T>(&self, index: usize, read: impl FnOnce(&Env) -> T) -> T {
+        assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
+        let chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
+        read(&chunk[index % self.shared.chunk_size])
+    }
+
+    /// Reads all environments in order.
+    pub fn for_each(&self, mut read: impl FnMut(usize, &Env)) {
+        for (c, chunk) in self.shared.chunks.iter().enumerate() {
+            for (i, env) in lock(chunk).iter().enumerate() {
+                read(c * self.shared.chunk_size + i, env);
+            }
+        }
+    }
+
+    /// Writes to environment `index`.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut Env) -> T) -> T {
+        assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
+        let mut chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
+        write(&mut chunk[index % self.shared.chunk_size])
+    }
+}
+
+impl Shared {
+    fn take_chunks(&self, job: &(dyn Fn(usize, &mut Env) + Send + Sync)) {
+        loop {
+            let c = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(chunk) = self.chunks.get(c) else { return };
+            for (i, env) in lock(chunk).iter_mut().enumerate() {
+                job(c * self.chunk_size + i, env);
+            }
+        }
+    }
+
+    /// Waits for a job newer than `seen`: spins first, then sleeps.
+    fn wait_for_job(&self, seen: u64) -> Option<(u64, Job)> {
+        for _ in 0..SPINS_BEFORE_SLEEP {
+            if self.epoch.load(Ordering::Acquire) != seen {
+                break;
+            }
+            std::hint::spin_loop();
+        }
+        let mut slot = lock(&self.job);
+        while slot.epoch == seen && !slot.stop {
+            slot = self.wake.wait(slot).unwrap_or_else(PoisonError::into_inner);
+        }
+        if slot.stop { None } else { slot.job.clone().map(|job| (slot.epoch, job)) }
+    }
+}
+
+fn work(shared: &Shared) {
+    let mut seen = 0;
+    while let Some((epoch, job)) = shared.wait_for_job(seen) {
+        seen = epoch;
+        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(&*job))).is_err() {
+            shared.panicked.store(true, Ordering::Relaxed);
+        }
+        drop(job);
+        shared.finished.fetch_add(1, Ordering::Release);
+    }
+}
+
+impl Drop for Batch {
+    fn drop(&mut self) {
+        lock(&self.shared.job).stop = true;
+        // Counts as a job for workers that spin.
+        self.shared.epoch.fetch_add(1, Ordering::Release);
+        self.shared.wake.notify_all();
+        for worker in self.workers.drain(..) {
+            let _ = worker.join();
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Drive properties as users write them, and their resolution to one set per joint.
+
+use super::{DriveModel, DriveType};
+use crate::pattern::{self, PatternError};
+use std::collections::BTreeMap;
+
+/// One number for all joints, or numbers by name pattern or control part.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PerJoint {
+    /// The same for every joint.
+    All(f64),
+    /// `(pattern or control part, value)`; joints that no key matches keep the default.
+    By(Vec<(String, f64)>),
+}
+
+impl From<f64> for PerJoint {
+    fn from(value: f64) -> Self {
+        Self::All(value)
+    }
+}
+
+impl<K: Into<String>, const N: usize> From<[(K, f64); N]> for PerJoint {
+    fn from(entries: [(K, f64); N]) -> Self {
+        Self::By(entries.into_iter().map(|(k, v)| (k.into(), v)).collect())
+    }
+}
+
+/// Drive properties of a robot. Every field is a number for all joints or `{pattern: value}`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveCfg {
+    /// What stiffness and damping mean.
+    pub drive_type: DriveType,
+    /// Who evaluates the law.
+    pub model: DriveModel,
+    /// Stiffness \[N m/rad or N/m\] (drive type `force`).
+    pub stiffness: PerJoint,
+    /// Damping \[N m s/rad or N s/m\] (drive type `force`).
+    pub damping: PerJoint,
+    /// Largest effort \[N m or N\]; where unset, the URDF's.
+    pub max_effort: Option<PerJoint>,
+    /// Dry friction \[N m or N\]; where unset, the URDF's.
+    pub friction: Option<PerJoint>,
+    /// Rotor inertia \[kg m² or kg\].
+    pub armature: PerJoint,
+}
+
+impl Default for DriveCfg {
+    fn default() -> Self {
+        Self {
+            drive_type: DriveType::Force,
+            model: DriveModel::Implicit,
+            stiffness: PerJoint::All(DEFAULT_STIFFNESS),
+            damping: PerJoint::All(DEFAULT_DAMPING),
+            max_effort: None,
+            friction: None,
+            armature: PerJoint::All(0.0),
+        }
+    }
+}
+
+/// EmbodiChain's default stiffness: what a joint keeps that no pattern matches.
+const DEFAULT_STIFFNESS: f64 = 1e4;
+/// EmbodiChain's default damping.
+const DEFAULT_DAMPING: f64 = 1e3;
+
+/// Drive properties of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointGains {
+    /// Stiffness.
+    pub stiffness: f64,
+    /// Damping.
+    pub damping: f64,
+    /// Largest effort, if the configuration sets one.
+    pub max_effort: Option<f64>,
+    /// Dry friction, if the configuration sets one.
+    pub friction: Option<f64>,
+    /// Rotor inertia.
+    pub armature: f64,
+}
+
+/// An error of drive properties.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriveCfgError {
+    /// A key of a `{pattern: value}` map is wrong.
+    #[error("drive property {property}: {error}")]
+    Pattern {
+        /// Name of the property.
+        property: &'static str,
+        /// What is wrong with the key.
+        #[source]
+        error: PatternError,
+    },
+    /// A value is negative or not finite.
+    #[error("drive property {property}: {value} is not a finite number >= 0")]
+    Value {
+        /// Name of the property.
+        property: &'static str,
+        /// The value given.
+        value: f64,
+    },
+}
+
+/// One set of drive properties for each of `joints`, in their order.
+///
+/// # Errors
+/// A key that matches no joint, a joint matched by two keys, a negative or non-finite number (an infinite
+/// `max_effort` means unlimited and is allowed).
+pub fn resolve(
+    cfg: &DriveCfg,
+    joints: &[&str],
+    parts: &BTreeMap<String, Vec<usize>>,
+) -> Result<Vec<JointGains>, DriveCfgError> {
+    let each = |property: &'static str, values: &PerJoint| -> Result<Vec<Option<f64>>, DriveCfgError> {
+        let assigned = match values {
+            PerJoint::All(value) => vec![Some(*value); joints.len()],
+            PerJoint::By(entries) => pattern::assign(entries, parts, joints, "joint")
+                .map_err(|error| DriveCfgError::Pattern { property, error })?,
+        };
+        for value in assigned.iter().flatten() {
+            let unlimited = property == "max_effort" && *value == f64::INFINITY;
+            if !(value.is_finite() && *value >= 0.0 || unlimited) {
+                return Err(DriveCfgError::Value { property, value: *value });
+            }
+        }
+        Ok(assigned)
+    };
+    let optional = |property, values: &Option<PerJoint>| match values {
+        Some(values) => each(property, values),
+        None => Ok(vec![None; joints.len()]),
+    };
+    let stiffness = each("stiffness", &cfg.stiffness)?;
+    let damping = each("damping", &cfg.damping)?;
+    let max_effort = optional("max_effort", &cfg.max_effort)?;
+    let friction = optional("friction", &cfg.friction)?;
+    let armature = each("armature", &cfg.armature)?;
+    Ok((0..joints.len())
+        .map(|i| JointGains {
+            stiffness: stiffness[i].unwrap_or(DEFAULT_STIFFNESS),
+            damping: damping[i].unwrap_or(DEFAULT_DAMPING),
+            max_effort: max_effort[i],
+            friction: friction[i],
+            armature: armature[i].unwrap_or(0.0),
+        })
+        .collect())
+}

@@ -1,0 +1,132 @@
+//! Joint drives: from drive properties to an actuator, and from the actuator to torque.
+//!
+//! The law of every drive, with position, velocity and effort targets `q*`, `v*`, `tau_ff`:
+//!
+//! ```text
+//! tau = clamp(kp (q* - q) + kd (v* - v) + tau_ff, -max_effort, +max_effort)
+//! ```
+//!
+//! * [`DriveMode`] says what stiffness and damping mean (`force.rs`, `acceleration.rs`, `none.rs`, listed once below).
+//! * [`DriveModel`] says who evaluates the law: [`implicit`] (a constraint row, at the end of the step, any gains) or
+//!   MuJoCo's own actuator ([`actuator`], gains inside its domain of stability).
+
+mod acceleration;
+mod cfg;
+mod force;
+mod none;
+
+pub mod actuator;
+pub mod implicit;
+pub mod table;
+
+pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};
+
+/// What a drive mode knows of its joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointInfo {
+    /// Inertia that the joint feels at the initial pose, `1 / (M⁻¹)_ii` \[kg m² or kg\].
+    pub effective_inertia: f64,
+}
+
+/// Proportional and derivative gain of an actuator in torque units \[N m/rad, N m s/rad\] or \[N/m, N s/m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActuatorSpec {
+    /// Proportional gain.
+    pub kp: f64,
+    /// Derivative gain.
+    pub kd: f64,
+}
+
+/// How stiffness and damping become an actuator's gains: one file per mode.
+pub trait DriveMode: std::fmt::Debug + Sync {
+    /// Name in configuration files (EmbodiChain's words).
+    fn name(&self) -> &'static str;
+
+    /// The actuator of a joint, or `None` where the joint stays passive.
+    fn actuator(&self, stiffness: f64, damping: f64, joint: &JointInfo) -> Option<ActuatorSpec>;
+}
+
+/// The list of drive modes: `Variant => the mode`.
+macro_rules! drive_modes {
+    ($($(#[$doc:meta])* $variant:ident => $mode:expr,)*) => {
+        /// What stiffness and damping mean.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub enum DriveType {
+            $($(#[$doc])* $variant,)*
+        }
+
+        impl DriveType {
+            /// All modes.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// The mode's implementation.
+            pub fn mode(self) -> &'static dyn DriveMode {
+                match self {
+                    $(Self::$variant => &$mode,)*
+                }
+            }
+        }
+    };
+}
+
+drive_modes! {
+    /// Gains are torques (forces) per angle (length).
+    #[default]
+    Force => force::Force,
+    /// Gains are accelerations: multiplied by the inertia the joint feels.
+    Acceleration => acceleration::Acceleration,
+    /// No drive: the joint moves freely.
+    None => none::None,
+}
+
+impl std::str::FromStr for DriveType {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL.iter().copied().find(|t| t.mode().name() == name).ok_or_else(|| {
+            let known: Vec<_> = Self::ALL.iter().map(|t| t.mode().name()).collect();
+            format!("unknown drive type {name:?}; known are {}", known.join(", "))
+        })
+    }
+}
+
+/// Who evaluates the drive law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum DriveModel {
+    /// A friction-type constraint row, solved together with contacts at the end of the step: stable for any gains and
+    /// exact at the effort limit. Integrators: Euler, and implicitfast on MuJoCo 4.x.
+    #[default]
+    Implicit,
+    /// MuJoCo's own actuator: explicit, every integrator, stable up to [`actuator::stable_timestep`].
+    Actuator,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mode_is_found_by_its_name() {
+        for mode in DriveType::ALL {
+            assert_eq!(mode.mode().name().parse(), Ok(*mode));
+        }
+        assert!("froce".parse::<DriveType>().unwrap_err().contains("force"));
+    }
+
+    #[test]
+    fn every_mode_scales_its_gains_together() {
+        // Whatever the unit, doubling stiffness and damping doubles the actuator's gains.
+        let joint = JointInfo { effective_inertia: 0.3 };
+        for mode in DriveType::ALL {
+            let (one, two) = (mode.mode().actuator(5.0, 2.0, &joint), mode.mode().actuator(10.0, 4.0, &joint));
+            match (one, two) {
+                (Some(one), Some(two)) => {
+                    assert!((two.kp - 2.0 * one.kp).abs() < 1e-12 && (two.kd - 2.0 * one.kd).abs() < 1e-12);
+                    assert!(one.kp > 0.0 && one.kd > 0.0);
+                }
+                (None, None) => assert_eq!(*mode, DriveType::None),
+                other => panic!("{mode:?}: {other:?}"),
+            }
+        }
+    }
+}
