@@ -2,8 +2,10 @@
 
 pub mod description;
 pub mod diagnostic;
+pub mod inertia;
 pub mod source;
 
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};
+pub use inertia::{InertiaFault, RigidInertia};
 pub use source::Source;
