@@ -2,6 +2,7 @@
 
 pub mod description;
 pub mod diagnostic;
+pub mod dynamics;
 pub mod inertia;
 pub mod source;
 
