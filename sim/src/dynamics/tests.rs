@@ -168,8 +168,10 @@ fn random_robots() -> impl Iterator<Item = (RobotDescription, Configuration)> {
     (0..24).map(|seed| random_robot(seed, seed % 2 == 1, seed % 4 >= 2))
 }
 
+type Body = (Pose, f64, Matrix3<f64>);
+
 /// Pose of each centre of mass with the axes of its tensor, mass, tensor: only `link_poses` and the file's numbers.
-fn bodies(description: &RobotDescription, at: &Configuration) -> Vec<(Pose, f64, Matrix3<f64>)> {
+fn bodies(description: &RobotDescription, at: &Configuration) -> Vec<Body> {
     let kinematics = Kinematics::new(description, at).unwrap();
     let of = |(link, pose): (&Link, &Pose)| link.inertial.as_ref().map(|i| (pose * i.link_from_com, i.mass, i.inertia));
     description.links.iter().zip(kinematics.link_poses()).filter_map(of).collect()
@@ -189,7 +191,7 @@ fn body_velocities(
     const H: f64 = 1e-5;
     let before = bodies(description, &at.integrated(description, velocity, -H));
     let after = bodies(description, &at.integrated(description, velocity, H));
-    let difference = |((a, ..), (b, ..)): (&(Pose, f64, Matrix3<f64>), &(Pose, f64, Matrix3<f64>))| {
+    let difference = |((a, ..), (b, ..)): (&Body, &Body)| {
         ((b.translation.vector - a.translation.vector) / (2.0 * H), turn(a, b) / (2.0 * H))
     };
     before.iter().zip(&after).map(difference).collect()
@@ -199,7 +201,7 @@ fn unit(n: usize, k: usize) -> DVector<f64> {
     DVector::from_fn(n, |i, _| f64::from(u8::from(i == k)))
 }
 
-fn world_inertia((pose, _, inertia): &(Pose, f64, Matrix3<f64>)) -> Matrix3<f64> {
+fn world_inertia((pose, _, inertia): &Body) -> Matrix3<f64> {
     let r = pose.rotation.to_rotation_matrix();
     r.matrix() * inertia * r.matrix().transpose()
 }
