@@ -1,2 +1,21 @@
 //! Sensors that have never heard of MuJoCo.
+//!
+//! One contract for all of them: a configuration ([`SensorCfg`]) says what it needs to see ([`Requires`]) and builds a
+//! sensor ([`Sensor`]), which turns each [`scene::SceneState`] into buffers of its own. [`Schedule`] decides when,
+//! [`History`] remembers. A new sensor is one new file; [`joint_state`] is the shortest example.
+//!
+//! Unsafe code is forbidden, which rules out ndarray's `s![]` (it expands to an `allow`): slice with `index_axis`,
+//! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
+
+pub mod error;
+pub mod history;
+pub mod joint_state;
+pub mod schedule;
+pub mod sensor;
+
+pub use error::SensorError;
+pub use history::History;
+pub use joint_state::{JointState, JointStateCfg};
+pub use schedule::{Phases, Schedule};
+pub use sensor::{Requires, Sensor, SensorCfg, SensorContext};

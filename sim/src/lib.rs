@@ -4,7 +4,9 @@ pub mod batch;
 pub mod description;
 pub mod diagnostic;
 pub mod drive;
+pub mod dynamics;
 pub mod env;
+pub mod inertia;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
 pub mod pattern;
@@ -12,4 +14,5 @@ pub mod source;
 
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};
+pub use inertia::{InertiaFault, RigidInertia};
 pub use source::Source;

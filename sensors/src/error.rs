@@ -1,0 +1,64 @@
+//! What can be wrong with a sensor.
+
+use crate::sensor::Requires;
+
+/// Why a sensor cannot be built or updated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SensorError {
+    /// The physics step is not a positive number.
+    #[error("the physics step is {dt} s; it must be a positive number")]
+    InvalidTimeStep {
+        /// The physics step \[s\].
+        dt: f64,
+    },
+    /// The update period is negative, infinite or not a number.
+    #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
+    InvalidPeriod {
+        /// The period \[s\].
+        update_period: f64,
+    },
+    /// The update period is not a whole number of physics steps.
+    #[error(
+        "update_period {update_period} s is {steps} physics steps of {dt} s; use a whole number of steps, such as \
+         {nearest} s, or set round_period"
+    )]
+    PeriodNotMultiple {
+        /// The period \[s\].
+        update_period: f64,
+        /// The physics step \[s\].
+        dt: f64,
+        /// The period in steps.
+        steps: f64,
+        /// The nearest period that would do \[s\].
+        nearest: f64,
+    },
+    /// An index names something that does not exist.
+    #[error("there is no {what} {index}: there are {count}, counted from 0")]
+    IndexOutOfRange {
+        /// What is counted.
+        what: &'static str,
+        /// The index given.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// The state lacks what the sensor requires.
+    #[error("the {sensor} sensor was given a state without {missing}")]
+    MissingFields {
+        /// The kind of sensor.
+        sensor: &'static str,
+        /// What is not there.
+        missing: Requires,
+    },
+    /// The state is not of the scene that the sensor was built for.
+    #[error("the state has {found} {what}, the sensor was built for {expected}")]
+    WrongShape {
+        /// What is counted.
+        what: &'static str,
+        /// What the sensor was built for.
+        expected: usize,
+        /// What the state has.
+        found: usize,
+    },
+}

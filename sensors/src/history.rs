@@ -1,0 +1,144 @@
+//! The last measurements of each environment, newest first.
+
+use ndarray::{Array3, ArrayView1, ArrayView2, ArrayView3, Axis};
+
+/// Rows of numbers, newest first, per environment.
+///
+/// All memory is taken at construction. Environments measure at their own times, so each has its own fill; rows that are
+/// not filled yet are `T::default()`. Older rows are moved up by one at each measurement, so that the whole history is
+/// one plain array view; a ring of indices would save the move (a few hundred bytes) and cost the view.
+#[derive(Clone, Debug)]
+pub struct History<T> {
+    rows: Array3<T>,
+    filled: Vec<usize>,
+}
+
+impl<T: Copy + Default> History<T> {
+    /// Room for `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 remembers nothing.
+    pub fn new(num_envs: usize, length: usize, width: usize) -> Self {
+        Self { rows: Array3::from_elem((num_envs, length, width), T::default()), filled: vec![0; num_envs] }
+    }
+
+    /// Adds the newest row of environment `env`; the oldest one falls out where the history is full.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment or `row` has not the width of the history.
+    #[track_caller]
+    pub fn push(&mut self, env: usize, row: &[T]) {
+        let (_, length, width) = self.rows.dim();
+        assert_eq!(row.len(), width, "a row of the history");
+        let mut rows = self.rows.index_axis_mut(Axis(0), env);
+        let Some(flat) = rows.as_slice_mut().filter(|_| length > 0) else {
+            return;
+        };
+        flat.copy_within(..(length - 1) * width, width);
+        flat[..width].copy_from_slice(row);
+        self.filled[env] = length.min(self.filled[env] + 1);
+    }
+
+    /// Forgets the rows of environment `env`.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    pub fn reset(&mut self, env: usize) {
+        self.rows.index_axis_mut(Axis(0), env).fill(T::default());
+        self.filled[env] = 0;
+    }
+
+    /// All rows, newest first, shape \[num_envs, length, width\].
+    pub fn view(&self) -> ArrayView3<'_, T> {
+        self.rows.view()
+    }
+
+    /// The filled rows of environment `env`, newest first, shape \[filled, width\].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    pub fn env(&self, env: usize) -> ArrayView2<'_, T> {
+        self.rows.index_axis(Axis(0), env).split_at(Axis(0), self.filled[env]).0
+    }
+
+    /// The row of environment `env` that is `age` measurements old (0 is the newest); `None` where there is none.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    pub fn row(&self, env: usize, age: usize) -> Option<ArrayView1<'_, T>> {
+        (age < self.filled[env]).then(|| self.rows.index_axis(Axis(0), env).index_axis_move(Axis(0), age))
+    }
+
+    /// How many rows of environment `env` are filled.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    pub fn filled(&self, env: usize) -> usize {
+        self.filled[env]
+    }
+
+    /// How many rows are kept.
+    pub fn length(&self) -> usize {
+        self.rows.dim().1
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn rows_are_newest_first_and_the_oldest_falls_out() {
+        let mut h = History::new(2, 3, 2);
+        for k in 1..=4 {
+            h.push(0, &[f64::from(k), -f64::from(k)]);
+        }
+        h.push(1, &[9.0, 9.0]);
+        assert_eq!(h.env(0), array![[4.0, -4.0], [3.0, -3.0], [2.0, -2.0]]);
+        assert_eq!(h.env(1), array![[9.0, 9.0]]);
+        assert_eq!(h.view().dim(), (2, 3, 2));
+        assert_eq!(h.view().index_axis(Axis(0), 1).split_at(Axis(0), 1).1, array![[0.0, 0.0], [0.0, 0.0]]);
+        assert_eq!(h.row(0, 2).unwrap(), array![2.0, -2.0]);
+        assert_eq!(h.row(1, 1), None);
+        assert_eq!((h.filled(0), h.filled(1), h.length()), (3, 1, 3));
+    }
+
+    #[test]
+    fn reset_forgets_one_environment() {
+        let mut h = History::new(2, 2, 1);
+        h.push(0, &[1]);
+        h.push(1, &[2]);
+        h.reset(0);
+        assert_eq!(h.filled(0), 0);
+        assert_eq!(h.view(), array![[[0], [0]], [[2], [0]]]);
+    }
+
+    #[test]
+    fn memory_stays_where_it_is() {
+        let mut h = History::new(1, 4, 3);
+        let place = h.view().as_ptr();
+        for k in 0..1000 {
+            h.push(0, &[k, k, k]);
+        }
+        h.reset(0);
+        assert_eq!(h.view().as_ptr(), place);
+    }
+
+    #[test]
+    fn a_history_of_nothing_is_fine() {
+        let mut h = History::new(2, 0, 3);
+        h.push(1, &[1.0, 2.0, 3.0]);
+        assert_eq!((h.filled(1), h.env(1).dim()), (0, (0, 3)));
+        let mut h = History::new(1, 2, 0);
+        h.push(0, &[] as &[f64]);
+        assert_eq!(h.view().dim(), (1, 2, 0));
+    }
+}

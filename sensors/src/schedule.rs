@@ -1,0 +1,186 @@
+//! When a sensor measures: a whole number of physics steps, counted in integers.
+
+use crate::error::SensorError;
+
+/// How far `update_period / dt` may be from a whole number, relative: decimal seconds are not exact in binary, and
+/// 1/30 s written with ten digits still counts.
+const TOLERANCE: f64 = 1e-8;
+/// The same, in steps: over 1e5 steps the relative tolerance would let fractions pass.
+const TOLERANCE_STEPS: f64 = 1e-3;
+/// Whole numbers above this are not exact in f64.
+const MAX_STEPS: f64 = 9_007_199_254_740_992.0;
+
+/// The period of a sensor in physics steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Schedule {
+    period_steps: u64,
+}
+
+impl Schedule {
+    /// A measurement every `update_period` \[s\], at physics steps of `dt` \[s\]. Period 0 is every step.
+    ///
+    /// With `round_period`, a period that is not a whole number of steps becomes the nearest one (at least 1).
+    ///
+    /// # Errors
+    ///
+    /// A step that is not positive; a period that is negative or not finite, or that is not a whole number of steps
+    /// (unless `round_period`).
+    pub fn new(update_period: f64, dt: f64, round_period: bool) -> Result<Self, SensorError> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(SensorError::InvalidTimeStep { dt });
+        }
+        let steps = update_period / dt;
+        if !(update_period >= 0.0 && steps < MAX_STEPS) {
+            return Err(SensorError::InvalidPeriod { update_period });
+        }
+        if update_period == 0.0 {
+            return Ok(Self { period_steps: 1 });
+        }
+        let whole = steps.round().max(1.0);
+        if !round_period && (steps - whole).abs() > (TOLERANCE * whole).min(TOLERANCE_STEPS) {
+            return Err(SensorError::PeriodNotMultiple { update_period, dt, steps, nearest: whole * dt });
+        }
+        Ok(Self { period_steps: whole as u64 })
+    }
+
+    /// The period in physics steps, at least 1.
+    pub fn period_steps(self) -> u64 {
+        self.period_steps
+    }
+
+    /// Counters for `num_envs` environments, all at step 0.
+    pub fn phases(self, num_envs: usize) -> Phases {
+        Phases { schedule: self, envs: vec![Phase { start: 0, seen: 0 }; num_envs] }
+    }
+}
+
+/// A [`Schedule`] at work: each environment counts from its own last reset.
+#[derive(Clone, Debug)]
+pub struct Phases {
+    schedule: Schedule,
+    envs: Vec<Phase>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Phase {
+    /// Step of the environment at which the sensor was reset.
+    start: u64,
+    /// Step of the environment at which it was last asked.
+    seen: u64,
+}
+
+impl Phases {
+    /// The schedule.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// Whether environment `env`, which is at physics step `step`, measures now: at whole periods after its reset, not
+    /// at the reset itself, and once per step however often it is asked.
+    ///
+    /// `step` is [`scene::SceneState::step`]. An environment that stands still (it was quarantined) measures nothing.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment, or if steps went backwards without [`reset`](Self::reset).
+    #[track_caller]
+    pub fn is_due(&mut self, env: usize, step: u64) -> bool {
+        let phase = &mut self.envs[env];
+        assert!(step >= phase.seen, "environment {env} went from step {} to {step} without a reset", phase.seen);
+        let is_new = step > phase.seen;
+        phase.seen = step;
+        is_new && (step - phase.start).is_multiple_of(self.schedule.period_steps)
+    }
+
+    /// Starts environment `env` anew: the next measurement falls one period after `step`.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    pub fn reset(&mut self, env: usize, step: u64) {
+        self.envs[env] = Phase { start: step, seen: step };
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    fn steps(update_period: f64, dt: f64) -> u64 {
+        Schedule::new(update_period, dt, false).unwrap().period_steps()
+    }
+
+    #[test]
+    fn periods_are_whole_steps() {
+        assert_eq!(steps(0.0, 0.005), 1);
+        assert_eq!(steps(0.005, 0.005), 1);
+        assert_eq!(steps(0.02, 0.005), 4);
+        assert_eq!(steps(0.1, 0.005), 20);
+        assert_eq!(steps(0.3, 0.1), 3);
+        assert_eq!(steps(1.0 / 30.0, 1.0 / 240.0), 8);
+        assert_eq!(steps(3600.0, 1e-4), 36_000_000);
+        for n in 1..10_000u32 {
+            for dt in [0.001, 0.002, 0.005, 0.01, 1.0 / 60.0, 1.0 / 240.0, 0.0025] {
+                assert_eq!(steps(f64::from(n) * dt, dt), u64::from(n));
+            }
+        }
+    }
+
+    #[test]
+    fn other_periods_are_an_error_unless_rounded() {
+        let error = Schedule::new(0.033, 0.005, false).unwrap_err();
+        assert!(matches!(error, SensorError::PeriodNotMultiple { nearest, .. } if nearest == 0.035), "{error}");
+        assert!(error.to_string().contains("round_period"), "{error}");
+        assert_eq!(Schedule::new(0.033, 0.005, true).unwrap().period_steps(), 7);
+        assert!(Schedule::new(0.001, 0.005, false).is_err(), "shorter than a step");
+        assert_eq!(Schedule::new(0.001, 0.005, true).unwrap().period_steps(), 1);
+        assert!(Schedule::new(1e6 + 0.005, 0.01, false).is_err(), "half a step too long");
+        for bad in [-0.1, f64::NAN, f64::INFINITY, 1e300] {
+            assert!(matches!(Schedule::new(bad, 0.005, true), Err(SensorError::InvalidPeriod { .. })));
+        }
+        for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            assert!(matches!(Schedule::new(0.1, bad, true), Err(SensorError::InvalidTimeStep { .. })));
+        }
+    }
+
+    /// Counting seconds in f32, as others do, turns intervals of 20 steps into 21 after 3200 steps.
+    #[test]
+    fn intervals_stay_exact_over_a_million_steps() {
+        let mut phases = Schedule::new(0.1, 0.005, false).unwrap().phases(1);
+        let due: Vec<u64> = (1..=1_000_000).filter(|&step| phases.is_due(0, step)).collect();
+        assert!(due.iter().copied().eq((1..=50_000).map(|k| 20 * k)));
+    }
+
+    #[test]
+    fn each_environment_counts_from_its_own_reset() {
+        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(2);
+        assert!(!phases.is_due(0, 0) && !phases.is_due(1, 0), "nothing at the start");
+        let mut due = [Vec::new(), Vec::new()];
+        for tick in 1..=12u64 {
+            // Environment 1 is reset after tick 6 and counts from 0 again.
+            if tick == 7 {
+                phases.reset(1, 0);
+            }
+            for (env, step) in [(0, tick), (1, if tick > 6 { tick - 6 } else { tick })] {
+                if phases.is_due(env, step) {
+                    due[env].push(tick);
+                }
+                assert!(!phases.is_due(env, step), "once per step");
+            }
+        }
+        assert_eq!(due, [vec![4, 8, 12], vec![4, 10]]);
+        // A sensor that is reset alone keeps the steps of its environment.
+        phases.reset(0, 13);
+        assert!((14..17).all(|step| !phases.is_due(0, step)) && phases.is_due(0, 17));
+    }
+
+    #[test]
+    #[should_panic(expected = "without a reset")]
+    fn going_back_without_a_reset_is_a_bug() {
+        let mut phases = Schedule::new(0.0, 0.005, false).unwrap().phases(1);
+        phases.is_due(0, 5);
+        phases.is_due(0, 4);
+    }
+}

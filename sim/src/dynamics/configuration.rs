@@ -1,0 +1,139 @@
+//! Where a robot is: positions of its joints and of its root.
+
+use super::DynamicsError;
+use crate::description::{JointKind, RobotDescription};
+use nalgebra::{DVector, Translation3, Unit, UnitQuaternion, Vector3};
+use scene::Pose;
+
+/// What the positions of mimic joints are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MimicPositions {
+    /// Derived from the joint that is followed; the numbers given for mimic joints are ignored.
+    #[default]
+    FollowDriver,
+    /// As given, whether they agree with the driver or not (MuJoCo's equalities may be a little off).
+    AsGiven,
+}
+
+/// Where a robot is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Configuration {
+    /// `world_from_root`.
+    pub root_pose: Pose,
+    /// Whether the root moves freely: six degrees of freedom ahead of all others.
+    pub floating_base: bool,
+    /// Position \[rad or m\] of each joint of [`RobotDescription::drivable_joints`], in that order, mimic ones included.
+    pub joint_positions: Vec<f64>,
+    /// What the positions of mimic joints are.
+    pub mimic: MimicPositions,
+    /// `joint_from_child` of each floating and planar joint, in the order of the description: identity at zero. For a
+    /// planar joint, a translation normal to the axis and a rotation about it (not checked).
+    pub free_joint_poses: Vec<Pose>,
+}
+
+impl Configuration {
+    /// All joints at zero (mimic joints at their offsets), the root fixed at the origin of the world.
+    pub fn zero(description: &RobotDescription) -> Self {
+        Self {
+            root_pose: Pose::identity(),
+            floating_base: false,
+            joint_positions: vec![0.0; description.drivable_joints().count()],
+            mimic: MimicPositions::FollowDriver,
+            free_joint_poses: vec![Pose::identity(); description.joints.iter().filter(|j| is_free(j.kind)).count()],
+        }
+    }
+
+    /// Position \[rad or m\] of each drivable joint, with mimic joints resolved as [`Self::mimic`] says.
+    ///
+    /// # Errors
+    ///
+    /// [`DynamicsError::WrongLength`] where `joint_positions` has not one number per drivable joint.
+    pub fn resolved_positions(&self, description: &RobotDescription) -> Result<Vec<f64>, DynamicsError> {
+        let drivable: Vec<_> = description.drivable_joints().map(|(id, _)| id).collect();
+        check_length("joint_positions", drivable.len(), self.joint_positions.len())?;
+        if self.mimic == MimicPositions::AsGiven {
+            return Ok(self.joint_positions.clone());
+        }
+        let mut column = vec![None; description.joints.len()];
+        for (k, id) in drivable.iter().enumerate() {
+            column[id.0] = Some(k);
+        }
+        let follow = |(k, &id): (usize, &crate::description::JointId)| {
+            if description.joint(id).mimic.is_none() {
+                return self.joint_positions[k];
+            }
+            let (driver, multiplier, offset) = description.mimic_driver(id);
+            // A joint that cannot move stays at zero.
+            multiplier * column[driver.0].map_or(0.0, |c| self.joint_positions[c]) + offset
+        };
+        Ok(drivable.iter().enumerate().map(follow).collect())
+    }
+
+    /// The configuration after moving with the constant generalized velocity `velocity` for `duration` \[s\]; the layout
+    /// of the velocity is that of [`Kinematics`](super::Kinematics).
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` has not the length of [`Kinematics::dof_count`](super::Kinematics::dof_count).
+    #[must_use]
+    #[track_caller]
+    pub fn integrated(&self, description: &RobotDescription, velocity: &DVector<f64>, duration: f64) -> Self {
+        let step = velocity * duration;
+        let mut next = self.clone();
+        let mut at = 0;
+        let mut take = |n: usize| {
+            at += n;
+            step.rows(at - n, n).into_owned()
+        };
+        if self.floating_base {
+            next.root_pose = moved_free(&self.root_pose, take(6).as_slice());
+        }
+        for q in &mut next.joint_positions {
+            *q += take(1)[0];
+        }
+        let free = description.joints.iter().filter(|j| is_free(j.kind));
+        for (pose, joint) in next.free_joint_poses.iter_mut().zip(free) {
+            *pose = match joint.kind {
+                JointKind::Planar => {
+                    let s = take(3);
+                    let [x, y] = planar_axes(&joint.axis);
+                    let shift = x.into_inner() * s[0] + y.into_inner() * s[1];
+                    Pose::from_parts(
+                        Translation3::from(pose.translation.vector + shift),
+                        UnitQuaternion::from_axis_angle(&joint.axis, s[2]) * pose.rotation,
+                    )
+                }
+                _ => moved_free(pose, take(6).as_slice()),
+            };
+        }
+        assert_eq!(at, step.len(), "one velocity per degree of freedom");
+        next
+    }
+}
+
+/// The two directions of travel of a planar joint: x and y turned by the shortest rotation that takes z to the axis
+/// (a half turn about x where the axis is -z).
+///
+/// URDF does not name them; whoever writes the joint as two slides and a hinge must use these.
+pub fn planar_axes(axis: &Unit<Vector3<f64>>) -> [Unit<Vector3<f64>>; 2] {
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), axis)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    [turn * Vector3::x_axis(), turn * Vector3::y_axis()]
+}
+
+/// Several degrees of freedom.
+pub(super) fn is_free(kind: JointKind) -> bool {
+    matches!(kind, JointKind::Floating | JointKind::Planar)
+}
+
+pub(super) fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(), DynamicsError> {
+    if expected == found { Ok(()) } else { Err(DynamicsError::WrongLength { what, expected, found }) }
+}
+
+/// Translation in the axes of the parent, rotation in the axes of the child.
+fn moved_free(pose: &Pose, step: &[f64]) -> Pose {
+    Pose::from_parts(
+        Translation3::from(pose.translation.vector + Vector3::new(step[0], step[1], step[2])),
+        pose.rotation * UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5])),
+    )
+}

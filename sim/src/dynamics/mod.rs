@@ -1,0 +1,492 @@
+//! Rigid-body dynamics of a [`RobotDescription`], exactly as the files describe it and without MuJoCo.
+//!
+//! It is the judge of everything downstream: what MuJoCo computes from the MJCF must agree with what the URDF says.
+//! Nothing is repaired here; a link without `<inertial>` has no mass, whatever it carries.
+//!
+//! **Generalized velocities** (and forces), in this order:
+//!
+//! 1. with [`Configuration::floating_base`], six of the root link: velocity of its origin in world axes, then angular
+//!    velocity in the axes of the link itself (MuJoCo's free joint);
+//! 2. one per joint of [`RobotDescription::drivable_joints`], in that order. Mimic joints are coordinates of their own,
+//!    as in MuJoCo, where the coupling is a constraint and not a reduction;
+//! 3. per floating joint six, per planar joint three, in the order of the description. Floating: velocity of the child
+//!    origin in the axes of the joint frame, angular velocity in the axes of the child. Planar: along both
+//!    [`planar_axes`], then about the axis.
+//!
+//! **Equation of motion**: `M(q) a + c(q, v) + g(q) = tau`. `tau` is what the joints exert, damping and friction of the
+//! joints are not part of it; `g` is the force that holds the robot still, the gradient of its potential energy.
+//!
+//! No function recurses: the depth of the tree is limited by memory only.
+
+mod configuration;
+mod spatial;
+#[cfg(test)]
+mod tests;
+
+pub use configuration::{Configuration, MimicPositions, planar_axes};
+
+use crate::description::{JointId, JointKind, LinkId, RobotDescription};
+use crate::inertia::RigidInertia;
+use configuration::{check_length, is_free};
+use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
+use scene::Pose;
+use spatial::{Force, Inertia, Motion};
+use std::ops::Range;
+
+/// Why dynamics cannot be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DynamicsError {
+    /// The links are not a tree below the root.
+    #[error("link {link:?} is not connected to the root by exactly one chain of joints")]
+    NotATree {
+        /// A link that is not reached from the root, or reached twice.
+        link: String,
+    },
+    /// A part of the configuration has the wrong length.
+    #[error("{what} has {found} entries, the robot needs {expected}")]
+    WrongLength {
+        /// The field.
+        what: &'static str,
+        /// The length that fits the robot.
+        expected: usize,
+        /// The length found.
+        found: usize,
+    },
+    /// A number of the configuration is infinite or not a number.
+    #[error("{what} has a number that is not finite")]
+    NotFinite {
+        /// The field.
+        what: &'static str,
+    },
+}
+
+/// Velocity of a link in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkVelocity {
+    /// Of the origin of the link \[m/s\].
+    pub linear: Vector3<f64>,
+    /// \[rad/s\].
+    pub angular: Vector3<f64>,
+}
+
+/// Momentum of the whole robot in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Momentum {
+    /// \[kg m/s\].
+    pub linear: Vector3<f64>,
+    /// About the centre of mass \[kg m²/s\]; about the root's origin where there is no mass.
+    pub angular: Vector3<f64>,
+}
+
+/// A robot in one configuration: where its links are, and how it answers to forces.
+#[derive(Clone, Debug)]
+pub struct Kinematics<'a> {
+    description: &'a RobotDescription,
+    /// Links in an order where parents come first.
+    order: Vec<LinkId>,
+    /// Parent of each link; the root has none.
+    parent: Vec<Option<LinkId>>,
+    world_from_link: Vec<Pose>,
+    /// Inertia of each link, in world axes about `origin`.
+    inertia: Vec<Inertia>,
+    dofs: Vec<Dof>,
+    /// Entries of `dofs` that move each link against its parent.
+    link_dofs: Vec<Range<usize>>,
+    /// First generalized velocity and their number, for each joint.
+    joint_columns: Vec<Range<usize>>,
+    /// Where spatial quantities are taken \[m\]: the origin of the root, so that a robot far from the origin of the world
+    /// loses no digits. It does not move with the root.
+    origin: Vector3<f64>,
+}
+
+/// One degree of freedom.
+#[derive(Clone, Copy, Debug)]
+struct Dof {
+    /// Its place among the generalized velocities.
+    column: usize,
+    axis: Motion,
+    /// Whether the axis is carried along by the parent; otherwise by the child. The same for one degree of freedom.
+    fixed_in_parent: bool,
+}
+
+impl<'a> Kinematics<'a> {
+    /// The robot in `configuration`.
+    ///
+    /// # Errors
+    ///
+    /// A description that is not a tree, a configuration of the wrong length or with numbers that are not finite.
+    pub fn new(description: &'a RobotDescription, configuration: &Configuration) -> Result<Self, DynamicsError> {
+        let positions = configuration.resolved_positions(description)?;
+        let free_count = description.joints.iter().filter(|j| is_free(j.kind)).count();
+        check_length("free_joint_poses", free_count, configuration.free_joint_poses.len())?;
+        if !positions.iter().all(|q| q.is_finite()) {
+            return Err(DynamicsError::NotFinite { what: "joint_positions" });
+        }
+        if !is_finite(&configuration.root_pose) {
+            return Err(DynamicsError::NotFinite { what: "root_pose" });
+        }
+        if !configuration.free_joint_poses.iter().all(is_finite) {
+            return Err(DynamicsError::NotFinite { what: "free_joint_poses" });
+        }
+
+        let (order, parent) = parents_first(description)?;
+        let n = description.links.len();
+        let mut this = Self {
+            description,
+            order,
+            parent,
+            world_from_link: vec![Pose::identity(); n],
+            inertia: vec![Inertia::zero(); n],
+            dofs: Vec::new(),
+            link_dofs: vec![0..0; n],
+            joint_columns: joint_columns(description, configuration.floating_base),
+            origin: configuration.root_pose.translation.vector,
+        };
+        this.place_links(configuration, &positions);
+        for (i, link) in description.links.iter().enumerate() {
+            if let Some(inertial) = &link.inertial {
+                let world_from_link = &this.world_from_link[i];
+                let origin_from_link = Pose::from_parts(
+                    Translation3::from(world_from_link.translation.vector - this.origin),
+                    world_from_link.rotation,
+                );
+                this.inertia[i] = Inertia::new(&RigidInertia::from_inertial(inertial).transformed(&origin_from_link));
+            }
+        }
+        Ok(this)
+    }
+
+    fn place_links(&mut self, configuration: &Configuration, positions: &[f64]) {
+        let root = self.description.root.0;
+        self.world_from_link[root] = configuration.root_pose;
+        if configuration.floating_base {
+            self.push_free_dofs(0, &UnitQuaternion::identity(), &configuration.root_pose);
+            self.link_dofs[root] = 0..6;
+        }
+        let mut position_of = vec![0.0; self.description.joints.len()];
+        for ((id, _), q) in self.description.drivable_joints().zip(positions) {
+            position_of[id.0] = *q;
+        }
+        let mut pose_of = vec![None; self.description.joints.len()];
+        let free = (0..pose_of.len()).filter(|&i| is_free(self.description.joints[i].kind));
+        for (i, pose) in free.zip(&configuration.free_joint_poses) {
+            pose_of[i] = Some(*pose);
+        }
+
+        for k in 0..self.order.len() {
+            let child = self.order[k];
+            let (Some(parent), Some(id)) = (self.parent[child.0], self.description.link(child).parent_joint) else {
+                continue;
+            };
+            let joint = self.description.joint(id);
+            let world_from_joint = self.world_from_link[parent.0] * joint.parent_from_joint;
+            let joint_from_child = match joint.kind {
+                JointKind::Revolute | JointKind::Continuous => Pose::from_parts(
+                    Translation3::identity(),
+                    UnitQuaternion::from_axis_angle(&joint.axis, position_of[id.0]),
+                ),
+                JointKind::Prismatic => Pose::translation(
+                    joint.axis.x * position_of[id.0],
+                    joint.axis.y * position_of[id.0],
+                    joint.axis.z * position_of[id.0],
+                ),
+                JointKind::Fixed => Pose::identity(),
+                JointKind::Floating | JointKind::Planar => pose_of[id.0].unwrap_or_else(Pose::identity),
+            };
+            let mut world_from_child = world_from_joint * joint_from_child;
+            // Rounding would add up along very long chains.
+            world_from_child.rotation.renormalize();
+            self.world_from_link[child.0] = world_from_child;
+
+            let first = self.dofs.len();
+            let column = self.joint_columns[id.0].start;
+            let axis = world_from_joint.rotation * joint.axis.into_inner();
+            let through_child = Motion::rotation(axis, world_from_child.translation.vector - self.origin);
+            let mut push = |offset: usize, axis: Motion, fixed_in_parent: bool| {
+                self.dofs.push(Dof { column: column + offset, axis, fixed_in_parent });
+            };
+            match joint.kind {
+                JointKind::Fixed => {}
+                JointKind::Revolute | JointKind::Continuous => push(0, through_child, false),
+                JointKind::Prismatic => push(0, Motion::translation(axis), false),
+                JointKind::Planar => {
+                    let [x, y] = planar_axes(&joint.axis);
+                    push(0, Motion::translation(world_from_joint.rotation * x.into_inner()), true);
+                    push(1, Motion::translation(world_from_joint.rotation * y.into_inner()), true);
+                    push(2, through_child, false);
+                }
+                JointKind::Floating => self.push_free_dofs(column, &world_from_joint.rotation, &world_from_child),
+            }
+            self.link_dofs[child.0] = first..self.dofs.len();
+        }
+    }
+
+    /// Translations in the axes of the parent, rotations in the axes of the child.
+    fn push_free_dofs(&mut self, column: usize, world_from_parent: &UnitQuaternion<f64>, world_from_child: &Pose) {
+        let point = world_from_child.translation.vector - self.origin;
+        for (k, e) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
+            let axis = Motion::translation(world_from_parent * e);
+            self.dofs.push(Dof { column: column + k, axis, fixed_in_parent: true });
+        }
+        for (k, e) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
+            let axis = Motion::rotation(world_from_child.rotation * e, point);
+            self.dofs.push(Dof { column: column + 3 + k, axis, fixed_in_parent: false });
+        }
+    }
+
+    /// Number of generalized velocities.
+    pub fn dof_count(&self) -> usize {
+        self.dofs.len()
+    }
+
+    /// The generalized velocities of a joint: empty for a fixed one.
+    pub fn columns(&self, joint: JointId) -> Range<usize> {
+        self.joint_columns[joint.0].clone()
+    }
+
+    /// `world_from_link` of every link, fixed ones included, indexed by [`LinkId`].
+    pub fn link_poses(&self) -> &[Pose] {
+        &self.world_from_link
+    }
+
+    /// `world_from_link` of a link.
+    pub fn link_pose(&self, link: LinkId) -> Pose {
+        self.world_from_link[link.0]
+    }
+
+    /// Sum of the link masses \[kg\].
+    pub fn total_mass(&self) -> f64 {
+        self.description.total_mass()
+    }
+
+    /// Centre of mass of the robot in the world \[m\]; `None` where it has no mass.
+    pub fn center_of_mass(&self) -> Option<Vector3<f64>> {
+        let whole = self.whole();
+        (whole.mass != 0.0).then(|| self.origin + whole.first_moment / whole.mass)
+    }
+
+    /// Potential energy \[J\] under `gravity` \[m/s²\] (z = -9.81 on earth), zero at the origin of the world.
+    pub fn potential_energy(&self, gravity: &Vector3<f64>) -> f64 {
+        let whole = self.whole();
+        -gravity.dot(&(whole.first_moment + self.origin * whole.mass))
+    }
+
+    /// Kinetic energy \[J\] at the generalized velocity `velocity`.
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` is not [`dof_count`](Self::dof_count) long.
+    #[track_caller]
+    pub fn kinetic_energy(&self, velocity: &DVector<f64>) -> f64 {
+        let velocities = self.spatial_velocities(velocity);
+        velocities.iter().zip(&self.inertia).map(|(v, i)| 0.5 * v.dot(&(*i * *v))).sum()
+    }
+
+    /// Velocity of every link at the generalized velocity `velocity`, indexed by [`LinkId`].
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` is not [`dof_count`](Self::dof_count) long.
+    #[track_caller]
+    pub fn link_velocities(&self, velocity: &DVector<f64>) -> Vec<LinkVelocity> {
+        let at_link = |(v, pose): (&Motion, &Pose)| LinkVelocity {
+            linear: v.at(&(pose.translation.vector - self.origin)),
+            angular: v.angular,
+        };
+        self.spatial_velocities(velocity).iter().zip(&self.world_from_link).map(at_link).collect()
+    }
+
+    /// Momentum of the robot at the generalized velocity `velocity`.
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` is not [`dof_count`](Self::dof_count) long.
+    #[track_caller]
+    pub fn momentum(&self, velocity: &DVector<f64>) -> Momentum {
+        let velocities = self.spatial_velocities(velocity);
+        let mut sum = Force::zero();
+        for (v, i) in velocities.iter().zip(&self.inertia) {
+            sum += *i * *v;
+        }
+        let com = self.center_of_mass().map_or_else(Vector3::zeros, |c| c - self.origin);
+        Momentum { linear: sum.force, angular: sum.moment - com.cross(&sum.force) }
+    }
+
+    /// The mass matrix M, shape \[dof_count, dof_count\], symmetric. Rows and columns: module documentation.
+    ///
+    /// Source: composite-rigid-body algorithm, Featherstone 2008, table 6.2.
+    pub fn mass_matrix(&self) -> DMatrix<f64> {
+        let mut composite = self.inertia.clone();
+        for &link in self.order.iter().rev() {
+            if let Some(parent) = self.parent[link.0] {
+                let of_link = composite[link.0];
+                composite[parent.0] += of_link;
+            }
+        }
+        let mut m = DMatrix::zeros(self.dof_count(), self.dof_count());
+        for &link in &self.order {
+            for dof in &self.dofs[self.link_dofs[link.0].clone()] {
+                let force = composite[link.0] * dof.axis;
+                let mut carrier = Some(link);
+                while let Some(at) = carrier {
+                    for other in &self.dofs[self.link_dofs[at.0].clone()] {
+                        let value = other.axis.dot(&force);
+                        m[(dof.column, other.column)] = value;
+                        m[(other.column, dof.column)] = value;
+                    }
+                    carrier = self.parent[at.0];
+                }
+            }
+        }
+        m
+    }
+
+    /// The generalized force g(q) that holds the robot still under `gravity` \[m/s²\] (z = -9.81 on earth): the gradient
+    /// of [`potential_energy`](Self::potential_energy). What gravity itself exerts is its negative.
+    pub fn gravity_torque(&self, gravity: &Vector3<f64>) -> DVector<f64> {
+        let zero = DVector::zeros(self.dof_count());
+        self.inverse_dynamics(&zero, &zero, gravity)
+    }
+
+    /// c(q, v) + g(q): the generalized force at zero acceleration (`qfrc_bias` of MuJoCo).
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` is not [`dof_count`](Self::dof_count) long.
+    #[track_caller]
+    pub fn bias_force(&self, velocity: &DVector<f64>, gravity: &Vector3<f64>) -> DVector<f64> {
+        self.inverse_dynamics(velocity, &DVector::zeros(self.dof_count()), gravity)
+    }
+
+    /// `tau = M a + c + g`: the generalized force that gives `acceleration`, the rate of `velocity`, under `gravity`
+    /// \[m/s²\].
+    ///
+    /// Source: recursive Newton-Euler algorithm, Featherstone 2008, table 5.1, in world axes (section 5.3's transforms
+    /// become identities); an axis S carried along by a body of velocity v changes by v × S.
+    ///
+    /// # Panics
+    ///
+    /// If `velocity` or `acceleration` is not [`dof_count`](Self::dof_count) long.
+    #[track_caller]
+    pub fn inverse_dynamics(
+        &self,
+        velocity: &DVector<f64>,
+        acceleration: &DVector<f64>,
+        gravity: &Vector3<f64>,
+    ) -> DVector<f64> {
+        assert_eq!(acceleration.len(), self.dof_count(), "one acceleration per degree of freedom");
+        let velocities = self.spatial_velocities(velocity);
+        // The ground accelerates upwards instead of bodies falling.
+        let ground = Motion { angular: Vector3::zeros(), linear: -gravity };
+        let mut accelerations = vec![ground; self.order.len()];
+        let mut forces = vec![Force::zero(); self.order.len()];
+        for &link in &self.order {
+            let parent = self.parent[link.0];
+            let mut a = parent.map_or(ground, |p| accelerations[p.0]);
+            for dof in &self.dofs[self.link_dofs[link.0].clone()] {
+                let carrier = if dof.fixed_in_parent {
+                    parent.map_or_else(Motion::zero, |p| velocities[p.0])
+                } else {
+                    velocities[link.0]
+                };
+                a += dof.axis * acceleration[dof.column] + carrier.cross(&dof.axis) * velocity[dof.column];
+            }
+            accelerations[link.0] = a;
+            let (inertia, v) = (self.inertia[link.0], velocities[link.0]);
+            forces[link.0] = inertia * a + v.cross_force(&(inertia * v));
+        }
+        let mut tau = DVector::zeros(self.dof_count());
+        for &link in self.order.iter().rev() {
+            let force = forces[link.0];
+            for dof in &self.dofs[self.link_dofs[link.0].clone()] {
+                tau[dof.column] = dof.axis.dot(&force);
+            }
+            if let Some(parent) = self.parent[link.0] {
+                forces[parent.0] += force;
+            }
+        }
+        tau
+    }
+
+    #[track_caller]
+    fn spatial_velocities(&self, velocity: &DVector<f64>) -> Vec<Motion> {
+        assert_eq!(velocity.len(), self.dof_count(), "one velocity per degree of freedom");
+        let mut velocities = vec![Motion::zero(); self.order.len()];
+        for &link in &self.order {
+            let mut v = self.parent[link.0].map_or_else(Motion::zero, |p| velocities[p.0]);
+            for dof in &self.dofs[self.link_dofs[link.0].clone()] {
+                v += dof.axis * velocity[dof.column];
+            }
+            velocities[link.0] = v;
+        }
+        velocities
+    }
+
+    fn whole(&self) -> Inertia {
+        let mut sum = Inertia::zero();
+        for i in &self.inertia {
+            sum += *i;
+        }
+        sum
+    }
+}
+
+fn is_finite(pose: &Pose) -> bool {
+    pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
+}
+
+fn joint_columns(description: &RobotDescription, floating_base: bool) -> Vec<Range<usize>> {
+    let mut columns = vec![0..0; description.joints.len()];
+    let mut next = if floating_base { 6 } else { 0 };
+    for one_dof in [true, false] {
+        for (joint, range) in description.joints.iter().zip(&mut columns) {
+            if joint.kind.is_drivable() == one_dof {
+                let count = match joint.kind {
+                    JointKind::Fixed => 0,
+                    JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => 1,
+                    JointKind::Planar => 3,
+                    JointKind::Floating => 6,
+                };
+                *range = next..next + count;
+                next += count;
+            }
+        }
+    }
+    columns
+}
+
+/// Links in an order where parents come first, and the parent of each.
+fn parents_first(description: &RobotDescription) -> Result<(Vec<LinkId>, Vec<Option<LinkId>>), DynamicsError> {
+    let n = description.links.len();
+    let not_a_tree = |link: usize| DynamicsError::NotATree {
+        link: description.links.get(link).map_or_else(|| format!("#{link}"), |l| l.name.clone()),
+    };
+    let mut parent = vec![None; n];
+    let mut reached = vec![false; n];
+    let root = description.root;
+    *reached.get_mut(root.0).ok_or_else(|| not_a_tree(root.0))? = true;
+    if description.link(root).parent_joint.is_some() {
+        return Err(not_a_tree(root.0));
+    }
+    let mut order = vec![root];
+    let mut next = 0;
+    while let Some(&link) = order.get(next) {
+        next += 1;
+        for &id in &description.link(link).child_joints {
+            let joint = description.joints.get(id.0).ok_or_else(|| not_a_tree(link.0))?;
+            let child = joint.child;
+            let fits =
+                joint.parent == link && description.links.get(child.0).is_some_and(|l| l.parent_joint == Some(id));
+            if !fits || std::mem::replace(&mut reached[child.0], true) {
+                return Err(not_a_tree(child.0));
+            }
+            parent[child.0] = Some(link);
+            order.push(child);
+        }
+    }
+    match reached.iter().position(|r| !r) {
+        Some(link) => Err(not_a_tree(link)),
+        None => Ok((order, parent)),
+    }
+}

@@ -1,0 +1,150 @@
+//! Spatial vectors in Plücker coordinates: the angular part first, everything at one fixed point in world axes.
+//!
+//! Source: R. Featherstone, "Rigid Body Dynamics Algorithms", Springer 2008, chapter 2. With one frame for all bodies
+//! no transform appears between them: velocities and inertias are simply added.
+
+use crate::inertia::RigidInertia;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::{Add, AddAssign, Mul};
+
+/// A velocity, an acceleration, or an axis of motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Motion {
+    pub(super) angular: Vector3<f64>,
+    /// Of the body point that passes through the origin.
+    pub(super) linear: Vector3<f64>,
+}
+
+/// A force, or a momentum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Force {
+    /// Moment about the origin.
+    pub(super) moment: Vector3<f64>,
+    pub(super) force: Vector3<f64>,
+}
+
+/// The inertia of a body, or of several, about the origin. Source: equation 2.63.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inertia {
+    pub(super) mass: f64,
+    /// Mass times centre of mass.
+    pub(super) first_moment: Vector3<f64>,
+    /// About the origin.
+    pub(super) inertia: Matrix3<f64>,
+}
+
+impl Motion {
+    pub(super) fn zero() -> Self {
+        Self { angular: Vector3::zeros(), linear: Vector3::zeros() }
+    }
+
+    /// A rotation of 1 rad/s about the unit `axis` through `point`.
+    pub(super) fn rotation(axis: Vector3<f64>, point: Vector3<f64>) -> Self {
+        Self { angular: axis, linear: point.cross(&axis) }
+    }
+
+    /// A translation of 1 m/s along the unit `axis`.
+    pub(super) fn translation(axis: Vector3<f64>) -> Self {
+        Self { angular: Vector3::zeros(), linear: axis }
+    }
+
+    /// `self ×`: how `other` changes when it is carried along. Source: equation 2.31.
+    pub(super) fn cross(&self, other: &Self) -> Self {
+        Self {
+            angular: self.angular.cross(&other.angular),
+            linear: self.angular.cross(&other.linear) + self.linear.cross(&other.angular),
+        }
+    }
+
+    /// `self ×*`: how a force or a momentum changes when it is carried along. Source: equation 2.32.
+    pub(super) fn cross_force(&self, other: &Force) -> Force {
+        Force {
+            moment: self.angular.cross(&other.moment) + self.linear.cross(&other.force),
+            force: self.angular.cross(&other.force),
+        }
+    }
+
+    /// Power, or the component of a force along an axis of motion.
+    pub(super) fn dot(&self, other: &Force) -> f64 {
+        self.angular.dot(&other.moment) + self.linear.dot(&other.force)
+    }
+
+    /// Velocity of the body point at `point`.
+    pub(super) fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.linear + self.angular.cross(point)
+    }
+}
+
+impl Force {
+    pub(super) fn zero() -> Self {
+        Self { moment: Vector3::zeros(), force: Vector3::zeros() }
+    }
+}
+
+impl Inertia {
+    pub(super) fn zero() -> Self {
+        Self { mass: 0.0, first_moment: Vector3::zeros(), inertia: Matrix3::zeros() }
+    }
+
+    /// Mass properties given in axes parallel to the world, from the origin.
+    pub(super) fn new(body: &RigidInertia) -> Self {
+        let (m, c) = (body.mass, body.com);
+        let parallel_axis = Matrix3::from_diagonal_element(c.norm_squared()) - c * c.transpose();
+        Self { mass: m, first_moment: c * m, inertia: body.inertia + parallel_axis * m }
+    }
+}
+
+impl Add for Motion {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { angular: self.angular + other.angular, linear: self.linear + other.linear }
+    }
+}
+
+impl AddAssign for Motion {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Mul<f64> for Motion {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self { angular: self.angular * factor, linear: self.linear * factor }
+    }
+}
+
+impl Add for Force {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { moment: self.moment + other.moment, force: self.force + other.force }
+    }
+}
+
+impl AddAssign for Force {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl AddAssign for Inertia {
+    fn add_assign(&mut self, other: Self) {
+        self.mass += other.mass;
+        self.first_moment += other.first_moment;
+        self.inertia += other.inertia;
+    }
+}
+
+impl Mul<Motion> for Inertia {
+    type Output = Force;
+
+    fn mul(self, v: Motion) -> Force {
+        Force {
+            moment: self.inertia * v.angular + self.first_moment.cross(&v.linear),
+            force: v.linear * self.mass - self.first_moment.cross(&v.angular),
+        }
+    }
+}
