@@ -9,6 +9,7 @@ pub mod env;
 pub mod inertia;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
+pub mod mjcf;
 pub mod pattern;
 pub mod source;
 

@@ -17,6 +17,7 @@ mod none;
 
 pub mod actuator;
 pub mod implicit;
+pub mod plan;
 pub mod table;
 
 pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};

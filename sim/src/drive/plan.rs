@@ -1,0 +1,233 @@
+//! What every joint of a robot will do: limits, drive, friction, start position, resolved from description and
+//! configuration. The stage between `RobotDescription` and MJCF.
+
+use super::cfg::{DriveCfg, DriveCfgError, resolve};
+use super::{ActuatorSpec, DriveType, JointInfo};
+use crate::description::{Joint, JointId, JointKind, RobotDescription};
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::dynamics::{Configuration, DynamicsError, Kinematics};
+use crate::pattern::{self, PatternError};
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// Everything about one drivable joint (revolute, continuous, prismatic), mimic joints included.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointPlan {
+    /// The joint.
+    pub joint: JointId,
+    /// Its actuator; `None` for passive and mimic joints.
+    pub actuator: Option<ActuatorSpec>,
+    /// Largest effort \[N m or N\]; infinite where there is none.
+    pub max_effort: f64,
+    /// Speed limit of the file \[rad/s or m/s\]; reported, not enforced.
+    pub max_velocity: Option<f64>,
+    /// Dry friction \[N m or N\].
+    pub friction: f64,
+    /// Rotor inertia \[kg m² or kg\].
+    pub armature: f64,
+    /// Viscous damping \[N m s/rad or N s/m\].
+    pub damping: f64,
+    /// The joint's own position limits \[rad or m\].
+    pub limit: Option<[f64; 2]>,
+    /// Positions a target may have \[rad or m\]: the own limits, narrowed by those of joints that mimic this one;
+    /// infinite where there are none.
+    pub usable: [f64; 2],
+    /// For a mimic joint: position = multiplier * position of the driver + offset (chains resolved).
+    pub mimic: Option<(JointId, f64, f64)>,
+    /// Start position \[rad or m\].
+    pub initial: f64,
+}
+
+/// An error of [`plan`].
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// A drive property is wrong.
+    #[error(transparent)]
+    Drive(#[from] DriveCfgError),
+    /// A key of the start positions is wrong.
+    #[error("init_qpos: {0}")]
+    InitialPattern(#[source] PatternError),
+    /// A start position is not finite.
+    #[error("init_qpos of joint {joint:?} is {value}, not a finite number")]
+    InitialValue {
+        /// The joint.
+        joint: String,
+        /// The value given.
+        value: f64,
+    },
+    /// The description's dynamics cannot be computed.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+}
+
+/// Resolves all drivable joints of `description`, in its order.
+///
+/// # Errors
+/// Patterns and values of the configuration that are wrong.
+pub fn plan(
+    description: &RobotDescription,
+    drive: &DriveCfg,
+    parts: &BTreeMap<String, Vec<usize>>,
+    init_qpos: &[(String, f64)],
+    floating_base: bool,
+) -> Result<(Vec<JointPlan>, Vec<Diagnostic>), PlanError> {
+    let joints: Vec<(JointId, &Joint)> = description.drivable_joints().collect();
+    let names: Vec<&str> = joints.iter().map(|(_, j)| j.name.as_str()).collect();
+    let gains = resolve(drive, &names, parts)?;
+    let initial = pattern::assign(init_qpos, parts, &names, "joint").map_err(PlanError::InitialPattern)?;
+
+    let mut diagnostics = Vec::new();
+    let mut plans: Vec<JointPlan> = joints
+        .iter()
+        .zip(&gains)
+        .map(|(&(id, joint), gains)| {
+            let effort = joint.limit.as_ref().and_then(|l| l.effort).filter(|&e| e > 0.0);
+            let limit = own_limit(joint);
+            JointPlan {
+                joint: id,
+                actuator: None,
+                max_effort: gains.max_effort.or(effort).unwrap_or(f64::INFINITY),
+                max_velocity: joint.limit.as_ref().and_then(|l| l.velocity),
+                friction: gains.friction.or(joint.friction).unwrap_or(0.0),
+                armature: gains.armature,
+                damping: joint.damping.unwrap_or(0.0),
+                limit,
+                usable: limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+                mimic: joint.mimic.as_ref().map(|_| description.mimic_driver(id)),
+                initial: 0.0,
+            }
+        })
+        .collect();
+    narrow_by_mimics(description, &mut plans, &mut diagnostics);
+    set_initial_positions(description, &mut plans, &initial, &mut diagnostics)?;
+
+    let needs_inertia = drive.drive_type == DriveType::Acceleration;
+    let inertias = if needs_inertia {
+        effective_inertias(&mass_matrix_at_start(description, &plans, floating_base)?)
+    } else {
+        vec![f64::NAN; plans.len()]
+    };
+    for ((plan, gains), inertia) in plans.iter_mut().zip(&gains).zip(inertias) {
+        if plan.mimic.is_none() {
+            let info = JointInfo { effective_inertia: inertia };
+            plan.actuator = drive.drive_type.mode().actuator(gains.stiffness, gains.damping, &info);
+        }
+    }
+    Ok((plans, diagnostics))
+}
+
+/// Position limits; a continuous joint has none, whatever the file says.
+fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
+    let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
+    Some([limit.lower?, limit.upper?])
+}
+
+/// A driver may only go where every joint that mimics it may follow.
+fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
+    for i in 0..plans.len() {
+        let (Some((driver, multiplier, offset)), Some(limit)) = (plans[i].mimic, plans[i].limit) else { continue };
+        if multiplier == 0.0 {
+            continue;
+        }
+        let Some(d) = plans.iter().position(|p| p.joint == driver) else { continue };
+        let ends = limit.map(|end| (end - offset) / multiplier);
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        // Limits are written with few digits: a hair's breadth is not worth a warning.
+        const SLACK: f64 = 1e-6;
+        let [old_low, old_high] = plans[d].usable;
+        if low <= old_low + SLACK && high >= old_high - SLACK {
+            continue;
+        }
+        let (joint, driver_joint) = (description.joint(plans[i].joint), description.joint(driver));
+        let narrowed = [old_low.max(low), old_high.min(high)];
+        let outcome = if narrowed[0] <= narrowed[1] {
+            plans[d].usable = narrowed;
+            format!("the usable range of {:?} is {:.4} .. {:.4}", driver_joint.name, narrowed[0], narrowed[1])
+        } else {
+            format!("the two ranges do not meet, so {:?} keeps its own", driver_joint.name)
+        };
+        diagnostics.push(Diagnostic::new(
+            DiagnosticKind::MimicRangeClipped,
+            joint.limit.as_ref().map(|l| l.source.clone()),
+            format!(
+                "joint {:?} follows {:?} by {multiplier} beyond its own limits {} .. {}: {outcome}",
+                joint.name, driver_joint.name, limit[0], limit[1]
+            ),
+        ));
+    }
+}
+
+fn set_initial_positions(
+    description: &RobotDescription,
+    plans: &mut [JointPlan],
+    initial: &[Option<f64>],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Result<(), PlanError> {
+    for (plan, value) in plans.iter_mut().zip(initial) {
+        let joint = description.joint(plan.joint);
+        let wanted = value.unwrap_or(0.0);
+        if !wanted.is_finite() {
+            return Err(PlanError::InitialValue { joint: joint.name.clone(), value: wanted });
+        }
+        plan.initial = wanted.clamp(plan.usable[0], plan.usable[1]);
+        if plan.mimic.is_none() && plan.initial != wanted {
+            diagnostics.push(Diagnostic::new(
+                DiagnosticKind::InitialPositionClamped,
+                joint.source.clone(),
+                format!(
+                    "joint {:?}: the start position {wanted} is outside of {:.4} .. {:.4}; it starts at {:.4}",
+                    joint.name, plan.usable[0], plan.usable[1], plan.initial
+                ),
+            ));
+        }
+    }
+    for i in 0..plans.len() {
+        if let Some((driver, multiplier, offset)) = plans[i].mimic
+            && let Some(d) = plans.iter().find(|p| p.joint == driver).map(|p| p.initial)
+        {
+            plans[i].initial = multiplier * d + offset;
+        }
+    }
+    Ok(())
+}
+
+/// The joint-space inertia of a robot at its start positions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartInertia {
+    /// The matrix, rotor inertias included; the base's six columns first where it floats.
+    pub matrix: DMatrix<f64>,
+    /// The column of each drivable joint.
+    pub columns: Vec<usize>,
+}
+
+/// The joint-space inertia at the start positions.
+///
+/// # Errors
+/// The description's dynamics cannot be computed.
+pub fn mass_matrix_at_start(
+    description: &RobotDescription,
+    plans: &[JointPlan],
+    floating_base: bool,
+) -> Result<StartInertia, DynamicsError> {
+    let mut configuration = Configuration::zero(description);
+    configuration.floating_base = floating_base;
+    configuration.joint_positions = plans.iter().map(|p| p.initial).collect();
+    let kinematics = Kinematics::new(description, &configuration)?;
+    let mut matrix = kinematics.mass_matrix();
+    let columns: Vec<usize> = plans.iter().map(|p| kinematics.columns(p.joint).start).collect();
+    for (plan, &column) in plans.iter().zip(&columns) {
+        matrix[(column, column)] += plan.armature;
+    }
+    Ok(StartInertia { matrix, columns })
+}
+
+/// `1 / (M⁻¹)_ii` of each drivable joint; the plain diagonal where the matrix is singular.
+fn effective_inertias(start: &StartInertia) -> Vec<f64> {
+    let inverse = start.matrix.clone().cholesky().map(|factor| factor.inverse());
+    start
+        .columns
+        .iter()
+        .map(|&i| inverse.as_ref().map_or(start.matrix[(i, i)], |inverse| 1.0 / inverse[(i, i)]))
+        .collect()
+}

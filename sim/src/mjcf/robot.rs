@@ -1,0 +1,556 @@
+//! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
+
+use super::document::{
+    Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Joint, JointEquality, JointType, MaterialAsset,
+    MeshAsset, MeshContent, Mjcf, Shape, Site,
+};
+use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::drive::plan::JointPlan;
+use crate::inertia::RigidInertia;
+use crate::source::Source;
+use nalgebra::Vector3;
+use scene::Pose;
+use scene::mesh::TriMesh;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// MuJoCo's XML reader refuses documents nested deeper than this many bodies (its limit is 500 elements).
+pub const MAX_BODY_DEPTH: usize = 480;
+
+/// What the document is for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Purpose<'a> {
+    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; dry friction of driven joints is a
+    /// tendon where `friction_tendons`, since the joint's own friction row carries the drive.
+    Run {
+        /// Drives are friction rows.
+        friction_tendons: bool,
+    },
+    /// To be opened elsewhere: real meshes, a site for every link.
+    Export(&'a VisualAssets),
+}
+
+/// Visual meshes written next to an exported document: parts by file and scale.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VisualAssets {
+    /// The parts of each mesh.
+    pub parts: BTreeMap<MeshKey, Vec<VisualPart>>,
+}
+
+/// One part of a visual mesh with one look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisualPart {
+    /// Name of the mesh asset.
+    pub mesh: String,
+    /// Name of the material asset, where the mesh file gives one.
+    pub material: Option<String>,
+}
+
+/// A mesh file at a scale.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MeshKey {
+    /// The file.
+    pub path: PathBuf,
+    /// Bits of the scale.
+    scale: [u64; 3],
+}
+
+impl MeshKey {
+    /// The key of `path` at `scale`.
+    pub fn new(path: &Path, scale: &Vector3<f64>) -> Self {
+        Self { path: path.to_path_buf(), scale: [scale.x.to_bits(), scale.y.to_bits(), scale.z.to_bits()] }
+    }
+
+    /// The scale.
+    pub fn scale(&self) -> [f64; 3] {
+        self.scale.map(f64::from_bits)
+    }
+}
+
+/// How a robot enters the document.
+#[derive(Clone, Debug)]
+pub struct RobotCfg<'a> {
+    /// Prefix of all names: `uid/link`.
+    pub uid: &'a str,
+    /// Contact bits of all its geoms.
+    pub contact: GeomRole,
+    /// Does not move in the world.
+    pub fix_base: bool,
+    /// Pose of the root link in the environment.
+    pub base_pose: Pose,
+    /// One per drivable joint.
+    pub plans: &'a [JointPlan],
+    /// Convex hulls of collision meshes.
+    pub hulls: &'a BTreeMap<MeshKey, TriMesh>,
+    /// What the document is for.
+    pub purpose: Purpose<'a>,
+}
+
+/// Where the robot's parts are in the document.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RobotLayout {
+    /// For every link (fused ones included): the body it is part of, and its frame there.
+    pub links: Vec<LinkFrame>,
+    /// Pairs of bodies that touch by construction: a fixed base and its first children.
+    pub base_pairs: Vec<(String, String)>,
+}
+
+/// A link's frame in its body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkFrame {
+    /// Name of the body.
+    pub body: String,
+    /// Pose of the link in the body.
+    pub body_from_link: Pose,
+}
+
+/// An error of [`add`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EmitError {
+    /// MuJoCo cannot read it.
+    #[error(
+        "{source_line}: link {link:?} is {depth} moving bodies below the root; MuJoCo reads at most {MAX_BODY_DEPTH}: \
+         join rigid parts by fixed joints"
+    )]
+    TooDeep {
+        /// The link.
+        link: String,
+        /// Its place.
+        source_line: Source,
+        /// Its depth.
+        depth: usize,
+    },
+}
+
+/// Adds a robot to `mjcf`.
+///
+/// # Errors
+/// The tree is deeper than MuJoCo can read.
+pub fn add(
+    description: &RobotDescription,
+    cfg: &RobotCfg<'_>,
+    mjcf: &mut Mjcf,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Result<RobotLayout, EmitError> {
+    let mut emitter = Emitter {
+        description,
+        cfg,
+        mjcf,
+        diagnostics,
+        plan_of: cfg.plans.iter().map(|p| (p.joint, p)).collect(),
+        depth: BTreeMap::new(),
+        placed: vec![None; description.links.len()],
+        masses: BTreeMap::new(),
+    };
+    emitter.bodies()?;
+    emitter.inertias();
+    emitter.couplings_and_actuators();
+    let base_pairs = emitter.base_pairs();
+    let links = emitter
+        .placed
+        .iter()
+        .map(|placed| {
+            // Every link is reachable from the root: `urdf::merge` refuses anything else.
+            let (body, body_from_link) = placed.unwrap_or((0, Pose::identity()));
+            LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
+        })
+        .collect();
+    Ok(RobotLayout { links, base_pairs })
+}
+
+struct Emitter<'a, 'm> {
+    description: &'a RobotDescription,
+    cfg: &'a RobotCfg<'a>,
+    mjcf: &'m mut Mjcf,
+    diagnostics: &'m mut Vec<Diagnostic>,
+    plan_of: BTreeMap<JointId, &'a JointPlan>,
+    /// Number of bodies above each body of this robot.
+    depth: BTreeMap<usize, usize>,
+    /// Body and frame of each link.
+    placed: Vec<Option<(usize, Pose)>>,
+    /// Links fused into each body.
+    masses: BTreeMap<usize, Vec<LinkId>>,
+}
+
+impl Emitter<'_, '_> {
+    fn name(&self, name: &str) -> String {
+        format!("{}/{name}", self.cfg.uid)
+    }
+
+    /// Links depth first from the root, a body for each that moves.
+    fn bodies(&mut self) -> Result<(), EmitError> {
+        let root = self.description.root;
+        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.name("base"), None)] };
+        let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
+        self.place(root, body, Pose::identity());
+        let mut stack: Vec<JointId> = self.description.link(root).child_joints.iter().rev().copied().collect();
+        while let Some(id) = stack.pop() {
+            let joint = self.description.joint(id);
+            // Parents are placed before their children are pushed.
+            let (parent_body, body_from_parent) = self.placed[joint.parent.0].unwrap_or((0, Pose::identity()));
+            let body_from_joint = body_from_parent * joint.parent_from_joint;
+            if joint.kind == JointKind::Fixed {
+                self.place(joint.child, parent_body, body_from_joint);
+            } else {
+                let (parent, pose) = self.parent_for(joint.kind, parent_body, body_from_joint);
+                let joints = self.joints(id, parent);
+                let body = self.push_body(joint.child, parent, pose, joints)?;
+                self.place(joint.child, body, Pose::identity());
+            }
+            stack.extend(self.description.link(joint.child).child_joints.iter().rev());
+        }
+        Ok(())
+    }
+
+    /// MuJoCo allows a free joint only on a child of the world: below a part that does not move, such a link becomes
+    /// one.
+    fn parent_for(&self, kind: JointKind, parent: usize, pose: Pose) -> (usize, Pose) {
+        let is_root = self.mjcf.bodies[parent].parent == 0;
+        if kind == JointKind::Floating && self.cfg.fix_base && is_root {
+            (0, self.mjcf.bodies[parent].pose * pose)
+        } else {
+            (parent, pose)
+        }
+    }
+
+    fn push_body(
+        &mut self,
+        link: LinkId,
+        parent: usize,
+        pose: Pose,
+        joints: Vec<Joint>,
+    ) -> Result<usize, EmitError> {
+        let depth = self.depth.get(&parent).map_or(1, |d| d + 1);
+        let described = self.description.link(link);
+        if depth > MAX_BODY_DEPTH {
+            return Err(EmitError::TooDeep { link: described.name.clone(), source_line: described.source.clone(), depth });
+        }
+        let index = self.mjcf.bodies.len();
+        self.depth.insert(index, depth);
+        self.mjcf.bodies.push(Body {
+            name: self.name(&described.name),
+            parent,
+            pose,
+            inertial: None,
+            joints,
+            geoms: Vec::new(),
+            sites: Vec::new(),
+            source: Some(described.source.clone()),
+        });
+        Ok(index)
+    }
+
+    /// Puts a link's shapes into its body.
+    fn place(&mut self, link: LinkId, body: usize, body_from_link: Pose) {
+        self.placed[link.0] = Some((body, body_from_link));
+        self.masses.entry(body).or_default().push(link);
+        let described = self.description.link(link);
+        for (i, collision) in described.collisions.iter().enumerate() {
+            let name = self.name(&format!("{}/collision{i}", described.name));
+            let shape = self.collision_shape(&collision.geometry, &collision.source);
+            self.mjcf.bodies[body].geoms.push(Geom {
+                name: Some(name),
+                shape,
+                pose: body_from_link * collision.link_from_shape,
+                role: self.cfg.contact,
+                rgba: None,
+                material: None,
+                source: Some(collision.source.clone()),
+            });
+        }
+        for (i, visual) in described.visuals.iter().enumerate() {
+            let name = self.name(&format!("{}/visual{i}", described.name));
+            let geoms = self.visual_geoms(&visual.geometry, visual.material.as_ref().and_then(|m| m.rgba));
+            let several = geoms.len() > 1;
+            for (part, (shape, rgba, material)) in geoms.into_iter().enumerate() {
+                self.mjcf.bodies[body].geoms.push(Geom {
+                    name: Some(if several { format!("{name}.{part}") } else { name.clone() }),
+                    shape,
+                    pose: body_from_link * visual.link_from_shape,
+                    role: GeomRole::Visual,
+                    rgba,
+                    material,
+                    source: Some(visual.source.clone()),
+                });
+            }
+        }
+        if matches!(self.cfg.purpose, Purpose::Export(_)) {
+            let site = Site { name: self.name(&described.name), pose: body_from_link };
+            self.mjcf.bodies[body].sites.push(site);
+        }
+    }
+
+    fn collision_shape(&mut self, geometry: &Geometry, source: &Source) -> Shape {
+        match geometry {
+            Geometry::Mesh { path, scale, .. } => Shape::Mesh(self.hull_asset(path, scale, source)),
+            primitive => primitive_shape(primitive),
+        }
+    }
+
+    /// The hull of a collision mesh as an inline asset, once per file and scale.
+    fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &Source) -> String {
+        let key = MeshKey::new(path, scale);
+        let index = self.cfg.hulls.keys().position(|k| *k == key).unwrap_or(usize::MAX);
+        // Asset names are lower case and unique, whatever the files are called: 2.2.2 folds case.
+        let name = format!("{}_hull{index}", self.cfg.uid.to_lowercase());
+        if !self.mjcf.meshes.iter().any(|m| m.name == name)
+            && let Some(hull) = self.cfg.hulls.get(&key)
+        {
+            self.mjcf.meshes.push(MeshAsset {
+                name: name.clone(),
+                content: MeshContent::Inline { vertices: hull.positions.clone(), triangles: hull.triangles.clone() },
+                visual: false,
+                source: Some(source.clone()),
+            });
+        }
+        name
+    }
+
+    fn visual_geoms(
+        &mut self,
+        geometry: &Geometry,
+        rgba: Option<[f64; 4]>,
+    ) -> Vec<(Shape, Option<[f64; 4]>, Option<String>)> {
+        /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
+        const PROXY: f64 = 1e-3;
+        match (&self.cfg.purpose, geometry) {
+            (Purpose::Run { .. }, _) => vec![(Shape::Sphere(PROXY), rgba, None)],
+            (Purpose::Export(assets), Geometry::Mesh { path, scale, .. }) => {
+                let parts = assets.parts.get(&MeshKey::new(path, scale));
+                // A material of the URDF overrides those of the mesh file (as RViz does).
+                parts
+                    .into_iter()
+                    .flatten()
+                    .map(|part| {
+                        let material = if rgba.is_some() { None } else { part.material.clone() };
+                        (Shape::Mesh(part.mesh.clone()), rgba, material)
+                    })
+                    .collect()
+            }
+            (Purpose::Export(_), primitive) => vec![(primitive_shape(primitive), rgba, None)],
+        }
+    }
+
+    fn free_joint(&self, name: &str, source: Option<Source>) -> Joint {
+        Joint {
+            name: name.into(),
+            kind: JointType::Free,
+            axis: Vector3::z(),
+            range: None,
+            damping: 0.0,
+            frictionloss: 0.0,
+            armature: 0.0,
+            source,
+        }
+    }
+
+    /// The MuJoCo joints of one URDF joint.
+    fn joints(&self, id: JointId, parent: usize) -> Vec<Joint> {
+        let joint = self.description.joint(id);
+        let name = self.name(&joint.name);
+        let plain = |suffix: &str, kind, axis| Joint {
+            name: format!("{name}{suffix}"),
+            kind,
+            axis,
+            range: None,
+            damping: joint.damping.unwrap_or(0.0),
+            frictionloss: joint.friction.unwrap_or(0.0),
+            armature: 0.0,
+            source: Some(joint.source.clone()),
+        };
+        match joint.kind {
+            JointKind::Fixed => Vec::new(),
+            JointKind::Floating if parent == 0 => vec![self.free_joint(&name, Some(joint.source.clone()))],
+            // Below a moving part the six degrees of freedom are three slides and a ball.
+            JointKind::Floating => vec![
+                plain(".x", JointType::Slide, Vector3::x()),
+                plain(".y", JointType::Slide, Vector3::y()),
+                plain(".z", JointType::Slide, Vector3::z()),
+                plain(".ball", JointType::Ball, Vector3::z()),
+            ],
+            JointKind::Planar => {
+                let [a, b] = crate::dynamics::planar_axes(&joint.axis);
+                vec![
+                    plain(".x", JointType::Slide, a.into_inner()),
+                    plain(".y", JointType::Slide, b.into_inner()),
+                    plain(".yaw", JointType::Hinge, joint.axis.into_inner()),
+                ]
+            }
+            JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => {
+                let plan = self.plan_of[&id];
+                let kind = if joint.kind == JointKind::Prismatic { JointType::Slide } else { JointType::Hinge };
+                let tendon = plan.actuator.is_some() && self.friction_is_tendon();
+                vec![Joint {
+                    range: plan.limit,
+                    damping: plan.damping,
+                    frictionloss: if tendon { 0.0 } else { plan.friction },
+                    armature: plan.armature,
+                    ..plain("", kind, joint.axis.into_inner())
+                }]
+            }
+        }
+    }
+
+    fn friction_is_tendon(&self) -> bool {
+        matches!(self.cfg.purpose, Purpose::Run { friction_tendons: true })
+    }
+
+    /// Mass properties of every body from the links fused into it, repaired where no rigid body has them.
+    fn inertias(&mut self) {
+        let masses = std::mem::take(&mut self.masses);
+        for (&body, links) in &masses {
+            let mut fused = RigidInertia::ZERO;
+            let mut place = None;
+            for &link in links {
+                let described = self.description.link(link);
+                let Some(inertial) = &described.inertial else { continue };
+                place.get_or_insert_with(|| inertial.source.clone());
+                let (_, body_from_link) = self.placed[link.0].unwrap_or((0, Pose::identity()));
+                fused = fused.combine(&RigidInertia::from_inertial(inertial).transformed(&body_from_link));
+            }
+            let moving = is_moving(&self.mjcf.bodies, body);
+            if fused.mass == 0.0 && fused.inertia.norm() == 0.0 {
+                if moving {
+                    let lightest = self.description.link(links[0]);
+                    self.diagnostics.push(Diagnostic::new(
+                        DiagnosticKind::MasslessLink,
+                        lightest.source.clone(),
+                        format!(
+                            "link {:?} moves but has no mass; MuJoCo needs some, so it gets {MASSLESS_MASS} kg and \
+                             {MASSLESS_MOMENT} kg m² (not counted in total_mass)",
+                            lightest.name
+                        ),
+                    ));
+                    fused.mass = MASSLESS_MASS;
+                    fused.inertia = nalgebra::Matrix3::identity() * MASSLESS_MOMENT;
+                } else {
+                    continue;
+                }
+            }
+            let (repaired, _) = fused.repaired();
+            self.report_faults(links, fused.check().is_err());
+            let (moments, axes) = repaired.principal();
+            self.mjcf.bodies[body].inertial =
+                Some(Inertial { mass: repaired.mass, com: repaired.com, axes, moments, source: place });
+        }
+    }
+}
+
+/// Stand-in mass of a moving body without any \[kg\]: a milligram disturbs no robot, and is far above MuJoCo's minimum.
+const MASSLESS_MASS: f64 = 1e-6;
+/// Its moment of inertia \[kg m²\]: that mass at 3 cm.
+const MASSLESS_MOMENT: f64 = 1e-9;
+
+impl Emitter<'_, '_> {
+    /// A warning for every link whose own inertia no rigid body can have.
+    fn report_faults(&mut self, links: &[LinkId], body_is_faulty: bool) {
+        for &link in links {
+            let described = self.description.link(link);
+            let Some(inertial) = &described.inertial else { continue };
+            let own = RigidInertia::from_inertial(inertial);
+            if own.mass == 0.0 && own.inertia.norm() == 0.0 {
+                continue;
+            }
+            if let Err(fault) = own.check() {
+                let outcome = match (links.len() > 1, body_is_faulty) {
+                    (true, false) => "sound after fusing with the links it is fixed to",
+                    (true, true) => "repaired after fusing with the links it is fixed to",
+                    (false, _) => "repaired",
+                };
+                self.diagnostics.push(Diagnostic::new(
+                    DiagnosticKind::InertiaRepaired,
+                    inertial.source.clone(),
+                    format!("link {:?}: {fault}; {outcome}, in the MJCF only", described.name),
+                ));
+            }
+        }
+    }
+
+    fn couplings_and_actuators(&mut self) {
+        for plan in self.cfg.plans {
+            let joint = self.description.joint(plan.joint);
+            let name = self.name(&joint.name);
+            if let Some((driver, multiplier, offset)) = plan.mimic {
+                self.mjcf.equalities.push(JointEquality {
+                    name: name.clone(),
+                    follower: name.clone(),
+                    driver: self.name(&self.description.joint(driver).name),
+                    multiplier,
+                    offset,
+                    source: joint.mimic.as_ref().map(|m| m.source.clone()),
+                });
+            }
+            if let Some(actuator) = plan.actuator {
+                // Without stiffness the control is a velocity, without both an effort.
+                let gain = [actuator.kp, actuator.kd, 1.0].into_iter().find(|&g| g > 0.0).unwrap_or(1.0);
+                let positions = actuator.kp > 0.0 && plan.usable.iter().all(|end| end.is_finite());
+                self.mjcf.actuators.push(Actuator {
+                    name: name.clone(),
+                    joint: name.clone(),
+                    gain,
+                    kp: actuator.kp,
+                    kd: actuator.kd,
+                    force_limit: Some(plan.max_effort).filter(|limit| limit.is_finite()),
+                    ctrl_range: positions.then_some(plan.usable),
+                    source: Some(joint.source.clone()),
+                });
+                if plan.friction > 0.0 && self.friction_is_tendon() {
+                    self.mjcf.friction_tendons.push(FrictionTendon {
+                        name: format!("{name}/friction"),
+                        joint: name,
+                        frictionloss: plan.friction,
+                    });
+                }
+            }
+        }
+    }
+
+    /// MuJoCo does not exclude contacts of a body with its parent where the parent is fixed in the world.
+    fn base_pairs(&self) -> Vec<(String, String)> {
+        let Some((base, _)) = self.placed[self.description.root.0].filter(|_| self.cfg.fix_base) else {
+            return Vec::new();
+        };
+        let bodies = &self.mjcf.bodies;
+        (base + 1..bodies.len())
+            .filter(|&b| bodies[b].parent == base)
+            .map(|b| (bodies[base].name.clone(), bodies[b].name.clone()))
+            .collect()
+    }
+}
+
+/// The body or one above it has a joint.
+fn is_moving(bodies: &[Body], mut body: usize) -> bool {
+    while body != 0 {
+        if !bodies[body].joints.is_empty() {
+            return true;
+        }
+        body = bodies[body].parent;
+    }
+    false
+}
+
+fn primitive_shape(geometry: &Geometry) -> Shape {
+    match geometry {
+        Geometry::Box { size } => Shape::Box((size / 2.0).into()),
+        Geometry::Cylinder { radius, length } => Shape::Cylinder(*radius, length / 2.0),
+        Geometry::Capsule { radius, length } => Shape::Capsule(*radius, length / 2.0),
+        Geometry::Sphere { radius } => Shape::Sphere(*radius),
+        Geometry::Mesh { path, .. } => Shape::Mesh(path.to_string_lossy().into_owned()),
+    }
+}
+
+impl VisualAssets {
+    /// Adds a mesh part and its material to the document.
+    pub fn declare(mjcf: &mut Mjcf, mesh: MeshAsset, material: Option<MaterialAsset>) -> VisualPart {
+        let part = VisualPart { mesh: mesh.name.clone(), material: material.as_ref().map(|m| m.name.clone()) };
+        mjcf.meshes.push(mesh);
+        if let Some(material) = material
+            && !mjcf.materials.iter().any(|m| m.name == material.name)
+        {
+            mjcf.materials.push(material);
+        }
+        part
+    }
+}

@@ -1,0 +1,414 @@
+//! MJCF text: deterministic, one element per line, with the place each line came from.
+//!
+//! What differs between the lines of MuJoCo is decided here and nowhere else.
+
+use super::document::{
+    Actuator, Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf, Shape,
+};
+use crate::mj::{CompileError, Target};
+use crate::source::Source;
+use scene::Pose;
+use std::fmt::Write as _;
+
+/// Text and the source of each of its lines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// The XML.
+    pub xml: String,
+    /// For each line of `xml`, the element of the user's file that caused it.
+    pub sources: Vec<Option<Source>>,
+}
+
+impl Text {
+    /// Adds to a compile error the place in the user's file that caused the line MuJoCo names.
+    #[must_use]
+    pub fn locate(&self, mut error: CompileError) -> CompileError {
+        error.source_line = error
+            .line
+            .and_then(|line| self.sources.get(usize::try_from(line).ok()?.checked_sub(1)?))
+            .cloned()
+            .flatten();
+        error
+    }
+}
+
+/// Writes the document for `target`.
+pub fn write(mjcf: &Mjcf, target: Target) -> Text {
+    let mut out = Writer { xml: String::new(), sources: Vec::new(), depth: 0, target };
+    out.document(mjcf);
+    Text { xml: out.xml, sources: out.sources }
+}
+
+struct Writer {
+    xml: String,
+    sources: Vec<Option<Source>>,
+    depth: usize,
+    target: Target,
+}
+
+/// One element under construction.
+struct Element {
+    text: String,
+}
+
+impl Element {
+    fn new(tag: &str) -> Self {
+        Self { text: format!("<{tag}") }
+    }
+
+    fn attr(mut self, name: &str, value: impl std::fmt::Display) -> Self {
+        let _ = write!(self.text, " {name}=\"{}\"", escape(&value.to_string()));
+        self
+    }
+
+    fn numbers(self, name: &str, values: &[f64]) -> Self {
+        self.attr(name, joined(values))
+    }
+
+    fn pose(self, pose: &Pose) -> Self {
+        let p = pose.translation.vector;
+        let q = pose.rotation;
+        let mut out = self;
+        if p != nalgebra::Vector3::zeros() {
+            out = out.numbers("pos", p.as_slice());
+        }
+        if q != nalgebra::UnitQuaternion::identity() {
+            out = out.numbers("quat", &[q.w, q.i, q.j, q.k]);
+        }
+        out
+    }
+
+    fn opt(self, name: &str, value: Option<impl std::fmt::Display>) -> Self {
+        match value {
+            Some(value) => self.attr(name, value),
+            None => self,
+        }
+    }
+}
+
+/// Shortest text that reads back as the same number; -0 is 0.
+fn number(value: f64) -> String {
+    let value = value + 0.0;
+    if value != 0.0 && !(1e-4..1e9).contains(&value.abs()) { format!("{value:e}") } else { format!("{value}") }
+}
+
+fn joined(values: &[f64]) -> String {
+    values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(" ")
+}
+
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&apos;"),
+            '\n' | '\r' | '\t' => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+impl Writer {
+    fn line(&mut self, text: &str, source: Option<&Source>) {
+        for _ in 0..self.depth {
+            self.xml.push_str("  ");
+        }
+        self.xml.push_str(text);
+        self.xml.push('\n');
+        self.sources.push(source.cloned());
+    }
+
+    fn leaf(&mut self, element: Element, source: Option<&Source>) {
+        self.line(&(element.text + "/>"), source);
+    }
+
+    fn open(&mut self, element: Element, source: Option<&Source>) {
+        self.line(&(element.text + ">"), source);
+        self.depth += 1;
+    }
+
+    fn close(&mut self, tag: &str) {
+        self.depth -= 1;
+        self.line(&format!("</{tag}>"), None);
+    }
+
+    fn document(&mut self, mjcf: &Mjcf) {
+        self.open(Element::new("mujoco").attr("model", &mjcf.model), None);
+        for comment in &mjcf.comments {
+            // "--" would end the comment.
+            self.line(&format!("<!-- {} -->", comment.replace("--", "- -").replace('\n', " ")), None);
+        }
+        self.leaf(Element::new("compiler").attr("angle", "radian").attr("autolimits", "false"), None);
+        self.option(mjcf);
+        self.open(Element::new("default"), None);
+        self.leaf(Element::new("geom").numbers("friction", &mjcf.option.friction), None);
+        self.close("default");
+        self.assets(mjcf);
+        self.bodies(mjcf);
+        self.constraints(mjcf);
+        if !mjcf.actuators.is_empty() {
+            self.open(Element::new("actuator"), None);
+            for actuator in &mjcf.actuators {
+                self.actuator(actuator);
+            }
+            self.close("actuator");
+        }
+        if !mjcf.keyframes.is_empty() {
+            self.open(Element::new("keyframe"), None);
+            for key in &mjcf.keyframes {
+                self.leaf(Element::new("key").attr("name", &key.name).numbers("qpos", &key.qpos), None);
+            }
+            self.close("keyframe");
+        }
+        self.close("mujoco");
+    }
+
+    fn option(&mut self, mjcf: &Mjcf) {
+        let o = &mjcf.option;
+        self.leaf(
+            Element::new("option")
+                .attr("timestep", number(o.timestep))
+                .numbers("gravity", o.gravity.as_slice())
+                .attr("integrator", o.integrator.name())
+                .attr("cone", if o.cone == Cone::Elliptic { "elliptic" } else { "pyramidal" })
+                .attr("impratio", number(o.impratio))
+                .attr("iterations", o.iterations),
+            None,
+        );
+        // 2.2.2's defaults (500 rows, 100 contacts) drop contacts silently in plain viewers; 4.x sizes its arena itself.
+        if self.target == Target::V2 {
+            self.leaf(Element::new("size").attr("njmax", 1500).attr("nconmax", 300), None);
+        }
+    }
+
+    fn assets(&mut self, mjcf: &Mjcf) {
+        if mjcf.meshes.is_empty() && mjcf.textures.is_empty() && mjcf.materials.is_empty() {
+            return;
+        }
+        self.open(Element::new("asset"), None);
+        for texture in &mjcf.textures {
+            let element =
+                Element::new("texture").attr("type", "2d").attr("name", &texture.name).attr("file", &texture.file);
+            self.leaf(element, None);
+        }
+        for material in &mjcf.materials {
+            let element = Element::new("material")
+                .attr("name", &material.name)
+                .opt("texture", material.texture.as_ref())
+                .numbers("rgba", &material.rgba);
+            self.leaf(element, None);
+        }
+        for mesh in &mjcf.meshes {
+            self.mesh(mesh);
+        }
+        self.close("asset");
+    }
+
+    fn mesh(&mut self, mesh: &MeshAsset) {
+        let mut element = Element::new("mesh").attr("name", &mesh.name);
+        if mesh.visual && self.target == Target::V4 {
+            // A flat or open mesh has no volume: 4.x asks for its inertia as a shell, 2.2.2 does not know the attribute.
+            element = element.attr("inertia", "shell");
+        }
+        element = match &mesh.content {
+            MeshContent::File(file) => element.attr("file", file),
+            MeshContent::Inline { vertices, triangles } => {
+                let vertices: Vec<String> = vertices.iter().flatten().map(|v| format!("{v}")).collect();
+                let triangles: Vec<String> = triangles.iter().flatten().map(ToString::to_string).collect();
+                element.attr("vertex", vertices.join(" ")).attr("face", triangles.join(" "))
+            }
+        };
+        self.leaf(element, mesh.source.as_ref());
+    }
+
+    /// Bodies depth first with a stack of our own: a chain of any length must not exhaust the call stack.
+    fn bodies(&mut self, mjcf: &Mjcf) {
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); mjcf.bodies.len()];
+        for (i, body) in mjcf.bodies.iter().enumerate().skip(1) {
+            children[body.parent].push(i);
+        }
+        self.open(Element::new("worldbody"), None);
+        for light in &mjcf.lights {
+            self.leaf(
+                Element::new("light")
+                    .attr("name", &light.name)
+                    .attr("directional", "true")
+                    .numbers("pos", light.position.as_slice())
+                    .numbers("dir", light.direction.as_slice())
+                    .numbers("diffuse", &light.diffuse),
+                None,
+            );
+        }
+        self.body_content(&mjcf.bodies[0]);
+        enum Visit {
+            Enter(usize),
+            Leave,
+        }
+        let mut stack: Vec<Visit> = children[0].iter().rev().map(|&b| Visit::Enter(b)).collect();
+        while let Some(visit) = stack.pop() {
+            match visit {
+                Visit::Enter(index) => {
+                    let body = &mjcf.bodies[index];
+                    let element = Element::new("body").attr("name", &body.name).pose(&body.pose);
+                    self.open(element, body.source.as_ref());
+                    self.body_content(body);
+                    stack.push(Visit::Leave);
+                    stack.extend(children[index].iter().rev().map(|&b| Visit::Enter(b)));
+                }
+                Visit::Leave => self.close("body"),
+            }
+        }
+        self.close("worldbody");
+    }
+
+    fn body_content(&mut self, body: &Body) {
+        if let Some(inertial) = &body.inertial {
+            self.inertial(inertial);
+        }
+        for joint in &body.joints {
+            self.joint(joint);
+        }
+        for geom in &body.geoms {
+            self.geom(geom);
+        }
+        for site in &body.sites {
+            self.leaf(Element::new("site").attr("name", &site.name).pose(&site.pose), None);
+        }
+    }
+
+    fn inertial(&mut self, inertial: &Inertial) {
+        let q = inertial.axes;
+        self.leaf(
+            Element::new("inertial")
+                .numbers("pos", inertial.com.as_slice())
+                .numbers("quat", &[q.w, q.i, q.j, q.k])
+                .attr("mass", number(inertial.mass))
+                .numbers("diaginertia", inertial.moments.as_slice()),
+            inertial.source.as_ref(),
+        );
+    }
+
+    fn joint(&mut self, joint: &Joint) {
+        let mut element = Element::new("joint").attr("name", &joint.name).attr(
+            "type",
+            match joint.kind {
+                JointType::Free => "free",
+                JointType::Ball => "ball",
+                JointType::Hinge => "hinge",
+                JointType::Slide => "slide",
+            },
+        );
+        if matches!(joint.kind, JointType::Hinge | JointType::Slide) {
+            element = element.numbers("axis", joint.axis.as_slice());
+        }
+        element = match joint.range {
+            Some(range) => element.attr("limited", "true").numbers("range", &range),
+            None => element.attr("limited", "false"),
+        };
+        for (name, value) in
+            [("damping", joint.damping), ("frictionloss", joint.frictionloss), ("armature", joint.armature)]
+        {
+            if value != 0.0 {
+                element = element.attr(name, number(value));
+            }
+        }
+        self.leaf(element, joint.source.as_ref());
+    }
+
+    fn geom(&mut self, geom: &Geom) {
+        let mut element = Element::new("geom").opt("name", geom.name.as_ref());
+        element = match &geom.shape {
+            Shape::Plane([x, y]) => element.attr("type", "plane").numbers("size", &[*x, *y, 1.0]),
+            Shape::Sphere(r) => element.attr("type", "sphere").numbers("size", &[*r]),
+            Shape::Capsule(r, h) => element.attr("type", "capsule").numbers("size", &[*r, *h]),
+            Shape::Cylinder(r, h) => element.attr("type", "cylinder").numbers("size", &[*r, *h]),
+            Shape::Box(half) => element.attr("type", "box").numbers("size", half),
+            Shape::Mesh(name) => element.attr("type", "mesh").attr("mesh", name),
+        };
+        element = element.pose(&geom.pose).attr("mass", 0);
+        element = match geom.role {
+            GeomRole::Collision { contype, conaffinity } => {
+                element.attr("contype", contype).attr("conaffinity", conaffinity).attr("group", 3)
+            }
+            GeomRole::Visual => element.attr("contype", 0).attr("conaffinity", 0).attr("group", 2),
+        };
+        element = element.opt("material", geom.material.as_ref());
+        if let Some(rgba) = &geom.rgba {
+            element = element.numbers("rgba", rgba);
+        }
+        self.leaf(element, geom.source.as_ref());
+    }
+
+    fn constraints(&mut self, mjcf: &Mjcf) {
+        if !mjcf.excludes.is_empty() {
+            self.open(Element::new("contact"), None);
+            for (a, b) in &mjcf.excludes {
+                self.leaf(Element::new("exclude").attr("body1", a).attr("body2", b), None);
+            }
+            self.close("contact");
+        }
+        if !mjcf.equalities.is_empty() {
+            self.open(Element::new("equality"), None);
+            for e in &mjcf.equalities {
+                let element = Element::new("joint")
+                    .attr("name", &e.name)
+                    .attr("joint1", &e.follower)
+                    .attr("joint2", &e.driver)
+                    .numbers("polycoef", &[e.offset, e.multiplier, 0.0, 0.0, 0.0]);
+                self.leaf(element, e.source.as_ref());
+            }
+            self.close("equality");
+        }
+        if !mjcf.friction_tendons.is_empty() {
+            self.open(Element::new("tendon"), None);
+            for tendon in &mjcf.friction_tendons {
+                let element = Element::new("fixed")
+                    .attr("name", &tendon.name)
+                    .attr("frictionloss", number(tendon.frictionloss));
+                self.open(element, None);
+                self.leaf(Element::new("joint").attr("joint", &tendon.joint).attr("coef", 1), None);
+                self.close("fixed");
+            }
+            self.close("tendon");
+        }
+    }
+
+    fn actuator(&mut self, a: &Actuator) {
+        let mut element = Element::new("general")
+            .attr("name", &a.name)
+            .attr("joint", &a.joint)
+            .numbers("gainprm", &[a.gain])
+            .attr("biastype", "affine")
+            .numbers("biasprm", &[0.0, -a.kp, -a.kd]);
+        element = match a.force_limit {
+            Some(limit) => element.attr("forcelimited", "true").numbers("forcerange", &[-limit, limit]),
+            None => element.attr("forcelimited", "false"),
+        };
+        element = match a.ctrl_range {
+            Some(range) => element.attr("ctrllimited", "true").numbers("ctrlrange", &range),
+            None => element.attr("ctrllimited", "false"),
+        };
+        self.leaf(element, a.source.as_ref());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_as_the_same_bits() {
+        for value in [0.1, 1.0 / 3.0, 1e-300, 6.02e23, -0.0, 1e-5, 123_456_789.25, f64::MIN_POSITIVE] {
+            assert_eq!(number(value).parse::<f64>().ok(), Some(value + 0.0), "{}", number(value));
+        }
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        assert_eq!(escape("a<b>\"&'\n"), "a&lt;b&gt;&quot;&amp;&apos; ");
+    }
+}
