@@ -2,7 +2,9 @@
 
 pub mod description;
 pub mod diagnostic;
+pub mod pattern;
 pub mod source;
+pub mod urdf;
 
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};

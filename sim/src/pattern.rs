@@ -1,0 +1,314 @@
+//! Name patterns: regular expressions that must match a whole name.
+//!
+//! The dialect is the `regex` crate's, matching is case-sensitive and always against the full name, as Python's
+//! `re.fullmatch` does. A pattern that matches nothing is an error, and so is a name claimed twice: a typing error in a
+//! script must never silently drive fewer joints than the user meant.
+
+use regex::Regex;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Why a list of patterns could not be applied to a list of names.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PatternError {
+    /// The pattern is no regular expression.
+    #[error("pattern \"{pattern}\" is not a regular expression: {reason}")]
+    Invalid {
+        /// The pattern as written.
+        pattern: String,
+        /// What is wrong with it.
+        reason: String,
+        /// The engine's own error.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The pattern uses look-around or back-references, which this dialect does not have.
+    #[error(
+        "pattern \"{pattern}\" uses {feature}, which name patterns do not support; list the names instead, such as \
+         \"(joint1|joint2)\""
+    )]
+    Unsupported {
+        /// The pattern as written.
+        pattern: String,
+        /// The feature that is not there.
+        feature: &'static str,
+        /// The engine's own error.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The pattern matches none of the names.
+    #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case counts); {}", list(.candidates, *.total))]
+    NoMatch {
+        /// The pattern as written.
+        pattern: String,
+        /// What the names are, such as `joint`.
+        what: &'static str,
+        /// The names, the closest first; at most [`MAX_CANDIDATES`].
+        candidates: Vec<String>,
+        /// How many names there are.
+        total: usize,
+    },
+    /// Two patterns match the same name.
+    #[error("{what} \"{name}\" is matched by both \"{first}\" and \"{second}\"; make the two disjoint")]
+    MatchedTwice {
+        /// What the name is, such as `joint`.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The first pattern or key.
+        first: String,
+        /// The second pattern or key.
+        second: String,
+    },
+}
+
+/// How many candidates an error lists at most.
+pub const MAX_CANDIDATES: usize = 12;
+
+/// A compiled name pattern.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    regex: Regex,
+}
+
+impl Pattern {
+    /// Compiles `pattern`.
+    ///
+    /// # Errors
+    /// [`PatternError::Invalid`] or [`PatternError::Unsupported`].
+    pub fn new(pattern: &str) -> Result<Self, PatternError> {
+        // The bare pattern is compiled first: wrapping could turn nonsense such as `a)|(b` into something valid.
+        let compiled = Regex::new(pattern).and_then(|_| {
+            // A trailing comment of `(?x)` would swallow the closing parenthesis, hence the second form.
+            Regex::new(&format!(r"\A(?:{pattern})\z")).or_else(|_| Regex::new(&format!("\\A(?:{pattern}\n)\\z")))
+        });
+        match compiled {
+            Ok(regex) => Ok(Self { regex }),
+            Err(error) => Err(explain(pattern, error)),
+        }
+    }
+
+    /// Whether the whole of `name` matches.
+    pub fn matches(&self, name: &str) -> bool {
+        self.regex.is_match(name)
+    }
+}
+
+fn explain(pattern: &str, error: regex::Error) -> PatternError {
+    let text = error.to_string();
+    let feature = if text.contains("look-around") {
+        Some("look-around")
+    } else if text.contains("backreferences") {
+        Some("back-references")
+    } else {
+        None
+    };
+    let pattern = pattern.to_owned();
+    match feature {
+        Some(feature) => PatternError::Unsupported { pattern, feature, source: error.into() },
+        None => {
+            let reason = text.lines().last().unwrap_or_default();
+            let reason = reason.strip_prefix("error: ").unwrap_or(reason).to_owned();
+            PatternError::Invalid { pattern, reason, source: error.into() }
+        }
+    }
+}
+
+/// Indices of the names that the patterns match: names in their order within a pattern, patterns one after the other.
+///
+/// `what` says what the names are, such as `joint`.
+///
+/// # Errors
+/// A pattern that does not compile or matches nothing, and a name matched by two patterns.
+pub fn select<P: AsRef<str>, N: AsRef<str>>(
+    patterns: &[P],
+    names: &[N],
+    what: &'static str,
+) -> Result<Vec<usize>, PatternError> {
+    let mut taken_by: Vec<Option<&str>> = vec![None; names.len()];
+    let mut selected = Vec::new();
+    for pattern in patterns {
+        let pattern = pattern.as_ref();
+        for index in matching(pattern, names, what)? {
+            claim(&mut taken_by, index, pattern, names, what)?;
+            selected.push(index);
+        }
+    }
+    Ok(selected)
+}
+
+/// The value that `{pattern: value}` entries give to each name; `None` where no entry matches.
+///
+/// A key that equals the name of a group (a control part) means the members of that group and is not read as a pattern.
+///
+/// # Errors
+/// A key that does not compile or matches nothing, and a name reached by two keys.
+///
+/// # Panics
+/// If a group holds an index outside of `names`.
+pub fn assign<V: Clone, N: AsRef<str>>(
+    entries: &[(String, V)],
+    groups: &BTreeMap<String, Vec<usize>>,
+    names: &[N],
+    what: &'static str,
+) -> Result<Vec<Option<V>>, PatternError> {
+    let mut taken_by: Vec<Option<&str>> = vec![None; names.len()];
+    let mut values = vec![None; names.len()];
+    for (key, value) in entries {
+        let indices = match groups.get(key) {
+            Some(members) => members.clone(),
+            None => matching(key, names, what)?,
+        };
+        for index in indices {
+            claim(&mut taken_by, index, key, names, what)?;
+            values[index] = Some(value.clone());
+        }
+    }
+    Ok(values)
+}
+
+fn matching<N: AsRef<str>>(pattern: &str, names: &[N], what: &'static str) -> Result<Vec<usize>, PatternError> {
+    let compiled = Pattern::new(pattern)?;
+    let found: Vec<usize> = (0..names.len()).filter(|&i| compiled.matches(names[i].as_ref())).collect();
+    if found.is_empty() {
+        let candidates = closest(pattern, names.iter().map(AsRef::as_ref)).into_iter().map(str::to_owned).collect();
+        return Err(PatternError::NoMatch { pattern: pattern.to_owned(), what, candidates, total: names.len() });
+    }
+    Ok(found)
+}
+
+fn claim<'k, N: AsRef<str>>(
+    taken_by: &mut [Option<&'k str>],
+    index: usize,
+    key: &'k str,
+    names: &[N],
+    what: &'static str,
+) -> Result<(), PatternError> {
+    match taken_by[index].replace(key) {
+        None => Ok(()),
+        Some(first) => Err(PatternError::MatchedTwice {
+            what,
+            name: names[index].as_ref().to_owned(),
+            first: first.to_owned(),
+            second: key.to_owned(),
+        }),
+    }
+}
+
+/// The candidates most like `name`, best first, at most [`MAX_CANDIDATES`]; case counts little.
+pub fn closest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Vec<&'c str> {
+    let mut ranked: Vec<(usize, &str)> = candidates.into_iter().map(|c| (edit_distance(name, c), c)).collect();
+    ranked.sort_by_key(|&(distance, _)| distance);
+    ranked.truncate(MAX_CANDIDATES);
+    ranked.into_iter().map(|(_, c)| c).collect()
+}
+
+/// Twice the number of insertions, deletions and replacements between the lower-case names, plus one if only case
+/// differs. Only the first 64 characters count, so that a hostile name stays cheap.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let lower = |s: &str| s.chars().take(64).flat_map(char::to_lowercase).collect::<Vec<char>>();
+    let (left, right) = (lower(a), lower(b));
+    let mut row: Vec<usize> = (0..=right.len()).collect();
+    for (i, l) in left.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, r) in right.iter().enumerate() {
+            let replaced = diagonal + usize::from(l != r);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    2 * row[right.len()] + usize::from(a != b)
+}
+
+/// `candidates: "a", "b"`, or `closest of 240: "a", "b"` when the list was cut.
+pub(crate) fn list(candidates: &[String], total: usize) -> String {
+    let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
+    match total {
+        0 => "there are none".to_owned(),
+        _ if total > candidates.len() => format!("closest of {total}: {quoted}"),
+        _ => format!("candidates: {quoted}"),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+
+    const JOINTS: [&str; 8] = ["joint1", "joint2", "JOINT3", "LEFT_THUMB", "LEFT_INDEX", "a+b", "élbow", "joint10"];
+
+    #[test]
+    fn the_whole_name_matches_and_case_counts() {
+        for (pattern, expected) in [
+            ("joint[1-6]", vec![0, 1]),
+            ("joint.*", vec![0, 1, 7]),
+            ("joint1", vec![0]),
+            ("LEFT_.*", vec![3, 4]),
+            ("(?i)joint[1-6]", vec![0, 1, 2]),
+            ("joint1|joint10", vec![0, 7]),
+            (r"a\+b", vec![5]),
+            (".lbow", vec![6]),
+            ("(?x) joint1 # the first", vec![0]),
+        ] {
+            assert_eq!(select(&[pattern], &JOINTS, "joint").unwrap(), expected, "{pattern}");
+        }
+    }
+
+    #[test]
+    fn order_is_patterns_then_names() {
+        assert_eq!(select(&["LEFT_.*", "joint[12]"], &JOINTS, "joint").unwrap(), [3, 4, 0, 1]);
+        assert_eq!(select::<&str, _>(&[], &JOINTS, "joint").unwrap(), [0usize; 0]);
+    }
+
+    #[test]
+    fn errors_say_what_and_list_candidates() {
+        let text = |patterns: &[&str]| select(patterns, &JOINTS, "joint").unwrap_err().to_string();
+        let e = text(&["JOINT1"]);
+        assert!(e.contains("\"JOINT1\" matches no joint") && e.contains("candidates: \"joint1\""), "{e}");
+        let e = text(&["joint"]);
+        assert!(e.contains("whole name"), "{e}");
+        let e = text(&["joint[12]", "joint2"]);
+        assert!(e.contains("joint \"joint2\" is matched by both \"joint[12]\" and \"joint2\""), "{e}");
+        for (pattern, feature) in
+            [("(?!a).*", "look-around"), ("(?<=a)b", "look-around"), (r"(a)\1", "back-references")]
+        {
+            let e = select(&[pattern], &JOINTS, "joint").unwrap_err();
+            assert!(matches!(&e, PatternError::Unsupported { feature: f, .. } if *f == feature), "{e:?}");
+        }
+        for pattern in ["(", "a)|(b", "[", "*", "a{1000000000}"] {
+            let e = select(&[pattern], &JOINTS, "joint").unwrap_err();
+            assert!(matches!(e, PatternError::Invalid { .. }), "{pattern}: {e:?}");
+        }
+        let none: [&str; 0] = [];
+        assert!(select(&["a"], &none, "joint").unwrap_err().to_string().contains("there are none"));
+    }
+
+    #[test]
+    fn long_lists_are_cut() {
+        let names: Vec<String> = (0..100).map(|i| format!("joint_{i}")).collect();
+        let e = select(&["joint42"], &names, "joint").unwrap_err().to_string();
+        assert!(e.contains("closest of 100: \"joint_42\""), "{e}");
+    }
+
+    #[test]
+    fn assign_takes_patterns_and_groups() {
+        let groups = BTreeMap::from([("hand".to_owned(), vec![3, 4])]);
+        let entries = |list: &[(&str, f64)]| list.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect::<Vec<_>>();
+        let values = assign(&entries(&[("joint[12]", 1.0), ("hand", 2.0)]), &groups, &JOINTS, "joint").unwrap();
+        assert_eq!(values, [Some(1.0), Some(1.0), None, Some(2.0), Some(2.0), None, None, None]);
+        let e = assign(&entries(&[("hand", 1.0), ("LEFT_T.*", 2.0)]), &groups, &JOINTS, "joint").unwrap_err();
+        let text = e.to_string();
+        assert!(matches!(e, PatternError::MatchedTwice { .. }));
+        assert!(text.contains("LEFT_THUMB") && text.contains("\"hand\"") && text.contains("\"LEFT_T.*\""), "{text}");
+        assert!(matches!(
+            assign(&entries(&[("foot", 1.0)]), &groups, &JOINTS, "joint"),
+            Err(PatternError::NoMatch { .. })
+        ));
+    }
+
+    #[test]
+    fn closest_prefers_case_then_edits() {
+        assert_eq!(closest("Base", ["bass", "BASE", "base", "other"])[..2], ["BASE", "base"]);
+        assert_eq!(closest("base", ["bass", "BASE", "base"])[0], "base");
+    }
+}
