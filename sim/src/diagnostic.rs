@@ -40,6 +40,8 @@ pub enum DiagnosticKind {
     InitialPositionClamped,
     /// A unit axis was expected; the axis was normalised.
     AxisNormalized,
+    /// A colour was outside 0..1 and was clamped.
+    ColorClamped,
 }
 
 impl DiagnosticKind {
@@ -62,6 +64,7 @@ impl DiagnosticKind {
             Self::InitialOverlap => "initial-overlap",
             Self::InitialPositionClamped => "initial-position-clamped",
             Self::AxisNormalized => "axis-normalized",
+            Self::ColorClamped => "color-clamped",
         }
     }
 }

@@ -12,6 +12,7 @@ pub mod mj;
 pub mod mjcf;
 pub mod pattern;
 pub mod source;
+pub mod urdf;
 
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};

@@ -1,0 +1,118 @@
+//! Which URDF files make a robot, and how they are joined.
+
+use scene::Pose;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A robot made of one or several URDF files.
+///
+/// ```
+/// use sim::urdf::{ComponentCfg, UrdfCfg};
+///
+/// let cfg = UrdfCfg {
+///     components: vec![ComponentCfg::new("arm", "arm.urdf"), ComponentCfg::new("hand", "hand.urdf")],
+///     ..Default::default()
+/// };
+/// assert_eq!(cfg.components[1].name, "hand"); // hangs from the tip of "arm" by default
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfCfg {
+    /// The files, in any order.
+    pub components: Vec<ComponentCfg>,
+    /// Case of the names of the merged robot.
+    pub name_case: NameCaseCfg,
+    /// Folders of `package://` and `model://` packages by name; these win over every search.
+    pub packages: BTreeMap<String, PathBuf>,
+    /// Name of the robot; by default the names of the files' robots, joined by `_`.
+    pub name: Option<String>,
+    /// Name of the massless link added below components where one is needed.
+    pub base_link_name: String,
+}
+
+impl Default for UrdfCfg {
+    fn default() -> Self {
+        Self {
+            components: Vec::new(),
+            name_case: NameCaseCfg::default(),
+            packages: BTreeMap::new(),
+            name: None,
+            base_link_name: "base_link".to_owned(),
+        }
+    }
+}
+
+impl UrdfCfg {
+    /// A robot of one file, as it is.
+    pub fn single(urdf: impl AsRef<Path>) -> Self {
+        Self { components: vec![ComponentCfg::new("robot", urdf)], ..Self::default() }
+    }
+}
+
+/// Case of the names of a merged robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NameCaseCfg {
+    /// Joints.
+    pub joint: NameCase,
+    /// Links.
+    pub link: NameCase,
+}
+
+/// What becomes of the case of a name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NameCase {
+    /// As in the file.
+    #[default]
+    Original,
+    /// Upper case.
+    Upper,
+    /// Lower case.
+    Lower,
+}
+
+impl NameCase {
+    /// The name in this case.
+    pub fn apply(self, name: &str) -> String {
+        match self {
+            Self::Original => name.to_owned(),
+            Self::Upper => name.to_uppercase(),
+            Self::Lower => name.to_lowercase(),
+        }
+    }
+}
+
+/// One URDF file of a robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComponentCfg {
+    /// What it is: `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`, `left_hand`, `right_hand`, `arm`, `hand`,
+    /// which know their usual parent, or any other name.
+    pub name: String,
+    /// The file.
+    pub urdf: PathBuf,
+    /// Pose of the root link in the frame of the link it is attached to; for a component without a parent, in the frame
+    /// of the robot.
+    pub transform: Pose,
+    /// The component it is attached to; by default the usual parent, if present.
+    pub parent: Option<String>,
+    /// The link of the parent component it is attached to, as named in that file; by default the tip.
+    pub parent_link: Option<String>,
+    /// The link of this component that is attached, as named in its file; must be its root.
+    pub child_link: Option<String>,
+    /// What its names start with; names that already do, in any case, stay. By default `left_` or `right_` for a
+    /// component of such a name in a robot of several, else nothing.
+    pub prefix: Option<String>,
+}
+
+impl ComponentCfg {
+    /// A component with the default parent and no transform.
+    pub fn new(name: impl Into<String>, urdf: impl AsRef<Path>) -> Self {
+        Self {
+            name: name.into(),
+            urdf: urdf.as_ref().to_path_buf(),
+            transform: Pose::identity(),
+            parent: None,
+            parent_link: None,
+            child_link: None,
+            prefix: None,
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! URDF files: read strictly, meshes resolved, components merged into one robot, and written back.
+//!
+//! [`parse`] checks one file and keeps where everything was said; [`resolve`] finds mesh files; [`merge`] turns one or
+//! several files into a [`RobotDescription`](crate::RobotDescription); [`write`] goes the other way. No walk over a tree
+//! recurses, so that neither depth nor size of a file can exhaust the stack.
+
+mod components;
+mod config;
+mod error;
+mod file;
+mod joint;
+mod link;
+pub mod merge;
+mod names;
+mod number;
+pub mod parse;
+pub mod resolve;
+mod rotation;
+mod shapes;
+mod tree;
+pub mod write;
+
+pub use config::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};
+pub use error::UrdfError;
+pub use file::{JointNotes, LimitNotes, LinkNotes, UrdfFile, VisualNotes};
+pub use merge::{Assembly, assemble};
+pub use parse::{parse_file, parse_str};
+pub use resolve::{Resolved, Resolver};
+pub use tree::Tree;
+pub use write::{write_urdf, write_urdf_with};

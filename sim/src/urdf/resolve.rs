@@ -1,0 +1,419 @@
+//! From the URI of a mesh or texture to a file.
+//!
+//! | URI | where it is looked for, in this order |
+//! |---|---|
+//! | `package://pkg/rest`, `model://pkg/rest` | the folder given for `pkg` in the configuration, and only there; else `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF: itself, its `pkg`, and its children, where the name or the `<name>` of `package.xml` is `pkg` |
+//! | `file://...` | the absolute path; a relative one starts at the URDF |
+//! | absolute path | there |
+//! | relative path | the folder of the URDF |
+//!
+//! What is not found there is looked for in `meshdir` of `<mujoco><compiler>`: the whole path, then only its last part,
+//! as MuJoCo does. `%20` and the like are decoded in URIs, and in plain paths if the path as written does not exist.
+//!
+//! `..` may leave a package or the folder of the URDF: robots do share meshes that way. The path simply has to exist; if
+//! it does not, the error shows the path with `..` worked out. Nothing is written, so climbing has no danger beyond
+//! reading a file that the user can read anyway.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Component, Path, PathBuf};
+
+/// How many entries of a folder are looked at in search of a package.
+const FOLDER_LIMIT: usize = 4096;
+
+/// What became of a URI.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Resolved {
+    /// The file exists.
+    Found(PathBuf),
+    /// The place is known and has no such file.
+    Missing {
+        /// The most likely place.
+        guess: PathBuf,
+        /// Every file that was looked at.
+        tried: Vec<String>,
+        /// A remark that helps, such as a file whose name differs only in case.
+        hint: Option<String>,
+    },
+    /// The package was found nowhere.
+    PackageUnknown {
+        /// The package.
+        package: String,
+        /// The most likely place.
+        guess: PathBuf,
+        /// Every folder that was looked at.
+        tried: Vec<String>,
+    },
+    /// The URI is empty.
+    Empty,
+    /// Nothing that could be a file, such as `http://`.
+    Unsupported {
+        /// What is wrong and what would be right.
+        problem: String,
+    },
+}
+
+/// Finds the files that a URDF names. Asking twice for the same URI costs nothing.
+#[derive(Debug)]
+pub struct Resolver<'c> {
+    packages: &'c BTreeMap<String, PathBuf>,
+    folder: PathBuf,
+    meshdir: Option<String>,
+    /// Entries of `ROS_PACKAGE_PATH`.
+    ros_package_path: Vec<PathBuf>,
+    /// Entries of `AMENT_PREFIX_PATH`.
+    ament_prefix_path: Vec<PathBuf>,
+    resolved: HashMap<String, Resolved>,
+    searched: HashMap<String, Search>,
+}
+
+/// The folders that may be a package, and all that were looked at.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    found: Vec<PathBuf>,
+    tried: Vec<String>,
+}
+
+impl<'c> Resolver<'c> {
+    /// A resolver for the URDF at `urdf`, with folders of packages by name. Reads `ROS_PACKAGE_PATH` and
+    /// `AMENT_PREFIX_PATH`.
+    pub fn new(urdf: &Path, packages: &'c BTreeMap<String, PathBuf>, meshdir: Option<&str>) -> Self {
+        let paths = |name: &str| {
+            let value = std::env::var_os(name).unwrap_or_default();
+            std::env::split_paths(&value).filter(|p| !p.as_os_str().is_empty()).collect::<Vec<_>>()
+        };
+        Self::with_paths(urdf, packages, meshdir, paths("ROS_PACKAGE_PATH"), paths("AMENT_PREFIX_PATH"))
+    }
+
+    /// As [`Resolver::new`], with the two search paths given instead of read from the environment.
+    pub fn with_paths(
+        urdf: &Path,
+        packages: &'c BTreeMap<String, PathBuf>,
+        meshdir: Option<&str>,
+        ros_package_path: Vec<PathBuf>,
+        ament_prefix_path: Vec<PathBuf>,
+    ) -> Self {
+        // Absolute, so that the walk upward does not end at the current folder and results survive a change of it.
+        let absolute = std::path::absolute(urdf).unwrap_or_else(|_| urdf.to_path_buf());
+        Self {
+            packages,
+            folder: absolute.parent().map(Path::to_path_buf).unwrap_or_default(),
+            meshdir: meshdir.map(str::to_owned),
+            ros_package_path,
+            ament_prefix_path,
+            resolved: HashMap::new(),
+            searched: HashMap::new(),
+        }
+    }
+
+    /// The file of a URI.
+    pub fn resolve(&mut self, uri: &str) -> Resolved {
+        if let Some(known) = self.resolved.get(uri) {
+            return known.clone();
+        }
+        let resolved = self.look_up(uri.trim());
+        self.resolved.insert(uri.to_owned(), resolved.clone());
+        resolved
+    }
+
+    fn look_up(&mut self, uri: &str) -> Resolved {
+        if uri.is_empty() {
+            return Resolved::Empty;
+        }
+        let Some((scheme, rest)) = uri.split_once("://") else { return self.plain(uri) };
+        match scheme.to_ascii_lowercase().as_str() {
+            "package" | "model" => self.package(&decode(rest)),
+            "file" => self.plain(&decode(rest.strip_prefix("localhost/").map_or(rest, |_| &rest["localhost".len()..]))),
+            _ => Resolved::Unsupported {
+                problem: format!("{scheme}:// is not supported; use package://, file:// or a path"),
+            },
+        }
+    }
+
+    /// A path, absolute or from the folder of the URDF.
+    fn plain(&self, path: &str) -> Resolved {
+        let mut candidates = vec![self.folder.join(path)];
+        let decoded = decode(path);
+        if decoded != path {
+            candidates.push(self.folder.join(decoded));
+        }
+        self.first_file(candidates, path)
+    }
+
+    fn package(&mut self, rest: &str) -> Resolved {
+        let (package, file) = rest.split_once('/').unwrap_or((rest, ""));
+        if package.is_empty() || file.is_empty() {
+            let problem = "it has no package or no file; write package://name_of_package/meshes/part.stl".to_owned();
+            return Resolved::Unsupported { problem };
+        }
+        let file = file.trim_start_matches('/');
+        let search = match self.packages.get(package) {
+            // A package the user named is there and nowhere else: a file found elsewhere would be a surprise.
+            Some(folder) => Search { found: vec![folder.clone()], tried: Vec::new() },
+            None => self.search(package),
+        };
+        if !search.found.is_empty() {
+            return self.first_file(search.found.iter().map(|folder| folder.join(file)).collect(), file);
+        }
+        let guess = self.folder.join(file);
+        match self.in_meshdir(file) {
+            Some(found) => Resolved::Found(found),
+            None => Resolved::PackageUnknown { package: package.to_owned(), guess, tried: search.tried },
+        }
+    }
+
+    /// The first candidate that is a file, or what is in `meshdir`.
+    fn first_file(&self, candidates: Vec<PathBuf>, path: &str) -> Resolved {
+        if let Some(found) = candidates.iter().find(|c| c.is_file()) {
+            return Resolved::Found(found.clone());
+        }
+        if let Some(found) = self.in_meshdir(path) {
+            return Resolved::Found(found);
+        }
+        let in_meshdir = self.meshdir_candidates(path);
+        let tried = candidates.iter().chain(&in_meshdir).map(|c| work_out(c).display().to_string()).collect();
+        let guess = candidates.into_iter().next().unwrap_or_default();
+        Resolved::Missing { hint: remark(&guess), guess, tried }
+    }
+
+    fn in_meshdir(&self, path: &str) -> Option<PathBuf> {
+        self.meshdir_candidates(path).into_iter().find(|c| c.is_file())
+    }
+
+    fn meshdir_candidates(&self, path: &str) -> Vec<PathBuf> {
+        let Some(meshdir) = &self.meshdir else { return Vec::new() };
+        let folder = self.folder.join(meshdir);
+        let mut candidates = Vec::new();
+        if Path::new(path).is_relative() {
+            candidates.push(folder.join(path));
+        }
+        candidates.extend(Path::new(path).file_name().map(|name| folder.join(name)));
+        candidates.dedup();
+        candidates
+    }
+
+    /// Folders that may be the package, best first.
+    fn search(&mut self, package: &str) -> Search {
+        if let Some(known) = self.searched.get(package) {
+            return known.clone();
+        }
+        let mut search = Search::default();
+        // A package is one folder: `..` or an absolute path is no name, and joining it would leave the search path.
+        let plain_name = matches!(Path::new(package).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+        if plain_name {
+            for folder in self.ros_package_path.clone() {
+                search.around(&folder, package, "ROS_PACKAGE_PATH");
+            }
+            for prefix in &self.ament_prefix_path {
+                search.check(prefix.join("share").join(package), "AMENT_PREFIX_PATH");
+            }
+            for folder in self.folder.ancestors() {
+                search.around(folder, package, "above the URDF");
+            }
+        }
+        self.searched.insert(package.to_owned(), search.clone());
+        search
+    }
+}
+
+impl Search {
+    /// The folder itself, the folder of that name in it, and its children whose `package.xml` has that name.
+    fn around(&mut self, folder: &Path, package: &str, why: &str) {
+        if folder.file_name().is_some_and(|n| n == package) || declared_name(folder).as_deref() == Some(package) {
+            self.check(folder.to_path_buf(), why);
+        }
+        self.check(folder.join(package), why);
+        let children = std::fs::read_dir(folder).into_iter().flatten().take(FOLDER_LIMIT).flatten();
+        let mut named: Vec<PathBuf> =
+            children.map(|c| c.path()).filter(|c| declared_name(c).as_deref() == Some(package)).collect();
+        named.sort();
+        for child in named {
+            self.check(child, why);
+        }
+    }
+
+    fn check(&mut self, folder: PathBuf, why: &str) {
+        if self.found.contains(&folder) {
+            return;
+        }
+        self.tried.push(format!("{} ({why})", folder.display()));
+        if folder.is_dir() {
+            self.found.push(folder);
+        }
+    }
+}
+
+/// The `<name>` of the `package.xml` in a folder.
+fn declared_name(folder: &Path) -> Option<String> {
+    let path = folder.join("package.xml");
+    if std::fs::metadata(&path).ok()?.len() > 1 << 20 {
+        return None;
+    }
+    let text = std::fs::read_to_string(path).ok()?;
+    let document = roxmltree::Document::parse(&text).ok()?;
+    let name = document.root_element().children().find(|n| n.has_tag_name("name"))?.text()?;
+    Some(name.trim().to_owned())
+}
+
+/// Decodes `%20` and the like; what is no valid escape or no UTF-8 stays as it is.
+fn decode(text: &str) -> String {
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        let hex = |at: usize| bytes.get(at).and_then(|b| char::from(*b).to_digit(16));
+        match (bytes[i], hex(i + 1), hex(i + 2)) {
+            (b'%', Some(high), Some(low)) => {
+                decoded.push((high * 16 + low) as u8);
+                i += 3;
+            }
+            (byte, ..) => {
+                decoded.push(byte);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8(decoded).unwrap_or_else(|_| text.to_owned())
+}
+
+/// The path with `.` and `..` worked out as text, for messages.
+fn work_out(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                out.pop();
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// What is odd about a path that is no file.
+fn remark(path: &Path) -> Option<String> {
+    if path.is_dir() {
+        return Some("it is a folder".to_owned());
+    }
+    let (folder, name) = (path.parent()?, path.file_name()?.to_str()?);
+    let entries = std::fs::read_dir(folder).ok()?.take(FOLDER_LIMIT).flatten();
+    let mut names: Vec<String> = entries.filter_map(|e| e.file_name().into_string().ok()).collect();
+    names.sort();
+    let alike = names.iter().find(|n| n.to_lowercase() == name.to_lowercase());
+    let stem = |n: &str| Path::new(n).file_stem().map(std::ffi::OsStr::to_os_string);
+    let found = alike.or_else(|| names.iter().find(|n| stem(n) == stem(name)))?;
+    Some(format!("the folder has \"{found}\""))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other folder` with the package
+    /// `meshes_pkg`, `ws/install/share/installed`, `ws/ros/rospkg`.
+    fn workspace() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |path: &str, text: &str| {
+            let path = dir.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        write("ws/robot_description/urdf/robot.urdf", "");
+        write("ws/robot_description/urdf/local.stl", "");
+        write("ws/robot_description/urdf/100%25.stl", "");
+        write("ws/robot_description/urdf/mj/only_here.stl", "");
+        write("ws/robot_description/package.xml", "<package><name> robot_description </name></package>");
+        write("ws/robot_description/meshes/part one.stl", "");
+        write("ws/robot_description/meshes/Base.STL", "");
+        write("ws/other folder/package.xml", "<package><name>meshes_pkg</name></package>");
+        write("ws/other folder/a.stl", "");
+        write("ws/install/share/installed/b.stl", "");
+        write("ws/ros/rospkg/c.stl", "");
+        write("ws/broken/package.xml", "<package><name>");
+        dir
+    }
+
+    fn resolve(dir: &Path, uri: &str) -> Resolved {
+        let packages = BTreeMap::from([("mapped".to_owned(), dir.join("ws/other folder"))]);
+        let urdf = dir.join("ws/robot_description/urdf/robot.urdf");
+        let (ros, ament) = (vec![dir.join("ws/ros")], vec![dir.join("ws/install")]);
+        Resolver::with_paths(&urdf, &packages, Some("mj"), ros, ament).resolve(uri)
+    }
+
+    #[test]
+    fn every_kind_of_uri_is_found() {
+        let dir = workspace();
+        let absolute = dir.path().join("ws/ros/rospkg/c.stl").display().to_string();
+        for (uri, file) in [
+            ("package://robot_description/meshes/part%20one.stl", "part one.stl"),
+            ("package://robot_description/meshes/part one.stl", "part one.stl"),
+            ("package://robot_description//meshes/Base.STL", "Base.STL"),
+            ("model://robot_description/meshes/Base.STL", "Base.STL"),
+            ("package://meshes_pkg/a.stl", "a.stl"),
+            ("package://mapped/a.stl", "a.stl"),
+            ("package://installed/b.stl", "b.stl"),
+            ("package://rospkg/c.stl", "c.stl"),
+            ("package://rospkg/../../robot_description/meshes/Base.STL", "Base.STL"),
+            ("package://nowhere/meshes/only_here.stl", "only_here.stl"),
+            (&absolute, "c.stl"),
+            (&format!("file://{absolute}"), "c.stl"),
+            (&format!("file://localhost{absolute}"), "c.stl"),
+            ("file://local.stl", "local.stl"),
+            ("local.stl", "local.stl"),
+            (" ./local.stl ", "local.stl"),
+            ("../meshes/part%20one.stl", "part one.stl"),
+            ("100%25.stl", "100%25.stl"),
+            ("only_here.stl", "only_here.stl"),
+            ("some/folder/only_here.stl", "only_here.stl"),
+        ] {
+            match resolve(dir.path(), uri) {
+                Resolved::Found(path) => assert!(path.is_file() && path.ends_with(file), "{uri}: {path:?}"),
+                other => panic!("{uri}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_found_says_where_it_was_looked_for() {
+        let dir = workspace();
+        for uri in ["package://robot_description/../../outside.stl", "../../outside.stl"] {
+            let Resolved::Missing { tried, .. } = resolve(dir.path(), uri) else { panic!("{uri}") };
+            assert!(tried[0].ends_with("outside.stl") && !tried[0].contains(".."), "{tried:?}");
+        }
+        let Resolved::Missing { hint, .. } = resolve(dir.path(), "../meshes/base.stl") else { panic!() };
+        assert_eq!(hint.unwrap(), "the folder has \"Base.STL\"");
+        let Resolved::Missing { hint, .. } = resolve(dir.path(), "../meshes/") else { panic!() };
+        assert_eq!(hint.unwrap(), "it is a folder");
+        let Resolved::Missing { tried, .. } = resolve(dir.path(), "package://mapped/c.stl") else { panic!() };
+        assert!(tried[0].ends_with("ws/other folder/c.stl"));
+        let Resolved::PackageUnknown { package, tried, .. } = resolve(dir.path(), "package://nope/x.stl") else {
+            panic!()
+        };
+        assert_eq!(package, "nope");
+        for place in ["ws/ros/nope (ROS_PACKAGE_PATH)", "ws/install/share/nope (AMENT_PREFIX_PATH)", "ws/nope (above"] {
+            assert!(tried.iter().any(|t| t.contains(place)), "{place} not in {tried:?}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused_without_panic() {
+        let dir = workspace();
+        assert_eq!(resolve(dir.path(), ""), Resolved::Empty);
+        assert_eq!(resolve(dir.path(), "  "), Resolved::Empty);
+        for uri in ["http://example.com/a.stl", "package://", "package://pkg", "package://pkg/", "package:///a.stl"] {
+            assert!(matches!(resolve(dir.path(), uri), Resolved::Unsupported { .. }), "{uri}");
+        }
+        for uri in ["package://../robot_description/x.stl", "package://./x.stl", "package://a\0b/x.stl"] {
+            assert!(matches!(resolve(dir.path(), uri), Resolved::PackageUnknown { .. }), "{uri}");
+        }
+        for uri in
+            ["%", "%0", "%zz.stl", "%ff.stl", "%00.stl", "file://", "://", "../../../../../../../../../../x", "~"]
+        {
+            let resolved = resolve(dir.path(), uri);
+            assert!(!matches!(resolved, Resolved::Found(_)), "{uri}: {resolved:?}");
+        }
+    }
+}
