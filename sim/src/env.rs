@@ -110,6 +110,15 @@ impl Env {
         self.refresh();
     }
 
+    /// Positions, velocities and warm start, to carry over to another model.
+    pub(crate) fn saved_arrays(&self) -> SavedArrays {
+        SavedArrays {
+            qpos: self.data.qpos().to_vec(),
+            qvel: self.data.qvel().to_vec(),
+            warmstart: self.data.qacc_warmstart().to_vec(),
+        }
+    }
+
     /// Running or diverged.
     pub fn status(&self) -> &EnvStatus {
         &self.status
@@ -236,6 +245,14 @@ impl Env {
         let _ = self.data.step1();
         self.data.take_warnings();
     }
+}
+
+/// Copies of the arrays that carry a state from one model to another.
+#[derive(Clone, Debug)]
+pub(crate) struct SavedArrays {
+    pub qpos: Vec<f64>,
+    pub qvel: Vec<f64>,
+    pub warmstart: Vec<f64>,
 }
 
 enum Verdict {

@@ -1,20 +1,36 @@
-//! URDF to MJCF to batched MuJoCo.
+//! URDF to MJCF to batched MuJoCo: one type per stage, one file per arrow.
+//!
+//! ```text
+//! URDF files -> UrdfFile -> RobotDescription -> Mjcf -> mj::Model -> Batch (N x Env)
+//!  urdf::parse  urdf::merge  mjcf::robot   mj::vfs     batch
+//! ```
 
 pub mod batch;
+mod compile;
 pub mod description;
 pub mod diagnostic;
 pub mod drive;
 pub mod dynamics;
 pub mod env;
+mod error;
+mod export;
 pub mod inertia;
+mod manager;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
 pub mod mjcf;
+pub mod objects;
 pub mod pattern;
 pub mod source;
 pub mod urdf;
 
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};
+pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};
+pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
+pub use manager::{EnvId, GroundCfg, LightCfg, RobotId, SimulationManager, SimulationManagerCfg};
+pub use mjcf::document::{Cone, Integrator};
+pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use source::Source;
+pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};

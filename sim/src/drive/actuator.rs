@@ -2,7 +2,10 @@
 //!
 //! Explicit: stable only while the time step is small against the joint's inertia, see [`stable_timestep`].
 
+use super::plan::{JointPlan, mass_matrix_at_start};
 use super::table::{Drive, Gains, Target};
+use crate::description::RobotDescription;
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj;
 use nalgebra::{DMatrix, DVector};
 
@@ -51,6 +54,42 @@ pub fn stable_timestep(mass_matrix: &DMatrix<f64>, kp: &DVector<f64>, kd: &DVect
         }
     }
     low
+}
+
+/// [`stable_timestep`] of a robot's drives at its start positions; `None` where the description's dynamics cannot be
+/// computed.
+pub fn stable_timestep_of(description: &RobotDescription, plans: &[JointPlan], floating_base: bool) -> Option<f64> {
+    let start = mass_matrix_at_start(description, plans, floating_base).ok()?;
+    let mut kp = DVector::zeros(start.matrix.nrows());
+    let mut kd = DVector::zeros(start.matrix.nrows());
+    for (plan, &column) in plans.iter().zip(&start.columns) {
+        if let Some(actuator) = plan.actuator {
+            kp[column] = actuator.kp;
+            kd[column] = actuator.kd;
+        }
+    }
+    Some(stable_timestep(&start.matrix, &kp, &kd))
+}
+
+/// A warning where the drives are not stable at the time step `dt` \[s\].
+pub fn warn_if_unstable(
+    description: &RobotDescription,
+    plans: &[JointPlan],
+    floating_base: bool,
+    dt: f64,
+) -> Option<Diagnostic> {
+    let largest = stable_timestep_of(description, plans, floating_base)?;
+    (dt >= largest).then(|| {
+        Diagnostic::new(
+            DiagnosticKind::ActuatorUnstable,
+            None,
+            format!(
+                "robot {:?}: explicit actuators with these gains are stable up to a time step of {largest:.3e} s at the \
+                 start positions, and the time step is {dt} s; use DriveModel::Implicit, smaller gains or more substeps",
+                description.name
+            ),
+        )
+    })
 }
 
 #[cfg(test)]

@@ -84,6 +84,15 @@ impl DriveState {
         }
     }
 
+    /// Takes gains, targets and effort of drive `from` of `other` for drive `to`.
+    pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
+        self.gains[to] = other.gains[from];
+        self.position[to] = other.position[from];
+        self.velocity[to] = other.velocity[from];
+        self.feedforward[to] = other.feedforward[from];
+        self.effort[to] = other.effort[from];
+    }
+
     /// The model's drives.
     pub fn table(&self) -> &Arc<DriveTable> {
         &self.table

@@ -115,6 +115,7 @@ data_arrays! {
     qpos: f64, "Positions, (nq,).";
     qvel: f64, "Velocities, (nv,).";
     qacc: f64, "Accelerations of the last solve, (nv,).";
+    qacc_warmstart: f64, "Accelerations the solver starts from, (nv,).";
     ctrl: f64, "Control inputs, (nu,).";
     qfrc_applied: f64, "Applied generalised forces, (nv,).";
     xfrc_applied: f64, "Applied forces and torques on bodies, (nbody, 6).";

@@ -32,6 +32,10 @@ impl Compiled {
         Self(Storage(raw))
     }
 
+    pub(super) fn raw(&self) -> *const mj::mjModel {
+        self.0.0.as_ptr()
+    }
+
     pub(super) fn raw_mut(&mut self) -> *mut mj::mjModel {
         self.0.0.as_ptr()
     }

@@ -1,6 +1,6 @@
 //! Names of MuJoCo objects.
 
-use super::model::Model;
+use super::model::{Compiled, Model};
 use mujoco_sys as mj;
 use std::ffi::CStr;
 
@@ -39,13 +39,38 @@ impl ObjectKind {
     }
 }
 
+/// # Safety
+/// `model` is alive.
+unsafe fn id(model: *const mj::mjModel, kind: ObjectKind, name: &str) -> Option<usize> {
+    let name = std::ffi::CString::new(name).ok()?;
+    // SAFETY: the model is alive (contract); the name is NUL-terminated; an unknown name gives -1.
+    let id = unsafe { mj::mj_name2id(model, kind.code(), name.as_ptr()) };
+    usize::try_from(id).ok()
+}
+
+impl Compiled {
+    /// Index of the object called `name`.
+    pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
+        // SAFETY: the model is alive as long as `self`.
+        unsafe { id(self.raw(), kind, name) }
+    }
+
+    /// First position and first degree of freedom of the joint called `name`.
+    pub fn joint_address(&self, name: &str) -> Option<(usize, usize)> {
+        let joint = self.id(ObjectKind::Joint, name)?;
+        // SAFETY: the model is alive and nothing writes to it while `self` is borrowed.
+        let qpos = unsafe { mj::fields::model::jnt_qposadr(self.raw()) };
+        // SAFETY: as above.
+        let dofs = unsafe { mj::fields::model::jnt_dofadr(self.raw()) };
+        Some((qpos[joint] as usize, dofs[joint] as usize))
+    }
+}
+
 impl Model {
     /// Index of the object called `name`.
     pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
-        let name = std::ffi::CString::new(name).ok()?;
-        // SAFETY: the model is alive; the name is NUL-terminated; an unknown name gives -1.
-        let id = unsafe { mj::mj_name2id(self.raw(), kind.code(), name.as_ptr()) };
-        usize::try_from(id).ok()
+        // SAFETY: the model is alive as long as `self`.
+        unsafe { id(self.raw(), kind, name) }
     }
 
     /// Name of object `id`; `None` for an unnamed one or an index out of range.

@@ -1,0 +1,333 @@
+//! From robots to a running simulation: document, MuJoCo model, drives, batch.
+
+use crate::batch::Batch;
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::drive::table::{Drive, DriveTable, Gains, Realization};
+use crate::drive::{DriveModel, implicit};
+use crate::env::with_small_buffers;
+use crate::error::{Error, Result};
+use crate::manager::SimulationManagerCfg;
+use crate::mj::{self, ObjectKind};
+use crate::mjcf::document::Mjcf;
+use crate::mjcf::robot::{self, Purpose, RobotLayout};
+use crate::mjcf::{scene, write};
+use crate::objects::robot::RobotData;
+use ::scene::Pose;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// A compiled scene and its environments.
+#[derive(Debug)]
+pub struct Simulation {
+    pub(crate) batch: Batch,
+    pub(crate) robots: Vec<RobotIndex>,
+    pub(crate) xml: String,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    pub(crate) start: Arc<Start>,
+    /// Pairs of bodies that are excluded from contact because they overlap at the start.
+    pub(crate) excluded: Vec<(String, String)>,
+}
+
+/// Where one robot's numbers are in MuJoCo's arrays.
+#[derive(Clone, Debug)]
+pub(crate) struct RobotIndex {
+    /// Position and velocity address of each drivable joint.
+    pub joints: Vec<JointIndexing>,
+    /// Body and frame of each link.
+    pub links: Vec<(usize, Pose)>,
+}
+
+/// Where one joint's numbers are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointIndexing {
+    pub qpos: usize,
+    pub dof: usize,
+    /// Index in the drive table.
+    pub drive: Option<usize>,
+}
+
+/// The initial state, as far as it differs from the model's `qpos0`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Start {
+    /// (address in qpos, position).
+    pub qpos: Vec<(usize, f64)>,
+    /// (drive, position target).
+    pub targets: Vec<(usize, f64)>,
+}
+
+/// Compiles a scene. Self-collision pairs that overlap in the initial pose are excluded and reported.
+pub(crate) fn compile(cfg: &SimulationManagerCfg, robots: &[Arc<RobotData>]) -> Result<Simulation> {
+    let first = build(cfg, robots, &[])?;
+    if !robots.iter().any(|r| r.cfg().self_collision) {
+        return first.into_simulation(cfg, robots, Vec::new());
+    }
+    let excluded = overlapping_pairs(&first, robots)?;
+    if excluded.is_empty() {
+        return first.into_simulation(cfg, robots, excluded);
+    }
+    build(cfg, robots, &excluded)?.into_simulation(cfg, robots, excluded)
+}
+
+/// The document of a scene, for running or for an export.
+pub(crate) fn document(
+    cfg: &SimulationManagerCfg,
+    robots: &[Arc<RobotData>],
+    excluded: &[(String, String)],
+    purpose: &Purpose<'_>,
+    mut mjcf: Mjcf,
+) -> Result<(Mjcf, Vec<RobotLayout>, Vec<Diagnostic>)> {
+    if let Some(ground) = &cfg.ground {
+        scene::add_ground(&mut mjcf, ground.half_size);
+    }
+    for (i, light) in cfg.lights.iter().enumerate() {
+        scene::add_light(&mut mjcf, &format!("light{i}"), light.direction, light.color);
+    }
+    let mut diagnostics = Vec::new();
+    let mut layouts = Vec::new();
+    for (index, data) in robots.iter().enumerate() {
+        let purpose = match purpose {
+            Purpose::Run { .. } => Purpose::Run { friction_tendons: data.cfg().drive.model == DriveModel::Implicit },
+            export => export.clone(),
+        };
+        let layout = robot::add(
+            data.description(),
+            &robot::RobotCfg {
+                uid: data.uid(),
+                contact: scene::robot_contact(index, data.cfg().self_collision),
+                fix_base: data.cfg().fix_base,
+                base_pose: data.cfg().init_pose,
+                plans: data.plans(),
+                hulls: data.hulls(),
+                purpose,
+            },
+            &mut mjcf,
+            &mut diagnostics,
+        )?;
+        if data.cfg().self_collision {
+            mjcf.excludes.extend(layout.base_pairs.iter().cloned());
+        }
+        layouts.push(layout);
+    }
+    for pair in excluded {
+        if !mjcf.excludes.contains(pair) {
+            mjcf.excludes.push(pair.clone());
+        }
+    }
+    Ok((mjcf, layouts, diagnostics))
+}
+
+struct Built {
+    model: mj::Model,
+    table: Arc<DriveTable>,
+    robots: Vec<RobotIndex>,
+    start: Arc<Start>,
+    xml: String,
+    diagnostics: Vec<Diagnostic>,
+}
+
+fn build(cfg: &SimulationManagerCfg, robots: &[Arc<RobotData>], excluded: &[(String, String)]) -> Result<Built> {
+    let empty = Mjcf::new("kinetoscope", cfg.physics_option());
+    let run = Purpose::Run { friction_tendons: true };
+    let (mjcf, layouts, diagnostics) = document(cfg, robots, excluded, &run, empty)?;
+    let text = write::write(&mjcf, mj::TARGET);
+    let compiled = mj::compile(&text.xml, &[]).map_err(|error| match error {
+        mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
+        other => other.into(),
+    })?;
+    let (model, table, indices, start) = set_up_drives(compiled, robots, &layouts)?;
+    Ok(Built { model, table: Arc::new(table), robots: indices, start: Arc::new(start), xml: text.xml, diagnostics })
+}
+
+/// Finds every joint and link in the compiled model, and moves implicit drives from actuators to rows.
+fn set_up_drives(
+    mut compiled: mj::Compiled,
+    robots: &[Arc<RobotData>],
+    layouts: &[RobotLayout],
+) -> Result<(mj::Model, DriveTable, Vec<RobotIndex>, Start)> {
+    let missing = |what: &'static str, name: &str| Error::UnknownName {
+        what,
+        name: name.into(),
+        candidates: Vec::new(),
+    };
+    let mut table = DriveTable::default();
+    let mut indices = Vec::new();
+    let mut start = Start::default();
+    let mut row_drives: Vec<(usize, usize)> = Vec::new();
+    let (mut row_actuators, mut native_actuators, mut damped) = (Vec::new(), Vec::new(), Vec::new());
+    for (data, layout) in robots.iter().zip(layouts) {
+        let implicit = data.cfg().drive.model == DriveModel::Implicit;
+        let mut joints = Vec::new();
+        for plan in data.plans() {
+            let name = format!("{}/{}", data.uid(), data.description().joint(plan.joint).name);
+            let (qpos, dof) = compiled.joint_address(&name).ok_or_else(|| missing("joint", &name))?;
+            start.qpos.push((qpos, plan.initial));
+            if implicit {
+                damped.push(dof);
+            }
+            let mut drive = None;
+            if let Some(actuator) = plan.actuator {
+                let ctrl = compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing("actuator", &name))?;
+                let gains = Gains { kp: actuator.kp, kd: actuator.kd, max_effort: plan.max_effort };
+                let index = table.drives.len();
+                table.drives.push(Drive { qpos, dof, ctrl, realization: Realization::Actuator, initial: gains });
+                start.targets.push((index, plan.initial));
+                drive = Some(index);
+                if implicit {
+                    row_drives.push((dof, index));
+                    row_actuators.push(ctrl);
+                } else {
+                    native_actuators.push(ctrl);
+                }
+            }
+            joints.push(JointIndexing { qpos, dof, drive });
+        }
+        let links = layout
+            .links
+            .iter()
+            .map(|frame| {
+                let body = compiled.id(ObjectKind::Body, &frame.body).ok_or_else(|| missing("body", &frame.body))?;
+                Ok((body, frame.body_from_link))
+            })
+            .collect::<Result<_>>()?;
+        indices.push(RobotIndex { joints, links });
+    }
+    let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
+    table.damped = implicit::prepare(&mut compiled, &dofs, &row_actuators, &damped);
+    compiled.unlimit_controls(&native_actuators);
+    compiled.prepare_for_stepping(!row_drives.is_empty());
+    let model = compiled.into_model();
+    // Friction rows come in the order of degrees of freedom, one for each with friction.
+    let with_friction: Vec<usize> =
+        model.dof_frictionloss().iter().enumerate().filter(|(_, f)| **f > 0.0).map(|(dof, _)| dof).collect();
+    for (dof, index) in row_drives {
+        let row = with_friction.binary_search(&dof).map_err(|_| missing("friction row", &format!("{dof}")))?;
+        table.drives[index].realization = Realization::Row { row };
+    }
+    Ok((model, table, indices, start))
+}
+
+impl Built {
+    fn into_simulation(
+        self,
+        cfg: &SimulationManagerCfg,
+        robots: &[Arc<RobotData>],
+        excluded: Vec<(String, String)>,
+    ) -> Result<Simulation> {
+        let mut diagnostics = self.diagnostics;
+        for (a, b) in &excluded {
+            diagnostics.push(Diagnostic::new(
+                DiagnosticKind::InitialOverlap,
+                None,
+                format!("{a:?} and {b:?} overlap in the initial pose and never collide with each other"),
+            ));
+        }
+        let threads = cfg
+            .threads
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get));
+        let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads)?;
+        let mut simulation =
+            Simulation { batch, robots: self.robots, xml: self.xml, diagnostics, start: self.start, excluded };
+        debug_assert_eq!(robots.len(), simulation.robots.len());
+        simulation.reset(&vec![true; cfg.num_envs]);
+        Ok(simulation)
+    }
+}
+
+impl Simulation {
+    /// Puts the chosen environments in the initial state.
+    pub(crate) fn reset(&mut self, chosen: &[bool]) {
+        let start = Arc::clone(&self.start);
+        let chosen = chosen.to_vec();
+        self.batch.run(Arc::new(move |i, env| {
+            if chosen[i] {
+                env.reset(|data, drives| {
+                    for &(address, position) in &start.qpos {
+                        data.qpos_mut()[address] = position;
+                    }
+                    for &(drive, target) in &start.targets {
+                        drives.position[drive] = target;
+                    }
+                });
+            }
+        }));
+    }
+
+    /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,
+    /// time.
+    pub(crate) fn carry_over(&mut self, old: &Self) {
+        let (old_model, model) = (old.batch.model(), self.batch.model());
+        let mut qpos = Vec::new();
+        let mut dofs = Vec::new();
+        for joint in 0..old_model.njnt() {
+            let Some(new) = old_model.name(ObjectKind::Joint, joint).and_then(|n| model.id(ObjectKind::Joint, &n))
+            else {
+                continue;
+            };
+            let (nq, nv) = match old_model.jnt_type()[joint] as u32 {
+                mj::mjJNT_FREE => (7, 6),
+                mj::mjJNT_BALL => (4, 3),
+                _ => (1, 1),
+            };
+            let at = |m: &mj::Model, j: usize| (m.jnt_qposadr()[j] as usize, m.jnt_dofadr()[j] as usize);
+            let ((from_q, from_v), (to_q, to_v)) = (at(old_model, joint), at(model, new));
+            qpos.extend((0..nq).map(|k| (from_q + k, to_q + k)));
+            dofs.extend((0..nv).map(|k| (from_v + k, to_v + k)));
+        }
+        let drives: Vec<(usize, usize)> = old
+            .robots
+            .iter()
+            .zip(&self.robots)
+            .flat_map(|(old, new)| old.joints.iter().zip(&new.joints))
+            .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
+            .collect();
+        for i in 0..self.batch.num_envs() {
+            let (state, time, targets) = old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone()));
+            self.batch.write(i, |env| {
+                for &(from, to) in &drives {
+                    env.drives.copy_from(&targets, from, to);
+                }
+                for &(from, to) in &dofs {
+                    env.drives.applied[to] = targets.applied[from];
+                }
+                env.write(|data| {
+                    for &(from, to) in &qpos {
+                        data.qpos_mut()[to] = state.qpos[from];
+                    }
+                    for &(from, to) in &dofs {
+                        data.qvel_mut()[to] = state.qvel[from];
+                        data.qacc_warmstart_mut()[to] = state.warmstart[from];
+                    }
+                    data.set_time(time);
+                });
+            });
+        }
+    }
+}
+
+/// Pairs of bodies of one robot that touch in the initial pose.
+fn overlapping_pairs(built: &Built, robots: &[Arc<RobotData>]) -> Result<Vec<(String, String)>> {
+    let mut data = mj::Data::new(&built.model.with_buffers(built.model.buffers()))?;
+    for &(address, position) in &built.start.qpos {
+        data.qpos_mut()[address] = position;
+    }
+    data.step1()?;
+    let model = &built.model;
+    let mut pairs = BTreeSet::new();
+    for contact in data.contact() {
+        let body = |geom: i32| {
+            usize::try_from(geom).ok().and_then(|g| {
+                let body = model.geom_bodyid()[g] as usize;
+                model.name(ObjectKind::Body, body)
+            })
+        };
+        let (Some(a), Some(b)) = (body(contact.geom1), body(contact.geom2)) else { continue };
+        let of_one_robot = robots.iter().any(|r| {
+            let prefix = format!("{}/", r.uid());
+            a.starts_with(&prefix) && b.starts_with(&prefix)
+        });
+        if of_one_robot && contact.dist < 0.0 {
+            pairs.insert(if a < b { (a, b) } else { (b, a) });
+        }
+    }
+    Ok(pairs.into_iter().collect())
+}

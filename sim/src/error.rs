@@ -1,0 +1,188 @@
+//! The error of the public API: what the user did, where, and what would be right.
+
+use crate::batch::BatchError;
+use crate::drive::plan::PlanError;
+use crate::mj::{CompileError, EngineError, LoadError, VersionError};
+use crate::mjcf::robot::EmitError;
+use crate::pattern::PatternError;
+use crate::source::Source;
+use crate::urdf::UrdfError;
+use std::path::PathBuf;
+
+/// Result of the public API.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// An error of the public API.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A URDF file or an assembly of them is wrong.
+    #[error(transparent)]
+    Urdf(#[from] UrdfError),
+    /// A mesh that collides cannot be used.
+    #[error("{at}: link {link:?}: {error}")]
+    CollisionMesh {
+        /// Where the mesh is named.
+        at: Source,
+        /// The link.
+        link: String,
+        /// What is wrong with the file.
+        #[source]
+        error: scene::mesh::MeshError,
+    },
+    /// A drive property or a start position is wrong.
+    #[error("robot {robot:?}: {error}")]
+    Plan {
+        /// The robot.
+        robot: String,
+        /// What is wrong.
+        #[source]
+        error: PlanError,
+    },
+    /// A control part's patterns are wrong.
+    #[error("robot {robot:?}, control part {part:?}: {error}")]
+    ControlPart {
+        /// The robot.
+        robot: String,
+        /// The part.
+        part: String,
+        /// What is wrong.
+        #[source]
+        error: PatternError,
+    },
+    /// The robot cannot be written as MJCF.
+    #[error(transparent)]
+    Emit(#[from] EmitError),
+    /// MuJoCo refuses the model.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// The MuJoCo library is not of the version of the headers.
+    #[error(transparent)]
+    MujocoVersion(#[from] VersionError),
+    /// Environments cannot be made.
+    #[error(transparent)]
+    Batch(#[from] BatchError),
+    /// MuJoCo's engine stopped.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// A number of the configuration is out of range.
+    #[error("{field} is {value}; {expected}")]
+    Config {
+        /// The field.
+        field: &'static str,
+        /// The value given.
+        value: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// The combination of integrator and drives does not work.
+    #[error(
+        "robot {robot:?}: implicit drives need the integrator Euler{also}, not {integrator}; change the integrator or \
+         use DriveModel::Actuator"
+    )]
+    Integrator {
+        /// The robot.
+        robot: String,
+        /// MuJoCo's word for the integrator.
+        integrator: &'static str,
+        /// Further integrators that this MuJoCo offers.
+        also: &'static str,
+    },
+    /// This MuJoCo does not know the integrator.
+    #[error("MuJoCo {version} has no integrator {integrator}; it has Euler, RK4 and implicit")]
+    IntegratorUnknown {
+        /// MuJoCo's word.
+        integrator: &'static str,
+        /// MuJoCo's version.
+        version: String,
+    },
+    /// A name is used already.
+    #[error("a robot called {0:?} exists already; give each robot a uid of its own")]
+    DuplicateUid(String),
+    /// A name that cannot be written to MJCF.
+    #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
+    InvalidUid(String),
+    /// More robots than contact bits.
+    #[error("{0} robots are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)")]
+    TooManyRobots(usize),
+    /// No such name.
+    #[error("there is no {what} {name:?}; {}", candidates_sentence(.candidates))]
+    UnknownName {
+        /// What kind of thing was looked for.
+        what: &'static str,
+        /// The name given.
+        name: String,
+        /// Names that exist, nearest first.
+        candidates: Vec<String>,
+    },
+    /// No such index.
+    #[error("{what} {index} does not exist; there are {count} (0 to {})", count.saturating_sub(1))]
+    UnknownIndex {
+        /// What kind of index.
+        what: &'static str,
+        /// The index given.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// An array has the wrong shape.
+    #[error("{argument} has shape {found:?}; expected {expected:?} ({meaning}), or one row for all environments")]
+    Shape {
+        /// The argument.
+        argument: &'static str,
+        /// Shape given.
+        found: Vec<usize>,
+        /// Shape that would be right.
+        expected: Vec<usize>,
+        /// What the axes are.
+        meaning: &'static str,
+    },
+    /// A value is NaN or infinite.
+    #[error("{argument}[{row}, {column}] (joint {joint:?}) is {value}; it must be finite")]
+    NotFinite {
+        /// The argument.
+        argument: &'static str,
+        /// Row of the array.
+        row: usize,
+        /// Column of the array.
+        column: usize,
+        /// The joint of the column.
+        joint: String,
+        /// The value.
+        value: f64,
+    },
+    /// A file cannot be read or written.
+    #[error("{path}: {error}")]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        #[source]
+        error: std::io::Error,
+    },
+    /// A texture cannot be converted.
+    #[error("{path}: not a readable PNG or JPEG image: {reason}")]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl From<LoadError> for Error {
+    fn from(error: LoadError) -> Self {
+        match error {
+            LoadError::Version(e) => Self::MujocoVersion(e),
+            LoadError::Compile(e) => Self::Compile(e),
+        }
+    }
+}
+
+fn candidates_sentence(candidates: &[String]) -> String {
+    if candidates.is_empty() {
+        return "there are none".into();
+    }
+    let names: Vec<String> = candidates.iter().map(|c| format!("{c:?}")).collect();
+    format!("known are {}", names.join(", "))
+}

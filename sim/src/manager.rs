@@ -1,0 +1,398 @@
+//! `SimulationManager`: robots in N environments, compiled and stepped together.
+
+use crate::batch::Batch;
+use crate::compile::{Simulation, compile};
+use crate::diagnostic::{Diagnostic, count_by_name};
+use crate::env::EnvStatus;
+use crate::error::{Error, Result};
+use crate::mj;
+use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
+use crate::mjcf::scene::MAX_ROBOTS;
+use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
+use nalgebra::Vector3;
+use ndarray::Array2;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulationManagerCfg {
+    /// Number of environments.
+    pub num_envs: usize,
+    /// Step of the simulation \[s\].
+    pub physics_dt: f64,
+    /// MuJoCo steps in one `physics_dt`.
+    pub substeps: u32,
+    /// Gravity \[m/s²\].
+    pub gravity: Vector3<f64>,
+    /// Integrator.
+    pub integrator: Integrator,
+    /// Friction cone.
+    pub cone: Cone,
+    /// Ratio of frictional to normal impedance; larger values slip less.
+    pub impratio: f64,
+    /// Largest number of solver iterations in a step.
+    pub solver_iterations: u32,
+    /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
+    pub friction: [f64; 3],
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Threads that step; every core where unset.
+    pub threads: Option<usize>,
+    /// Distance of environments in the overview \[m\].
+    pub arena_space: f64,
+    /// Ground plane at z = 0; `None` for none.
+    pub ground: Option<GroundCfg>,
+    /// Lights.
+    pub lights: Vec<LightCfg>,
+}
+
+/// A ground plane at z = 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundCfg {
+    /// Half of the side that is drawn \[m\]; the plane itself is infinite.
+    pub half_size: f64,
+}
+
+impl Default for GroundCfg {
+    fn default() -> Self {
+        Self { half_size: 50.0 }
+    }
+}
+
+/// A directional light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightCfg {
+    /// Direction in which it shines.
+    pub direction: Vector3<f64>,
+    /// Colour, 0..=1.
+    pub color: [f64; 3],
+}
+
+impl Default for LightCfg {
+    fn default() -> Self {
+        Self { direction: Vector3::new(-0.3, 0.4, -1.0), color: [0.8, 0.8, 0.8] }
+    }
+}
+
+impl Default for SimulationManagerCfg {
+    fn default() -> Self {
+        Self {
+            num_envs: 1,
+            physics_dt: 0.01,
+            substeps: 1,
+            gravity: Vector3::new(0.0, 0.0, -9.81),
+            integrator: Integrator::Euler,
+            cone: Cone::Pyramidal,
+            impratio: 1.0,
+            solver_iterations: 100,
+            friction: [1.0, 0.005, 0.0001],
+            seed: 0,
+            threads: None,
+            arena_space: 5.0,
+            ground: Some(GroundCfg::default()),
+            lights: vec![LightCfg::default()],
+        }
+    }
+}
+
+impl SimulationManagerCfg {
+    /// For hands that hold things: elliptic cones that do not slip.
+    pub fn manipulation() -> Self {
+        Self { cone: Cone::Elliptic, impratio: 10.0, ..Self::default() }
+    }
+
+    /// For robots on legs: 200 Hz.
+    pub fn legged() -> Self {
+        Self { physics_dt: 0.005, ..Self::default() }
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first field that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let fail = |field, value: &dyn std::fmt::Display, expected| {
+            Err(Error::Config { field, value: value.to_string(), expected })
+        };
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if self.num_envs == 0 {
+            return fail("num_envs", &0, "a simulation needs at least 1 environment");
+        }
+        if self.num_envs > MAX_ENVS {
+            return fail("num_envs", &self.num_envs, "one process can hold at most 1048576 environments");
+        }
+        if !positive(self.physics_dt) || self.physics_dt > 1.0 {
+            return fail("physics_dt", &self.physics_dt, "it must be above 0 and at most 1 second, such as 0.01");
+        }
+        if self.substeps == 0 || self.substeps > 10_000 {
+            return fail("substeps", &self.substeps, "it must be 1 to 10000");
+        }
+        if self.physics_dt / f64::from(self.substeps) < 1e-9 {
+            return fail("physics_dt", &self.physics_dt, "physics_dt / substeps must be at least 1e-9 seconds");
+        }
+        if !self.gravity.iter().all(|g| g.is_finite()) {
+            return fail("gravity", &self.gravity, "it must be finite, such as (0, 0, -9.81)");
+        }
+        if !positive(self.impratio) {
+            return fail("impratio", &self.impratio, "it must be above 0");
+        }
+        if self.solver_iterations == 0 || self.solver_iterations > 1_000_000 {
+            return fail("solver_iterations", &self.solver_iterations, "it must be 1 to 1000000");
+        }
+        if !self.friction.iter().all(|f| f.is_finite() && *f >= 0.0) {
+            return fail("friction", &format!("{:?}", self.friction), "the three coefficients must be >= 0");
+        }
+        if let Some(threads) = self.threads
+            && !(1..=1024).contains(&threads)
+        {
+            return fail("threads", &threads, "it must be 1 to 1024; leave it out to use every core");
+        }
+        if !(self.arena_space.is_finite() && self.arena_space >= 0.0) {
+            return fail("arena_space", &self.arena_space, "it must be a distance >= 0 in metres");
+        }
+        if let Some(ground) = &self.ground
+            && !positive(ground.half_size)
+        {
+            return fail("ground.half_size", &ground.half_size, "it must be above 0 metres");
+        }
+        for light in &self.lights {
+            if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
+                return fail("lights.direction", &light.direction, "it must be a finite vector other than zero");
+            }
+            if !light.color.iter().all(|c| (0.0..=1.0).contains(c)) {
+                return fail("lights.color", &format!("{:?}", light.color), "each component must be 0 to 1");
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn physics_option(&self) -> PhysicsOption {
+        PhysicsOption {
+            timestep: self.physics_dt / f64::from(self.substeps),
+            gravity: self.gravity,
+            integrator: self.integrator,
+            cone: self.cone,
+            impratio: self.impratio,
+            iterations: self.solver_iterations,
+            friction: self.friction,
+        }
+    }
+}
+
+/// More environments than any machine steps; keeps a typing error from filling the memory.
+const MAX_ENVS: usize = 1 << 20;
+
+/// Index of an environment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EnvId(pub usize);
+
+/// Handle of a robot; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RobotId(pub(crate) usize);
+
+/// Robots in N environments. Environments never touch each other; dropping the manager frees everything.
+#[derive(Debug)]
+pub struct SimulationManager {
+    cfg: SimulationManagerCfg,
+    robots: Vec<Arc<RobotData>>,
+    diagnostics: Vec<Diagnostic>,
+    simulation: Simulation,
+}
+
+impl SimulationManager {
+    /// An empty simulation.
+    ///
+    /// # Errors
+    /// A number of the configuration is out of range, or MuJoCo is not the one this program was built for.
+    pub fn new(cfg: SimulationManagerCfg) -> Result<Self> {
+        cfg.validate()?;
+        mj::check_version()?;
+        if cfg.integrator == Integrator::ImplicitFast && mj::TARGET == mj::Target::V2 {
+            let version = mj::version_string();
+            return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
+        }
+        let simulation = compile(&cfg, &[])?;
+        Ok(Self { cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation })
+    }
+
+    /// The configuration.
+    pub fn cfg(&self) -> &SimulationManagerCfg {
+        &self.cfg
+    }
+
+    /// Number of environments.
+    pub fn num_envs(&self) -> usize {
+        self.cfg.num_envs
+    }
+
+    /// Number of threads that step.
+    pub fn threads(&self) -> usize {
+        self.simulation.batch.threads()
+    }
+
+    /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
+    /// error the simulation is as it was. What exists already keeps its state.
+    ///
+    /// # Errors
+    /// Anything wrong with the files, names, drives or meshes of the robot.
+    pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
+        if self.robots.iter().any(|r| r.uid() == cfg.uid) {
+            return Err(Error::DuplicateUid(cfg.uid));
+        }
+        if self.robots.len() >= MAX_ROBOTS {
+            return Err(Error::TooManyRobots(MAX_ROBOTS));
+        }
+        let mut diagnostics = Vec::new();
+        let robot = RobotData::load(cfg, &self.cfg, &mut diagnostics)?;
+        let mut robots = self.robots.clone();
+        robots.push(Arc::new(robot));
+        let mut simulation = compile(&self.cfg, &robots)?;
+        diagnostics.append(&mut simulation.diagnostics);
+        simulation.carry_over(&self.simulation);
+        self.simulation = simulation;
+        self.robots = robots;
+        self.diagnostics.extend(diagnostics);
+        Ok(RobotId(self.robots.len() - 1))
+    }
+
+    /// A robot, to read.
+    pub fn robot(&self, id: RobotId) -> Robot<'_> {
+        Robot::new(&self.robots[id.0], &self.simulation, id.0)
+    }
+
+    /// A robot, to command and to write.
+    pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
+        RobotMut::new(&self.robots[id.0], &mut self.simulation, id.0)
+    }
+
+    /// The robot called `uid`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
+        self.robots.iter().position(|r| r.uid() == uid).map(RobotId).ok_or_else(|| Error::UnknownName {
+            what: "robot",
+            name: uid.into(),
+            candidates: self.robots.iter().map(|r| r.uid().to_string()).collect(),
+        })
+    }
+
+    /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
+    pub fn update(&mut self, steps: u32) {
+        for _ in 0..steps / BLOCK {
+            self.simulation.batch.step(BLOCK * self.cfg.substeps);
+        }
+        self.simulation.batch.step(steps % BLOCK * self.cfg.substeps);
+    }
+
+    /// Puts environments back to their initial state, all of them where `env_ids` is `None`; revives diverged ones.
+    ///
+    /// # Errors
+    /// An environment does not exist; then none is reset.
+    pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let chosen = env_mask(env_ids, self.num_envs())?;
+        self.simulation.reset(&chosen);
+        Ok(())
+    }
+
+    /// Simulation time of each environment \[s\].
+    pub fn time(&self) -> Vec<f64> {
+        let mut times = Vec::with_capacity(self.num_envs());
+        self.simulation.batch.for_each(|_, env| times.push(env.data().time()));
+        times
+    }
+
+    /// Places of the environments in the overview \[m\], (N, 3): a grid with `arena_space` between neighbours.
+    ///
+    /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k stands in row k div cols, column k mod cols.
+    pub fn env_origins(&self) -> Array2<f64> {
+        let n = self.num_envs();
+        let rows = n.div_ceil(n.isqrt().max(1));
+        let cols = n.div_ceil(rows);
+        let space = self.cfg.arena_space;
+        let mut origins = Array2::zeros((n, 3));
+        for (k, mut origin) in origins.rows_mut().into_iter().enumerate() {
+            let (i, j) = ((k / cols) as f64, (k % cols) as f64);
+            origin[0] = -(i - (rows - 1) as f64 / 2.0) * space;
+            origin[1] = (j - (cols - 1) as f64 / 2.0) * space;
+        }
+        origins
+    }
+
+    /// Environments that a step could not be done in, with the reason; they stand in their last good state.
+    pub fn diverged(&self) -> Vec<(EnvId, String)> {
+        let mut diverged = Vec::new();
+        self.simulation.batch.for_each(|i, env| {
+            if let EnvStatus::Diverged { step, reason } = env.status() {
+                diverged.push((EnvId(i), format!("step {step}: {reason}")));
+            }
+        });
+        diverged
+    }
+
+    /// Everything that was repaired, ignored or unusual when robots were added.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
+    }
+
+    /// Counts of all warnings by name: diagnostics, MuJoCo's warnings over all environments, diverged environments.
+    pub fn warning_counts(&self) -> BTreeMap<String, u64> {
+        let mut counts: BTreeMap<String, u64> =
+            count_by_name(&self.diagnostics).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();
+        let mut mujoco = mj::WarningCounts::default();
+        let mut diverged = 0;
+        self.simulation.batch.for_each(|_, env| {
+            mujoco.add(env.warnings());
+            diverged += u64::from(*env.status() != EnvStatus::Running);
+        });
+        for (warning, n) in mj::Warning::ALL.iter().zip(mujoco.0) {
+            if n > 0 {
+                counts.insert(warning.name().into(), n);
+            }
+        }
+        if diverged > 0 {
+            counts.insert("environment-diverged".into(), diverged);
+        }
+        counts
+    }
+
+    /// How often contact and constraint buffers were doubled, over all environments.
+    pub fn buffer_growths(&self) -> u64 {
+        let mut growths = 0;
+        self.simulation.batch.for_each(|_, env| growths += u64::from(env.growths()));
+        growths
+    }
+
+    /// The MJCF that is being stepped.
+    pub fn mjcf(&self) -> &str {
+        &self.simulation.xml
+    }
+
+    /// The batch of environments, for work below this API.
+    pub fn batch(&self) -> &Batch {
+        &self.simulation.batch
+    }
+
+    /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both
+    /// MuJoCo lines with its meshes.
+    ///
+    /// # Errors
+    /// A file cannot be written, or a visual mesh or texture cannot be read.
+    pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<()> {
+        crate::export::dump(&self.cfg, &self.robots, &self.simulation, dir.as_ref())
+    }
+}
+
+/// Steps done in one go: a caller's Ctrl+C and other environments wait no longer.
+const BLOCK: u32 = 1000;
+
+/// Which environments are meant, as a mask.
+pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<bool>> {
+    let Some(ids) = env_ids else { return Ok(vec![true; num_envs]) };
+    let mut mask = vec![false; num_envs];
+    for &EnvId(index) in ids {
+        *mask.get_mut(index).ok_or(Error::UnknownIndex { what: "environment", index, count: num_envs })? = true;
+    }
+    Ok(mask)
+}

@@ -1,0 +1,493 @@
+//! Robots: configuration, the loaded robot, and its views of a running simulation.
+
+use crate::compile::{RobotIndex, Simulation};
+use crate::description::{JointKind, RobotDescription};
+use crate::diagnostic::Diagnostic;
+use crate::drive::plan::{JointPlan, plan};
+use crate::drive::{DriveCfg, DriveModel};
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManagerCfg, env_mask};
+use crate::mj;
+use crate::mjcf::document::Integrator;
+use crate::mjcf::robot::MeshKey;
+use crate::pattern;
+use crate::urdf::{UrdfCfg, assemble};
+use ndarray::{Array2, Array3, AsArray, Ix2};
+use ::scene::Pose;
+use ::scene::mesh::{HullCache, HullCfg, TriMesh};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Configuration of a robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotCfg {
+    /// Name of the robot, unique in the simulation; prefix of its names in MuJoCo.
+    pub uid: String,
+    /// The URDF files.
+    pub urdf: UrdfCfg,
+    /// Named groups of joints: patterns that each match whole joint names.
+    pub control_parts: Vec<(String, Vec<String>)>,
+    /// Drive properties.
+    pub drive: DriveCfg,
+    /// Whether the root link stands fixed in the environment.
+    pub fix_base: bool,
+    /// Pose of the root link in the environment.
+    pub init_pose: Pose,
+    /// Start positions by joint pattern or control part \[rad or m\]; 0 where none matches.
+    pub init_qpos: Vec<(String, f64)>,
+    /// Whether links of this robot collide with each other.
+    pub self_collision: bool,
+    /// How collision meshes become convex hulls.
+    pub hull: HullCfg,
+}
+
+impl Default for RobotCfg {
+    fn default() -> Self {
+        Self {
+            uid: "robot".into(),
+            urdf: UrdfCfg::default(),
+            control_parts: Vec::new(),
+            drive: DriveCfg::default(),
+            fix_base: true,
+            init_pose: Pose::identity(),
+            init_qpos: Vec::new(),
+            self_collision: false,
+            hull: HullCfg::default(),
+        }
+    }
+}
+
+/// Column of a joint in `get_qpos` and its kin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct JointIndex(pub usize);
+
+/// A loaded robot: everything about it that does not change while the simulation runs.
+#[derive(Debug)]
+pub struct RobotData {
+    cfg: RobotCfg,
+    description: RobotDescription,
+    plans: Vec<JointPlan>,
+    joint_names: Vec<String>,
+    parts: BTreeMap<String, Vec<usize>>,
+    hulls: BTreeMap<MeshKey, TriMesh>,
+}
+
+impl RobotData {
+    /// Reads the files, resolves names, drives and meshes.
+    pub(crate) fn load(
+        cfg: RobotCfg,
+        manager: &SimulationManagerCfg,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<Self> {
+        let usable = (1..=64).contains(&cfg.uid.chars().count())
+            && !cfg.uid.chars().any(|c| c == '/' || c.is_control());
+        if !usable {
+            return Err(Error::InvalidUid(cfg.uid));
+        }
+        check_integrator(&cfg, manager.integrator)?;
+        let assembly = assemble(&cfg.urdf)?;
+        let mut found = assembly.diagnostics;
+        let description = assembly.description;
+        let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
+        let mut parts = BTreeMap::new();
+        for (part, patterns) in &cfg.control_parts {
+            let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
+                robot: cfg.uid.clone(),
+                part: part.clone(),
+                error,
+            })?;
+            parts.insert(part.clone(), members);
+        }
+        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error };
+        let (plans, mut planned) =
+            plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
+        found.append(&mut planned);
+        if cfg.drive.model == DriveModel::Actuator {
+            let dt = manager.physics_option().timestep;
+            found.extend(crate::drive::actuator::warn_if_unstable(&description, &plans, !cfg.fix_base, dt));
+        }
+        let hulls = collision_hulls(&description, &cfg.hull)?;
+        diagnostics.append(&mut found);
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls })
+    }
+
+    /// Name of the robot.
+    pub fn uid(&self) -> &str {
+        &self.cfg.uid
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &RobotCfg {
+        &self.cfg
+    }
+
+    /// The merged robot as its files describe it.
+    pub fn description(&self) -> &RobotDescription {
+        &self.description
+    }
+
+    /// Limits and drives of its joints.
+    pub fn plans(&self) -> &[JointPlan] {
+        &self.plans
+    }
+
+    pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
+        &self.hulls
+    }
+}
+
+/// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
+fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
+    let allowed = match integrator {
+        Integrator::Euler => true,
+        Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
+        Integrator::Rk4 | Integrator::Implicit => false,
+    };
+    let driven = cfg.drive.drive_type != crate::drive::DriveType::None;
+    if cfg.drive.model == DriveModel::Implicit && driven && !allowed {
+        let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
+        return Err(Error::Integrator { robot: cfg.uid.clone(), integrator: integrator.name(), also });
+    }
+    Ok(())
+}
+
+/// The convex hull of every collision mesh, one per file and scale, from the cache where it is there.
+fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
+    let cache = HullCache::default_location();
+    let mut hulls = BTreeMap::new();
+    for link in &description.links {
+        for collision in &link.collisions {
+            let crate::description::Geometry::Mesh { path, scale, .. } = &collision.geometry else { continue };
+            let key = MeshKey::new(path, scale);
+            if hulls.contains_key(&key) {
+                continue;
+            }
+            let hull = cache.hull_of_file(path, (*scale).into(), cfg).map_err(|error| Error::CollisionMesh {
+                at: collision.source.clone(),
+                link: link.name.clone(),
+                error,
+            })?;
+            hulls.insert(key, hull);
+        }
+    }
+    Ok(hulls)
+}
+
+/// A robot, to read. Arrays have one row per environment and one column per joint, in the order of
+/// [`joint_names`](Self::joint_names).
+#[derive(Clone, Copy, Debug)]
+pub struct Robot<'a> {
+    data: &'a Arc<RobotData>,
+    simulation: &'a Simulation,
+    index: usize,
+}
+
+impl<'a> Robot<'a> {
+    pub(crate) fn new(data: &'a Arc<RobotData>, simulation: &'a Simulation, index: usize) -> Self {
+        Self { data, simulation, index }
+    }
+
+    fn indexing(&self) -> &'a RobotIndex {
+        &self.simulation.robots[self.index]
+    }
+
+    /// Name of the robot.
+    pub fn uid(&self) -> &'a str {
+        self.data.uid()
+    }
+
+    /// The merged robot as its files describe it.
+    pub fn description(&self) -> &'a RobotDescription {
+        self.data.description()
+    }
+
+    /// Number of movable joints with one degree of freedom, mimic ones included: the columns of `get_qpos`.
+    pub fn dof(&self) -> usize {
+        self.data.plans.len()
+    }
+
+    /// Names of the movable joints in the order of the merged URDF.
+    pub fn joint_names(&self) -> &'a [String] {
+        &self.data.joint_names
+    }
+
+    /// Names of all links, fused ones included, in the order of the merged URDF.
+    pub fn link_names(&self) -> Vec<&'a str> {
+        self.data.description.links.iter().map(|l| l.name.as_str()).collect()
+    }
+
+    /// Names of the control parts.
+    pub fn control_parts(&self) -> Vec<&'a str> {
+        self.data.parts.keys().map(String::as_str).collect()
+    }
+
+    /// Columns of the joints of a control part, mimic joints included, in the order of its patterns.
+    ///
+    /// # Errors
+    /// There is no such part; the error lists those there are.
+    pub fn get_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
+        let members = self.data.parts.get(part).ok_or_else(|| Error::UnknownName {
+            what: "control part",
+            name: part.into(),
+            candidates: pattern::closest(part, self.data.parts.keys().map(String::as_str))
+                .into_iter()
+                .map(str::to_string)
+                .collect(),
+        })?;
+        Ok(members.iter().map(|&i| JointIndex(i)).collect())
+    }
+
+    /// Column of the joint called `name`.
+    ///
+    /// # Errors
+    /// There is no such joint; the error lists the nearest names.
+    pub fn joint_id(&self, name: &str) -> Result<JointIndex> {
+        self.joint_names().iter().position(|n| n == name).map(JointIndex).ok_or_else(|| Error::UnknownName {
+            what: "joint",
+            name: name.into(),
+            candidates: pattern::closest(name, self.joint_names().iter().map(String::as_str))
+                .into_iter()
+                .map(str::to_string)
+                .collect(),
+        })
+    }
+
+    /// Whether a joint follows another one.
+    pub fn is_mimic(&self, joint: JointIndex) -> bool {
+        self.data.plans.get(joint.0).is_some_and(|p| p.mimic.is_some())
+    }
+
+    /// For every joint: the joint it follows, ratio and offset; itself, 1 and 0 where it follows none.
+    pub fn mimic_drivers(&self) -> Vec<(JointIndex, f64, f64)> {
+        (0..self.dof())
+            .map(|i| match self.data.plans[i].mimic {
+                Some((driver, multiplier, offset)) => {
+                    let driver = self.data.plans.iter().position(|p| p.joint == driver).unwrap_or(i);
+                    (JointIndex(driver), multiplier, offset)
+                }
+                None => (JointIndex(i), 1.0, 0.0),
+            })
+            .collect()
+    }
+
+    /// Joint positions \[rad or m\], shape (N, dof).
+    pub fn get_qpos(&self) -> Array2<f64> {
+        self.gather(|env, joint| env.data().qpos()[joint.qpos])
+    }
+
+    /// Joint velocities \[rad/s or m/s\], shape (N, dof).
+    pub fn get_qvel(&self) -> Array2<f64> {
+        self.gather(|env, joint| env.data().qvel()[joint.dof])
+    }
+
+    /// Efforts of the drives in the last step \[N m or N\], shape (N, dof); 0 for joints without a drive.
+    pub fn get_qf(&self) -> Array2<f64> {
+        self.gather(|env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
+    }
+
+    /// Position targets \[rad or m\], shape (N, dof); for a mimic joint, what its driver's target implies; the present
+    /// position for a joint without a drive.
+    pub fn get_target_qpos(&self) -> Array2<f64> {
+        let mut targets = self.gather(|env, joint| match joint.drive {
+            Some(d) => env.drives.position[d],
+            None => env.data().qpos()[joint.qpos],
+        });
+        for (i, (driver, multiplier, offset)) in self.mimic_drivers().into_iter().enumerate() {
+            if driver.0 != i {
+                for mut row in targets.rows_mut() {
+                    row[i] = multiplier * row[driver.0] + offset;
+                }
+            }
+        }
+        targets
+    }
+
+    /// Positions that targets may have \[rad or m\], shape (N, dof, 2): own limits, narrowed by the limits of joints that
+    /// mimic this one; infinite where there are none.
+    pub fn qpos_limits(&self) -> Array3<f64> {
+        let n = self.simulation.batch.num_envs();
+        Array3::from_shape_fn((n, self.dof(), 2), |(_, joint, end)| self.data.plans[joint].usable[end])
+    }
+
+    /// Speed limits of the files \[rad/s or m/s\], infinite where there are none, shape (dof,). Reported, not enforced.
+    pub fn qvel_limits(&self) -> Vec<f64> {
+        self.data.plans.iter().map(|p| p.max_velocity.filter(|&v| v > 0.0).unwrap_or(f64::INFINITY)).collect()
+    }
+
+    /// Effort limits of the drives \[N m or N\], infinite where there are none, shape (N, dof).
+    pub fn qf_limits(&self) -> Array2<f64> {
+        self.gather(|env, joint| joint.drive.map_or(f64::INFINITY, |d| env.drives.gains[d].max_effort))
+    }
+
+    /// Sum of the link masses in the files \[kg\].
+    pub fn total_mass(&self) -> f64 {
+        self.data.description.total_mass()
+    }
+
+    /// Pose of a link, fused ones included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
+    ///
+    /// # Errors
+    /// There is no such link; the error lists the nearest names.
+    pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
+        let link = self.data.description.link_id(name).ok_or_else(|| Error::UnknownName {
+            what: "link",
+            name: name.into(),
+            candidates: pattern::closest(name, self.link_names()).into_iter().map(str::to_string).collect(),
+        })?;
+        let (body, body_from_link) = self.indexing().links[link.0];
+        let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
+        self.simulation.batch.for_each(|i, env| {
+            let world_from_link = body_pose(env.data(), body) * body_from_link;
+            for (k, value) in ::scene::pose::to_row(&world_from_link).into_iter().enumerate() {
+                poses[(i, k)] = value;
+            }
+        });
+        Ok(poses)
+    }
+
+    fn gather(&self, read: impl Fn(&crate::env::Env, &crate::compile::JointIndexing) -> f64) -> Array2<f64> {
+        let joints = &self.indexing().joints;
+        let mut values = Vec::with_capacity(self.simulation.batch.num_envs() * joints.len());
+        self.simulation.batch.for_each(|_, env| values.extend(joints.iter().map(|joint| read(env, joint))));
+        // One value for each environment and joint was pushed.
+        Array2::from_shape_vec((self.simulation.batch.num_envs(), joints.len()), values).unwrap_or_default()
+    }
+}
+
+fn body_pose(data: &mj::Data, body: usize) -> Pose {
+    let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
+    ::scene::pose::from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
+}
+
+/// A robot, to command and to write.
+#[derive(Debug)]
+pub struct RobotMut<'a> {
+    data: &'a Arc<RobotData>,
+    simulation: &'a mut Simulation,
+    index: usize,
+}
+
+impl<'a> RobotMut<'a> {
+    pub(crate) fn new(data: &'a Arc<RobotData>, simulation: &'a mut Simulation, index: usize) -> Self {
+        Self { data, simulation, index }
+    }
+
+    /// The robot, to read.
+    pub fn read(&self) -> Robot<'_> {
+        Robot::new(self.data, self.simulation, self.index)
+    }
+
+    /// Sets position targets \[rad or m\]: rows for `env_ids` (all where `None`; a single row is for all of them), columns
+    /// for `joint_ids` (all where `None`). Targets are clamped to the limits; columns of mimic joints are accepted and
+    /// ignored.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    pub fn set_qpos<'t>(
+        &mut self,
+        targets: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("set_qpos", targets.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                for (&joint, &value) in write.joints.iter().zip(row) {
+                    if let Some(drive) = robot.joints[joint].drive {
+                        let [low, high] = self.data.plans[joint].usable;
+                        env.drives.position[drive] = value.clamp(low, high);
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Writes joint positions \[rad or m\] into the state, clamped to the limits; targets stay. Rows and columns as in
+    /// [`set_qpos`](Self::set_qpos); mimic joints are written as given. A forward pass follows, so that everything that
+    /// is read afterwards belongs to the new state.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is written.
+    pub fn write_qpos<'t>(
+        &mut self,
+        positions: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("write_qpos", positions.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                env.write(|data| {
+                    for (&joint, &value) in write.joints.iter().zip(row) {
+                        let [low, high] = self.data.plans[joint].limit.unwrap_or([f64::MIN, f64::MAX]);
+                        data.qpos_mut()[robot.joints[joint].qpos] = value.clamp(low, high);
+                    }
+                });
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks an argument of a writer before anything is written.
+    fn checked(
+        &self,
+        argument: &'static str,
+        values: ndarray::ArrayView2<'_, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Write> {
+        let count = self.data.plans.len();
+        let joints: Vec<usize> = match joint_ids {
+            None => (0..count).collect(),
+            Some(ids) => ids
+                .iter()
+                .map(|&JointIndex(index)| {
+                    if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) }
+                })
+                .collect::<Result<_>>()?,
+        };
+        let num_envs = self.simulation.batch.num_envs();
+        env_mask(env_ids, num_envs)?;
+        let envs: Vec<usize> = match env_ids {
+            None => (0..num_envs).collect(),
+            Some(ids) => ids.iter().map(|id| id.0).collect(),
+        };
+        let rows = values.nrows();
+        if values.ncols() != joints.len() || (rows != envs.len() && rows != 1) {
+            return Err(Error::Shape {
+                argument,
+                found: values.shape().to_vec(),
+                expected: vec![envs.len(), joints.len()],
+                meaning: "environments, joints",
+            });
+        }
+        for ((row, column), &value) in values.indexed_iter() {
+            if !value.is_finite() {
+                let joint = self.data.joint_names[joints[column]].clone();
+                return Err(Error::NotFinite { argument, row, column, joint, value });
+            }
+        }
+        let rows = envs
+            .into_iter()
+            .enumerate()
+            .map(|(i, env)| (env, values.row(if rows == 1 { 0 } else { i }).to_vec()))
+            .collect();
+        Ok(Write { joints, rows })
+    }
+}
+
+/// A checked argument: columns, and one row of values per environment.
+struct Write {
+    joints: Vec<usize>,
+    rows: Vec<(usize, Vec<f64>)>,
+}
+
+impl RobotData {
+    /// How a joint moves.
+    pub fn joint_kind(&self, joint: JointIndex) -> Option<JointKind> {
+        self.plans.get(joint.0).map(|p| self.description.joint(p.joint).kind)
+    }
+}
