@@ -1,7 +1,11 @@
 //! Convex hulls with a bounded number of vertices.
 //!
-//! Quickhull in `f64` that always adds the point that is farthest outside the hull so far. Stopped early, the hull is
-//! therefore a good coarse one; its vertices are input points, so that it never reaches beyond the true hull.
+//! Quickhull that always adds the point that is farthest outside the hull so far. Stopped early, the hull is therefore a
+//! good coarse one; its vertices are input points, so that it never reaches beyond the true hull.
+//!
+//! Which side of a plane a point is on is decided exactly: points are snapped to a grid of 2^38 steps across their extent
+//! (4e-12 of it, far below what `f32` coordinates resolve), where planes are integers. With rounding instead, faces of
+//! CAD parts with many points in one plane give slivers that point anywhere.
 
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 
@@ -11,10 +15,12 @@ use super::builder::{cross, dot, sub};
 /// Changes whenever the same input may give another hull; part of the key of [`super::HullCache`].
 pub(super) const ALGORITHM: u32 = 1;
 
-/// A point sees a face when it is not clearly behind it: closer than this fraction of the diagonal counts as in the
-/// plane. The square root of the precision of `f64`: a thinner sliver would have a plane that is wrong by more than the
-/// sliver is thin.
-const PLANE: f64 = 1e-8;
+/// The least tolerance, as a fraction of the diagonal: less than half a unit in the last place of `f32`.
+const RESOLUTION: f64 = 1e-8;
+
+/// Steps of the grid across the largest extent, as a power of two. Planes then fit into 79 bits, and the products with
+/// differences of points into 120.
+const GRID_BITS: i32 = 38;
 
 /// How a hull is simplified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +28,7 @@ pub struct HullCfg {
     /// The most vertices of the hull, at least 4. Contact tests cost time per vertex.
     pub max_vertices: usize,
     /// Points that stick out of the hull by less than this fraction of the diagonal of the bounding box are left out, at
-    /// least 0 (which acts as 1e-8, the least that rounding allows). The default 1e-4 is 0.03 mm on a link of 0.3 m: below what a robot is built to, above the noise of a
+    /// least 0 (which acts as 1e-8, less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below what a robot is built to, above the noise of a
     /// tessellated cylinder.
     pub tolerance: f64,
     /// The thickness \[m\] that a flat point set gets, half on each side of its plane. Flat means thinner than the
@@ -103,7 +109,7 @@ pub fn convex_hull(points: &[[f32; 3]], cfg: &HullCfg) -> Result<TriMesh, HullEr
         return Err(HullError::TooFewPoints { found: points.len() });
     }
     let exact: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
-    let tolerance = cfg.tolerance.max(PLANE) * diagonal(&exact);
+    let tolerance = cfg.tolerance.max(RESOLUTION) * diagonal(&exact);
     if tolerance == 0.0 {
         return Err(HullError::Coincident { count: points.len() });
     }
@@ -119,7 +125,7 @@ pub fn convex_hull(points: &[[f32; 3]], cfg: &HullCfg) -> Result<TriMesh, HullEr
     };
     let slab = thickened(&exact, &start, thickness);
     // The thickness may be less than the tolerance of a large plate.
-    let tolerance = tolerance.min(thickness / 10.0).max(PLANE * diagonal(&slab));
+    let tolerance = tolerance.min(thickness / 10.0).max(RESOLUTION * diagonal(&slab));
     let start = simplex(&slab);
     if start.off_plane <= tolerance {
         return Err(HullError::Coplanar { deviation: start.off_plane, tolerance });
@@ -208,10 +214,19 @@ struct Face {
     corners: [usize; 3],
     /// Neighbour across the edge from corner `i` to corner `i + 1`.
     neighbours: [usize; 3],
+    /// The normal, exactly, and with unit length.
+    exact: [i128; 3],
     normal: [f64; 3],
     alive: bool,
     /// Points in front of this face, each in the list of one face only.
     outside: Vec<usize>,
+}
+
+/// An edge of the horizon, directed as in the face that goes, and the face that stays.
+struct Edge {
+    from: usize,
+    to: usize,
+    beyond: usize,
 }
 
 /// A candidate for the next point; the farthest first, then the smaller point.
@@ -237,33 +252,37 @@ impl PartialOrd for Candidate {
     }
 }
 
-struct Quickhull<'p> {
-    points: &'p [[f64; 3]],
+struct Quickhull {
+    /// Points in steps of the grid, relative to the first.
+    points: Vec<[f64; 3]>,
     faces: Vec<Face>,
     heap: BinaryHeap<Candidate>,
     /// Faces at each vertex of the hull; 0 for all other points.
     degree: Vec<u32>,
     vertices: usize,
-    /// Points that rounding makes impossible to add.
-    refused: BTreeSet<usize>,
+    /// In steps of the grid.
     tolerance: f64,
-    plane: f64,
 }
 
-impl<'p> Quickhull<'p> {
-    fn run(points: &'p [[f64; 3]], start: [usize; 4], tolerance: f64, max_vertices: usize) -> TriMesh {
-        let mut hull = Quickhull {
-            points,
+impl Quickhull {
+    fn run(points: &[[f64; 3]], start: [usize; 4], tolerance: f64, max_vertices: usize) -> TriMesh {
+        // At most twice the largest extent.
+        let extent = diagonal(points);
+        let steps = 2f64.powi(GRID_BITS - 1 - extent.log2().floor() as i32);
+        let snapped = points.iter().map(|&p| sub(p, points[0]).map(|x| (x * steps).round())).collect();
+        let mut hull = Self {
+            points: snapped,
             faces: Vec::new(),
             heap: BinaryHeap::new(),
             degree: vec![0; points.len()],
             vertices: 0,
-            refused: BTreeSet::new(),
-            tolerance,
-            plane: PLANE * diagonal(points),
+            tolerance: tolerance * steps,
         };
         let [a, mut b, mut c, d] = start;
-        let height = dot(cross(sub(points[b], points[a]), sub(points[c], points[a])), sub(points[d], points[a]));
+        let height = dot(
+            cross(sub(hull.points[b], hull.points[a]), sub(hull.points[c], hull.points[a])),
+            sub(hull.points[d], hull.points[a]),
+        );
         if height > 0.0 {
             // Seen from d, the triangle a b c has to turn clockwise.
             std::mem::swap(&mut b, &mut c);
@@ -273,8 +292,7 @@ impl<'p> Quickhull<'p> {
         hull.add([b, a, d], [0, 3, 2]);
         hull.add([c, b, d], [0, 1, 3]);
         hull.add([a, c, d], [0, 2, 1]);
-        // Each round hands out all points anew: a vertex that was swallowed, or a point that rounding took for an inner
-        // one, gets another chance. One round and a look that finds nothing are the rule.
+        // Points that the tolerance dropped too early get another chance; a second round that finds nothing is the rule.
         for _ in 0..8 {
             let everything = (0..points.len()).collect();
             let all: Vec<usize> = (0..hull.faces.len()).filter(|&f| hull.faces[f].alive).collect();
@@ -283,23 +301,19 @@ impl<'p> Quickhull<'p> {
                 break;
             }
         }
-        hull.into_mesh()
+        hull.into_mesh(points)
     }
 
     /// Adds points until none is outside (true) or there are vertices enough (false).
     fn grow(&mut self, max_vertices: usize) -> bool {
         while let Some(Candidate { point, face, .. }) = self.heap.pop() {
-            // Entries of faces that are gone, or that have lost the point, are stale.
-            if !self.faces[face].alive || self.refused.contains(&point) {
+            if !self.faces[face].alive {
                 continue;
             }
             if self.vertices >= max_vertices {
                 return false;
             }
-            if !self.insert(point, face) {
-                self.refused.insert(point);
-                self.announce(face);
-            }
+            self.insert(point, face);
         }
         for face in &mut self.faces {
             face.outside.clear();
@@ -307,21 +321,36 @@ impl<'p> Quickhull<'p> {
         true
     }
 
+    /// How far a point is in front of a face, in steps.
     fn distance(&self, face: usize, point: usize) -> f64 {
         let face = &self.faces[face];
         dot(face.normal, sub(self.points[point], self.points[face.corners[0]]))
     }
 
+    /// Whether a point is strictly in front of a face, exactly.
+    fn sees(&self, point: usize, face: usize) -> bool {
+        let distance = self.distance(face, point);
+        // The rounding of `distance` is below 2^-12 steps.
+        if distance.abs() > 0.01 {
+            return distance > 0.0;
+        }
+        let face = &self.faces[face];
+        let from_face = sub(self.points[point], self.points[face.corners[0]]).map(|x| x as i128);
+        (0..3).map(|i| face.exact[i] * from_face[i]).sum::<i128>() > 0
+    }
+
     fn add(&mut self, corners: [usize; 3], neighbours: [usize; 3]) {
         let [a, b, c] = corners.map(|i| self.points[i]);
-        let n = cross(sub(b, a), sub(c, a));
-        let length = norm(n).max(f64::MIN_POSITIVE);
+        let [u, v] = [sub(b, a), sub(c, a)].map(|e| e.map(|x| x as i128));
+        let exact = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let normal = exact.map(|x| x as f64);
+        let length = norm(normal).max(1.0);
         for corner in corners {
             self.vertices += usize::from(self.degree[corner] == 0);
             self.degree[corner] += 1;
         }
-        let normal = n.map(|x| x / length);
-        self.faces.push(Face { corners, neighbours, normal, alive: true, outside: Vec::new() });
+        let normal = normal.map(|x| x / length);
+        self.faces.push(Face { corners, neighbours, exact, normal, alive: true, outside: Vec::new() });
     }
 
     fn remove(&mut self, face: usize) -> Vec<usize> {
@@ -336,7 +365,7 @@ impl<'p> Quickhull<'p> {
     /// Gives each point to the face of `among` that it is farthest in front of, and drops those in front of none.
     fn hand_out(&mut self, points: Vec<usize>, among: &[usize]) {
         for point in points {
-            if self.degree[point] > 0 || self.refused.contains(&point) {
+            if self.degree[point] > 0 {
                 continue;
             }
             let mut best = (self.tolerance, None);
@@ -357,87 +386,73 @@ impl<'p> Quickhull<'p> {
 
     /// Puts the farthest point of a face up as a candidate.
     fn announce(&mut self, face: usize) {
-        let points = self.faces[face].outside.iter().filter(|p| !self.refused.contains(p));
+        let points = self.faces[face].outside.iter();
         let candidates = points.map(|&point| Candidate { distance: self.distance(face, point), point, face });
         if let Some(best) = candidates.max() {
             self.heap.push(best);
         }
     }
 
-    /// Replaces all faces that `apex` sees by a cone; false, with nothing changed, if rounding leaves no clean horizon.
-    fn insert(&mut self, apex: usize, from: usize) -> bool {
-        // Usually faces in the plane of the apex go too, so that no slivers arise; where that tears the horizon, only
-        // those go that it is clearly in front of.
-        let horizon = [-self.plane, 0.0, self.plane].into_iter().find_map(|limit| self.horizon(apex, from, limit));
-        let Some((seen, rim)) = horizon else { return false };
+    /// Replaces all faces that `apex` sees by a cone.
+    fn insert(&mut self, apex: usize, from: usize) {
+        let (seen, rim) = self.horizon(apex, from);
         let first = self.faces.len();
         let count = rim.len();
-        let mut points = Vec::new();
-        for (i, &(a, b, beyond)) in rim.iter().enumerate() {
+        for (i, &Edge { from: a, to: b, beyond }) in rim.iter().enumerate() {
+            // No sliver without area: the apex is strictly in front of a face with this edge, so not in line with it.
             self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
-            let edge = (0..3).find(|&e| self.faces[beyond].corners[e] == b).unwrap_or(0);
-            self.faces[beyond].neighbours[edge] = first + i;
+            if let Some(edge) = (0..3).find(|&e| self.faces[beyond].corners[e] == b) {
+                self.faces[beyond].neighbours[edge] = first + i;
+            }
         }
-        for &face in &seen {
-            // A corner that disappears may still be outside by a little: it goes back among the points.
-            let corners = self.faces[face].corners;
+        let mut points = Vec::new();
+        for face in seen {
             points.extend(self.remove(face));
-            points.extend(corners.into_iter().filter(|&c| self.degree[c] == 0));
         }
         let new: Vec<usize> = (first..self.faces.len()).collect();
         self.hand_out(points, &new);
-        true
     }
 
-    /// The faces that `apex` sees, connected to `from`, and the edges around them in order: start, end, the face beyond.
-    #[allow(clippy::type_complexity, reason = "used once, right above")]
-    fn horizon(&self, apex: usize, from: usize, limit: f64) -> Option<(Vec<usize>, Vec<(usize, usize, usize)>)> {
+    /// The faces that `apex` sees, starting with `from`, and the edges around them in order. Exact planes of a convex
+    /// body make that one simple loop.
+    fn horizon(&self, apex: usize, from: usize) -> (Vec<usize>, Vec<Edge>) {
         let mut seen = vec![from];
         let mut is_seen = BTreeSet::from([from]);
-        let mut edges: HashMap<usize, (usize, usize)> = HashMap::new();
+        let mut edges: HashMap<usize, Edge> = HashMap::new();
+        let mut rim = Vec::new();
         let mut next = 0;
-        let mut start = None;
         while let Some(&face) = seen.get(next) {
             next += 1;
-            for neighbour in self.faces[face].neighbours {
-                if !is_seen.contains(&neighbour) && self.distance(neighbour, apex) > limit {
-                    is_seen.insert(neighbour);
-                    seen.push(neighbour);
-                }
-            }
-        }
-        for &face in &seen {
             let Face { corners, neighbours, .. } = &self.faces[face];
-            for i in 0..3 {
-                if !is_seen.contains(&neighbours[i]) {
-                    let (a, b) = (corners[i], corners[(i + 1) % 3]);
-                    start.get_or_insert(a);
-                    // Two edges from one vertex: the region touches itself.
-                    if edges.insert(a, (b, neighbours[i])).is_some() {
-                        return None;
-                    }
+            for (i, &beyond) in neighbours.iter().enumerate() {
+                if is_seen.contains(&beyond) {
+                    continue;
+                }
+                if self.sees(apex, beyond) {
+                    is_seen.insert(beyond);
+                    seen.push(beyond);
+                } else {
+                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], beyond });
                 }
             }
         }
-        let (count, start) = (edges.len(), start?);
-        let mut rim = Vec::with_capacity(count);
-        let mut a = start;
-        while let Some((b, beyond)) = edges.remove(&a) {
-            rim.push((a, b, beyond));
-            a = b;
+        let mut at = edges.keys().min().copied();
+        while let Some(edge) = at.and_then(|a| edges.remove(&a)) {
+            at = Some(edge.to);
+            rim.push(edge);
         }
-        // One loop through all edges, and the apex is not already on it.
-        (a == start && rim.len() == count && count >= 3 && self.degree[apex] == 0).then_some((seen, rim))
+        debug_assert!(edges.is_empty(), "the horizon is not one loop");
+        (seen, rim)
     }
 
-    fn into_mesh(self) -> TriMesh {
+    fn into_mesh(self, points: &[[f64; 3]]) -> TriMesh {
         let mut number: HashMap<usize, u32> = HashMap::new();
         let mut positions = Vec::new();
         let mut triangles = Vec::new();
         for face in self.faces.iter().filter(|f| f.alive) {
             triangles.push(face.corners.map(|corner| {
                 *number.entry(corner).or_insert_with(|| {
-                    positions.push(self.points[corner].map(|x| x as f32));
+                    positions.push(points[corner].map(|x| x as f32));
                     (positions.len() - 1) as u32
                 })
             }));
