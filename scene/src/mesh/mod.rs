@@ -1,7 +1,34 @@
 //! Triangle meshes and their files: STL, OBJ + MTL, DAE, GLB in; convex hulls; STL and OBJ out.
 
+mod builder;
+mod dae;
+mod dae_material;
+mod error;
+mod glb;
+mod glb_buffers;
+mod hull;
+mod hull_cache;
+mod load;
+mod mtl;
+mod obj;
+mod polygon;
+mod stl;
+#[cfg(test)]
+mod tests_corrupt;
+#[cfg(test)]
+mod tests_robots;
+mod trimesh;
+mod write;
+
 use std::ops::Range;
 use std::path::PathBuf;
+
+pub use error::MeshError;
+pub use hull::{HullCfg, HullError, convex_hull};
+pub use hull_cache::HullCache;
+pub use load::{DaeUpAxis, MeshOptions, load, load_bytes, load_with};
+pub use trimesh::MeshFault;
+pub use write::{write_binary_stl, write_obj};
 
 /// Triangles with optional normals and texture coordinates, in one vertex array.
 ///
@@ -13,7 +40,8 @@ pub struct TriMesh {
     pub positions: Vec<[f32; 3]>,
     /// Unit vertex normals.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA).
+    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA). They may leave 0..=1: the
+    /// image repeats.
     pub uvs: Option<Vec<[f32; 2]>>,
     /// Vertex indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -37,7 +65,7 @@ pub struct MeshPart {
 pub struct MeshMaterial {
     /// Name in the file.
     pub name: String,
-    /// Base colour rgba in 0..=1 (multiplies the texture).
+    /// Base colour rgba in 0..=1 (multiplies the texture), meant for the screen as it is (sRGB, not linear).
     pub rgba: [f32; 4],
     /// Base colour image.
     pub texture: Option<TextureSource>,

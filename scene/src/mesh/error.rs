@@ -1,0 +1,175 @@
+//! What can go wrong with a mesh file.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use super::{HullError, MeshOptions};
+
+/// A mesh file that cannot be used, and where it goes wrong.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// The file, or a buffer it refers to, cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The file that was opened.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// Neither the extension nor the first bytes tell the format.
+    #[error("{}: unknown mesh format; expected .stl, .obj, .dae, .glb or .gltf", path.display())]
+    UnknownFormat {
+        /// The mesh file.
+        path: PathBuf,
+    },
+    /// The file ends before the data it announces.
+    #[error("{}: {at} ends early: expected {expected} bytes, found {found}", path.display())]
+    Truncated {
+        /// The mesh file.
+        path: PathBuf,
+        /// Which part of the file.
+        at: String,
+        /// Bytes that should be there.
+        expected: u64,
+        /// Bytes that are there.
+        found: u64,
+    },
+    /// A line or element does not say what the format asks for.
+    #[error("{}: {at}: {what}", path.display())]
+    Invalid {
+        /// The file (a mesh, or the MTL of an OBJ).
+        path: PathBuf,
+        /// The line or element.
+        at: String,
+        /// What is wrong and what would be right.
+        what: String,
+        /// The parser's own error, if one was involved.
+        source: Option<Box<dyn Error + Send + Sync>>,
+    },
+    /// An index points past the end of what it refers to.
+    #[error("{}: {at}: index {index} is out of range, there are {count}", path.display())]
+    IndexOutOfRange {
+        /// The mesh file.
+        path: PathBuf,
+        /// The line or element that holds the index.
+        at: String,
+        /// The index as written.
+        index: i64,
+        /// How many there are to refer to.
+        count: usize,
+    },
+    /// A position is infinite or not a number.
+    #[error("{}: {at}: vertex position {value:?} is not finite", path.display())]
+    NonFinite {
+        /// The mesh file.
+        path: PathBuf,
+        /// The line or element.
+        at: String,
+        /// The position after all transforms.
+        value: [f32; 3],
+    },
+    /// The file needs something these readers do not have.
+    #[error("{}: {feature} is not supported", path.display())]
+    Unsupported {
+        /// The mesh file.
+        path: PathBuf,
+        /// The extension, element or mode, by name.
+        feature: String,
+    },
+    /// The file is well formed but holds no triangle.
+    #[error("{}: no triangles; a mesh needs at least one", path.display())]
+    Empty {
+        /// The mesh file.
+        path: PathBuf,
+    },
+    /// The file unfolds to more triangles than a mesh may have.
+    #[error("{}: more than {limit} {what}", path.display())]
+    TooLarge {
+        /// The mesh file.
+        path: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// The most that is accepted.
+        limit: usize,
+    },
+    /// The mesh has no convex hull.
+    #[error("{}: no convex hull: {source}", path.display())]
+    Hull {
+        /// The mesh file.
+        path: PathBuf,
+        /// Why.
+        source: HullError,
+    },
+}
+
+/// The file being read and how: what every reader needs to make an error.
+pub(super) struct Ctx<'a> {
+    pub(super) path: &'a Path,
+    pub(super) options: &'a MeshOptions,
+}
+
+impl Ctx<'_> {
+    pub(super) fn invalid(&self, at: impl Into<String>, what: impl Into<String>) -> MeshError {
+        MeshError::Invalid { path: self.path.to_owned(), at: at.into(), what: what.into(), source: None }
+    }
+
+    pub(super) fn caused(
+        &self,
+        at: impl Into<String>,
+        what: impl Into<String>,
+        source: impl Error + Send + Sync + 'static,
+    ) -> MeshError {
+        let source: Option<Box<dyn Error + Send + Sync>> = Some(Box::new(source));
+        MeshError::Invalid { path: self.path.to_owned(), at: at.into(), what: what.into(), source }
+    }
+
+    pub(super) fn index(&self, at: impl Into<String>, index: i64, count: usize) -> MeshError {
+        MeshError::IndexOutOfRange { path: self.path.to_owned(), at: at.into(), index, count }
+    }
+
+    pub(super) fn unsupported(&self, feature: impl Into<String>) -> MeshError {
+        MeshError::Unsupported { path: self.path.to_owned(), feature: feature.into() }
+    }
+
+    pub(super) fn truncated(&self, at: impl Into<String>, expected: u64, found: u64) -> MeshError {
+        MeshError::Truncated { path: self.path.to_owned(), at: at.into(), expected, found }
+    }
+
+    pub(super) fn too_large(&self, what: &'static str, limit: usize) -> MeshError {
+        MeshError::TooLarge { path: self.path.to_owned(), what, limit }
+    }
+
+    /// A path written in this file, relative to the folder of this file.
+    pub(super) fn beside(&self, written: &str) -> PathBuf {
+        beside(self.path, written)
+    }
+}
+
+/// A path as mesh files write it (URI escapes, `file://`, backslashes), relative to the folder of `file`.
+pub(super) fn beside(file: &Path, written: &str) -> PathBuf {
+    let plain = written.trim();
+    let plain = plain.strip_prefix("file://").unwrap_or(plain).replace('\\', "/");
+    file.parent().unwrap_or(Path::new("")).join(plain)
+}
+
+/// Undoes `%20` and its like; what is not a valid escape stays as written.
+pub(super) fn percent_decoded(uri: &str) -> String {
+    let bytes = uri.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        let hex = |b: u8| char::from(b).to_digit(16).map(|d| d as u8);
+        if bytes[i] == b'%'
+            && let (Some(hi), Some(lo)) =
+                (bytes.get(i + 1).copied().and_then(hex), bytes.get(i + 2).copied().and_then(hex))
+        {
+            out.push(hi << 4 | lo);
+            i += 3;
+        } else {
+            out.push(bytes[i]);
+            i += 1;
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}

@@ -1,0 +1,466 @@
+//! Convex hulls with a bounded number of vertices.
+//!
+//! Quickhull that always adds the point that is farthest outside the hull so far. Stopped early, the hull is therefore a
+//! good coarse one; its vertices are input points, so that it never reaches beyond the true hull.
+//!
+//! Which side of a plane a point is on is decided exactly: points are snapped to a grid of 2^38 steps across their extent
+//! (4e-12 of it, far below what `f32` coordinates resolve), where planes are integers. With rounding instead, faces of
+//! CAD parts with many points in one plane give slivers that point anywhere.
+
+use std::collections::{BTreeSet, BinaryHeap, HashMap};
+
+use super::TriMesh;
+use super::builder::{cross, dot, sub};
+
+/// Changes whenever the same input may give another hull; part of the key of [`super::HullCache`].
+pub(super) const ALGORITHM: u32 = 1;
+
+/// The least tolerance, as a fraction of the diagonal: less than half a unit in the last place of `f32`.
+const RESOLUTION: f64 = 1e-8;
+
+/// Steps of the grid across the largest extent, as a power of two. Planes then fit into 79 bits, and the products with
+/// differences of points into 120.
+const GRID_BITS: i32 = 38;
+
+/// How a hull is simplified.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HullCfg {
+    /// The most vertices of the hull, at least 4. Contact tests cost time per vertex.
+    pub max_vertices: usize,
+    /// Points that stick out of the hull by less than this fraction of the diagonal of the bounding box are left out, at
+    /// least 0 (which acts as 1e-8, less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below what a robot is built to, above the noise of a
+    /// tessellated cylinder.
+    pub tolerance: f64,
+    /// The thickness \[m\] that a flat point set gets, half on each side of its plane. Flat means thinner than the
+    /// tolerance. `None` makes a flat point set an error.
+    pub min_thickness: Option<f64>,
+}
+
+impl Default for HullCfg {
+    fn default() -> Self {
+        Self { max_vertices: 64, tolerance: 1e-4, min_thickness: Some(1e-3) }
+    }
+}
+
+/// Why points have no hull.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HullError {
+    /// A field of the configuration is out of its range.
+    #[error("HullCfg::{field} is {value}; expected {expected}")]
+    InvalidCfg {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is accepted.
+        expected: &'static str,
+    },
+    /// Fewer than four points.
+    #[error("{found} points; a hull needs at least 4")]
+    TooFewPoints {
+        /// How many there are.
+        found: usize,
+    },
+    /// A coordinate is infinite or not a number.
+    #[error("point {index} is {value:?}; expected finite coordinates")]
+    NonFinite {
+        /// Which point.
+        index: usize,
+        /// Its coordinates.
+        value: [f32; 3],
+    },
+    /// All points are the same.
+    #[error("all {count} points coincide")]
+    Coincident {
+        /// How many there are.
+        count: usize,
+    },
+    /// All points are on a line, within the tolerance.
+    #[error("the points lie on a line: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m")]
+    Collinear {
+        /// Largest distance from the line \[m\].
+        deviation: f64,
+        /// The tolerance \[m\].
+        tolerance: f64,
+    },
+    /// All points are in a plane, within the tolerance, and no thickness is configured.
+    #[error(
+        "the points lie in a plane: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m; \
+         HullCfg::min_thickness would thicken them"
+    )]
+    Coplanar {
+        /// Largest distance from the plane \[m\].
+        deviation: f64,
+        /// The tolerance \[m\].
+        tolerance: f64,
+    },
+}
+
+/// The convex hull of points: closed, convex, outside the front, the same for the same input.
+///
+/// Unless `max_vertices` stops it, no point is farther outside than the tolerance.
+pub fn convex_hull(points: &[[f32; 3]], cfg: &HullCfg) -> Result<TriMesh, HullError> {
+    check(cfg)?;
+    if let Some(index) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(HullError::NonFinite { index, value: points[index] });
+    }
+    if points.len() < 4 {
+        return Err(HullError::TooFewPoints { found: points.len() });
+    }
+    let exact: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
+    let tolerance = cfg.tolerance.max(RESOLUTION) * diagonal(&exact);
+    if tolerance == 0.0 {
+        return Err(HullError::Coincident { count: points.len() });
+    }
+    let start = simplex(&exact);
+    if start.off_line <= tolerance {
+        return Err(HullError::Collinear { deviation: start.off_line, tolerance });
+    }
+    if start.off_plane > tolerance {
+        return Ok(Quickhull::run(&exact, start.corners, tolerance, cfg.max_vertices));
+    }
+    let Some(thickness) = cfg.min_thickness else {
+        return Err(HullError::Coplanar { deviation: start.off_plane, tolerance });
+    };
+    let slab = thickened(&exact, &start, thickness);
+    // The thickness may be less than the tolerance of a large plate.
+    let tolerance = tolerance.min(thickness / 10.0).max(RESOLUTION * diagonal(&slab));
+    let start = simplex(&slab);
+    if start.off_plane <= tolerance {
+        return Err(HullError::Coplanar { deviation: start.off_plane, tolerance });
+    }
+    Ok(Quickhull::run(&slab, start.corners, tolerance, cfg.max_vertices))
+}
+
+fn check(cfg: &HullCfg) -> Result<(), HullError> {
+    let fault = |field, value, expected| Err(HullError::InvalidCfg { field, value, expected });
+    if cfg.max_vertices < 4 {
+        return fault("max_vertices", cfg.max_vertices as f64, "4 or more");
+    }
+    if !(cfg.tolerance >= 0.0 && cfg.tolerance < 1.0) {
+        return fault("tolerance", cfg.tolerance, "0 or more and less than 1");
+    }
+    match cfg.min_thickness {
+        Some(t) if !(t > 0.0 && t.is_finite()) => fault("min_thickness", t, "a positive length or None"),
+        _ => Ok(()),
+    }
+}
+
+fn diagonal(points: &[[f64; 3]]) -> f64 {
+    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in points {
+        for i in 0..3 {
+            lo[i] = lo[i].min(p[i]);
+            hi[i] = hi[i].max(p[i]);
+        }
+    }
+    norm(sub(hi, lo))
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+/// Four extreme points and how far the third and fourth are off the line and the plane of those before.
+struct Simplex {
+    corners: [usize; 4],
+    off_line: f64,
+    off_plane: f64,
+    normal: [f64; 3],
+    origin: [f64; 3],
+}
+
+/// The index with the largest value; the first of equals.
+fn farthest(points: &[[f64; 3]], distance: impl Fn([f64; 3]) -> f64) -> (usize, f64) {
+    points.iter().enumerate().fold((0, f64::NEG_INFINITY), |best, (i, &p)| {
+        let d = distance(p);
+        if d > best.1 { (i, d) } else { best }
+    })
+}
+
+fn simplex(points: &[[f64; 3]]) -> Simplex {
+    // The longest of the extents along the axes, then the point farthest from one end of it: nearly the diameter.
+    let extent = |axis: usize| {
+        let (hi, above) = farthest(points, |p| p[axis]);
+        let (_, below) = farthest(points, |p| -p[axis]);
+        (above + below, hi)
+    };
+    let (_, a) = (0..3).map(extent).fold((-1.0, 0), |best, e| if e.0 > best.0 { e } else { best });
+    let (b, length) = farthest(points, |p| norm(sub(p, points[a])));
+    let origin = points[a];
+    let along = sub(points[b], origin).map(|x| x / length.max(f64::MIN_POSITIVE));
+    let (c, off_line) = farthest(points, |p| norm(cross(along, sub(p, origin))));
+    let normal = cross(along, sub(points[c], origin)).map(|x| x / off_line.max(f64::MIN_POSITIVE));
+    let (d, off_plane) = farthest(points, |p| dot(normal, sub(p, origin)).abs());
+    Simplex { corners: [a, b, c, d], off_line, off_plane, normal, origin }
+}
+
+/// The points flattened into their plane, once on each side of it.
+fn thickened(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]> {
+    let heights = || points.iter().map(|&p| dot(flat.normal, sub(p, flat.origin)));
+    let (lo, hi) = heights().fold((0.0f64, 0.0f64), |(lo, hi), h| (lo.min(h), hi.max(h)));
+    let (middle, half) = ((lo + hi) / 2.0, (hi - lo).max(thickness) / 2.0);
+    let side = |sign: f64| {
+        points
+            .iter()
+            .zip(heights())
+            .map(move |(p, h)| std::array::from_fn(|i| p[i] + flat.normal[i] * (middle + sign * half - h)))
+    };
+    side(-1.0).chain(side(1.0)).collect()
+}
+
+struct Face {
+    corners: [usize; 3],
+    /// Neighbour across the edge from corner `i` to corner `i + 1`.
+    neighbours: [usize; 3],
+    /// The normal, exactly, and with unit length.
+    exact: [i128; 3],
+    normal: [f64; 3],
+    alive: bool,
+    /// Points in front of this face, each in the list of one face only.
+    outside: Vec<usize>,
+}
+
+/// An edge of the horizon, directed as in the face that goes, and the face that stays.
+struct Edge {
+    from: usize,
+    to: usize,
+    beyond: usize,
+}
+
+/// A candidate for the next point; the farthest first, then the smaller point.
+#[derive(PartialEq)]
+struct Candidate {
+    distance: f64,
+    point: usize,
+    face: usize,
+}
+
+impl Eq for Candidate {}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let order = self.distance.total_cmp(&other.distance);
+        order.then(other.point.cmp(&self.point)).then(other.face.cmp(&self.face))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+struct Quickhull {
+    /// Points in steps of the grid, relative to the first.
+    points: Vec<[f64; 3]>,
+    faces: Vec<Face>,
+    heap: BinaryHeap<Candidate>,
+    /// Faces at each vertex of the hull; 0 for all other points.
+    degree: Vec<u32>,
+    vertices: usize,
+    /// In steps of the grid.
+    tolerance: f64,
+}
+
+impl Quickhull {
+    fn run(points: &[[f64; 3]], start: [usize; 4], tolerance: f64, max_vertices: usize) -> TriMesh {
+        // At most twice the largest extent.
+        let extent = diagonal(points);
+        let steps = 2f64.powi(GRID_BITS - 1 - extent.log2().floor() as i32);
+        let snapped = points.iter().map(|&p| sub(p, points[0]).map(|x| (x * steps).round())).collect();
+        let mut hull = Self {
+            points: snapped,
+            faces: Vec::new(),
+            heap: BinaryHeap::new(),
+            degree: vec![0; points.len()],
+            vertices: 0,
+            tolerance: tolerance * steps,
+        };
+        let [a, mut b, mut c, d] = start;
+        let height = dot(
+            cross(sub(hull.points[b], hull.points[a]), sub(hull.points[c], hull.points[a])),
+            sub(hull.points[d], hull.points[a]),
+        );
+        if height > 0.0 {
+            // Seen from d, the triangle a b c has to turn clockwise.
+            std::mem::swap(&mut b, &mut c);
+        }
+        // Neighbours by hand: face 0 is the base, faces 1 to 3 stand on its edges.
+        hull.add([a, b, c], [1, 2, 3]);
+        hull.add([b, a, d], [0, 3, 2]);
+        hull.add([c, b, d], [0, 1, 3]);
+        hull.add([a, c, d], [0, 2, 1]);
+        // Points that the tolerance dropped too early get another chance; a second round that finds nothing is the rule.
+        for _ in 0..8 {
+            let everything = (0..points.len()).collect();
+            let all: Vec<usize> = (0..hull.faces.len()).filter(|&f| hull.faces[f].alive).collect();
+            hull.hand_out(everything, &all);
+            if hull.heap.is_empty() || !hull.grow(max_vertices) {
+                break;
+            }
+        }
+        hull.into_mesh(points)
+    }
+
+    /// Adds points until none is outside (true) or there are vertices enough (false).
+    fn grow(&mut self, max_vertices: usize) -> bool {
+        while let Some(Candidate { point, face, .. }) = self.heap.pop() {
+            if !self.faces[face].alive {
+                continue;
+            }
+            if self.vertices >= max_vertices {
+                return false;
+            }
+            self.insert(point, face);
+        }
+        for face in &mut self.faces {
+            face.outside.clear();
+        }
+        true
+    }
+
+    /// How far a point is in front of a face, in steps.
+    fn distance(&self, face: usize, point: usize) -> f64 {
+        let face = &self.faces[face];
+        dot(face.normal, sub(self.points[point], self.points[face.corners[0]]))
+    }
+
+    /// Whether a point is strictly in front of a face, exactly.
+    fn sees(&self, point: usize, face: usize) -> bool {
+        let distance = self.distance(face, point);
+        // The rounding of `distance` is below 2^-12 steps.
+        if distance.abs() > 0.01 {
+            return distance > 0.0;
+        }
+        let face = &self.faces[face];
+        let from_face = sub(self.points[point], self.points[face.corners[0]]).map(|x| x as i128);
+        (0..3).map(|i| face.exact[i] * from_face[i]).sum::<i128>() > 0
+    }
+
+    fn add(&mut self, corners: [usize; 3], neighbours: [usize; 3]) {
+        let [a, b, c] = corners.map(|i| self.points[i]);
+        let [u, v] = [sub(b, a), sub(c, a)].map(|e| e.map(|x| x as i128));
+        let exact = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let normal = exact.map(|x| x as f64);
+        let length = norm(normal).max(1.0);
+        for corner in corners {
+            self.vertices += usize::from(self.degree[corner] == 0);
+            self.degree[corner] += 1;
+        }
+        let normal = normal.map(|x| x / length);
+        self.faces.push(Face { corners, neighbours, exact, normal, alive: true, outside: Vec::new() });
+    }
+
+    fn remove(&mut self, face: usize) -> Vec<usize> {
+        self.faces[face].alive = false;
+        for corner in self.faces[face].corners {
+            self.degree[corner] -= 1;
+            self.vertices -= usize::from(self.degree[corner] == 0);
+        }
+        std::mem::take(&mut self.faces[face].outside)
+    }
+
+    /// Gives each point to the face of `among` that it is farthest in front of, and drops those in front of none.
+    fn hand_out(&mut self, points: Vec<usize>, among: &[usize]) {
+        for point in points {
+            if self.degree[point] > 0 {
+                continue;
+            }
+            let mut best = (self.tolerance, None);
+            for &face in among {
+                let distance = self.distance(face, point);
+                if distance > best.0 {
+                    best = (distance, Some(face));
+                }
+            }
+            if let Some(face) = best.1 {
+                self.faces[face].outside.push(point);
+            }
+        }
+        for &face in among {
+            self.announce(face);
+        }
+    }
+
+    /// Puts the farthest point of a face up as a candidate.
+    fn announce(&mut self, face: usize) {
+        let points = self.faces[face].outside.iter();
+        let candidates = points.map(|&point| Candidate { distance: self.distance(face, point), point, face });
+        if let Some(best) = candidates.max() {
+            self.heap.push(best);
+        }
+    }
+
+    /// Replaces all faces that `apex` sees by a cone.
+    fn insert(&mut self, apex: usize, from: usize) {
+        let (seen, rim) = self.horizon(apex, from);
+        let first = self.faces.len();
+        let count = rim.len();
+        for (i, &Edge { from: a, to: b, beyond }) in rim.iter().enumerate() {
+            // No sliver without area: the apex is strictly in front of a face with this edge, so not in line with it.
+            self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
+            if let Some(edge) = (0..3).find(|&e| self.faces[beyond].corners[e] == b) {
+                self.faces[beyond].neighbours[edge] = first + i;
+            }
+        }
+        let mut points = Vec::new();
+        for face in seen {
+            points.extend(self.remove(face));
+        }
+        let new: Vec<usize> = (first..self.faces.len()).collect();
+        self.hand_out(points, &new);
+    }
+
+    /// The faces that `apex` sees, starting with `from`, and the edges around them in order. Exact planes of a convex
+    /// body make that one simple loop.
+    fn horizon(&self, apex: usize, from: usize) -> (Vec<usize>, Vec<Edge>) {
+        let mut seen = vec![from];
+        let mut is_seen = BTreeSet::from([from]);
+        let mut edges: HashMap<usize, Edge> = HashMap::new();
+        let mut rim = Vec::new();
+        let mut next = 0;
+        while let Some(&face) = seen.get(next) {
+            next += 1;
+            let Face { corners, neighbours, .. } = &self.faces[face];
+            for (i, &beyond) in neighbours.iter().enumerate() {
+                if is_seen.contains(&beyond) {
+                    continue;
+                }
+                if self.sees(apex, beyond) {
+                    is_seen.insert(beyond);
+                    seen.push(beyond);
+                } else {
+                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], beyond });
+                }
+            }
+        }
+        let mut at = edges.keys().min().copied();
+        while let Some(edge) = at.and_then(|a| edges.remove(&a)) {
+            at = Some(edge.to);
+            rim.push(edge);
+        }
+        debug_assert!(edges.is_empty(), "the horizon is not one loop");
+        (seen, rim)
+    }
+
+    fn into_mesh(self, points: &[[f64; 3]]) -> TriMesh {
+        let mut number: HashMap<usize, u32> = HashMap::new();
+        let mut positions = Vec::new();
+        let mut triangles = Vec::new();
+        for face in self.faces.iter().filter(|f| f.alive) {
+            triangles.push(face.corners.map(|corner| {
+                *number.entry(corner).or_insert_with(|| {
+                    positions.push(points[corner].map(|x| x as f32));
+                    (positions.len() - 1) as u32
+                })
+            }));
+        }
+        TriMesh::from_triangles(positions, triangles)
+    }
+}
+
+#[cfg(test)]
+#[path = "tests_hull.rs"]
+mod tests;

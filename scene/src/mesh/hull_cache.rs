@@ -1,0 +1,253 @@
+//! Hulls of mesh files, kept on disk between runs.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::load::{Format, read};
+use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hull, load_bytes};
+
+/// Changes whenever the readers give other vertices for the same file.
+const READERS: u32 = 1;
+const MAGIC: &[u8; 12] = b"kshull\r\n\x00\x01\x00\x00";
+const KEY: usize = 32;
+const HEAD: usize = MAGIC.len() + KEY + 8;
+
+/// A folder of convex hulls. Whatever is wrong with the folder or a file in it costs time, never an error: the hull is
+/// computed again, and written again where that is possible.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct HullCache {
+    dir: Option<PathBuf>,
+}
+
+impl HullCache {
+    /// `$KINETOSCOPE_CACHE`, else `$XDG_CACHE_HOME/kinetoscope`, else `$HOME/.cache/kinetoscope`, else no cache.
+    pub fn default_location() -> Self {
+        Self::located(|name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from))
+    }
+
+    fn located(var: impl Fn(&str) -> Option<PathBuf>) -> Self {
+        let dir = var("KINETOSCOPE_CACHE")
+            .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("kinetoscope")))
+            .or_else(|| var("HOME").map(|d| d.join(".cache").join("kinetoscope")));
+        Self { dir }
+    }
+
+    /// A cache in a folder, which is made when the first hull is written.
+    pub fn at(dir: impl Into<PathBuf>) -> Self {
+        Self { dir: Some(dir.into()) }
+    }
+
+    /// No cache: every hull is computed.
+    pub fn disabled() -> Self {
+        Self { dir: None }
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> Option<&Path> {
+        self.dir.as_deref()
+    }
+
+    /// The convex hull of the vertices of a mesh file, scaled along its axes (the `scale` of URDF).
+    pub fn hull_of_file(&self, path: &Path, scale: [f64; 3], cfg: &HullCfg) -> Result<TriMesh, MeshError> {
+        self.hull_of_file_with(path, &MeshOptions::default(), scale, cfg)
+    }
+
+    /// [`HullCache::hull_of_file`] with options for the reader.
+    pub fn hull_of_file_with(
+        &self,
+        path: &Path,
+        options: &MeshOptions,
+        scale: [f64; 3],
+        cfg: &HullCfg,
+    ) -> Result<TriMesh, MeshError> {
+        if scale.iter().any(|s| !s.is_finite() || *s == 0.0) {
+            return Err(MeshError::Invalid {
+                path: path.to_owned(),
+                at: format!("scale {scale:?}"),
+                what: "expected finite factors other than 0".to_owned(),
+                source: None,
+            });
+        }
+        let bytes = read(path)?;
+        // The vertices of a plain glTF are in other files, which the key does not cover.
+        let format = Format::of(path, &bytes).filter(|f| *f != Format::Gltf);
+        let entry = self.dir.as_ref().zip(format).map(|(dir, format)| {
+            let key = key(&bytes, format, options, scale, cfg);
+            let mut name = String::with_capacity(2 * KEY + 5);
+            for byte in key {
+                // Writing to a string cannot fail.
+                let _ = write!(name, "{byte:02x}");
+            }
+            (dir.join(name + ".hull"), key)
+        });
+        if let Some(hull) = entry.as_ref().and_then(|(file, key)| decoded(&std::fs::read(file).ok()?, key)) {
+            return Ok(hull);
+        }
+        let mesh = load_bytes(path, &bytes, options)?.scaled(scale);
+        let hull =
+            convex_hull(&mesh.positions, cfg).map_err(|source| MeshError::Hull { path: path.to_owned(), source })?;
+        if let Some((file, key)) = entry {
+            // A cache that cannot be written is no cache.
+            let _ = store(&file, &encoded(&hull, &key));
+        }
+        Ok(hull)
+    }
+}
+
+fn key(bytes: &[u8], format: Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
+    let HullCfg { max_vertices, tolerance, min_thickness } = *cfg;
+    let MeshOptions { dae_up_axis } = *options;
+    let mut hasher = Sha256::new();
+    hasher.update(MAGIC);
+    hasher.update(hull::ALGORITHM.to_le_bytes());
+    hasher.update(READERS.to_le_bytes());
+    hasher.update([format as u8, u8::from(dae_up_axis == DaeUpAxis::Apply), u8::from(min_thickness.is_some())]);
+    for number in scale.into_iter().chain([tolerance, min_thickness.unwrap_or(0.0)]) {
+        hasher.update(number.to_bits().to_le_bytes());
+    }
+    hasher.update((max_vertices as u64).to_le_bytes());
+    hasher.update(bytes);
+    hasher.finalize().into()
+}
+
+/// Magic, key, counts, positions, triangles, and the SHA-256 of all that.
+fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
+    let mut out = MAGIC.to_vec();
+    out.extend(key);
+    out.extend((hull.positions.len() as u32).to_le_bytes());
+    out.extend((hull.triangles.len() as u32).to_le_bytes());
+    out.extend(hull.positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    out.extend(hull.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
+    let sum = Sha256::digest(&out);
+    out.extend(sum);
+    out
+}
+
+fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
+    let (content, sum) = bytes.split_at_checked(bytes.len().checked_sub(KEY)?)?;
+    let (head, body) = content.split_at_checked(HEAD)?;
+    let (magic, rest) = head.split_at(MAGIC.len());
+    if magic != MAGIC || rest[..KEY] != key[..] || Sha256::digest(content)[..] != *sum {
+        return None;
+    }
+    let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    let (vertices, faces) = (word(&rest[KEY..]) as usize, word(&rest[KEY + 4..]) as usize);
+    if body.len() as u64 != 12 * (vertices as u64 + faces as u64) {
+        return None;
+    }
+    let mut rows = body.chunks_exact(12).map(|r| [word(r), word(&r[4..]), word(&r[8..])]);
+    let positions = rows.by_ref().take(vertices).map(|r| r.map(f32::from_bits)).collect();
+    let hull = TriMesh::from_triangles(positions, rows.collect());
+    hull.validate().is_ok().then_some(hull)
+}
+
+/// Writes beside the place and renames, so that no reader ever sees half a file.
+fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let dir = file.parent().unwrap_or(Path::new("."));
+    std::fs::create_dir_all(dir)?;
+    let mut temporary = tempfile::NamedTempFile::new_in(dir)?;
+    temporary.write_all(bytes)?;
+    temporary.persist(file)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use std::fs;
+
+    use super::*;
+    use crate::mesh::write_binary_stl;
+
+    fn cube(dir: &Path) -> PathBuf {
+        let points: Vec<[f32; 3]> = (0..8u8).map(|i| [0, 1, 2].map(|axis| f32::from(i >> axis & 1))).collect();
+        let path = dir.join("cube.stl");
+        let hull = convex_hull(&points, &HullCfg::default()).unwrap();
+        write_binary_stl(&hull, fs::File::create(&path).unwrap()).unwrap();
+        path
+    }
+
+    fn only_file(dir: &Path) -> PathBuf {
+        let files: Vec<_> = fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
+        assert_eq!(files.len(), 1, "{files:?}");
+        files[0].clone()
+    }
+
+    #[test]
+    fn a_hit_is_the_same_hull_and_damage_is_repaired() {
+        let scratch = tempfile::tempdir().unwrap();
+        let (mesh, cache) = (cube(scratch.path()), HullCache::at(scratch.path().join("a/cache")));
+        let (scale, cfg) = ([1.0, -2.0, 3.0], HullCfg::default());
+        let fresh = HullCache::disabled().hull_of_file(&mesh, scale, &cfg).unwrap();
+        assert!((fresh.signed_volume() - 6.0).abs() < 1e-9);
+        assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
+        let file = only_file(cache.dir().unwrap());
+        let good = fs::read(&file).unwrap();
+        assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
+        // A hit does not look at the mesh again: a hull planted under the right key comes back.
+        let key: [u8; KEY] = good[MAGIC.len()..][..KEY].try_into().unwrap();
+        let planted = fresh.scaled([2.0; 3]);
+        fs::write(&file, encoded(&planted, &key)).unwrap();
+        assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), planted);
+        for cut in 0..good.len() {
+            assert_eq!(decoded(&good[..cut], &key), None);
+            let mut flipped = good.clone();
+            flipped[cut] ^= 0x10;
+            assert_eq!(decoded(&flipped, &key), None);
+        }
+        fs::write(&file, &good[..good.len() / 2]).unwrap();
+        assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
+        assert_eq!(fs::read(only_file(cache.dir().unwrap())).unwrap(), good);
+    }
+
+    #[test]
+    fn the_key_covers_everything_that_matters() {
+        let base = HullCfg::default();
+        let configurations = [
+            base,
+            HullCfg { max_vertices: 5, ..base },
+            HullCfg { tolerance: 2e-4, ..base },
+            HullCfg { min_thickness: None, ..base },
+            HullCfg { min_thickness: Some(2e-3), ..base },
+        ];
+        let mut keys = std::collections::BTreeSet::new();
+        let apply = MeshOptions { dae_up_axis: DaeUpAxis::Apply };
+        for (bytes, format, options, scale) in [
+            (&b"a"[..], Format::Stl, MeshOptions::default(), [1.0; 3]),
+            (b"b", Format::Stl, MeshOptions::default(), [1.0; 3]),
+            (b"a", Format::Obj, MeshOptions::default(), [1.0; 3]),
+            (b"a", Format::Stl, apply, [1.0; 3]),
+            (b"a", Format::Stl, MeshOptions::default(), [1.0, 1.0, -1.0]),
+        ] {
+            keys.extend(configurations.map(|cfg| key(bytes, format, &options, scale, &cfg)));
+        }
+        assert_eq!(keys.len(), 25);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_is_no_error() {
+        let scratch = tempfile::tempdir().unwrap();
+        let mesh = cube(scratch.path());
+        // The folder would have to be inside a file.
+        let cache = HullCache::at(mesh.join("cache"));
+        assert_eq!(cache.hull_of_file(&mesh, [1.0; 3], &HullCfg::default()).unwrap().triangles.len(), 12);
+        let error = cache.hull_of_file(&mesh, [0.0, 1.0, 1.0], &HullCfg::default()).unwrap_err();
+        assert!(error.to_string().ends_with("scale [0.0, 1.0, 1.0]: expected finite factors other than 0"));
+    }
+
+    #[test]
+    fn the_default_place_follows_the_environment() {
+        let located = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+            HullCache::located(move |name| set.iter().any(|s| s == name).then(|| Path::new("/").join(name)))
+        };
+        let all = ["KINETOSCOPE_CACHE", "XDG_CACHE_HOME", "HOME"];
+        assert_eq!(located(&all), HullCache::at("/KINETOSCOPE_CACHE"));
+        assert_eq!(located(&all[1..]), HullCache::at("/XDG_CACHE_HOME/kinetoscope"));
+        assert_eq!(located(&all[2..]), HullCache::at("/HOME/.cache/kinetoscope"));
+        assert_eq!(located(&[]), HullCache::disabled());
+    }
+}

@@ -1,0 +1,132 @@
+//! Wavefront OBJ.
+//!
+//! The `tobj` crate serves as the reference of the tests only: it panics on some input (`Kd` with one number, texture
+//! indices near the end of the integers), loses the pairing where only some corners have texture coordinates, and its
+//! errors do not tell the line.
+
+use std::collections::HashMap;
+
+use super::builder::{Builder, Corner};
+use super::error::{Ctx, beside};
+use super::polygon::triangulate;
+use super::{MeshError, TriMesh, mtl};
+
+#[derive(Default)]
+struct Reader {
+    v: Vec<[f32; 3]>,
+    vt: Vec<[f32; 2]>,
+    vn: Vec<[f32; 3]>,
+    builder: Builder,
+    /// Every material of every library read, by name.
+    known: HashMap<String, usize>,
+    material: Option<usize>,
+}
+
+pub(super) fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut reader = Reader::default();
+    let mut lines = text.lines().enumerate();
+    while let Some((index, line)) = lines.next() {
+        if !line.trim_end().ends_with('\\') {
+            reader.line(ctx, index + 1, line)?;
+            continue;
+        }
+        // A backslash at the end joins the next line to this one.
+        let mut joined = line.trim_end().trim_end_matches('\\').to_owned();
+        for (_, next) in lines.by_ref() {
+            joined.push(' ');
+            joined.push_str(next.trim_end().trim_end_matches('\\'));
+            if !next.trim_end().ends_with('\\') {
+                break;
+            }
+        }
+        reader.line(ctx, index + 1, &joined)?;
+    }
+    reader.builder.finish(ctx)
+}
+
+impl Reader {
+    fn line(&mut self, ctx: &Ctx<'_>, number: usize, line: &str) -> Result<(), MeshError> {
+        let line = line.trim();
+        let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        match word {
+            // A fourth number would be a weight or the first of a colour: neither moves the point.
+            "v" => self.v.push(floats(ctx, number, rest)?),
+            "vn" => self.vn.push(floats(ctx, number, rest)?),
+            // One number is a coordinate of a 1D texture.
+            "vt" if rest.split_whitespace().count() == 1 => {
+                let [u] = floats(ctx, number, rest)?;
+                self.vt.push([u, 0.0]);
+            }
+            "vt" => self.vt.push(floats(ctx, number, rest)?),
+            "f" => self.face(ctx, number, rest)?,
+            "usemtl" => self.material = self.known.get(rest.trim()).copied(),
+            "mtllib" => self.library(ctx, rest.trim())?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, ctx: &Ctx<'_>, number: usize, rest: &str) -> Result<(), MeshError> {
+        let mut corners = Vec::with_capacity(4);
+        for word in rest.split_whitespace().take_while(|w| !w.starts_with('#')) {
+            let mut fields = word.split('/');
+            let mut next = || fields.next().filter(|f| !f.is_empty());
+            let (v, vt, vn) = (next(), next(), next());
+            let v = v.ok_or_else(|| ctx.invalid(format!("line {number}"), "face corner without a vertex index"))?;
+            corners.push(Corner {
+                position: look_up(ctx, number, v, &self.v, "v")?,
+                uv: vt.map(|i| look_up(ctx, number, i, &self.vt, "vt")).transpose()?,
+                normal: vn.map(|i| look_up(ctx, number, i, &self.vn, "vn")).transpose()?,
+            });
+        }
+        if corners.len() < 3 {
+            let what = format!("face with {} corners; expected 3 or more", corners.len());
+            return Err(ctx.invalid(format!("line {number}"), what));
+        }
+        let points: Vec<[f64; 3]> = corners.iter().map(|c| c.position.map(f64::from)).collect();
+        for triangle in triangulate(&points) {
+            self.builder.triangle(ctx, triangle.map(|i| corners[i]), self.material, || format!("line {number}"))?;
+        }
+        Ok(())
+    }
+
+    /// Reads the libraries of one `mtllib` line; those that are not there are skipped.
+    fn library(&mut self, ctx: &Ctx<'_>, names: &str) -> Result<(), MeshError> {
+        // One name with spaces, or several names?
+        let whole = std::fs::read(beside(ctx.path, names)).ok().map(|bytes| vec![(names, bytes)]);
+        let files = whole.unwrap_or_else(|| {
+            let one = |name| std::fs::read(beside(ctx.path, name)).ok().map(|bytes| (name, bytes));
+            names.split_whitespace().filter_map(one).collect()
+        });
+        for (name, bytes) in files {
+            for material in mtl::read(&beside(ctx.path, name), ctx, &bytes)? {
+                let name = material.name.clone();
+                let id = self.builder.material(material);
+                self.known.entry(name).or_insert(id);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn floats<const N: usize>(ctx: &Ctx<'_>, number: usize, rest: &str) -> Result<[f32; N], MeshError> {
+    let mut words = rest.split_whitespace();
+    let mut out = [0.0; N];
+    for x in &mut out {
+        let at = || format!("line {number}");
+        let word = words.next().ok_or_else(|| ctx.invalid(at(), format!("expected {N} numbers")))?;
+        *x = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a number"), e))?;
+    }
+    Ok(out)
+}
+
+/// An index as OBJ counts: from 1, or backwards from the newest with a minus.
+fn look_up<T: Copy>(ctx: &Ctx<'_>, number: usize, word: &str, all: &[T], what: &str) -> Result<T, MeshError> {
+    let at = || format!("line {number}, {what} index");
+    let index: i64 = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a whole number"), e))?;
+    let from_zero =
+        if index > 0 { Some(index - 1) } else { (all.len() as i64).checked_add(index).filter(|_| index < 0) };
+    let found = from_zero.and_then(|i| usize::try_from(i).ok()).and_then(|i| all.get(i));
+    found.copied().ok_or_else(|| ctx.index(at(), index, all.len()))
+}

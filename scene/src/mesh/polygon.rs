@@ -1,0 +1,112 @@
+//! Polygons of OBJ and COLLADA to triangles.
+
+/// Above this a concave polygon is cut as a fan: ear clipping is quadratic, and such polygons are flat convex caps.
+const MAX_EARS: usize = 512;
+
+/// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon: a fan from the first corner
+/// where it is convex, ear clipping where it is not.
+pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
+    let n = points.len();
+    if n < 3 {
+        return Vec::new();
+    }
+    let fan = || (1..n - 1).map(|i| [0, i, i + 1]).collect();
+    if n == 3 || n > MAX_EARS {
+        return fan();
+    }
+    let flat = flattened(points);
+    let corner = |a: usize, b: usize, c: usize| turn(flat[a], flat[b], flat[c]);
+    let reflex = |ring: &[usize], i: usize| {
+        let k = ring.len();
+        corner(ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]) < 0.0
+    };
+    let mut ring: Vec<usize> = (0..n).collect();
+    if !(0..n).any(|i| reflex(&ring, i)) {
+        return fan();
+    }
+    let mut out = Vec::with_capacity(n - 2);
+    while ring.len() > 3 {
+        let k = ring.len();
+        let ear = (0..k).find(|&i| {
+            let (a, b, c) = (ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]);
+            corner(a, b, c) > 0.0
+                && ring.iter().all(|&q| {
+                    [a, b, c].contains(&q)
+                        || [a, b, c].iter().any(|&e| flat[e] == flat[q])
+                        || corner(a, b, q) < 0.0
+                        || corner(b, c, q) < 0.0
+                        || corner(c, a, q) < 0.0
+                })
+        });
+        // A polygon that crosses itself may have no ear; cut anywhere rather than fail.
+        let i = ear.unwrap_or(0);
+        out.push([ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]]);
+        ring.remove(i);
+    }
+    out.push([ring[0], ring[1], ring[2]]);
+    out
+}
+
+/// The polygon seen along its normal (Newell's method), counter-clockwise.
+fn flattened(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
+    let mut normal = [0.0; 3];
+    for (i, p) in points.iter().enumerate() {
+        let q = points[(i + 1) % points.len()];
+        for (axis, n) in normal.iter_mut().enumerate() {
+            let (y, z) = ((axis + 1) % 3, (axis + 2) % 3);
+            *n += (p[y] - q[y]) * (p[z] + q[z]);
+        }
+    }
+    let axis = (0..3).fold(0, |best, i| if normal[i].abs() > normal[best].abs() { i } else { best });
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mirror = if normal[axis] < 0.0 { -1.0 } else { 1.0 };
+    points.iter().map(|p| [p[u] * mirror, p[v]]).collect()
+}
+
+/// Twice the area of the triangle, positive when it is counter-clockwise.
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builder::{cross, sub};
+
+    fn area(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> f64 {
+        triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| points[i]);
+                let n = cross(sub(b, a), sub(c, a));
+                n[2] / 2.0
+            })
+            .sum()
+    }
+
+    #[test]
+    fn concave_polygons_keep_area_and_winding() {
+        // An L, an arrow whose fan from corner 0 would leave it, and the arrow wound the other way.
+        let l = [[0., 0., 0.], [2., 0., 0.], [2., 1., 0.], [1., 1., 0.], [1., 2., 0.], [0., 2., 0.]];
+        let arrow = [[-1., -1., 0.], [0., -0.5, 0.], [1., -1., 0.], [0., 1., 0.]];
+        for (points, expected) in [(&l[..], 3.0), (&arrow[..], 1.5)] {
+            for shift in 0..points.len() {
+                let mut p = points.to_vec();
+                p.rotate_left(shift);
+                let t = triangulate(&p);
+                assert_eq!(t.len(), p.len() - 2);
+                assert!((area(&p, &t) - expected).abs() < 1e-12);
+                assert!(t.iter().all(|&t| area(&p, &[t]) > 0.0), "{shift}: {t:?}");
+                p.reverse();
+                let t = triangulate(&p);
+                assert!(t.iter().all(|&t| area(&p, &[t]) < 0.0));
+                assert!((area(&p, &t) + expected).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_from_less_than_a_triangle() {
+        assert!(triangulate(&[[0.0; 3]; 2]).is_empty());
+    }
+}

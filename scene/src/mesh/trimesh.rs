@@ -1,0 +1,239 @@
+//! What every mesh can do.
+
+use super::builder::{cross, dot, unit};
+use super::dae::Placement;
+use super::{MeshPart, TriMesh};
+use crate::Pose;
+
+/// A broken promise of [`TriMesh`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshFault {
+    /// Normals or texture coordinates are not as many as positions.
+    #[error("{count} {what} for {positions} positions; expected as many")]
+    Length {
+        /// "normals" or "texture coordinates".
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many positions there are.
+        positions: usize,
+    },
+    /// A position, normal or texture coordinate is not finite.
+    #[error("{what} {index} is not finite")]
+    NonFinite {
+        /// "position", "normal" or "texture coordinate".
+        what: &'static str,
+        /// Which one.
+        index: usize,
+    },
+    /// A triangle refers to a vertex that is not there.
+    #[error("triangle {triangle} refers to vertex {index}, but there are {positions}")]
+    Index {
+        /// Which triangle.
+        triangle: usize,
+        /// The vertex it names.
+        index: u32,
+        /// How many positions there are.
+        positions: usize,
+    },
+    /// The parts do not cover the triangles one after the other.
+    #[error(
+        "part {part} covers triangles {found_start}..{found_end}; expected it to begin at {expected_start}, and the last to end at {triangles}"
+    )]
+    Parts {
+        /// Which part (one past the last if triangles are left over).
+        part: usize,
+        /// Where it begins.
+        found_start: usize,
+        /// Where it ends.
+        found_end: usize,
+        /// Where it has to begin.
+        expected_start: usize,
+        /// How many triangles there are.
+        triangles: usize,
+    },
+    /// A part names a material that is not there.
+    #[error("part {part} names material {material}, but there are {materials}")]
+    Material {
+        /// Which part.
+        part: usize,
+        /// The material it names.
+        material: usize,
+        /// How many materials there are.
+        materials: usize,
+    },
+}
+
+impl TriMesh {
+    /// Triangles without normals, texture coordinates or material, as one part.
+    pub fn from_triangles(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        let parts = vec![MeshPart { triangles: 0..triangles.len(), material: None }];
+        Self { positions, triangles, parts, ..Self::default() }
+    }
+
+    /// Smallest and largest coordinates \[m\]; `None` without vertices.
+    pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(lo, hi), p| {
+            let pick = |f: fn(f32, f32) -> f32, a: [f32; 3]| std::array::from_fn(|i| f(a[i], p[i]));
+            (pick(f32::min, lo), pick(f32::max, hi))
+        }))
+    }
+
+    /// Enclosed volume \[m³\]: positive for a closed surface with its front outside, meaningless for an open one.
+    pub fn signed_volume(&self) -> f64 {
+        // About the middle, so that a small part far from the origin loses no digits.
+        let Some((lo, hi)) = self.bounds() else { return 0.0 };
+        let middle: [f64; 3] = std::array::from_fn(|i| (f64::from(lo[i]) + f64::from(hi[i])) / 2.0);
+        let six: f64 = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| {
+                    let p = self.positions[i as usize];
+                    std::array::from_fn(|k| f64::from(p[k]) - middle[k])
+                });
+                dot(a, cross(b, c))
+            })
+            .sum();
+        six / 6.0
+    }
+
+    /// The mesh scaled along its axes, as `scale` of a URDF mesh does. A negative product mirrors the mesh: the winding
+    /// follows, so that the front stays outside.
+    pub fn scaled(&self, scale: [f64; 3]) -> Self {
+        let [x, y, z] = scale;
+        self.affine(&[[x, 0., 0., 0.], [0., y, 0., 0.], [0., 0., z, 0.]])
+    }
+
+    /// The mesh moved by a pose: coordinates of the frame that `pose` maps into.
+    pub fn transformed(&self, pose: &Pose) -> Self {
+        let m = pose.to_homogeneous();
+        self.affine(&[0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)], m[(i, 3)]]))
+    }
+
+    fn affine(&self, matrix: &[[f64; 4]; 3]) -> Self {
+        let place = Placement::new(matrix);
+        let mut out = self.clone();
+        for p in &mut out.positions {
+            *p = place.point(p.map(f64::from)).map(|x| x as f32);
+        }
+        for n in out.normals.iter_mut().flatten() {
+            // A scale of zero has no inverse; the old normal is as good as any.
+            *n = place.normal(n.map(f64::from)).or_else(|| unit(*n)).unwrap_or(*n);
+        }
+        if place.mirrored {
+            for t in &mut out.triangles {
+                t.swap(1, 2);
+            }
+        }
+        out
+    }
+
+    /// Checks everything the type promises; meshes from [`super::load`] keep it.
+    pub fn validate(&self) -> Result<(), MeshFault> {
+        let positions = self.positions.len();
+        let lengths = [
+            ("normals", self.normals.as_ref().map(Vec::len)),
+            ("texture coordinates", self.uvs.as_ref().map(Vec::len)),
+        ];
+        for (what, count) in lengths {
+            if let Some(count) = count.filter(|&c| c != positions) {
+                return Err(MeshFault::Length { what, count, positions });
+            }
+        }
+        let bad = |v: &[f32]| v.iter().any(|x| !x.is_finite());
+        if let Some(index) = self.positions.iter().position(|p| bad(p)) {
+            return Err(MeshFault::NonFinite { what: "position", index });
+        }
+        if let Some(index) = self.normals.iter().flatten().position(|n| bad(n)) {
+            return Err(MeshFault::NonFinite { what: "normal", index });
+        }
+        if let Some(index) = self.uvs.iter().flatten().position(|uv| bad(uv)) {
+            return Err(MeshFault::NonFinite { what: "texture coordinate", index });
+        }
+        for (triangle, t) in self.triangles.iter().enumerate() {
+            if let Some(&index) = t.iter().find(|&&i| i as usize >= positions) {
+                return Err(MeshFault::Index { triangle, index, positions });
+            }
+        }
+        let (mut expected_start, triangles) = (0, self.triangles.len());
+        let fault = |part, range: &std::ops::Range<usize>, expected_start| MeshFault::Parts {
+            part,
+            found_start: range.start,
+            found_end: range.end,
+            expected_start,
+            triangles,
+        };
+        for (part, MeshPart { triangles: range, material }) in self.parts.iter().enumerate() {
+            if range.start != expected_start || range.end < range.start || range.end > triangles {
+                return Err(fault(part, range, expected_start));
+            }
+            expected_start = range.end;
+            if let Some(material) = material.filter(|&m| m >= self.materials.len()) {
+                return Err(MeshFault::Material { part, material, materials: self.materials.len() });
+            }
+        }
+        if expected_start != triangles {
+            return Err(fault(self.parts.len(), &(expected_start..expected_start), expected_start));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+    use crate::pose::from_xyz_rpy;
+
+    /// A corner tetrahedron of volume 1/6 with a normal per vertex.
+    fn corner() -> TriMesh {
+        let positions = vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
+        let mut mesh = TriMesh::from_triangles(positions, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+        let s = 3f32.sqrt().recip();
+        mesh.normals = Some(vec![[-s, -s, -s], [1., 0., 0.], [0., 1., 0.], [s, s, s]]);
+        mesh
+    }
+
+    #[test]
+    fn mirrors_keep_the_front_outside() {
+        let mesh = corner();
+        assert_eq!(mesh.validate(), Ok(()));
+        assert!((mesh.signed_volume() - 1.0 / 6.0).abs() < 1e-12);
+        let mirrored = mesh.scaled([-2.0, 1.0, 3.0]);
+        assert!((mirrored.signed_volume() - 1.0).abs() < 1e-9);
+        assert_eq!(mirrored.bounds(), Some(([-2., 0., 0.], [0., 1., 3.])));
+        // The normal of the plane x/-2 + y + z/3 = 1 is (-1/2, 1, 1/3), normalised.
+        let n = mirrored.normals.unwrap()[3];
+        let length = (0.25f32 + 1.0 + 1.0 / 9.0).sqrt();
+        for (found, expected) in n.iter().zip([-0.5 / length, 1.0 / length, 1.0 / 3.0 / length]) {
+            assert!((found - expected).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn poses_turn_normals_and_far_parts_keep_their_volume() {
+        let pose = from_xyz_rpy([100.0, 0.0, 0.0], [0.0, 0.0, std::f64::consts::FRAC_PI_2]);
+        let moved = corner().transformed(&pose);
+        assert_eq!(moved.positions[1], [100.0, 1.0, 0.0]);
+        let n = moved.normals.as_ref().unwrap()[1];
+        assert!((n[1] - 1.0).abs() < 1e-6 && n[0].abs() < 1e-6);
+        assert!((moved.signed_volume() - 1.0 / 6.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn validate_names_the_fault() {
+        let fault = |change: fn(&mut TriMesh)| {
+            let mut mesh = corner();
+            change(&mut mesh);
+            mesh.validate().unwrap_err().to_string()
+        };
+        assert_eq!(fault(|m| m.triangles[2][1] = 9), "triangle 2 refers to vertex 9, but there are 4");
+        assert_eq!(fault(|m| m.positions[3][0] = f32::NAN), "position 3 is not finite");
+        assert_eq!(fault(|m| m.uvs = Some(vec![])), "0 texture coordinates for 4 positions; expected as many");
+        assert_eq!(fault(|m| m.parts[0].material = Some(0)), "part 0 names material 0, but there are 0");
+        assert!(fault(|m| m.parts.clear()).starts_with("part 0 covers triangles 0..0"));
+    }
+}
