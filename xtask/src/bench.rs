@@ -1,7 +1,7 @@
 //! `cargo xtask bench`: ours and the rivals on both lines of MuJoCo, and the page with the results.
 
 use crate::run::{Cmd, Failure, Outcome, Repo};
-use crate::setup::{self, Line, Wanted};
+use crate::setup::{self, Line, Need, Wanted};
 use crate::wheel;
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -11,6 +11,8 @@ use std::{fs, thread};
 const RESULTS: &str = "benches/RESULTS.md";
 /// Names a python that can `import mujoco` of the wheel's version; its loops are among the rivals.
 const PYTHON: &str = "KINETOSCOPE_PYTHON4";
+
+const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct BenchArgs {
@@ -23,9 +25,10 @@ pub(crate) struct BenchArgs {
 
 pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     let mut rows = Vec::new();
+    let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
+    let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
     let python = python_with_mujoco(repo);
-    for line in [Line::Debian, Line::Wheel] {
-        let ready = setup::prepare(repo, Wanted { line: Some(line), extras: true })?;
+    for ready in both {
         let file = repo.target.join("bench-rows.json");
         if file.exists() {
             fs::remove_file(&file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;

@@ -2,7 +2,7 @@
 
 use crate::docs_check::TEST_COMMAND;
 use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
-use crate::setup::{self, Line, Ready, Wanted};
+use crate::setup::{self, Line, Need, Ready, Wanted};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{arrows, docs_check, examples, source_check, wheel};
@@ -48,11 +48,11 @@ struct Context<'a> {
 
 impl Context<'_> {
     fn debian(&self) -> Outcome<Ready> {
-        setup::prepare(self.repo, Wanted { line: Some(Line::Debian), extras: false })
+        setup::prepare(self.repo, Wanted { line: Some(Line::Debian), extras: &[] })
     }
 
     fn wheel(&self) -> Outcome<Ready> {
-        setup::prepare(self.repo, Wanted { line: Some(Line::Wheel), extras: false })
+        setup::prepare(self.repo, Wanted { line: Some(Line::Wheel), extras: &[] })
     }
 }
 
@@ -145,7 +145,7 @@ fn clock(time: Duration) -> String {
 }
 
 fn install(context: &Context<'_>) -> Outcome {
-    setup::prepare(context.repo, Wanted { line: Some(Line::Debian), extras: true }).map(|_| ())
+    setup::prepare(context.repo, Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip] }).map(|_| ())
 }
 
 fn fmt(context: &Context<'_>) -> Outcome {

@@ -22,8 +22,8 @@ pub(crate) enum Line {
 pub(crate) struct Wanted {
     /// None: the MuJoCo of `MUJOCO_DIR` if that is set, else Debian's.
     pub(crate) line: Option<Line>,
-    /// Also the models that come with MuJoCo (humanoid.xml) and pip; missing ones stop CI only.
-    pub(crate) extras: bool,
+    /// What serves comparisons and second runs only: where it cannot be installed, CI stops, others go on.
+    pub(crate) extras: &'static [Need],
 }
 
 /// A machine that is ready, and the MuJoCo that was chosen.
@@ -69,15 +69,15 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     if matches!(choice, Choice::Debian) {
         needs.push(Need::MuJoCo);
     }
+    if matches!(choice, Choice::Wheel { .. }) && !wheel::is_available(repo) {
+        needs.push(Need::Pip);
+    }
     install(&machine, &needs)?;
-    if wanted.extras {
-        // These serve comparisons and second runs: a machine without them still does everything else.
-        if let Err(failure) = install(&machine, &[Need::Models, Need::Pip]) {
-            if in_ci() {
-                return Err(failure);
-            }
-            eprintln!("note: {}", failure.message);
+    if let Err(failure) = install(&machine, wanted.extras) {
+        if in_ci() {
+            return Err(failure);
         }
+        eprintln!("note: {}", failure.message);
     }
     let choice = match choice {
         Choice::Wheel { target, .. } => Choice::Wheel { mujoco_dir: wheel::obtain(repo)?, target },
@@ -88,12 +88,13 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
 
 /// Something the machine must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Need {
+pub(crate) enum Need {
     Compiler,
     Libclang,
     MuJoCo,
     Models,
     Pip,
+    Venv,
 }
 
 impl Need {
@@ -103,7 +104,8 @@ impl Need {
             Self::Libclang => &["libclang-dev"],
             Self::MuJoCo => &["libmujoco-dev"],
             Self::Models => &["libmujoco-samples"],
-            Self::Pip => &["python3-pip", "python3-venv"],
+            Self::Pip => &["python3-pip"],
+            Self::Venv => &["python3-venv"],
         }
     }
 
@@ -116,7 +118,8 @@ impl Need {
                  MuJoCo 4.x; or `cargo xtask test --mujoco 4`, which downloads that"
             }
             Self::Models => "the models that come with MuJoCo (humanoid.xml)",
-            Self::Pip => "python3 with pip and venv (MuJoCo 4 is downloaded with it)",
+            Self::Pip => "python3 with pip (MuJoCo 4 is downloaded with it)",
+            Self::Venv => "python3 with venv (rivals in Python are installed with it)",
         }
     }
 }
@@ -127,7 +130,7 @@ struct Machine {
     root: PathBuf,
     search_path: Vec<PathBuf>,
     libclang_path: Option<PathBuf>,
-    has_pip: fn() -> bool,
+    python_has: fn(Need) -> bool,
 }
 
 impl Machine {
@@ -136,7 +139,10 @@ impl Machine {
             root: PathBuf::from("/"),
             search_path: env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default(),
             libclang_path: env::var_os("LIBCLANG_PATH").map(PathBuf::from),
-            has_pip: || wheel::pip().is_some(),
+            python_has: |need| match need {
+                Need::Venv => Cmd::new("python3").args(["-c", "import venv, ensurepip"]).quiet().succeeds(),
+                _ => wheel::pip().is_some(),
+            },
         }
     }
 
@@ -150,8 +156,8 @@ impl Machine {
                 self.header("mujoco/mujoco.h").is_some()
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
-            Need::Models => self.root.join("usr/share/mujoco/model/humanoid.xml").exists(),
-            Need::Pip => (self.has_pip)(),
+            Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
+            Need::Pip | Need::Venv => (self.python_has)(need),
         }
     }
 
@@ -295,7 +301,8 @@ mod tests {
             fs::write(path, "").expect("writable");
         }
         let search_path = vec![dir.path().join("usr/bin")];
-        let machine = Machine { root: dir.path().to_path_buf(), search_path, libclang_path: None, has_pip: || false };
+        let machine =
+            Machine { root: dir.path().to_path_buf(), search_path, libclang_path: None, python_has: |_| false };
         (dir, machine)
     }
 

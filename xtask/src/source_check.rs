@@ -146,7 +146,7 @@ fn foreign_paths(files: &[TextFile]) -> Vec<String> {
             for folder in FOREIGN_FOLDERS {
                 let needle = format!("/{folder}/");
                 let is_start = |at: usize| {
-                    // `host/home/` and `../work/` are no absolute paths; `file:///home/` is.
+                    // In the middle of a path or address the folder means something else; behind `file://` it does not.
                     line[..at].chars().next_back().is_none_or(|c| !c.is_alphanumeric() && !"._-})$*".contains(c))
                 };
                 if line.match_indices(&needle).any(|(at, _)| is_start(at)) {

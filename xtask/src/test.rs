@@ -19,7 +19,7 @@ pub(crate) struct TestArgs {
 }
 
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
-    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: false })?;
+    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: &[] })?;
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
     ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args)).run()
 }
