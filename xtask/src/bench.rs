@@ -155,7 +155,7 @@ fn machine() -> String {
 fn heading(machine: &str) -> String {
     format!(
         "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}.\n\nOurs and the rival ran in \
-         the same process run, one after the other. `ratio > 1`: ours is faster. `-`: the rival was not on the machine.\n"
+         one run, one after the other. `ratio > 1`: ours is faster. `-`: the rival was not on the machine.\n"
     )
 }
 
