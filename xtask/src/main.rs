@@ -1,1 +1,108 @@
-fn main() {}
+//! The project's commands: `cargo xtask demo | test | ci | bench | bless`.
+//!
+//! Every command first installs what is missing on the machine (`setup.rs`). This crate depends on no room of the
+//! project, so that it builds before MuJoCo is there.
+#![forbid(unsafe_code)]
+
+mod arrows;
+mod bench;
+mod bless;
+mod ci;
+mod demo;
+mod docs_check;
+mod examples;
+mod run;
+mod setup;
+mod source_check;
+mod test;
+mod wheel;
+
+use clap::{Parser, Subcommand};
+use run::{Outcome, Repo};
+use std::process::ExitCode;
+
+/// Kinetoscope's commands.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Install what is missing and run the first example, without a window
+    Demo(demo::DemoArgs),
+    /// Install what is missing and run all tests
+    Test(test::TestArgs),
+    /// Everything a change has to pass, in one command
+    Ci(ci::CiArgs),
+    /// Ours and the rivals side by side; without a name also writes benches/RESULTS.md
+    Bench(bench::BenchArgs),
+    /// Rewrite the expected outputs (goldens) of the tests from what the code gives now
+    Bless(bless::BlessArgs),
+}
+
+impl Cli {
+    fn run(&self, repo: &Repo) -> Outcome {
+        match &self.command {
+            Task::Demo(args) => demo::run(repo, args),
+            Task::Test(args) => test::run(repo, args),
+            Task::Ci(args) => ci::run(repo, args),
+            Task::Bench(args) => bench::run(repo, args),
+            Task::Bless(args) => bless::run(repo, args),
+        }
+    }
+
+    fn test_args(&self) -> Option<&test::TestArgs> {
+        match &self.command {
+            Task::Test(args) => Some(args),
+            _ => None,
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match Repo::find().and_then(|repo| cli.run(&repo)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{failure}");
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn arguments_after_two_dashes_reach_the_test_binaries() {
+        let cli = Cli::try_parse_from(["cargo xtask", "test", "gravity", "--", "--nocapture"]).expect("valid");
+        let Task::Test(args) = cli.command else { panic!("parsed as another task") };
+        assert_eq!(args.filter.as_deref(), Some("gravity"));
+        assert_eq!(args.test_args, ["--nocapture"]);
+    }
+
+    #[test]
+    fn only_the_two_supported_lines_of_mujoco_are_accepted() {
+        assert!(Cli::try_parse_from(["cargo xtask", "test", "--mujoco", "4"]).is_ok());
+        assert!(Cli::try_parse_from(["cargo xtask", "test", "--mujoco", "3"]).is_err());
+    }
+
+    #[test]
+    fn demo_takes_flags_with_and_without_two_dashes() {
+        for line in [&["cargo xtask", "demo", "--steps", "7"][..], &["cargo xtask", "demo", "--", "--steps", "7"]] {
+            let cli = Cli::try_parse_from(line).expect("valid");
+            let Task::Demo(args) = cli.command else { panic!("parsed as another task") };
+            assert_eq!(args.args, ["--steps", "7"]);
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! `cargo xtask bench`: ours and the rivals on both lines of MuJoCo, and the page with the results.
+
+use crate::run::{Cmd, Failure, Outcome, Repo};
+use crate::setup::{self, Line, Need, Wanted};
+use crate::wheel;
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{fs, thread};
+
+const RESULTS: &str = "benches/RESULTS.md";
+/// Names a python that can `import mujoco` of the wheel's version; its loops are among the rivals.
+const PYTHON: &str = "KINETOSCOPE_PYTHON4";
+
+const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct BenchArgs {
+    /// Only this benchmark
+    name: Option<String>,
+    /// Also write all rows, as JSON, to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
+    let mut rows = Vec::new();
+    let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
+    let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
+    let python = python_with_mujoco(repo);
+    for ready in both {
+        let file = repo.target.join("bench-rows.json");
+        if file.exists() {
+            fs::remove_file(&file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
+        }
+        let mut cmd = ready.cargo();
+        if let Some(python) = &python {
+            cmd = cmd.env(PYTHON, python);
+        }
+        cmd.args(["run", "--release", "--package", "kinetoscope-benches", "--"])
+            .args(&args.name)
+            .arg("--json")
+            .arg(&file)
+            .run()?;
+        rows.extend(read_rows(&file)?);
+    }
+    if let Some(path) = &args.json {
+        write(path, &format!("{:#}\n", Value::Array(rows.clone())))?;
+    }
+    let tables = tables(&rows)?;
+    println!("\n{tables}");
+    if args.name.is_none() {
+        let path = repo.root.join(RESULTS);
+        write(&path, &format!("{}\n{tables}", heading(&machine())))?;
+        println!("written to {RESULTS}");
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Outcome {
+    fs::write(path, text).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+}
+
+fn read_rows(file: &Path) -> Outcome<Vec<Value>> {
+    let text = fs::read_to_string(file)
+        .map_err(|e| Failure::new(format!("the benchmarks wrote no rows to {}: {e}", file.display())))?;
+    match serde_json::from_str(&text) {
+        Ok(Value::Array(rows)) if !rows.is_empty() => Ok(rows),
+        Ok(_) => Err(Failure::new(format!("{}: not an array of rows", file.display()))),
+        Err(e) => Err(Failure::new(format!("{}: {e}", file.display()))),
+    }
+}
+
+/// A virtual environment below the target folder, made at the first call. Without one the rivals in Python are left out.
+fn python_with_mujoco(repo: &Repo) -> Option<PathBuf> {
+    let venv = repo.target.join("bench-venv");
+    let python = venv.join("bin/python");
+    let is_ready = || {
+        let check = format!("import mujoco; assert mujoco.__version__ == '{}'", wheel::VERSION);
+        Cmd::new(&python).args(["-c", &check]).quiet().succeeds()
+    };
+    if is_ready() {
+        return Some(python);
+    }
+    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run().and_then(|()| {
+        Cmd::new(&python)
+            .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet"])
+            .arg(format!("mujoco=={}", wheel::VERSION))
+            .run()
+    });
+    if made.is_ok() && is_ready() {
+        return Some(python);
+    }
+    eprintln!("note: no python with mujoco {} could be made: rivals in Python are left out", wheel::VERSION);
+    None
+}
+
+/// One table per benchmark, in the order the rows came.
+fn tables(rows: &[Value]) -> Outcome<String> {
+    let mut benches: Vec<&str> = Vec::new();
+    for row in rows {
+        let bench = text(row, "bench")?;
+        if !benches.contains(&bench) {
+            benches.push(bench);
+        }
+    }
+    let mut out = String::new();
+    for bench in benches {
+        let _ = writeln!(out, "## {bench}\n");
+        out.push_str(
+            "| case | unit | threads | MuJoCo | ours | rival | | ratio |\n|---|---|--:|---|--:|--:|---|--:|\n",
+        );
+        for row in rows.iter().filter(|row| row["bench"] == bench) {
+            let _ = writeln!(
+                out,
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
+                text(row, "case")?,
+                text(row, "unit")?,
+                row["threads"],
+                row["mujoco"].as_str().map_or_else(|| row["mujoco"].to_string(), str::to_string),
+                number(&row["ours"]),
+                number(&row["rival"]),
+                row["rival_name"].as_str().unwrap_or("-"),
+                row["ratio"].as_f64().map_or_else(|| "-".to_string(), |ratio| format!("**{ratio:.2}**")),
+            );
+        }
+        out.push('\n');
+    }
+    Ok(format!("{}\n", out.trim_end()))
+}
+
+fn text<'a>(row: &'a Value, key: &str) -> Outcome<&'a str> {
+    row[key].as_str().ok_or_else(|| Failure::new(format!("a row without the text `{key}`: {row}")))
+}
+
+/// Three digits that count; `-` where there is no number.
+fn number(value: &Value) -> String {
+    match value.as_f64() {
+        None => "-".to_string(),
+        Some(x) if x.abs() >= 100.0 => format!("{x:.0}"),
+        Some(x) if x.abs() >= 10.0 => format!("{x:.1}"),
+        Some(x) if x.abs() >= 1.0 || x == 0.0 => format!("{x:.2}"),
+        Some(x) => format!("{x:.3}"),
+    }
+}
+
+fn machine() -> String {
+    let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')).map(|(_, name)| name.trim());
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    format!("{cores} x {}", model.unwrap_or(std::env::consts::ARCH))
+}
+
+fn heading(machine: &str) -> String {
+    format!(
+        "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}.\n\nOurs and the rival ran in \
+         one run, one after the other. `ratio > 1`: ours is faster. `-`: the rival was not on the machine.\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn row(bench: &str, mujoco: &str, rival: Value, ratio: Value) -> Value {
+        json!({"bench": bench, "case": "arm, 64 envs", "unit": "env-steps/s", "ours": 251_000.4, "rival": rival,
+               "rival_name": "mj_step", "ratio": ratio, "threads": 2, "mujoco": mujoco})
+    }
+
+    #[test]
+    fn rows_of_both_runs_share_one_table_per_benchmark() {
+        let rows = [
+            row("step", "2.2.2", json!(200_000.0), json!(1.255)),
+            row("camera", "2.2.2", json!(12.345), json!(3.0)),
+            row("step", "4.0.0", Value::Null, Value::Null),
+        ];
+        let page = tables(&rows).expect("complete rows");
+        assert_eq!(page.matches("## ").count(), 2);
+        assert!(
+            page.contains("| arm, 64 envs | env-steps/s | 2 | 2.2.2 | 251000 | 200000 | mj_step | **1.25** |"),
+            "{page}"
+        );
+        assert!(page.contains("| 4.0.0 | 251000 | - | mj_step | - |"), "{page}");
+        assert!(page.find("4.0.0") < page.find("## camera"), "{page}");
+    }
+
+    #[test]
+    fn a_row_without_its_name_is_an_error() {
+        assert!(tables(&[json!({"case": "x"})]).is_err());
+    }
+
+    #[test]
+    fn a_run_that_wrote_no_rows_is_an_error() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let file = dir.path().join("rows.json");
+        assert!(read_rows(&file).is_err());
+        for text in ["", "[]", "{}"] {
+            fs::write(&file, text).expect("writable");
+            assert!(read_rows(&file).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_keep_three_digits() {
+        let shown: Vec<String> = [0.12345, 1.2345, 12.345, 1234.5].iter().map(|x| number(&json!(x))).collect();
+        assert_eq!(shown, ["0.123", "1.23", "12.3", "1234"]);
+        assert_eq!(number(&Value::Null), "-");
+    }
+}

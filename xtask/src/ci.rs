@@ -1,0 +1,270 @@
+//! `cargo xtask ci`: everything a change has to pass, stage by stage, on both lines of MuJoCo.
+
+use crate::docs_check::TEST_COMMAND;
+use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
+use crate::setup::{self, Line, Need, Ready, Wanted};
+use crate::source_check::files_below;
+use crate::test::{self, TestArgs};
+use crate::{arrows, docs_check, examples, source_check, wheel};
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CiArgs {
+    /// Only what takes a minute: formatting, rules of the tree, clippy, unit tests
+    #[arg(long)]
+    quick: bool,
+    /// Only this stage
+    #[arg(long, value_name = "STAGE", value_parser = clap::builder::PossibleValuesParser::new(STAGES.iter().map(|s| s.name)), conflicts_with = "quick")]
+    only: Option<String>,
+}
+
+/// One line of the table that is printed at the end.
+#[derive(Debug)]
+struct Stage {
+    name: &'static str,
+    what: &'static str,
+    when: When,
+    run: fn(&Context<'_>) -> Outcome,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum When {
+    Always,
+    /// Left out by `--quick`.
+    Full,
+    /// Left out without `--quick`: a larger stage covers it.
+    Quick,
+    /// Left out by `--quick`, and on a developer's machine that cannot download the wheel.
+    Wheel,
+}
+
+#[derive(Debug)]
+struct Context<'a> {
+    repo: &'a Repo,
+    /// What git saw as changed before the first stage; None where there is no git.
+    changed_before: Option<BTreeSet<String>>,
+}
+
+impl Context<'_> {
+    fn debian(&self) -> Outcome<Ready> {
+        setup::prepare(self.repo, Wanted { line: Some(Line::Debian), extras: &[] })
+    }
+
+    fn wheel(&self) -> Outcome<Ready> {
+        setup::prepare(self.repo, Wanted { line: Some(Line::Wheel), extras: &[] })
+    }
+}
+
+const STAGES: &[Stage] = &[
+    Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
+    Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
+    Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| arrows::run(c.repo) },
+    Stage { name: "rules", what: "rules of the tree", when: When::Always, run: |c| source_check::run(c.repo) },
+    Stage {
+        name: "docs",
+        what: "commands and links of the pages",
+        when: When::Always,
+        run: |c| docs_check::run(c.repo),
+    },
+    Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?) },
+    Stage { name: "unit", what: "unit tests, MuJoCo 2.2.2", when: When::Quick, run: unit_tests },
+    Stage { name: "rustdoc", what: "documentation", when: When::Full, run: rustdoc },
+    Stage { name: "demo", what: "the README's first command", when: When::Full, run: demo },
+    Stage { name: "test", what: "the README's second command, MuJoCo 2.2.2", when: When::Full, run: readme_test },
+    Stage {
+        name: "examples",
+        what: "examples, MuJoCo 2.2.2",
+        when: When::Full,
+        run: |c| examples::run(c.repo, &c.debian()?),
+    },
+    Stage { name: "benches", what: "benchmarks compile", when: When::Full, run: benches },
+    Stage { name: "clippy-4", what: "lints, MuJoCo 4", when: When::Wheel, run: |c| clippy(&c.wheel()?) },
+    Stage { name: "test-4", what: "tests, MuJoCo 4", when: When::Wheel, run: wheel_test },
+    Stage {
+        name: "examples-4",
+        what: "examples, MuJoCo 4",
+        when: When::Wheel,
+        run: |c| examples::run(c.repo, &c.wheel()?),
+    },
+    Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
+];
+
+pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
+    let context = Context { repo, changed_before: changed_files(repo) };
+    let chosen = chosen(args);
+    let start = Instant::now();
+    let mut table = Vec::new();
+    for (at, stage) in chosen.iter().enumerate() {
+        println!("\n=== {}/{} {}: {} [{}]", at + 1, chosen.len(), stage.name, stage.what, clock(start.elapsed()));
+        if stage.when == When::Wheel && !in_ci() && !wheel::is_available(repo) {
+            println!(
+                "skipped: MuJoCo {} is downloaded with pip, and there is none (with CI=true an error)",
+                wheel::VERSION
+            );
+            table.push((stage.name, "skipped".to_string()));
+            continue;
+        }
+        let stage_start = Instant::now();
+        let result = (stage.run)(&context);
+        let took = clock(stage_start.elapsed());
+        if let Err(failure) = result {
+            table.push((stage.name, format!("{took} FAILED")));
+            print_table(&table, start.elapsed());
+            let again = failure.again.unwrap_or_else(|| format!("cargo xtask ci --only {}", stage.name));
+            let message = format!("stage `{}` failed: {}", stage.name, failure.message);
+            return Err(Failure { message, again: Some(again), code: 1 });
+        }
+        table.push((stage.name, took));
+    }
+    print_table(&table, start.elapsed());
+    Ok(())
+}
+
+fn chosen(args: &CiArgs) -> Vec<&'static Stage> {
+    STAGES
+        .iter()
+        .filter(|stage| match &args.only {
+            Some(name) => stage.name == name,
+            None if args.quick => matches!(stage.when, When::Always | When::Quick),
+            None => stage.when != When::Quick,
+        })
+        .collect()
+}
+
+fn print_table(table: &[(&str, String)], total: Duration) {
+    println!();
+    for (name, took) in table {
+        println!("{name:<12} {took:>7}");
+    }
+    println!("{:<12} {:>7}", "total", clock(total));
+}
+
+fn clock(time: Duration) -> String {
+    format!("{}:{:02}", time.as_secs() / 60, time.as_secs() % 60)
+}
+
+fn install(context: &Context<'_>) -> Outcome {
+    setup::prepare(context.repo, Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip] }).map(|_| ())
+}
+
+fn fmt(context: &Context<'_>) -> Outcome {
+    Cmd::new("cargo").args(["fmt", "--all", "--check"]).current_dir(&context.repo.root).run()
+}
+
+fn clippy(ready: &Ready) -> Outcome {
+    ready.cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()
+}
+
+fn unit_tests(context: &Context<'_>) -> Outcome {
+    context.debian()?.cargo().args(["test", "--workspace", "--lib", "--bins"]).run()
+}
+
+fn rustdoc(context: &Context<'_>) -> Outcome {
+    let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
+    cargo.args(["doc", "--workspace", "--no-deps"]).run()
+}
+
+fn demo(context: &Context<'_>) -> Outcome {
+    let [command, _] = docs_check::PROMISED;
+    docs_check::parse(command).map_err(|e| Failure::new(e.to_string()))?.run(context.repo)
+}
+
+/// The very line of the README, so that what newcomers type is what is tested.
+fn readme_test(context: &Context<'_>) -> Outcome {
+    let cli = docs_check::parse(TEST_COMMAND).map_err(|e| Failure::new(e.to_string()))?;
+    let args = cli.test_args().ok_or_else(|| Failure::new(format!("`{TEST_COMMAND}` is no test command")))?;
+    // The second half of CI is the other line: here a MUJOCO_DIR of the caller's must not count.
+    test::run(context.repo, &TestArgs { mujoco: Some(args.mujoco.unwrap_or(Line::Debian)), ..args.clone() })
+        .map_err(|failure| Failure { again: Some(TEST_COMMAND.to_string()), ..failure })
+}
+
+fn wheel_test(context: &Context<'_>) -> Outcome {
+    test::run(context.repo, &TestArgs { mujoco: Some(Line::Wheel), ..TestArgs::default() })
+        .map_err(|failure| Failure { again: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
+}
+
+fn benches(context: &Context<'_>) -> Outcome {
+    context.debian()?.cargo().args(["build", "--release", "--package", "kinetoscope-benches"]).run()
+}
+
+/// MuJoCo's log file, and files that tests or examples wrote into the tree.
+fn leftovers(context: &Context<'_>) -> Outcome {
+    let mut findings: Vec<String> =
+        files_below(&context.repo.root).into_iter().filter(|path| path.ends_with("MUJOCO_LOG.TXT")).collect();
+    match (&context.changed_before, changed_files(context.repo)) {
+        (Some(before), Some(after)) => findings.extend(after.difference(before).cloned()),
+        _ => println!("not a git repository: only looked for MUJOCO_LOG.TXT"),
+    }
+    no_findings("these files were left behind or changed while CI ran", &findings)
+}
+
+/// Lines of `git status`: everything that is not as committed and not ignored.
+fn changed_files(repo: &Repo) -> Option<BTreeSet<String>> {
+    let status = Cmd::new("git")
+        .args(["status", "--porcelain", "--untracked-files=all"])
+        .current_dir(&repo.root)
+        .output()
+        .ok()?;
+    Some(String::from_utf8_lossy(&status).lines().map(|line| line.trim_end().to_string()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(quick: bool, only: Option<&str>) -> Vec<&'static str> {
+        chosen(&CiArgs { quick, only: only.map(str::to_string) }).iter().map(|stage| stage.name).collect()
+    }
+
+    #[test]
+    fn quick_leaves_out_everything_long() {
+        assert_eq!(names(true, None), ["setup", "fmt", "arrows", "rules", "docs", "clippy", "unit"]);
+    }
+
+    #[test]
+    fn the_full_run_ends_with_the_look_at_the_tree() {
+        let names = names(false, None);
+        assert!(!names.contains(&"unit"));
+        assert!(names.contains(&"test") && names.contains(&"test-4"));
+        assert_eq!(names.last(), Some(&"leftovers"));
+    }
+
+    #[test]
+    fn one_stage_can_be_repeated_alone() {
+        for stage in STAGES {
+            assert_eq!(names(false, Some(stage.name)), [stage.name]);
+        }
+    }
+
+    #[test]
+    fn times_read_as_minutes_and_seconds() {
+        assert_eq!(clock(Duration::from_millis(61_900)), "1:01");
+    }
+
+    #[test]
+    fn a_file_that_a_test_left_behind_is_found() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let git = |args: &[&str]| Cmd::new("git").args(args).current_dir(dir.path()).output().expect("git works");
+        git(&["init", "--quiet"]);
+        let repo =
+            Repo { root: dir.path().into(), target: dir.path().join("target"), metadata: serde_json::Value::Null };
+        std::fs::write(dir.path().join("before.txt"), "").expect("writable");
+        let context = Context { repo: &repo, changed_before: changed_files(&repo) };
+        assert!(leftovers(&context).is_ok());
+        std::fs::create_dir_all(dir.path().join("sub")).expect("writable");
+        std::fs::write(dir.path().join("sub/dump.xml"), "").expect("writable");
+        let failure = leftovers(&context).expect_err("a new file");
+        assert!(failure.message.contains("sub/dump.xml"), "{failure}");
+    }
+
+    #[test]
+    fn the_log_of_mujoco_is_found_although_git_ignores_it() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        std::fs::create_dir_all(dir.path().join("sim")).expect("writable");
+        std::fs::write(dir.path().join("sim/MUJOCO_LOG.TXT"), "").expect("writable");
+        let repo =
+            Repo { root: dir.path().into(), target: dir.path().join("target"), metadata: serde_json::Value::Null };
+        assert!(leftovers(&Context { repo: &repo, changed_before: None }).is_err());
+    }
+}

@@ -1,0 +1,68 @@
+//! `cargo xtask demo`: the first example, from nothing installed to a running robot.
+
+use crate::run::{Outcome, Repo};
+use crate::setup::{self, Wanted};
+
+/// What runs when nothing else is asked for; a flag of the user's replaces the one here.
+const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("4000"))];
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DemoArgs {
+    /// Flags of the example `create_robot`; they replace the demo's own
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    pub(crate) args: Vec<String>,
+}
+
+pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
+    let ready = setup::prepare(repo, Wanted::default())?;
+    ready
+        .cargo()
+        // Paths among the arguments are relative to where the user is, not to the repository.
+        .current_dir(".")
+        .args(["run", "--release", "--manifest-path"])
+        .arg(repo.root.join("Cargo.toml"))
+        .args(["--package", "kinetoscope", "--example", "create_robot", "--"])
+        .args(merged(DEFAULTS, &args.args))
+        .inherit_stdin()
+        .run()
+}
+
+fn merged(defaults: &[(&str, Option<&str>)], user: &[String]) -> Vec<String> {
+    let named: Vec<String> = user.iter().filter_map(|arg| flag_name(arg)).collect();
+    let mut merged = Vec::new();
+    for (flag, value) in defaults {
+        if !flag_name(flag).is_some_and(|name| named.contains(&name)) {
+            merged.push((*flag).to_string());
+            merged.extend(value.map(str::to_string));
+        }
+    }
+    merged.extend_from_slice(user);
+    merged
+}
+
+/// `--num_envs=8` and `--num-envs` are the same flag `num-envs`.
+fn flag_name(arg: &str) -> Option<String> {
+    let name = arg.strip_prefix("--")?;
+    Some(name.split('=').next().unwrap_or(name).replace('_', "-"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(line: &str) -> Vec<String> {
+        line.split_whitespace().map(str::to_string).collect()
+    }
+
+    #[test]
+    fn defaults_stand_without_flags_of_the_user() {
+        assert_eq!(merged(DEFAULTS, &[]), words("--headless --num-envs 4 --steps 4000"));
+    }
+
+    #[test]
+    fn a_flag_of_the_user_replaces_the_default_in_either_spelling() {
+        assert_eq!(merged(DEFAULTS, &words("--num_envs 9")), words("--headless --steps 4000 --num_envs 9"));
+        assert_eq!(merged(DEFAULTS, &words("--steps=1")), words("--headless --num-envs 4 --steps=1"));
+        assert_eq!(merged(DEFAULTS, &words("--seed 3")), words("--headless --num-envs 4 --steps 4000 --seed 3"));
+    }
+}

@@ -1,0 +1,145 @@
+//! What the pages promise: their commands parse, their links lead somewhere.
+
+use crate::Cli;
+use crate::run::{Outcome, Repo, no_findings};
+use crate::source_check::files_below;
+use clap::Parser;
+
+const README: &str = "README.md";
+/// The two commands a newcomer types; CI runs the second one literally.
+pub(crate) const PROMISED: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
+pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
+const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
+
+pub(crate) fn run(repo: &Repo) -> Outcome {
+    let mut pages: Vec<String> = files_below(&repo.root).into_iter().filter(|path| is_page(path)).collect();
+    pages.extend(NEEDED.map(str::to_string));
+    pages.sort();
+    pages.dedup();
+    let mut findings = Vec::new();
+    for path in &pages {
+        let Ok(page) = repo.read(path) else {
+            findings.push(format!("{path} does not exist"));
+            continue;
+        };
+        if path == README {
+            findings.extend(missing_commands(&page).into_iter().map(|finding| format!("{path}: {finding}")));
+        }
+        findings.extend(commands_that_do_not_parse(&page).into_iter().map(|finding| format!("{path}: {finding}")));
+        let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        for link in relative_links(&page) {
+            if !repo.root.join(folder).join(&link).exists() {
+                findings.push(format!("{path}: the link to `{link}` leads nowhere"));
+            }
+        }
+    }
+    no_findings("the documentation is not true", &findings)
+}
+
+/// Pages of the project's own: those in the root and in docs/, not the ones that came with somebody's robot.
+fn is_page(path: &str) -> bool {
+    path.ends_with(".md") && (!path.contains('/') || path.starts_with("docs/"))
+}
+
+fn missing_commands(readme: &str) -> Vec<String> {
+    let commands: Vec<&str> = code_lines(readme).filter_map(command).collect();
+    let has = |promised: &&&str| commands.contains(*promised);
+    PROMISED.iter().filter(|promised| !has(promised)).map(|c| format!("has no line `{c}` in a code block")).collect()
+}
+
+fn commands_that_do_not_parse(page: &str) -> Vec<String> {
+    code_lines(page)
+        .filter_map(command)
+        .filter(|line| line.starts_with("cargo xtask "))
+        .filter_map(|line| match parse(line) {
+            Ok(_) => None,
+            Err(e) => Some(format!("`{line}` is not a command: {}", e.to_string().lines().next().unwrap_or_default())),
+        })
+        .collect()
+}
+
+/// A line of a code block as the command it is: without a prompt and without a comment.
+fn command(line: &str) -> Option<&str> {
+    let line = line.trim();
+    let line = line.strip_prefix("$ ").unwrap_or(line);
+    let line = line.split(" #").next().unwrap_or(line).trim();
+    (!line.is_empty()).then_some(line)
+}
+
+/// The parsed form of a line `cargo xtask ...`.
+pub(crate) fn parse(line: &str) -> Result<Cli, clap::Error> {
+    // `cargo xtask` is one word to clap: the name of the program.
+    let words = line.trim_start_matches("cargo xtask").split_whitespace();
+    Cli::try_parse_from(std::iter::once("cargo xtask").chain(words))
+}
+
+/// Lines inside fenced blocks.
+fn code_lines(page: &str) -> impl Iterator<Item = &str> {
+    let mut in_block = false;
+    page.lines().filter(move |line| {
+        let is_fence = line.trim_start().starts_with("```");
+        in_block ^= is_fence;
+        in_block && !is_fence
+    })
+}
+
+/// Targets of `[text](target)` outside of code, without anchors, titles and addresses of the web.
+fn relative_links(page: &str) -> Vec<String> {
+    let mut in_block = false;
+    let mut links = Vec::new();
+    for line in page.lines() {
+        if line.trim_start().starts_with("```") {
+            in_block = !in_block;
+            continue;
+        }
+        if in_block {
+            continue;
+        }
+        let prose: String = line.split('`').step_by(2).collect::<Vec<_>>().join("``");
+        for (at, _) in prose.match_indices("](") {
+            let target = prose[at + 2..].split([')', ' ']).next().unwrap_or_default();
+            let target = target.split('#').next().unwrap_or_default();
+            if !target.is_empty() && !target.contains("://") && !target.starts_with("mailto:") {
+                links.push(target.to_string());
+            }
+        }
+    }
+    links
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_promised_commands_must_stand_in_a_code_block() {
+        assert_eq!(missing_commands("```sh\n$ cargo xtask demo\ncargo xtask test   # all\n```\n"), [""; 0]);
+        assert_eq!(missing_commands("Run cargo xtask demo.\n```sh\ncargo xtask test\n```\n").len(), 1);
+        assert_eq!(missing_commands("").len(), 2);
+    }
+
+    #[test]
+    fn a_command_that_does_not_exist_is_found() {
+        assert!(commands_that_do_not_parse("```\ncargo xtask test --mujoco 4\ncargo build\n```").is_empty());
+        assert_eq!(commands_that_do_not_parse("```\ncargo xtask fly\n```").len(), 1);
+        assert_eq!(commands_that_do_not_parse("```\ncargo xtask test --mujoco 9\n```").len(), 1);
+    }
+
+    #[test]
+    fn the_test_command_parses() {
+        assert!(parse(TEST_COMMAND).is_ok());
+    }
+
+    #[test]
+    fn links_into_the_tree_are_told_from_others() {
+        let page = "[a](docs/a.md#part) ![b](b.png \"title\") [c](https://example.org/x) [d](#part) `[e](e.md)`\n\
+                    ```\n[f](f.md)\n```\n[g](g.md)";
+        assert_eq!(relative_links(page), ["docs/a.md", "b.png", "g.md"]);
+    }
+
+    #[test]
+    fn pages_of_the_project_are_told_from_others() {
+        assert!(is_page("README.md") && is_page("docs/decisions/0001-a.md"));
+        assert!(!is_page("assets/arm/README.md") && !is_page("docs/a.png"));
+    }
+}

@@ -1,0 +1,177 @@
+//! The table of how CI runs every example, and the check that every example stands in it.
+
+use crate::run::{Failure, Outcome, Repo, no_findings};
+use crate::setup::Ready;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+/// Vendor robots beside the repository; where they are absent, the rows that need them are skipped.
+const ROBOTS: &str = "../shared/robots";
+/// No example runs that long with the arguments of the table; one that does hangs.
+const TIME_LIMIT: Duration = Duration::from_secs(600);
+
+/// One run. In the arguments, `{out}` is an empty scratch folder and `{robots}` the folder of the vendor robots.
+#[derive(Debug)]
+struct Run {
+    example: &'static str,
+    args: &'static str,
+    exits: &'static [i32],
+}
+
+const fn run_of(example: &'static str, exits: &'static [i32], args: &'static str) -> Run {
+    Run { example, args, exits }
+}
+
+/// A new example needs at least one row here: what it does on good input, and its exit code on bad input.
+const TABLE: &[Run] = &[
+    run_of("create_robot", &[0], "--headless --num-envs 4 --steps 400 --report {out}/create_robot.json"),
+    run_of(
+        "create_robot",
+        &[0],
+        "--headless --num-envs 2 --steps 400 --arm-urdf {robots}/rokae_description/urdf/SR5.urdf \
+         --hand-urdf {robots}/inspire_hand/DFQ_left_hand.urdf --arm-joints joint[1-6] --hand-joints L_.*",
+    ),
+    run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
+    run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
+    run_of("inspect_robot", &[0, 1], "assets/sr5/SR5.urdf"),
+    run_of("inspect_robot", &[1], "{robots}/anymal_c_simple_description/urdf/anymal.urdf"),
+    run_of("inspect_robot", &[2], "{out}/malformed.urdf"),
+    run_of("inspect_robot", &[2], "{out}/there_is_no_such_file.urdf"),
+];
+
+/// Builds and runs every row of the table.
+pub(crate) fn run(repo: &Repo, ready: &Ready) -> Outcome {
+    no_findings("examples and their table in xtask/src/examples.rs disagree", &table_gaps(&examples(&repo.root)))?;
+    ready.cargo().args(["build", "--release", "--package", "kinetoscope", "--examples"]).run()?;
+    let out = repo.target.join("examples-out");
+    if out.exists() {
+        fs::remove_dir_all(&out).map_err(|e| Failure::new(format!("{}: {e}", out.display())))?;
+    }
+    fs::create_dir_all(&out)
+        .and_then(|()| fs::write(out.join("malformed.urdf"), "<robot name=\"torn\">\n  <link name=\"base\">\n"))
+        .map_err(|e| Failure::new(format!("{}: {e}", out.display())))?;
+    let has_robots = repo.root.join(ROBOTS).is_dir();
+    for row in TABLE {
+        if row.args.contains("{robots}") && !has_robots {
+            println!("skipped, {ROBOTS} is not there: {} {}", row.example, row.args);
+            continue;
+        }
+        run_row(ready, row, &out)?;
+    }
+    Ok(())
+}
+
+fn run_row(ready: &Ready, row: &Run, out: &Path) -> Outcome {
+    let args = words(row.args, &out.to_string_lossy());
+    let cmd = ready
+        .cargo()
+        .args(["run", "--quiet", "--release", "--package", "kinetoscope", "--example", row.example, "--"])
+        .args(&args);
+    let line = cmd.to_string();
+    let failure = |message: String| Failure { again: Some(line.clone()), ..Failure::new(message) };
+    let code = cmd.exit_code_within(TIME_LIMIT)?;
+    if !row.exits.contains(&code) {
+        let expected: Vec<String> = row.exits.iter().map(i32::to_string).collect();
+        let expected = expected.join(" or ");
+        return Err(failure(format!("`{} {}` ended with {code}, expected {expected}", row.example, args.join(" "))));
+    }
+    if let (0, Some(report)) = (code, flag_value(&args, "--report")) {
+        check_report(Path::new(report)).map_err(|reason| failure(format!("the report {report}: {reason}")))?;
+    }
+    Ok(())
+}
+
+fn words(args: &str, out: &str) -> Vec<String> {
+    args.split_whitespace().map(|word| word.replace("{out}", out).replace("{robots}", ROBOTS)).collect()
+}
+
+fn flag_value<'a>(args: &'a [String], flag: &str) -> Option<&'a str> {
+    args.iter().position(|arg| arg == flag).and_then(|at| args.get(at + 1)).map(String::as_str)
+}
+
+/// A report is a JSON object that says something.
+fn check_report(path: &Path) -> Result<(), String> {
+    let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
+    match serde_json::from_str::<Value>(&text) {
+        Ok(Value::Object(fields)) if !fields.is_empty() => Ok(()),
+        Ok(_) => Err("not a JSON object with fields".to_string()),
+        Err(e) => Err(format!("not JSON: {e}")),
+    }
+}
+
+/// Names of `examples/x.rs` and `examples/x/main.rs`.
+fn examples(root: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(root.join("examples"))
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "rs") || path.join("main.rs").is_file())
+        .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    names
+}
+
+fn table_gaps(examples: &[String]) -> Vec<String> {
+    let mut findings: Vec<String> = examples
+        .iter()
+        .filter(|name| !TABLE.iter().any(|row| row.example == *name))
+        .map(|name| format!("the example `{name}` has no row"))
+        .collect();
+    let mut rows: Vec<&str> = TABLE.iter().map(|row| row.example).collect();
+    rows.dedup();
+    rows.retain(|name| !examples.iter().any(|example| example == name));
+    findings.extend(rows.iter().map(|name| format!("there are rows for `{name}`, but no such example")));
+    findings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(names: &[&str]) -> Vec<String> {
+        names.iter().map(|name| (*name).to_string()).collect()
+    }
+
+    #[test]
+    fn an_example_without_a_row_and_a_row_without_an_example_are_named() {
+        assert_eq!(table_gaps(&names(&["create_robot", "inspect_robot"])), [""; 0]);
+        assert_eq!(table_gaps(&names(&["create_robot", "inspect_robot", "new"])), ["the example `new` has no row"]);
+        assert_eq!(table_gaps(&names(&["create_robot"])), ["there are rows for `inspect_robot`, but no such example"]);
+    }
+
+    #[test]
+    fn examples_are_files_and_folders_with_a_main() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        for path in ["examples/a.rs", "examples/b/main.rs", "examples/common/mod.rs", "examples/README.md"] {
+            let path = dir.path().join(path);
+            fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
+            fs::write(path, "").expect("writable");
+        }
+        assert_eq!(examples(dir.path()), ["a", "b"]);
+    }
+
+    #[test]
+    fn placeholders_are_filled() {
+        let args = words("--report {out}/a.json --urdf {robots}/x.urdf", "scratch");
+        assert_eq!(args, ["--report", "scratch/a.json", "--urdf", "../shared/robots/x.urdf"]);
+        assert_eq!(flag_value(&args, "--report"), Some("scratch/a.json"));
+        assert_eq!(flag_value(&args, "--out"), None);
+    }
+
+    #[test]
+    fn an_empty_or_broken_report_is_found() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let path = dir.path().join("report.json");
+        assert!(check_report(&path).is_err());
+        for text in ["", "{}", "[1]", "{\"steps\": NaN}"] {
+            fs::write(&path, text).expect("writable");
+            assert!(check_report(&path).is_err(), "{text}");
+        }
+        fs::write(&path, "{\"steps\": 400}").expect("writable");
+        assert!(check_report(&path).is_ok());
+    }
+}

@@ -1,0 +1,370 @@
+//! Finds out what the machine lacks, installs it with apt-get, and chooses the MuJoCo to build against.
+
+use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, which};
+use crate::wheel;
+use clap::ValueEnum;
+use std::env;
+use std::path::{Path, PathBuf};
+
+/// The two supported lines of MuJoCo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Line {
+    /// Debian's package libmujoco-dev (2.2.2)
+    #[value(name = "2")]
+    Debian,
+    /// The PyPI wheel mujoco-core (4.0.0), downloaded into the target folder
+    #[value(name = "4")]
+    Wheel,
+}
+
+/// What a command needs besides a compiler and libclang.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wanted {
+    /// None: the MuJoCo of `MUJOCO_DIR` if that is set, else Debian's.
+    pub(crate) line: Option<Line>,
+    /// What serves comparisons and second runs only: where it cannot be installed, CI stops, others go on.
+    pub(crate) extras: &'static [Need],
+}
+
+/// A machine that is ready, and the MuJoCo that was chosen.
+#[derive(Debug)]
+pub(crate) struct Ready {
+    root: PathBuf,
+    choice: Choice,
+}
+
+#[derive(Debug)]
+enum Choice {
+    Environment,
+    Debian,
+    Wheel { mujoco_dir: PathBuf, target: PathBuf },
+}
+
+impl Ready {
+    /// Cargo in the repository's root, with the chosen MuJoCo. Each line has a target folder of its own, so that the two
+    /// do not evict each other's builds.
+    pub(crate) fn cargo(&self) -> Cmd {
+        let cmd = Cmd::new("cargo").current_dir(&self.root);
+        match &self.choice {
+            Choice::Environment => cmd,
+            Choice::Debian => cmd.env_remove("MUJOCO_DIR"),
+            Choice::Wheel { mujoco_dir, target } => cmd.env("MUJOCO_DIR", mujoco_dir).env("CARGO_TARGET_DIR", target),
+        }
+    }
+}
+
+/// Installs what is missing.
+///
+/// # Errors
+/// If something needed is still missing afterwards; the message says what to do.
+pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
+    let mujoco_dir_set = env::var_os("MUJOCO_DIR").is_some();
+    let choice = match wanted.line {
+        None if mujoco_dir_set => Choice::Environment,
+        None | Some(Line::Debian) => Choice::Debian,
+        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new(), target: repo.target.join("mujoco4") },
+    };
+    let machine = Machine::this();
+    let mut needs = vec![Need::Compiler, Need::Libclang];
+    if matches!(choice, Choice::Debian) {
+        needs.push(Need::MuJoCo);
+    }
+    if matches!(choice, Choice::Wheel { .. }) && !wheel::is_available(repo) {
+        needs.push(Need::Pip);
+    }
+    install(&machine, &needs)?;
+    if let Err(failure) = install(&machine, wanted.extras) {
+        if in_ci() {
+            return Err(failure);
+        }
+        eprintln!("note: {}", failure.message);
+    }
+    let choice = match choice {
+        Choice::Wheel { target, .. } => Choice::Wheel { mujoco_dir: wheel::obtain(repo)?, target },
+        other => other,
+    };
+    Ok(Ready { root: repo.root.clone(), choice })
+}
+
+/// Something the machine must have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Need {
+    Compiler,
+    Libclang,
+    MuJoCo,
+    Models,
+    Pip,
+    Venv,
+}
+
+impl Need {
+    fn packages(self) -> &'static [&'static str] {
+        match self {
+            Self::Compiler => &["gcc", "libc6-dev"],
+            Self::Libclang => &["libclang-dev"],
+            Self::MuJoCo => &["libmujoco-dev"],
+            Self::Models => &["libmujoco-samples"],
+            Self::Pip => &["python3-pip"],
+            Self::Venv => &["python3-venv"],
+        }
+    }
+
+    fn description(self) -> &'static str {
+        match self {
+            Self::Compiler => "a C compiler `cc` with the C library's headers (Rust links with it)",
+            Self::Libclang => "libclang with its headers (the bindings are generated with it)",
+            Self::MuJoCo => {
+                "MuJoCo 2.2.2 with its headers; or set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so* of \
+                 MuJoCo 4.x; or `cargo xtask test --mujoco 4`, which downloads that"
+            }
+            Self::Models => "the models that come with MuJoCo (humanoid.xml)",
+            Self::Pip => "python3 with pip (MuJoCo 4 is downloaded with it)",
+            Self::Venv => "python3 with venv (rivals in Python are installed with it)",
+        }
+    }
+}
+
+/// The file system and the variables that are looked at; tests pass a folder of their own.
+#[derive(Debug)]
+struct Machine {
+    root: PathBuf,
+    search_path: Vec<PathBuf>,
+    libclang_path: Option<PathBuf>,
+    python_has: fn(Need) -> bool,
+}
+
+impl Machine {
+    fn this() -> Self {
+        Self {
+            root: PathBuf::from("/"),
+            search_path: env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default(),
+            libclang_path: env::var_os("LIBCLANG_PATH").map(PathBuf::from),
+            python_has: |need| match need {
+                Need::Venv => Cmd::new("python3").args(["-c", "import venv, ensurepip"]).quiet().succeeds(),
+                _ => wheel::pip().is_some(),
+            },
+        }
+    }
+
+    fn has(&self, need: Need) -> bool {
+        match need {
+            Need::Compiler => {
+                self.search_path.iter().any(|dir| dir.join("cc").is_file()) && self.header("stdlib.h").is_some()
+            }
+            Need::Libclang => self.has_libclang(),
+            Need::MuJoCo => {
+                self.header("mujoco/mujoco.h").is_some()
+                    && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
+            }
+            Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
+            Need::Pip | Need::Venv => (self.python_has)(need),
+        }
+    }
+
+    fn header(&self, name: &str) -> Option<PathBuf> {
+        ["usr/include", "usr/local/include"].iter().map(|dir| self.root.join(dir).join(name)).find(|file| file.exists())
+    }
+
+    fn library_folders(&self) -> Vec<PathBuf> {
+        ["usr/lib", "usr/lib64", "usr/local/lib"]
+            .iter()
+            .map(|dir| self.root.join(dir))
+            .chain([self.root.join(format!("usr/lib/{}-linux-gnu", env::consts::ARCH))])
+            .collect()
+    }
+
+    /// The library alone is not enough: without clang's own `stddef.h` no C header parses.
+    fn has_libclang(&self) -> bool {
+        if self.libclang_path.is_some() {
+            return true;
+        }
+        let llvm: Vec<PathBuf> = entries(&self.root.join("usr/lib"))
+            .into_iter()
+            .filter(|dir| file_name(dir).starts_with("llvm-"))
+            .map(|dir| dir.join("lib"))
+            .collect();
+        let mut folders = self.library_folders();
+        folders.extend(llvm);
+        let library = folders.iter().flat_map(|dir| entries(dir)).any(|file| is_libclang(&file_name(&file)));
+        let headers = folders
+            .iter()
+            .flat_map(|dir| entries(&dir.join("clang")))
+            .any(|version| version.join("include/stddef.h").exists());
+        library && headers
+    }
+}
+
+/// `libclang.so`, `libclang.so.13`, `libclang-14.so.1`, but neither `libclang-cpp.so.14` nor `libclangAST.a`.
+fn is_libclang(name: &str) -> bool {
+    let Some(rest) = name.strip_prefix("libclang") else { return false };
+    let version = rest.strip_prefix('-').unwrap_or(rest).trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    rest.starts_with(".so") || rest.starts_with('-') && version.starts_with("so")
+}
+
+fn entries(dir: &Path) -> Vec<PathBuf> {
+    std::fs::read_dir(dir).map(|found| found.flatten().map(|entry| entry.path()).collect()).unwrap_or_default()
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn missing(machine: &Machine, needs: &[Need]) -> Vec<Need> {
+    needs.iter().copied().filter(|need| !machine.has(*need)).collect()
+}
+
+fn packages(needs: &[Need]) -> Vec<&'static str> {
+    needs.iter().flat_map(|need| need.packages()).copied().collect()
+}
+
+fn descriptions(needs: &[Need]) -> String {
+    needs.iter().map(|need| format!("\n  - {}", need.description())).collect()
+}
+
+fn install(machine: &Machine, needs: &[Need]) -> Outcome {
+    let absent = missing(machine, needs);
+    if absent.is_empty() {
+        return Ok(());
+    }
+    if which("apt-get").is_none() {
+        return Err(Failure::new(format!(
+            "this machine has no apt-get, so please install by hand:{}",
+            descriptions(&absent)
+        )));
+    }
+    let names = packages(&absent);
+    let Some(root) = as_root() else {
+        return Err(Failure::new(format!(
+            "packages are missing, and installing them needs root. Please run:\n\n    {}\n",
+            by_hand(&names)
+        )));
+    };
+    eprintln!("installing {}", names.join(" "));
+    let known = |name: &&&str| Cmd::new("apt-cache").args(["show", name]).quiet().succeeds();
+    let lists_are_complete = names.iter().filter(known).count() == names.len();
+    if !lists_are_complete {
+        apt(&root).arg("update").run()?;
+    }
+    let result = apt_install(&root, &names).or_else(|failure| {
+        if !lists_are_complete {
+            return Err(failure);
+        }
+        // Package lists that know an older build of a package than the mirror has.
+        apt(&root).arg("update").run()?;
+        apt_install(&root, &names)
+    });
+    let absent = missing(machine, needs);
+    match result {
+        Ok(()) if absent.is_empty() => Ok(()),
+        Ok(()) => {
+            Err(Failure::new(format!("after installing {}, still missing:{}", names.join(" "), descriptions(&absent))))
+        }
+        Err(failure) => {
+            Err(Failure { message: format!("{}\nneeded:{}", failure.message, descriptions(&absent)), ..failure })
+        }
+    }
+}
+
+/// The words that give root's rights without a question: none for root, else `sudo -n`.
+fn as_root() -> Option<Vec<&'static str>> {
+    let uid = Cmd::new("id").arg("-u").output().ok()?;
+    if uid.trim_ascii() == b"0" {
+        return Some(Vec::new());
+    }
+    Cmd::new("sudo").args(["-n", "true"]).quiet().succeeds().then(|| vec!["sudo", "-n"])
+}
+
+fn by_hand(names: &[&str]) -> String {
+    format!("sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends {}'", names.join(" "))
+}
+
+/// sudo drops variables, so `env` sets the one that keeps debconf from asking.
+fn apt(root: &[&str]) -> Cmd {
+    let words: Vec<&str> = root.iter().copied().chain(["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]).collect();
+    Cmd::new(words[0]).args(&words[1..]).args(["-o", "DPkg::Lock::Timeout=300"])
+}
+
+fn apt_install(root: &[&str], names: &[&str]) -> Outcome {
+    apt(root).args(["install", "-y", "--no-install-recommends"]).args(names).run()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn machine(files: &[&str]) -> (tempfile::TempDir, Machine) {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        for file in files {
+            let path = dir.path().join(file);
+            fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
+            fs::write(path, "").expect("writable");
+        }
+        let search_path = vec![dir.path().join("usr/bin")];
+        let machine =
+            Machine { root: dir.path().to_path_buf(), search_path, libclang_path: None, python_has: |_| false };
+        (dir, machine)
+    }
+
+    #[test]
+    fn an_empty_machine_lacks_everything() {
+        let (_dir, machine) = machine(&[]);
+        let needs = [Need::Compiler, Need::Libclang, Need::MuJoCo, Need::Models, Need::Pip];
+        assert_eq!(missing(&machine, &needs), needs);
+        assert_eq!(packages(&needs[..3]), ["gcc", "libc6-dev", "libclang-dev", "libmujoco-dev"]);
+    }
+
+    #[test]
+    fn a_header_without_its_library_is_not_enough() {
+        let (_dir, with_header) = machine(&["usr/include/mujoco/mujoco.h"]);
+        assert!(!with_header.has(Need::MuJoCo));
+        let library = format!("usr/lib/{}-linux-gnu/libmujoco.so", env::consts::ARCH);
+        let (_dir, with_both) = machine(&["usr/include/mujoco/mujoco.h", &library]);
+        assert!(with_both.has(Need::MuJoCo));
+    }
+
+    #[test]
+    fn libclang_needs_its_library_and_its_headers() {
+        let (library, headers) =
+            ("usr/lib/llvm-14/lib/libclang-14.so.1", "usr/lib/llvm-14/lib/clang/14/include/stddef.h");
+        assert!(!machine(&[library]).1.has(Need::Libclang));
+        assert!(!machine(&[headers]).1.has(Need::Libclang));
+        assert!(!machine(&["usr/lib/llvm-14/lib/libclang-cpp.so.14", headers]).1.has(Need::Libclang));
+        let (_dir, both) = machine(&[library, headers]);
+        assert!(both.has(Need::Libclang));
+    }
+
+    #[test]
+    fn a_compiler_needs_the_c_headers() {
+        let (_dir, alone) = machine(&["usr/bin/cc"]);
+        assert!(!alone.has(Need::Compiler));
+        let (_dir, complete) = machine(&["usr/bin/cc", "usr/include/stdlib.h"]);
+        assert!(complete.has(Need::Compiler));
+    }
+
+    #[test]
+    fn names_of_libclang() {
+        for name in ["libclang.so", "libclang.so.13", "libclang-14.so", "libclang-14.so.1", "libclang-14.0.6.so"] {
+            assert!(is_libclang(name), "{name}");
+        }
+        for name in ["libclang-cpp.so.14", "libclangAST.a", "libclang.a", "libmujoco.so"] {
+            assert!(!is_libclang(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_line_to_run_by_hand_is_one_command() {
+        let line = by_hand(&["libclang-dev", "libmujoco-dev"]);
+        assert_eq!(
+            line,
+            "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends libclang-dev libmujoco-dev'"
+        );
+    }
+
+    #[test]
+    fn apt_never_asks() {
+        let shown = apt(&["sudo", "-n"]).arg("update").to_string();
+        assert_eq!(shown, "sudo -n env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 update");
+        assert!(apt(&[]).to_string().starts_with("env DEBIAN_FRONTEND=noninteractive apt-get"));
+    }
+}

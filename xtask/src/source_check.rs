@@ -1,0 +1,383 @@
+//! Rules on the text of the tree: where `unsafe` may stand, how long a file may be, what may not be left behind.
+
+use crate::run::{Outcome, Repo, no_findings};
+use std::path::Path;
+
+/// The unsafe wall: generated bindings, and the one module that calls them.
+const UNSAFE_MAY_STAND_IN: [&str; 2] = ["mujoco-sys/src/lib.rs", "sim/src/mj/"];
+/// Crates that forbid unsafe code as a whole.
+const FORBID_UNSAFE: [&str; 2] = ["scene/src/lib.rs", "sensors/src/lib.rs"];
+const MAX_LINES: usize = 800;
+/// First folders of absolute paths that exist on one machine only.
+const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
+/// Larger files are data.
+const MAX_TEXT_BYTES: u64 = 1 << 20;
+
+/// A text file of the tree, its path relative to the root with `/`.
+#[derive(Debug)]
+pub(crate) struct TextFile {
+    pub(crate) path: String,
+    pub(crate) text: String,
+}
+
+impl TextFile {
+    fn is_rust(&self) -> bool {
+        self.path.ends_with(".rs")
+    }
+}
+
+pub(crate) fn run(repo: &Repo) -> Outcome {
+    let files = text_files(&repo.root);
+    let mut findings = unsafe_outside_the_wall(&files);
+    findings.extend(missing_forbid(&files));
+    findings.extend(long_files(&files));
+    findings.extend(stubs(&files));
+    findings.extend(foreign_paths(&files));
+    findings.extend(dependencies_without_reason(&repo.read("Cargo.toml")?));
+    no_findings("rules of the tree are broken", &findings)
+}
+
+/// All files below `root` in order of their path, without version control and without cargo's target folders.
+pub(crate) fn files_below(root: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let Ok(kind) = entry.file_type() else { continue };
+            if kind.is_dir() {
+                let skip = entry.file_name() == ".git" || entry.file_name() == "target";
+                if !skip && !path.join("CACHEDIR.TAG").exists() {
+                    folders.push(path);
+                }
+            } else if let Ok(relative) = path.strip_prefix(root) {
+                found.push(relative.to_string_lossy().replace('\\', "/"));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn text_files(root: &Path) -> Vec<TextFile> {
+    files_below(root)
+        .into_iter()
+        .filter(|path| path != ".git")
+        .filter(|path| std::fs::metadata(root.join(path)).is_ok_and(|data| data.len() <= MAX_TEXT_BYTES))
+        .filter_map(|path| Some(TextFile { text: std::fs::read_to_string(root.join(&path)).ok()?, path }))
+        .collect()
+}
+
+fn may_hold_unsafe(path: &str) -> bool {
+    UNSAFE_MAY_STAND_IN.iter().any(|allowed| path == *allowed || allowed.ends_with('/') && path.starts_with(allowed))
+}
+
+fn unsafe_outside_the_wall(files: &[TextFile]) -> Vec<String> {
+    let mut findings = Vec::new();
+    for file in files.iter().filter(|file| file.is_rust() && !may_hold_unsafe(&file.path)) {
+        let code = code_only(&file.text);
+        for (at, word) in words(&code) {
+            let lifts_the_lint = || {
+                let call = code[..at].rfind('(').map(|open| code[..open].trim_end()).unwrap_or_default();
+                ["allow", "expect", "warn"].iter().any(|level| call.ends_with(level))
+            };
+            if word == "unsafe" || word == "unsafe_code" && lifts_the_lint() {
+                findings.push(format!(
+                    "{}:{}: `{word}` outside of {}",
+                    file.path,
+                    line_of(&code, at),
+                    UNSAFE_MAY_STAND_IN.join(" and ")
+                ));
+            }
+        }
+    }
+    findings
+}
+
+fn missing_forbid(files: &[TextFile]) -> Vec<String> {
+    FORBID_UNSAFE
+        .iter()
+        .filter(|path| {
+            !files.iter().any(|file| {
+                let code: String = code_only(&file.text).split_whitespace().collect();
+                file.path == **path && code.contains("#![forbid(unsafe_code")
+            })
+        })
+        .map(|path| format!("{path}: must say #![forbid(unsafe_code)]"))
+        .collect()
+}
+
+fn long_files(files: &[TextFile]) -> Vec<String> {
+    files
+        .iter()
+        .filter(|file| file.is_rust())
+        .map(|file| (file, file.text.lines().count()))
+        .filter(|(_, lines)| *lines > MAX_LINES)
+        .map(|(file, lines)| format!("{}: {lines} lines, the limit is {MAX_LINES}", file.path))
+        .collect()
+}
+
+fn stubs(files: &[TextFile]) -> Vec<String> {
+    let mut findings = Vec::new();
+    for file in files.iter().filter(|file| file.is_rust()) {
+        let code = code_only(&file.text);
+        for (at, word) in words(&code) {
+            let is_macro = code[at + word.len()..].starts_with('!');
+            let is_attribute = code[..at].trim_end().ends_with("#[");
+            let in_cfg_attr = || {
+                let open = code[..at].rfind("#[").map(|open| &code[open..at]);
+                open.is_some_and(|attribute| attribute.contains("cfg_attr") && !attribute.contains(']'))
+            };
+            let found = match word {
+                "todo" | "unimplemented" | "dbg" if is_macro => format!("{word}!"),
+                "ignore" if is_attribute || in_cfg_attr() => "#[ignore]".to_string(),
+                _ => continue,
+            };
+            findings.push(format!("{}:{}: {found}", file.path, line_of(&code, at)));
+        }
+    }
+    findings
+}
+
+fn foreign_paths(files: &[TextFile]) -> Vec<String> {
+    let mut findings = Vec::new();
+    for file in files {
+        for (number, line) in file.text.lines().enumerate() {
+            for folder in FOREIGN_FOLDERS {
+                let needle = format!("/{folder}/");
+                let is_start = |at: usize| {
+                    // In the middle of a path or address the folder means something else; behind `file://` it does not.
+                    line[..at].chars().next_back().is_none_or(|c| !c.is_alphanumeric() && !"._-})$*".contains(c))
+                };
+                if line.match_indices(&needle).any(|(at, _)| is_start(at)) {
+                    findings.push(format!("{}:{}: absolute path {needle}...", file.path, number + 1));
+                }
+            }
+        }
+    }
+    findings
+}
+
+/// Names in `[workspace.dependencies]` that come from a registry, with the text of their entry.
+pub(crate) fn workspace_dependencies(cargo_toml: &str) -> Vec<(String, String)> {
+    let section = cargo_toml
+        .lines()
+        .skip_while(|line| line.trim() != "[workspace.dependencies]")
+        .skip(1)
+        .take_while(|line| !line.starts_with('['));
+    let (mut entries, mut entry, mut depth) = (Vec::new(), String::new(), 0i32);
+    for line in section {
+        let value = line.split('#').next().unwrap_or_default();
+        if depth == 0 && value.trim().is_empty() {
+            continue;
+        }
+        entry.push_str(line);
+        entry.push('\n');
+        depth += value.chars().map(|c| i32::from("[{".contains(c)) - i32::from("]}".contains(c))).sum::<i32>();
+        if depth == 0 {
+            let name = entry.split('=').next().unwrap_or_default().trim().trim_matches('"').to_string();
+            let entry = std::mem::take(&mut entry);
+            if !entry.contains("path =") {
+                entries.push((name, entry));
+            }
+        }
+    }
+    entries
+}
+
+fn dependencies_without_reason(cargo_toml: &str) -> Vec<String> {
+    workspace_dependencies(cargo_toml)
+        .into_iter()
+        .filter(|(_, entry)| {
+            let comment = |line: &str| line.split_once('#').is_some_and(|(_, reason)| !reason.trim().is_empty());
+            !entry.lines().any(comment)
+        })
+        .map(|(name, _)| format!("Cargo.toml: the dependency `{name}` has no `# reason` behind it"))
+        .collect()
+}
+
+fn line_of(text: &str, at: usize) -> usize {
+    text[..at].matches('\n').count() + 1
+}
+
+/// Identifiers and keywords with their byte offset.
+fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    code.split(move |c| !is_word(c))
+        .filter(|word| !word.is_empty())
+        .map(|word| (word.as_ptr() as usize - code.as_ptr() as usize, word))
+}
+
+/// Rust text with comments and literals blanked out; line breaks stay where they are.
+pub(crate) fn code_only(text: &str) -> String {
+    let chars: Vec<char> = text.chars().collect();
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    while at < chars.len() {
+        match opaque_end(&chars, at) {
+            Some(end) => {
+                out.extend(chars[at..end].iter().map(|c| if *c == '\n' { '\n' } else { ' ' }));
+                at = end;
+            }
+            None => {
+                out.push(chars[at]);
+                at += 1;
+            }
+        }
+    }
+    out
+}
+
+/// Where the comment or literal that starts at `at` ends.
+fn opaque_end(chars: &[char], at: usize) -> Option<usize> {
+    let next = |offset: usize| chars.get(at + offset).copied();
+    let find = |from: usize, pattern: &[char]| {
+        let rest = chars.get(from..).unwrap_or_default();
+        let found = rest.windows(pattern.len()).position(|window| window == pattern);
+        found.map_or(chars.len(), |offset| from + offset + pattern.len())
+    };
+    let in_word = at > 0 && (chars[at - 1].is_alphanumeric() || chars[at - 1] == '_');
+    match chars[at] {
+        '/' if next(1) == Some('/') => Some((at..chars.len()).find(|i| chars[*i] == '\n').unwrap_or(chars.len())),
+        '/' if next(1) == Some('*') => Some(block_comment_end(chars, at)),
+        '"' => Some(quoted_end(chars, at + 1, '"')),
+        '\'' if next(1) == Some('\\') => Some(quoted_end(chars, at + 1, '\'')),
+        '\'' if next(2) == Some('\'') => Some(at + 3),
+        'r' | 'b' | 'c' if !in_word => {
+            let prefix = usize::from(chars[at] != 'r');
+            let hashes = chars[at..].iter().skip(prefix + 1).take_while(|c| **c == '#').count();
+            let is_raw = next(prefix) == Some('r') && next(prefix + 1 + hashes) == Some('"');
+            let end: Vec<char> = std::iter::once('"').chain(std::iter::repeat_n('#', hashes)).collect();
+            is_raw.then(|| find(at + prefix + 2 + hashes, &end))
+        }
+        _ => None,
+    }
+}
+
+fn block_comment_end(chars: &[char], start: usize) -> usize {
+    let (mut depth, mut at) = (0, start);
+    while at < chars.len() {
+        match (chars[at], chars.get(at + 1)) {
+            ('/', Some('*')) => (depth, at) = (depth + 1, at + 2),
+            ('*', Some('/')) => (depth, at) = (depth - 1, at + 2),
+            _ => at += 1,
+        }
+        if depth == 0 {
+            return at;
+        }
+    }
+    chars.len()
+}
+
+fn quoted_end(chars: &[char], start: usize, quote: char) -> usize {
+    let mut at = start;
+    while at < chars.len() {
+        match chars[at] {
+            '\\' => at += 2,
+            c if c == quote => return at + 1,
+            _ => at += 1,
+        }
+    }
+    chars.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(path: &str, text: &str) -> Vec<TextFile> {
+        vec![TextFile { path: path.into(), text: text.into() }]
+    }
+
+    #[test]
+    fn comments_and_literals_are_no_code() {
+        let text =
+            "let a = \"unsafe \\\" x\"; // unsafe\n/* unsafe /* b */ unsafe */ let c = r#\"unsafe \"# ; let q = '\"';";
+        let code = code_only(text);
+        assert!(!code.contains("unsafe"), "{code}");
+        assert!(code.contains("let c ="), "{code}");
+        assert!(code.contains("let q ="), "{code}");
+        assert_eq!(code.chars().count(), text.chars().count());
+        assert_eq!(code_only("fn f<'a>(x: &'a str) -> &'a str { x }"), "fn f<'a>(x: &'a str) -> &'a str { x }");
+        assert_eq!(code_only("b'\\'' x br\"y\" z").split_whitespace().collect::<Vec<_>>(), ["b", "x", "z"]);
+    }
+
+    #[test]
+    fn unsafe_code_is_found_with_its_line() {
+        let text = "fn f() {\n    unsafe { g() }\n}";
+        assert_eq!(unsafe_outside_the_wall(&file("sim/src/batch.rs", text)).len(), 1);
+        assert!(unsafe_outside_the_wall(&file("sim/src/batch.rs", text))[0].starts_with("sim/src/batch.rs:2:"));
+        for text in ["unsafe impl Send for A {}", "#![allow(unsafe_code)]", "#[allow(dead_code, unsafe_code)] mod a;"] {
+            assert_eq!(unsafe_outside_the_wall(&file("sim/src/lib.rs", text)).len(), 1, "{text}");
+        }
+    }
+
+    #[test]
+    fn unsafe_code_may_stand_in_the_wall_and_in_prose() {
+        let text = "unsafe fn f() {}";
+        assert!(unsafe_outside_the_wall(&file("mujoco-sys/src/lib.rs", text)).is_empty());
+        assert!(unsafe_outside_the_wall(&file("sim/src/mj/data.rs", text)).is_empty());
+        assert_eq!(unsafe_outside_the_wall(&file("sim/src/mjcf.rs", text)).len(), 1);
+        assert!(unsafe_outside_the_wall(&file("a.rs", "#![forbid(unsafe_code)] // unsafe {\n")).is_empty());
+        assert!(unsafe_outside_the_wall(&file("README.md", text)).is_empty());
+    }
+
+    #[test]
+    fn crates_that_must_forbid_unsafe_code_are_named() {
+        assert_eq!(missing_forbid(&[]).len(), 2);
+        let mut files = file("scene/src/lib.rs", "//! Doc.\n#![forbid(unsafe_code)]\n");
+        files.extend(file("sensors/src/lib.rs", "// #![forbid(unsafe_code)]\n"));
+        assert_eq!(missing_forbid(&files), ["sensors/src/lib.rs: must say #![forbid(unsafe_code)]"]);
+    }
+
+    #[test]
+    fn a_file_of_801_lines_is_too_long() {
+        assert!(long_files(&file("a.rs", &"\n".repeat(800))).is_empty());
+        assert_eq!(long_files(&file("a.rs", &"\n".repeat(801))).len(), 1);
+        assert!(long_files(&file("a.xml", &"\n".repeat(801))).is_empty());
+    }
+
+    #[test]
+    fn stubs_are_found_in_code_only() {
+        for text in ["fn f() { todo!() }", "unimplemented!(\"x\")", "dbg!(a);", "#[ignore]", "#[ignore = \"slow\"]"] {
+            assert_eq!(stubs(&file("a.rs", text)).len(), 1, "{text}");
+        }
+        assert_eq!(stubs(&file("a.rs", "#[cfg_attr(miri, ignore)]")).len(), 1);
+        assert!(
+            stubs(&file("a.rs", "// todo!()\nlet ignore = \"dbg!\"; fn todo() {} if ignore != a[0] {}")).is_empty()
+        );
+    }
+
+    #[test]
+    fn absolute_paths_of_one_machine_are_found() {
+        for folder in FOREIGN_FOLDERS {
+            assert_eq!(foreign_paths(&file("a.md", &format!("see /{folder}/x"))).len(), 1);
+            assert_eq!(foreign_paths(&file("a.md", &format!("file:///{folder}/x"))).len(), 1);
+            assert!(foreign_paths(&file("a.md", &format!("example.org/{folder}/x and ../{folder}/y"))).is_empty());
+            assert!(foreign_paths(&file("a.md", &format!("{{out}}/{folder}/"))).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_dependency_without_a_reason_is_named() {
+        let toml = "[workspace.dependencies]\n# Rooms.\nscene = { path = \"scene\" }\n\
+            clap = { version = \"4\", features = [\n  \"derive\",\n] } # flags\nserde = \"1\"\nregex = \"1\" #\n\
+            [workspace.lints.rust]\nfoo = 1\n";
+        let findings = dependencies_without_reason(toml);
+        assert_eq!(findings.len(), 2, "{findings:?}");
+        assert!(findings[0].contains("`serde`") && findings[1].contains("`regex`"), "{findings:?}");
+        let names: Vec<String> = workspace_dependencies(toml).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["clap", "serde", "regex"]);
+    }
+
+    #[test]
+    fn target_folders_and_version_control_are_not_looked_at() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        for path in ["a/b.rs", "target/c.rs", "other-target/CACHEDIR.TAG", "other-target/d.rs", ".git/e"] {
+            let path = dir.path().join(path);
+            std::fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
+            std::fs::write(path, "").expect("writable");
+        }
+        assert_eq!(files_below(dir.path()), ["a/b.rs"]);
+    }
+}

@@ -1,0 +1,60 @@
+//! `cargo xtask test`: every test of the workspace, doctests included, against one MuJoCo.
+
+use crate::run::{Outcome, Repo};
+use crate::setup::{self, Line, Wanted};
+
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct TestArgs {
+    /// MuJoCo to test against: 2 is Debian's 2.2.2, 4 the wheel's 4.0.0 [default: MUJOCO_DIR if set, else 2]
+    #[arg(long, value_enum)]
+    pub(crate) mujoco: Option<Line>,
+    /// Only this package, for example kinetoscope-sim
+    #[arg(long, short)]
+    pub(crate) package: Option<String>,
+    /// Only tests whose name contains this
+    pub(crate) filter: Option<String>,
+    /// Arguments of the test binaries
+    #[arg(last = true)]
+    pub(crate) test_args: Vec<String>,
+}
+
+pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
+    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: &[] })?;
+    // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
+    ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args)).run()
+}
+
+fn cargo_args(args: &TestArgs) -> Vec<String> {
+    let mut words = vec!["test".to_string()];
+    match &args.package {
+        Some(package) => words.extend(["--package".to_string(), package.clone()]),
+        None => words.push("--workspace".to_string()),
+    }
+    words.extend(args.filter.clone());
+    if !args.test_args.is_empty() {
+        words.push("--".to_string());
+        words.extend(args.test_args.iter().cloned());
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_arguments_everything_is_tested() {
+        assert_eq!(cargo_args(&TestArgs::default()), ["test", "--workspace"]);
+    }
+
+    #[test]
+    fn package_filter_and_test_arguments_are_handed_on() {
+        let args = TestArgs {
+            package: Some("xtask".into()),
+            filter: Some("wheel".into()),
+            test_args: vec!["--nocapture".into()],
+            ..TestArgs::default()
+        };
+        assert_eq!(cargo_args(&args), ["test", "--package", "xtask", "wheel", "--", "--nocapture"]);
+    }
+}
