@@ -92,17 +92,13 @@ fn a_chain_of_200_000_links_is_read_quickly() {
         );
     }
     text.push_str("</robot>");
-    let start = Instant::now();
-    let file = parse_str(&text, Path::new("robot.urdf")).unwrap();
-    println!("200 000 links: {:?}", start.elapsed());
-    assert_eq!((file.tree.tips(), file.joints[n - 2].source.line), (vec![n - 1], 2 * n as u32));
-    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
-
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("chain.urdf");
     std::fs::write(&path, &text).unwrap();
     let start = Instant::now();
     let robot = assemble(&UrdfCfg::single(&path)).unwrap().description;
+    println!("200 000 links: {:?}", start.elapsed());
+    assert_eq!((robot.links.len(), robot.joints[n - 2].source.line), (n, 2 * n as u32));
     assert_eq!(robot.mimic_driver(JointId(n - 2)).0, JointId(0));
     assert!(write_urdf(&robot).len() > text.len());
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
