@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn long_lists_are_cut() {
         let names: Vec<String> = (0..100).map(|i| format!("joint_{i}")).collect();
-        let e = select(&["joint42"], &names, "joint").unwrap_err().to_string();
+        let e = select(&["Joint_42"], &names, "joint").unwrap_err().to_string();
         assert!(e.contains("closest of 100: \"joint_42\""), "{e}");
     }
 

@@ -1,7 +1,7 @@
 //! URDF files: read strictly, meshes resolved, components merged into one robot, and written back.
 //!
 //! [`parse`] checks one file and keeps where everything was said; [`resolve`] finds mesh files; [`merge`] turns one or
-//! several files into a [`RobotDescription`](crate::RobotDescription); [`write`] goes the other way. No walk over a tree
+//! several files into a [`RobotDescription`](crate::RobotDescription); [`mod@write`] goes the other way. No walk over a tree
 //! recurses, so that neither depth nor size of a file can exhaust the stack.
 
 mod components;

@@ -22,8 +22,8 @@ use std::sync::Arc;
 const LARGEST_FILE: u64 = 256 << 20;
 
 /// Top-level elements that mean nothing to the simulation and are common enough to be skipped without a word.
-const SKIPPED: [&str; 9] =
-    ["gazebo", "plugin", "ros2_control", "mujoco", "drake", "safety_controller", "sensor", "group", "verbose"];
+const SKIPPED: [&str; 8] =
+    ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
 /// Reads a URDF file.
 ///
@@ -77,7 +77,7 @@ pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
     if text.trim().is_empty() {
         return Err(UrdfError::FileEmpty { path: path.to_path_buf() });
     }
-    let document = Document::parse(text).map_err(|e| malformed(e, path))?;
+    let document = Document::parse(text).map_err(|e| malformed(e, text, path))?;
     let root = document.root_element();
     let mut reader = Reader::new(Arc::new(path.to_path_buf()), text, root.tag_name().namespace());
     check_root(&reader, root)?;
@@ -174,13 +174,24 @@ impl Pass {
     }
 }
 
-fn malformed(error: roxmltree::Error, path: &Path) -> UrdfError {
+fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
     let position = error.pos();
     let at = Source::new(path, position.row);
     match &error {
-        roxmltree::Error::DtdDetected => UrdfError::Doctype { at: Source::new(path, 1) },
+        roxmltree::Error::DtdDetected => {
+            let before = text.split("<!DOCTYPE").next().unwrap_or_default();
+            let line = 1 + before.bytes().filter(|&b| b == b'\n').count();
+            UrdfError::Doctype { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)) }
+        }
         roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
             UrdfError::Xacro { at, found: "an element with prefix xacro:".to_owned() }
+        }
+        // The library points at the start, the user must look at the end.
+        roxmltree::Error::UnclosedRootNode => {
+            let line = text.lines().count();
+            let column = text.lines().last().map_or(1, |l| l.chars().count() + 1);
+            let at = Source::new(path, u32::try_from(line).unwrap_or(u32::MAX));
+            UrdfError::Xml { at, column: u32::try_from(column).unwrap_or(u32::MAX), source: error.into() }
         }
         _ => UrdfError::Xml { at, column: position.col, source: error.into() },
     }

@@ -246,7 +246,8 @@ impl Search {
 /// The `<name>` of the `package.xml` in a folder.
 fn declared_name(folder: &Path) -> Option<String> {
     let path = folder.join("package.xml");
-    if std::fs::metadata(&path).ok()?.len() > 1 << 20 {
+    let metadata = std::fs::metadata(&path).ok()?;
+    if !metadata.is_file() || metadata.len() > 1 << 20 {
         return None;
     }
     let text = std::fs::read_to_string(path).ok()?;

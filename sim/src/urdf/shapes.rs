@@ -129,14 +129,20 @@ fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
         Resolved::Found(path) => (path, "exists".to_owned()),
         Resolved::Missing { guess, tried, hint } => {
             let hint = hint.map(|h| format!(" ({h})")).unwrap_or_default();
-            (guess, format!("does not exist{hint}, looked at {}", tried.join(", ")))
+            (guess, format!("does not exist{hint}, looked at {}", shortened(&tried)))
         }
         Resolved::PackageUnknown { package, guess, tried } => {
-            (guess, format!("is in package \"{package}\", which was found nowhere, looked at {}", tried.join(", ")))
+            (guess, format!("is in package \"{package}\", which was found nowhere, looked at {}", shortened(&tried)))
         }
         Resolved::Empty => (PathBuf::new(), "is empty".to_owned()),
         Resolved::Unsupported { problem } => (PathBuf::from(uri), format!("cannot be read: {problem}")),
     }
+}
+
+/// The first places; a warning need not be complete.
+fn shortened(tried: &[String]) -> String {
+    let first = tried.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if tried.len() > 3 { format!("{first} and {} more", tried.len() - 3) } else { first }
 }
 
 fn mesh(uri: &str, path: PathBuf, scale: Option<urdf_rs::Vec3>) -> Geometry {

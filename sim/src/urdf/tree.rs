@@ -90,8 +90,7 @@ impl Tree {
     /// root is a circle.
     fn find_root(&mut self, links: &[Named], edges: &[Edge]) -> Result<(), UrdfError> {
         let roots: Vec<usize> = (0..links.len()).filter(|&l| self.parent_joint[l].is_none()).collect();
-        if let [root, _, ..] = roots[..] {
-            debug_assert!(root < links.len());
+        if roots.len() > 1 {
             let roots = roots.iter().map(|&l| (links[l].name.clone(), links[l].source.clone())).collect();
             return Err(UrdfError::SeveralRoots { roots });
         }
