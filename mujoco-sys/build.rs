@@ -174,14 +174,19 @@ fn write_fields(installation: &Installation, path: &Path) {
         for (name, (kind, rows, cols)) in arrays {
             let kind = rust_type(kind);
             let (rows, cols) = (size_expression(rows), size_expression(cols));
-            let (arguments, owner) =
-                if module == "model" { ("m: *const mjModel", "m") } else { ("m: *const mjModel, d: *const mjData", "d") };
+            let (arguments, owner) = if module == "model" {
+                ("m: *const mjModel", "m")
+            } else {
+                ("m: *const mjModel, d: *const mjData", "d")
+            };
             writeln!(
                 out,
                 "    pub unsafe fn {name}<'a>({arguments}) -> &'a [{kind}] {{ unsafe {{ super::slice((*{owner}).{name}, ({rows}) * ({cols})) }} }}"
             )
             .unwrap();
-            let arguments = arguments.replace("d: *const", "d: *mut").replace("m: *const mjModel", if module == "model" { "m: *mut mjModel" } else { "m: *const mjModel" });
+            let arguments = arguments
+                .replace("d: *const", "d: *mut")
+                .replace("m: *const mjModel", if module == "model" { "m: *mut mjModel" } else { "m: *const mjModel" });
             writeln!(
                 out,
                 "    pub unsafe fn {name}_mut<'a>({arguments}) -> &'a mut [{kind}] {{ unsafe {{ super::slice_mut((*{owner}).{name}, ({rows}) * ({cols})) }} }}"

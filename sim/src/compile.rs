@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// A compiled scene and its environments.
 #[derive(Debug)]
-pub struct Simulation {
+pub(crate) struct Simulation {
     pub(crate) batch: Batch,
     pub(crate) robots: Vec<RobotIndex>,
     pub(crate) xml: String,
@@ -144,11 +144,8 @@ fn set_up_drives(
     robots: &[Arc<RobotData>],
     layouts: &[RobotLayout],
 ) -> Result<(mj::Model, DriveTable, Vec<RobotIndex>, Start)> {
-    let missing = |what: &'static str, name: &str| Error::UnknownName {
-        what,
-        name: name.into(),
-        candidates: Vec::new(),
-    };
+    let missing =
+        |what: &'static str, name: &str| Error::UnknownName { what, name: name.into(), candidates: Vec::new() };
     let mut table = DriveTable::default();
     let mut indices = Vec::new();
     let mut start = Start::default();
@@ -221,9 +218,8 @@ impl Built {
                 format!("{a:?} and {b:?} overlap in the initial pose and never collide with each other"),
             ));
         }
-        let threads = cfg
-            .threads
-            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get));
+        let threads =
+            cfg.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get));
         let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads)?;
         let mut simulation =
             Simulation { batch, robots: self.robots, xml: self.xml, diagnostics, start: self.start, excluded };
@@ -281,7 +277,8 @@ impl Simulation {
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
         for i in 0..self.batch.num_envs() {
-            let (state, time, targets) = old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone()));
+            let (state, time, targets) =
+                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone()));
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);

@@ -117,10 +117,11 @@ pub fn plan(
     Ok((plans, diagnostics))
 }
 
-/// Position limits; a continuous joint has none, whatever the file says.
+/// Position limits; a continuous joint has none, whatever the file says. A single missing end is 0, URDF's default; with
+/// both missing (or refused with a warning) the joint is not limited.
 fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
-    Some([limit.lower?, limit.upper?])
+    (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])
 }
 
 /// A driver may only go where every joint that mimics it may follow.

@@ -107,7 +107,8 @@ impl DriveState {
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, data);
         for (i, drive) in table.drives.iter().enumerate() {
-            let target = Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
+            let target =
+                Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
             match drive.realization {
                 Realization::Row { row } => implicit::apply(drive, row, &self.gains[i], &target, data),
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
@@ -119,9 +120,7 @@ impl DriveState {
     pub fn read_efforts(&mut self, data: &mj::Data) {
         for (i, drive) in self.table.drives.iter().enumerate() {
             self.effort[i] = match drive.realization {
-                Realization::Row { row } => {
-                    implicit::effort(row, &self.gains[i], self.feedforward[i], data)
-                }
+                Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
                 Realization::Actuator => data.actuator_force()[drive.ctrl],
             };
         }

@@ -101,9 +101,7 @@ impl WarningCounts {
 
     /// Any position, velocity or acceleration was bad.
     pub fn diverged(&self) -> Option<Warning> {
-        [Warning::BadPosition, Warning::BadVelocity, Warning::BadAcceleration]
-            .into_iter()
-            .find(|&w| self.get(w) > 0)
+        [Warning::BadPosition, Warning::BadVelocity, Warning::BadAcceleration].into_iter().find(|&w| self.get(w) > 0)
     }
 
     /// A buffer was too small.

@@ -47,8 +47,7 @@ impl std::fmt::Display for CompileError {
 /// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, parser and compiler).
 fn line_named_in(message: &str) -> Option<u32> {
     let after = &message[message.rfind("line")? + 4..];
-    let digits: String =
-        after.trim_start_matches([' ', '=', ':']).chars().take_while(char::is_ascii_digit).collect();
+    let digits: String = after.trim_start_matches([' ', '=', ':']).chars().take_while(char::is_ascii_digit).collect();
     digits.parse().ok()
 }
 

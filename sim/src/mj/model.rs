@@ -87,11 +87,7 @@ pub struct Buffers {
 impl Buffers {
     /// Twice as much of everything.
     pub fn doubled(self) -> Self {
-        Self {
-            contacts: self.contacts * 2,
-            constraints: self.constraints * 2,
-            arena_bytes: self.arena_bytes * 2,
-        }
+        Self { contacts: self.contacts * 2, constraints: self.constraints * 2, arena_bytes: self.arena_bytes * 2 }
     }
 }
 
@@ -209,8 +205,17 @@ fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
     // part; in numbers of 8 bytes.
     let square = buffers.constraints + header.neq as usize + header.nv as usize;
     let linear = [
-        header.nq, header.nv, header.nu, header.na, header.nbody, header.njnt, header.ngeom, header.nsite, header.neq,
-        header.ntendon, header.nwrap,
+        header.nq,
+        header.nv,
+        header.nu,
+        header.na,
+        header.nbody,
+        header.njnt,
+        header.ngeom,
+        header.nsite,
+        header.neq,
+        header.ntendon,
+        header.nwrap,
     ]
     .iter()
     .map(|&n| n as usize)

@@ -95,7 +95,8 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
         if !vfs.add(asset) {
-            let message = format!("the asset {:?} cannot be added: its name is used twice or it is too large", asset.name);
+            let message =
+                format!("the asset {:?} cannot be added: its name is used twice or it is too large", asset.name);
             return Err(CompileError::new(&message).into());
         }
     }

@@ -215,17 +215,15 @@ impl Emitter<'_, '_> {
         }
     }
 
-    fn push_body(
-        &mut self,
-        link: LinkId,
-        parent: usize,
-        pose: Pose,
-        joints: Vec<Joint>,
-    ) -> Result<usize, EmitError> {
+    fn push_body(&mut self, link: LinkId, parent: usize, pose: Pose, joints: Vec<Joint>) -> Result<usize, EmitError> {
         let depth = self.depth.get(&parent).map_or(1, |d| d + 1);
         let described = self.description.link(link);
         if depth > MAX_BODY_DEPTH {
-            return Err(EmitError::TooDeep { link: described.name.clone(), source_line: described.source.clone(), depth });
+            return Err(EmitError::TooDeep {
+                link: described.name.clone(),
+                source_line: described.source.clone(),
+                depth,
+            });
         }
         let index = self.mjcf.bodies.len();
         self.depth.insert(index, depth);

@@ -366,9 +366,8 @@ impl Writer {
         if !mjcf.friction_tendons.is_empty() {
             self.open(Element::new("tendon"), None);
             for tendon in &mjcf.friction_tendons {
-                let element = Element::new("fixed")
-                    .attr("name", &tendon.name)
-                    .attr("frictionloss", number(tendon.frictionloss));
+                let element =
+                    Element::new("fixed").attr("name", &tendon.name).attr("frictionloss", number(tendon.frictionloss));
                 self.open(element, None);
                 self.leaf(Element::new("joint").attr("joint", &tendon.joint).attr("coef", 1), None);
                 self.close("fixed");

@@ -12,9 +12,9 @@ use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::pattern;
 use crate::urdf::{UrdfCfg, assemble};
-use ndarray::{Array2, Array3, AsArray, Ix2};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
+use ndarray::{Array2, Array3, AsArray, Ix2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -79,8 +79,8 @@ impl RobotData {
         manager: &SimulationManagerCfg,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
-        let usable = (1..=64).contains(&cfg.uid.chars().count())
-            && !cfg.uid.chars().any(|c| c == '/' || c.is_control());
+        let usable =
+            (1..=64).contains(&cfg.uid.chars().count()) && !cfg.uid.chars().any(|c| c == '/' || c.is_control());
         if !usable {
             return Err(Error::InvalidUid(cfg.uid));
         }
@@ -383,9 +383,9 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
-    pub fn set_qpos<'t>(
+    pub fn set_qpos(
         &mut self,
-        targets: impl AsArray<'t, f64, Ix2>,
+        targets: impl AsArray<'_, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
@@ -410,9 +410,9 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is written.
-    pub fn write_qpos<'t>(
+    pub fn write_qpos(
         &mut self,
-        positions: impl AsArray<'t, f64, Ix2>,
+        positions: impl AsArray<'_, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
@@ -442,12 +442,13 @@ impl<'a> RobotMut<'a> {
         let count = self.data.plans.len();
         let joints: Vec<usize> = match joint_ids {
             None => (0..count).collect(),
-            Some(ids) => ids
-                .iter()
-                .map(|&JointIndex(index)| {
-                    if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) }
-                })
-                .collect::<Result<_>>()?,
+            Some(ids) => {
+                ids.iter()
+                    .map(|&JointIndex(index)| {
+                        if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) }
+                    })
+                    .collect::<Result<_>>()?
+            }
         };
         let num_envs = self.simulation.batch.num_envs();
         env_mask(env_ids, num_envs)?;
