@@ -383,9 +383,10 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
-    pub fn set_qpos(
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qpos<'t>(
         &mut self,
-        targets: impl AsArray<'_, f64, Ix2>,
+        targets: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
@@ -410,9 +411,10 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is written.
-    pub fn write_qpos(
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_qpos<'t>(
         &mut self,
-        positions: impl AsArray<'_, f64, Ix2>,
+        positions: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
