@@ -1,0 +1,195 @@
+//! What every example shares: flags, Ctrl+C, the progress bar, the report.
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use kinetoscope::prelude::*;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Errors end an example with a message and exit code 2.
+pub type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
+
+/// Flags of every example; each is accepted with dashes and with underscores.
+#[derive(Clone, Debug, Args)]
+pub struct Launcher {
+    /// Number of environments
+    #[arg(long, alias = "num_envs", default_value_t = 1)]
+    pub num_envs: usize,
+    /// Number of steps; without it the example runs until Ctrl+C
+    #[arg(long)]
+    pub steps: Option<u64>,
+    /// Run without a window
+    #[arg(long)]
+    pub headless: bool,
+    /// Where physics runs
+    #[arg(long, value_enum, default_value_t = Device::Cpu)]
+    pub device: Device,
+    /// How images are drawn
+    #[arg(long, value_enum, default_value_t = Renderer::Auto)]
+    pub renderer: Renderer,
+    /// Distance of environments in the overview [m]
+    #[arg(long, alias = "arena_space")]
+    pub arena_space: Option<f64>,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Threads that step; every core by default
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Folder for pictures
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Folder for every stage of the pipeline: merged URDF, description, MJCF for both MuJoCo lines, meshes
+    #[arg(long)]
+    pub dump: Option<PathBuf>,
+    /// File for the report, as JSON
+    #[arg(long)]
+    pub report: Option<PathBuf>,
+}
+
+/// Where physics runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Device {
+    /// This machine's processor
+    Cpu,
+    /// A graphics card (not supported)
+    Cuda,
+}
+
+/// How images are drawn. Nothing is drawn yet; the names are accepted so that scripts run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Renderer {
+    /// The default
+    Auto,
+    /// Rasterizer
+    Raster,
+    /// Rasterizer with traced shadows
+    Hybrid,
+    /// Ray tracer, few samples
+    FastRt,
+    /// Ray tracer
+    Rt,
+}
+
+impl Launcher {
+    /// The simulation these flags ask for.
+    ///
+    /// # Errors
+    /// The device is not supported.
+    pub fn simulation(&self) -> Result<SimulationManagerCfg> {
+        if self.device == Device::Cuda {
+            return Err("--device cuda is not supported: Kinetoscope simulates on the CPU; use --device cpu, \
+                        and --threads to choose how many cores"
+                .into());
+        }
+        if !self.headless {
+            println!("There is no window yet: going on headless.");
+        }
+        if !matches!(self.renderer, Renderer::Auto) || self.out.is_some() {
+            println!("This example draws no images yet: --renderer and --out have no effect.");
+        }
+        Ok(SimulationManagerCfg {
+            num_envs: self.num_envs,
+            seed: self.seed,
+            threads: self.threads,
+            ..Default::default()
+        })
+    }
+
+    /// Writes `report` to the file of `--report`.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_report(&self, report: &serde_json::Value) -> Result {
+        let Some(path) = &self.report else { return Ok(()) };
+        let text = serde_json::to_string_pretty(report)? + "\n";
+        std::fs::write(path, text).map_err(|e| format!("--report {}: {e}", path.display()))?;
+        println!("Report written to {}", path.display());
+        Ok(())
+    }
+}
+
+/// A file of the user as it is, else an asset of that name.
+///
+/// # Errors
+/// It is neither.
+pub fn user_or_asset(path: &Path) -> Result<PathBuf> {
+    if path.exists() { Ok(path.to_path_buf()) } else { Ok(assets::path(path)?) }
+}
+
+/// Runs an example: an error is printed and gives exit code 2.
+pub fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
+    match example() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The loop's clock: progress bar, Ctrl+C, number of steps.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    steps: Option<u64>,
+    interrupted: Arc<AtomicBool>,
+    start: Instant,
+}
+
+impl Progress {
+    /// Starts the clock; `cycle` is the length of the bar where the number of steps is open.
+    pub fn new(launcher: &Launcher, cycle: u64) -> Self {
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupted);
+        // A second Ctrl+C ends the program at once, should the report hang on a slow disk.
+        let handler = ctrlc::set_handler(move || {
+            if flag.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+        });
+        if let Err(error) = handler {
+            eprintln!("warning: Ctrl+C will end the example without a report: {error}");
+        }
+        let bar = ProgressBar::new(launcher.steps.unwrap_or(cycle));
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} steps  {per_sec}") {
+            bar.set_style(style);
+        }
+        Self { bar, steps: launcher.steps, interrupted, start: Instant::now() }
+    }
+
+    /// Ctrl+C was pressed or all steps are done.
+    pub fn stop(&self, step: u64) -> bool {
+        self.interrupted.load(Ordering::SeqCst) || self.steps.is_some_and(|steps| step >= steps)
+    }
+
+    /// Where a block of at most `length` steps ends.
+    pub fn end_of_block(&self, step: u64, length: u64) -> u64 {
+        (step + length).min(self.steps.unwrap_or(u64::MAX))
+    }
+
+    /// Prints a line above the bar.
+    pub fn say(&self, message: &str) {
+        // Without a terminal the bar is hidden and would swallow the line.
+        if std::io::stderr().is_terminal() { self.bar.suspend(|| println!("{message}")) } else { println!("{message}") }
+    }
+
+    /// Moves the bar.
+    pub fn advance(&self, step: u64) {
+        if self.steps.is_none() && step > self.bar.length().unwrap_or(0) {
+            self.bar.set_length(step);
+        }
+        self.bar.set_position(step);
+    }
+
+    /// Steps of all environments per second since the start; ends the bar.
+    pub fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
+        let seconds = self.start.elapsed().as_secs_f64();
+        self.bar.finish_and_clear();
+        steps as f64 * num_envs as f64 / seconds.max(1e-9)
+    }
+}
