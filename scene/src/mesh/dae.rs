@@ -513,3 +513,7 @@ impl Placement {
         super::builder::unit(n.map(|x| (x / largest) as f32))
     }
 }
+
+#[cfg(test)]
+#[path = "tests_dae.rs"]
+pub(super) mod tests;

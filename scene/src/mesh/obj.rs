@@ -130,3 +130,7 @@ fn look_up<T: Copy>(ctx: &Ctx<'_>, number: usize, word: &str, all: &[T], what: &
     let found = from_zero.and_then(|i| usize::try_from(i).ok()).and_then(|i| all.get(i));
     found.copied().ok_or_else(|| ctx.index(at(), index, all.len()))
 }
+
+#[cfg(test)]
+#[path = "tests_obj.rs"]
+mod tests;
