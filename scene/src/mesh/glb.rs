@@ -6,8 +6,8 @@
 
 use serde_json::Value;
 
+use super::affine::{Affine, IDENTITY, Placement, product};
 use super::builder::{Builder, Corner};
-use super::dae::{Affine, IDENTITY, Placement, product};
 use super::error::{Ctx, percent_decoded};
 use super::glb_buffers::{Gltf, item, len};
 use super::{MeshError, MeshMaterial, TextureSource, TriMesh};
@@ -213,7 +213,7 @@ impl Reader<'_> {
         if let Some(&bad) = indices.iter().find(|&&i| i as usize >= n) {
             return Err(ctx.index(format!("{at}, vertex index"), i64::from(bad), n));
         }
-        if mode == 4 && indices.len() % 3 != 0 {
+        if mode == 4 && !indices.len().is_multiple_of(3) {
             return Err(ctx.invalid(at, format!("{} indices of triangles; expected a multiple of 3", indices.len())));
         }
         let corner = |i: u32| {

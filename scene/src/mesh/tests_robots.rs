@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::{HullCfg, MeshMaterial, TextureSource, TriMesh, convex_hull, load};
+use super::{HullCache, HullCfg, MeshMaterial, TextureSource, TriMesh, convex_hull, load};
 
 /// A small generator (xorshift64*) so that every run tests the same.
 pub(super) struct Random(pub(super) u64);
@@ -86,16 +86,16 @@ const ANYMAL: [(&str, usize, [f32; 3], [f32; 3]); 19] = [
 
 /// SR5 and Inspire by trimesh: triangles, different positions, smallest and largest coordinates.
 #[rustfmt::skip]
-const STL: [(&str, usize, usize, [f32; 3], [f32; 3]); 9] = [
-    ("L_hand_base_link.STL", 28960, 14410, [-0.0274, -0.14155, -0.042769], [0.0274, 0.0, 0.038735]),
-    ("Link12_L.STL", 18344, 9152, [-0.003698, -0.039029, -0.017698], [0.059723, 0.01111, 0.001698]),
-    ("xMateSR5_base.stl", 23964, 11974, [-166.5, -74.990166, 0.0], [74.96067, 100.0, 104.5]),
-    ("xMateSR5_link1.stl", 21026, 10515, [-61.285351, -55.195129, -238.0], [61.285351, 58.0, 61.285351]),
-    ("xMateSR5_link2.stl", 41718, 20869, [-61.311024, -152.988403, -61.311047], [106.309265, -40.0, 456.309265]),
-    ("xMateSR5_link3.stl", 23836, 11920, [-95.45874, -52.5, -55.686096], [55.674435, 51.016697, 203.0]),
-    ("xMateSR5_link4.stl", 14966, 7485, [-44.925362, -77.0, -205.0], [44.925362, 70.0, 44.935219]),
-    ("xMateSR5_link5.stl", 21896, 10950, [-45.87941, -72.500801, -86.192772], [45.87941, 44.653809, 75.0]),
-    ("xMateSR5_link6.stl", 12230, 6117, [-46.363201, -44.0, -34.5], [43.995171, 44.568966, 0.0]),
+const STL: [((&str, usize, usize), [f32; 3], [f32; 3]); 9] = [
+    (("L_hand_base_link.STL", 28960, 14410), [-0.0274, -0.14155, -0.042769], [0.0274, 0.0, 0.038735]),
+    (("Link12_L.STL", 18344, 9152), [-0.003698, -0.039029, -0.017698], [0.059723, 0.01111, 0.001698]),
+    (("xMateSR5_base.stl", 23964, 11974), [-166.5, -74.990166, 0.0], [74.96067, 100.0, 104.5]),
+    (("xMateSR5_link1.stl", 21026, 10515), [-61.285351, -55.195129, -238.0], [61.285351, 58.0, 61.285351]),
+    (("xMateSR5_link2.stl", 41718, 20869), [-61.311024, -152.988403, -61.311047], [106.309265, -40.0, 456.309265]),
+    (("xMateSR5_link3.stl", 23836, 11920), [-95.45874, -52.5, -55.686096], [55.674435, 51.016697, 203.0]),
+    (("xMateSR5_link4.stl", 14966, 7485), [-44.925362, -77.0, -205.0], [44.925362, 70.0, 44.935219]),
+    (("xMateSR5_link5.stl", 21896, 10950), [-45.87941, -72.500801, -86.192772], [45.87941, 44.653809, 75.0]),
+    (("xMateSR5_link6.stl", 12230, 6117), [-46.363201, -44.0, -34.5], [43.995171, 44.568966, 0.0]),
 ];
 
 fn assert_bounds(name: &str, mesh: &TriMesh, lo: [f32; 3], hi: [f32; 3]) {
@@ -152,7 +152,7 @@ fn anymal_base_has_six_materials_in_three_instances() {
 #[test]
 fn vendor_stl_agrees_with_trimesh() {
     let files = stl_files();
-    for (name, triangles, vertices, lo, hi) in STL.into_iter().filter(|_| !files.is_empty()) {
+    for ((name, triangles, vertices), lo, hi) in STL.into_iter().filter(|_| !files.is_empty()) {
         let path = files.iter().find(|p| p.ends_with(name)).unwrap();
         let mesh = load(path).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (triangles, vertices), "{name}");
@@ -165,7 +165,9 @@ fn vendor_stl_agrees_with_trimesh() {
 #[ignore = "prints times"]
 fn times() {
     for extension in ["dae", "stl"] {
-        let (mut loading, mut hulls, mut count) = (0.0, 0.0, 0);
+        let (mut loading, mut hulls, mut hits, mut count) = (0.0, 0.0, 0.0, 0);
+        let scratch = tempfile::tempdir().unwrap();
+        let cache = HullCache::at(scratch.path());
         for path in files(extension) {
             let start = Instant::now();
             let mesh = load(&path).unwrap();
@@ -173,12 +175,17 @@ fn times() {
             let start = Instant::now();
             let hull = convex_hull(&mesh.positions, &HullCfg::default()).unwrap();
             let hulled = start.elapsed().as_secs_f64() * 1e3;
+            let cached = || cache.hull_of_file(&path, [1.0; 3], &HullCfg::default()).unwrap();
+            cached();
+            let start = Instant::now();
+            assert_eq!(cached(), hull);
+            hits += start.elapsed().as_secs_f64() * 1e3;
             let (n, name) = (mesh.triangles.len(), path.file_name().unwrap().display().to_string());
             println!("{name:24} {n:6} triangles: {loaded:7.2} ms, hull {hulled:6.2} ms, {}", hull.positions.len());
             loading += loaded;
             hulls += hulled;
             count += 1;
         }
-        println!("{count} {extension}: loading {loading:.1} ms, hulls {hulls:.1} ms");
+        println!("{count} {extension}: loading {loading:.1} ms, hulls {hulls:.1} ms, from the cache {hits:.1} ms");
     }
 }
