@@ -1,8 +1,7 @@
 //! Wavefront OBJ.
 //!
-//! The `tobj` crate serves as the reference of the tests only: it panics on some input (`Kd` with one number, texture
-//! indices near the end of the integers), loses the pairing where only some corners have texture coordinates, and its
-//! errors do not tell the line.
+//! The `tobj` crate serves as the reference of the tests only: version 4.0.5 panics on an MTL line `Kd 1`, loses track of
+//! which vertex has which texture coordinate where only some have one, and its errors do not tell the line.
 
 use std::collections::HashMap;
 

@@ -84,9 +84,12 @@ const ANYMAL: [(&str, usize, [f32; 3], [f32; 3]); 19] = [
     ("wide_angle_camera.dae", 148, [-0.02441, -0.019879, -0.033957], [0.003711, 0.019879, 0.019117]),
 ];
 
+/// File, triangles, different positions.
+type Counts = (&'static str, usize, usize);
+
 /// SR5 and Inspire by trimesh: triangles, different positions, smallest and largest coordinates.
 #[rustfmt::skip]
-const STL: [((&str, usize, usize), [f32; 3], [f32; 3]); 9] = [
+const STL: [(Counts, [f32; 3], [f32; 3]); 9] = [
     (("L_hand_base_link.STL", 28960, 14410), [-0.0274, -0.14155, -0.042769], [0.0274, 0.0, 0.038735]),
     (("Link12_L.STL", 18344, 9152), [-0.003698, -0.039029, -0.017698], [0.059723, 0.01111, 0.001698]),
     (("xMateSR5_base.stl", 23964, 11974), [-166.5, -74.990166, 0.0], [74.96067, 100.0, 104.5]),
