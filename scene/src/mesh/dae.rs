@@ -3,22 +3,20 @@
 //! Node transforms multiply in document order, parent before child. Polygons with holes, curves, skinning weights,
 //! `<lookat>` and `<skew>` are not read (the last two are errors).
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::str::FromStr;
 
 use roxmltree::{Document, Node};
 
+use super::affine::{Affine, IDENTITY, Placement, product, rotation};
 use super::builder::{Builder, Corner};
 use super::dae_material::Binding;
 use super::error::Ctx;
 use super::polygon::triangulate;
 use super::{DaeUpAxis, MeshError, TriMesh};
 
-/// The upper three rows of a transform.
-pub(super) type Affine = [[f64; 4]; 3];
-
-pub(super) const IDENTITY: Affine = [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.]];
 const MAX_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
@@ -109,13 +107,13 @@ pub(super) fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     dae.builder.finish(ctx)
 }
 
-fn decoded(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<String, MeshError> {
+fn decoded<'b>(ctx: &Ctx<'_>, bytes: &'b [u8]) -> Result<Cow<'b, str>, MeshError> {
     match std::str::from_utf8(bytes) {
-        Ok(text) => Ok(text.to_owned()),
+        Ok(text) => Ok(Cow::Borrowed(text)),
         Err(e) => {
             let head = String::from_utf8_lossy(&bytes[..bytes.len().min(100)]).to_ascii_lowercase();
             if head.contains("iso-8859-1") || head.contains("windows-1252") {
-                return Ok(bytes.iter().map(|&b| char::from(b)).collect());
+                return Ok(Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()));
             }
             let line = bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count() + 1;
             Err(ctx.caused(format!("line {line}"), "text is not UTF-8", e))
@@ -364,7 +362,7 @@ impl<'a, 'i> Dae<'a, 'i> {
             }
             for p in children(primitive, "p") {
                 let p: Vec<u32> = self.numbers(p)?;
-                if p.len() % columns != 0 {
+                if !p.len().is_multiple_of(columns) {
                     let what = format!("{} indices in <p>; expected a multiple of {columns}", p.len());
                     return Err(self.ctx.invalid(line(primitive), what));
                 }
@@ -375,7 +373,7 @@ impl<'a, 'i> Dae<'a, 'i> {
                 let n = corners.len();
                 let mut faces: Vec<[usize; 3]> = Vec::with_capacity(n);
                 match kind {
-                    "triangles" if n % 3 != 0 => {
+                    "triangles" if !n.is_multiple_of(3) => {
                         let what = format!("{n} corners in <p>; expected a multiple of 3");
                         return Err(self.ctx.invalid(line(primitive), what));
                     }
@@ -456,60 +454,6 @@ fn polygon(corners: &[([f64; 3], Corner)], range: std::ops::Range<usize>, faces:
     faces.extend(triangulate(&points).into_iter().map(|t| t.map(|i| i + start)));
 }
 
-pub(super) fn product(a: &Affine, b: &Affine) -> Affine {
-    let mut out = [[0.0; 4]; 3];
-    for (row, a) in out.iter_mut().zip(a) {
-        for (j, x) in row.iter_mut().enumerate() {
-            *x = a[0] * b[0][j] + a[1] * b[1][j] + a[2] * b[2][j] + if j == 3 { a[3] } else { 0.0 };
-        }
-    }
-    out
-}
-
-/// Rotation about a unit axis by an angle \[rad\].
-fn rotation(axis: [f64; 3], angle: f64) -> Affine {
-    let ([x, y, z], (s, c)) = (axis, angle.sin_cos());
-    let t = 1.0 - c;
-    [
-        [t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0.0],
-        [t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0.0],
-        [t * x * z - s * y, t * y * z + s * x, t * z * z + c, 0.0],
-    ]
-}
-
-/// A transform ready for points and normals.
-pub(super) struct Placement {
-    matrix: Affine,
-    /// The cofactors: the inverse transpose times the determinant, so that no division can fail.
-    cofactors: [[f64; 3]; 3],
-    pub(super) mirrored: bool,
-}
-
-impl Placement {
-    pub(super) fn new(matrix: &Affine) -> Self {
-        let m = matrix;
-        let minor = |i: usize, j: usize| {
-            let (r, s, u, v) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
-            m[r][u] * m[s][v] - m[r][v] * m[s][u]
-        };
-        let cofactors = [0, 1, 2].map(|i| [0, 1, 2].map(|j| minor(i, j)));
-        let determinant: f64 = (0..3).map(|j| m[0][j] * cofactors[0][j]).sum();
-        Self { matrix: *matrix, cofactors, mirrored: determinant < 0.0 }
-    }
-
-    pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
-        self.matrix.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
-    }
-
-    /// The unit normal; `None` for a zero one and where the transform flattens it away.
-    pub(super) fn normal(&self, n: [f64; 3]) -> Option<[f32; 3]> {
-        let sign = if self.mirrored { -1.0 } else { 1.0 };
-        let n = self.cofactors.map(|row| sign * (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]));
-        // Scaled first: the cofactors of a millimetre file are of the order 1e-6.
-        let largest = n.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        if !(largest > 0.0 && largest.is_finite()) {
-            return None;
-        }
-        super::builder::unit(n.map(|x| (x / largest) as f32))
-    }
-}
+#[cfg(test)]
+#[path = "tests_dae.rs"]
+pub(super) mod tests;

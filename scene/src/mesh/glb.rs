@@ -6,8 +6,8 @@
 
 use serde_json::Value;
 
+use super::affine::{Affine, IDENTITY, Placement, product};
 use super::builder::{Builder, Corner};
-use super::dae::{Affine, IDENTITY, Placement, product};
 use super::error::{Ctx, percent_decoded};
 use super::glb_buffers::{Gltf, item, len};
 use super::{MeshError, MeshMaterial, TextureSource, TriMesh};
@@ -213,7 +213,7 @@ impl Reader<'_> {
         if let Some(&bad) = indices.iter().find(|&&i| i as usize >= n) {
             return Err(ctx.index(format!("{at}, vertex index"), i64::from(bad), n));
         }
-        if mode == 4 && indices.len() % 3 != 0 {
+        if mode == 4 && !indices.len().is_multiple_of(3) {
             return Err(ctx.invalid(at, format!("{} indices of triangles; expected a multiple of 3", indices.len())));
         }
         let corner = |i: u32| {
@@ -251,10 +251,8 @@ impl Reader<'_> {
         let none = Value::Null;
         let pbr = material.get("pbrMetallicRoughness").unwrap_or(&none);
         let factor: [f64; 4] = self.numbers(pbr, "baseColorFactor", &at)?.unwrap_or([1.0; 4]);
-        let mut rgba = factor.map(|x| x.clamp(0.0, 1.0) as f32);
-        for x in &mut rgba[..3] {
-            *x = to_display(*x);
-        }
+        let [r, g, b, a] = factor.map(|x| x.clamp(0.0, 1.0));
+        let mut rgba = [to_display(r), to_display(g), to_display(b), a].map(|x| x as f32);
         if material.get("alphaMode").and_then(Value::as_str).unwrap_or("OPAQUE") == "OPAQUE" {
             rgba[3] = 1.0;
         }
@@ -301,6 +299,10 @@ fn trs(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
 }
 
 /// Linear light to sRGB.
-fn to_display(x: f32) -> f32 {
+fn to_display(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
+
+#[cfg(test)]
+#[path = "tests_glb.rs"]
+pub(super) mod tests;

@@ -1,5 +1,6 @@
 //! Triangle meshes and their files: STL, OBJ + MTL, DAE, GLB in; convex hulls; STL and OBJ out.
 
+mod affine;
 mod builder;
 mod dae;
 mod dae_material;

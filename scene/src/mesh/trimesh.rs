@@ -1,7 +1,7 @@
 //! What every mesh can do.
 
+use super::affine::Placement;
 use super::builder::{cross, dot, unit};
-use super::dae::Placement;
 use super::{MeshPart, TriMesh};
 use crate::Pose;
 

@@ -1,0 +1,124 @@
+//! OBJ and MTL, and what is written by [`crate::mesh::write_obj`].
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use std::path::Path;
+
+use super::*;
+use crate::mesh::{MeshOptions, TextureSource, load, load_bytes, write_binary_stl, write_obj};
+
+fn parse(text: &str) -> Result<TriMesh, MeshError> {
+    load_bytes(Path::new("part.Obj"), text.as_bytes(), &MeshOptions::default())
+}
+
+const SQUARE: &str = "# a square and a triangle\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0 0.5 0.5 0.5\nvt 0 0\nvt 1 0 0\n\
+                      vt 1 1\nvt 0 1\nvn 0 0 2\nusemtl red\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl blue\nf -4//1 -3//-1 \\\n\
+                      -1//-1\n";
+
+#[test]
+fn faces_of_all_kinds() {
+    let mesh = parse(SQUARE).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 4, 5]]);
+    assert_eq!(mesh.positions.len(), 6);
+    assert_eq!(mesh.normals.as_ref().unwrap()[3], [0.0, 0.0, 1.0]);
+    assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
+    // No library: both materials are unknown, which makes one part without any.
+    assert_eq!((mesh.parts.len(), mesh.materials.len()), (1, 0));
+    mesh.validate().unwrap();
+}
+
+#[test]
+fn libraries_beside_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let lib = "newmtl unused\nKd 1 1 0\nnewmtl blue\nKd 0 0 1\nmap_Kd tex/blue.png\nnewmtl red\nKd 1 0 0\n";
+    std::fs::write(dir.path().join("my colours.mtl"), lib).unwrap();
+    let path = dir.path().join("part.obj");
+    std::fs::write(&path, format!("mtllib missing.mtl\nmtllib my colours.mtl\n{SQUARE}usemtl red\nf 2 3 4\n")).unwrap();
+    let mesh = load(&path).unwrap();
+    assert_eq!(mesh.parts.len(), 2);
+    assert_eq!((mesh.parts[0].triangles.clone(), mesh.parts[1].triangles.clone()), (0..3, 3..4));
+    assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["red", "blue"]);
+    assert_eq!(mesh.materials[1].texture, Some(TextureSource::File(dir.path().join("tex/blue.png"))));
+}
+
+#[test]
+fn errors_name_line_and_element() {
+    for (text, expected) in [
+        ("v 0 0\n", "line 1: expected 3 numbers"),
+        ("v 0 0 x\n", "line 1: \"x\" is not a number"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3: face with 2 corners; expected 3 or more"),
+        ("v 0 0 0\nf 1 1 2\n", "line 2, v index: index 2 is out of range, there are 1"),
+        ("v 0 0 0\nf 1 1 0\n", "line 2, v index: index 0 is out of range, there are 1"),
+        ("v 0 0 0\nf 1 1 -2\n", "line 2, v index: index -2 is out of range, there are 1"),
+        ("v 0 0 0\nf 1/9 1 1\n", "line 2, vt index: index 9 is out of range, there are 0"),
+        ("v 0 0 0\nf 1//-9223372036854775808 1 1\n", "line 2, vn index: index -9223372036854775808 is out"),
+        ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "line 4: vertex position [0.0, NaN, 0.0] is not finite"),
+        ("v 0 0 0\n", "no triangles; a mesh needs at least one"),
+    ] {
+        let error = parse(text).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("part.Obj: {expected}")), "{error}");
+    }
+}
+
+#[test]
+fn agrees_with_tobj() {
+    // Every face corner of a random file in order, with the single index of both readers undone.
+    let mut random = crate::mesh::tests_robots::Random(9);
+    let mut text = String::new();
+    for _ in 0..60 {
+        let mut x = || random.unit();
+        text += &format!("v {} {} {}\nvt {} {}\nvn {} {} {}\n", x(), x(), x(), x(), x(), x(), x(), x());
+    }
+    for i in 0..200 {
+        let mut corner =
+            || format!("{}/{}/-{}", random.next() % 60 + 1, random.next() % 60 + 1, random.next() % 60 + 1);
+        text += &format!("f {} {} {}\n", corner(), corner(), corner());
+        if i == 100 {
+            text += "g second\n";
+        }
+    }
+    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).unwrap();
+    let theirs: Vec<([f32; 3], [f32; 2])> = models
+        .iter()
+        .flat_map(|m| m.mesh.indices.chunks(3).map(move |t| (m, t)))
+        .filter(|(_, t)| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
+        .flat_map(|(m, t)| t.iter().map(move |&i| (m, i as usize)))
+        .map(|(m, i)| {
+            let (p, t) = (&m.mesh.positions[3 * i..], &m.mesh.texcoords[2 * i..]);
+            ([p[0], p[1], p[2]], [t[0], t[1]])
+        })
+        .collect();
+    // Triangles with two corners at one position have no area and are gone here.
+    let theirs: Vec<_> =
+        theirs.chunks(3).filter(|t| t[0].0 != t[1].0 && t[1].0 != t[2].0 && t[2].0 != t[0].0).flatten().collect();
+    let ours = parse(&text).unwrap();
+    let uvs = ours.uvs.as_ref().unwrap();
+    let ours: Vec<_> =
+        ours.triangles.iter().flatten().map(|&i| (ours.positions[i as usize], uvs[i as usize])).collect();
+    assert_eq!(ours.iter().collect::<Vec<_>>(), theirs);
+}
+
+#[test]
+fn what_is_written_reads_back() {
+    let mut mesh = parse(SQUARE).unwrap().scaled([1e-3, 1e10, 0.1]);
+    mesh.positions[1][2] = 1e-30;
+    let mut text = Vec::new();
+    write_obj(&mesh, 0..3, &mut text).unwrap();
+    let back = parse(std::str::from_utf8(&text).unwrap()).unwrap();
+    assert_eq!((&back.positions, &back.uvs, &back.triangles), (&mesh.positions, &mesh.uvs, &mesh.triangles));
+    for (a, b) in back.normals.iter().flatten().flatten().zip(mesh.normals.iter().flatten().flatten()) {
+        assert!((a - b).abs() < 1e-6);
+    }
+    // A part has only its own vertices.
+    let mut text = Vec::new();
+    write_obj(&mesh, 2..3, &mut text).unwrap();
+    assert_eq!(parse(std::str::from_utf8(&text).unwrap()).unwrap().positions.len(), 3);
+    assert!(write_obj(&mesh, 2..9, &mut text).is_err());
+
+    let mut stl = Vec::new();
+    write_binary_stl(&mesh, &mut stl).unwrap();
+    assert_eq!(stl.len(), 84 + 3 * 50);
+    let back = load_bytes(Path::new("x.stl"), &stl, &MeshOptions::default()).unwrap();
+    let soup = |m: &TriMesh| m.triangles.iter().flatten().map(|&i| m.positions[i as usize]).collect::<Vec<_>>();
+    assert_eq!(soup(&back), soup(&mesh));
+}
