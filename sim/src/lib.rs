@@ -14,6 +14,7 @@ pub mod dynamics;
 pub mod env;
 mod error;
 mod export;
+mod gather;
 pub mod inertia;
 mod manager;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
@@ -21,6 +22,7 @@ pub mod mj;
 pub mod mjcf;
 pub mod objects;
 pub mod pattern;
+mod sensor_list;
 pub mod source;
 pub mod urdf;
 
@@ -32,5 +34,6 @@ pub use inertia::{InertiaFault, RigidInertia};
 pub use manager::{EnvId, GroundCfg, LightCfg, RobotId, SimulationManager, SimulationManagerCfg};
 pub use mjcf::document::{Cone, Integrator};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
+pub use sensor_list::SensorId;
 pub use source::Source;
 pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};
