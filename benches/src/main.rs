@@ -1,1 +1,3 @@
+//! Benchmarks: ours and the rivals, in one run.
+
 fn main() {}

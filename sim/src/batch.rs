@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
+/// Work on one environment, given its index.
+pub type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
 
 /// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
 const SPINS_BEFORE_SLEEP: u32 = 20_000;
@@ -150,7 +151,7 @@ impl Batch {
     ///
     /// # Panics
     /// `job` panicked.
-    pub fn run(&mut self, job: Arc<dyn Fn(usize, &mut Env) + Send + Sync>) {
+    pub fn run(&mut self, job: Job) {
         let shared = &*self.shared;
         shared.next.store(0, Ordering::Relaxed);
         shared.finished.store(0, Ordering::Relaxed);

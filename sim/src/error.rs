@@ -28,7 +28,7 @@ pub enum Error {
         link: String,
         /// What is wrong with the file.
         #[source]
-        error: scene::mesh::MeshError,
+        error: Box<scene::mesh::MeshError>,
     },
     /// A drive property or a start position is wrong.
     #[error("robot {robot:?}: {error}")]
@@ -37,7 +37,7 @@ pub enum Error {
         robot: String,
         /// What is wrong.
         #[source]
-        error: PlanError,
+        error: Box<PlanError>,
     },
     /// A control part's patterns are wrong.
     #[error("robot {robot:?}, control part {part:?}: {error}")]
@@ -48,7 +48,7 @@ pub enum Error {
         part: String,
         /// What is wrong.
         #[source]
-        error: PatternError,
+        error: Box<PatternError>,
     },
     /// The robot cannot be written as MJCF.
     #[error(transparent)]
@@ -158,7 +158,7 @@ pub enum Error {
         sensor: String,
         /// What is wrong.
         #[source]
-        error: sensors::SensorError,
+        error: Box<sensors::SensorError>,
     },
     /// A sensor needs a quantity that is not gathered.
     #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]

@@ -17,7 +17,6 @@ mod export;
 mod gather;
 pub mod inertia;
 mod manager;
-#[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
 pub mod mjcf;
 pub mod objects;

@@ -78,12 +78,13 @@ impl SensorList {
             return Err(Error::SensorRequires { sensor: uid, missing: missing.to_string() });
         }
         let build: Builder = Box::new(move |context| Ok(Box::new(cfg.build(context)?) as Box<dyn Sensor>));
-        let mut sensor = build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error })?;
+        let mut sensor =
+            build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         let all = self.entries.iter().fold(requires, |sum, e| sum | e.requires);
         let mut state = gather::allocate(simulation, all);
         gather::gather(simulation, substeps, &mut state);
         let envs: Vec<usize> = (0..context.num_envs).collect();
-        sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error })?;
+        sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         self.state = state;
         self.entries.push(Entry { uid, requires, build, sensor, fault: None });
         Ok(SensorId { index: self.entries.len() - 1, sensor: PhantomData })

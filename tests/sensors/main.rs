@@ -89,10 +89,10 @@ impl SensorCfg for HeightCfg {
 
 impl Sensor for Height {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        let poses = state.body_poses.as_ref().ok_or(SensorError::MissingFields {
-            sensor: "height",
-            missing: Requires::POSES,
-        })?;
+        let poses = state
+            .body_poses
+            .as_ref()
+            .ok_or(SensorError::MissingFields { sensor: "height", missing: Requires::POSES })?;
         for (env, height) in self.0.iter_mut().enumerate() {
             *height = poses[(env, poses.dim().1 - 1, 2)];
         }

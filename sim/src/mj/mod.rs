@@ -8,6 +8,7 @@
 //! * A slice has the length that MuJoCo's own `mjxmacro.h` declares (`mujoco_sys::fields`).
 //!
 //! Names are MuJoCo's own (`qpos`, `geom`, `efc_aref`) in this module and in `mjcf` only.
+#![allow(unsafe_code, reason = "the wall to MuJoCo")]
 
 mod arrays;
 mod data;

@@ -94,11 +94,11 @@ impl RobotData {
             let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
                 robot: cfg.uid.clone(),
                 part: part.clone(),
-                error,
+                error: Box::new(error),
             })?;
             parts.insert(part.clone(), members);
         }
-        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error };
+        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
         found.append(&mut planned);
@@ -165,7 +165,7 @@ fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTre
             let hull = cache.hull_of_file(path, (*scale).into(), cfg).map_err(|error| Error::CollisionMesh {
                 at: collision.source.clone(),
                 link: link.name.clone(),
-                error,
+                error: Box::new(error),
             })?;
             hulls.insert(key, hull);
         }
