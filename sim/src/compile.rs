@@ -277,8 +277,8 @@ impl Simulation {
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
         for i in 0..self.batch.num_envs() {
-            let (state, time, targets) =
-                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone()));
+            let (state, time, targets, history) =
+                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -296,6 +296,7 @@ impl Simulation {
                     }
                     data.set_time(time);
                 });
+                env.adopt(&history);
             });
         }
     }

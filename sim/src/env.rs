@@ -119,6 +119,21 @@ impl Env {
         }
     }
 
+    /// Takes over what `old`, the same environment of an earlier model, has been through.
+    pub(crate) fn adopt(&mut self, old: &EnvHistory) {
+        self.steps = old.steps;
+        self.warnings.add(&old.warnings);
+        self.growths += old.growths;
+        if self.status == EnvStatus::Running {
+            self.status = old.status.clone();
+        }
+    }
+
+    /// What this environment has been through.
+    pub(crate) fn history(&self) -> EnvHistory {
+        EnvHistory { steps: self.steps, warnings: self.warnings, growths: self.growths, status: self.status.clone() }
+    }
+
     /// Running or diverged.
     pub fn status(&self) -> &EnvStatus {
         &self.status
@@ -245,6 +260,15 @@ impl Env {
         let _ = self.data.step1();
         self.data.take_warnings();
     }
+}
+
+/// Counts and status of an environment.
+#[derive(Clone, Debug)]
+pub(crate) struct EnvHistory {
+    steps: u64,
+    warnings: WarningCounts,
+    growths: u32,
+    status: EnvStatus,
 }
 
 /// Copies of the arrays that carry a state from one model to another.

@@ -408,6 +408,16 @@ impl SimulationManager {
         counts
     }
 
+    /// Counts of MuJoCo's warnings in one environment, by name.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn env_warning_counts(&self, env: EnvId) -> Result<BTreeMap<&'static str, u64>> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        let counts = self.simulation.batch.read(env.0, |env| *env.warnings());
+        Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
+    }
+
     /// How often contact and constraint buffers were doubled, over all environments.
     pub fn buffer_growths(&self) -> u64 {
         let mut growths = 0;

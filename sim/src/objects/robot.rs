@@ -85,6 +85,12 @@ impl RobotData {
             return Err(Error::InvalidUid(cfg.uid));
         }
         check_integrator(&cfg, manager.integrator)?;
+        let transforms = cfg.urdf.components.iter().map(|c| ("component transform", &c.transform));
+        for (field, pose) in std::iter::once(("init_pose", &cfg.init_pose)).chain(transforms) {
+            if !::scene::pose::to_row(pose).iter().all(|x| x.is_finite()) {
+                return Err(Error::Config { field, value: format!("{pose}"), expected: "a pose must be finite" });
+            }
+        }
         let assembly = assemble(&cfg.urdf)?;
         let mut found = assembly.diagnostics;
         let description = assembly.description;
