@@ -6,6 +6,7 @@
 //! ```
 
 pub mod batch;
+mod body_inertia;
 mod compile;
 pub mod description;
 pub mod diagnostic;
@@ -15,6 +16,7 @@ pub mod env;
 mod error;
 mod export;
 pub mod inertia;
+pub mod inspect;
 mod manager;
 #[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
