@@ -41,8 +41,8 @@ struct Args {
 
 /// Steps of one phase.
 const PHASE: u64 = 1000;
-/// Steps between looks at Ctrl+C and the progress bar.
-const BLOCK: u64 = 50;
+/// Environment steps between looks at Ctrl+C and the progress bar: a tenth of a second or so.
+const BLOCK: u64 = 4096;
 
 fn main() -> ExitCode {
     launcher::run("create_robot", || run(&Args::parse()))
@@ -77,9 +77,11 @@ fn run(args: &Args) -> launcher::Result {
         let phase = &phases[(step / PHASE) as usize % phases.len()];
         if step % PHASE == 0 {
             progress.say(phase.message);
-            sim.robot_mut(robot).set_qpos(&phase.targets(sim.num_envs()), Some(&phase.joints), None)?;
+            let targets = phase.targets(sim.num_envs());
+            sim.robot_mut(robot).set_qpos(&targets, Some(&phase.joints), None)?;
         }
-        let end = progress.end_of_block(step, BLOCK.min(PHASE - step % PHASE));
+        let block = (BLOCK / sim.num_envs() as u64).clamp(1, PHASE - step % PHASE);
+        let end = progress.end_of_block(step, block);
         sim.update((end - step) as u32);
         step = end;
         progress.advance(step);
@@ -148,7 +150,8 @@ fn phases(sim: &SimulationManager, robot: RobotId, swap_hand: bool) -> launcher:
     let view = sim.robot(robot);
     let (arm, hand) = (view.get_joint_ids("arm")?, view.get_joint_ids("hand")?);
     // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
-    let arm_target = |first: &[f64]| arm.iter().enumerate().map(|(i, _)| first.get(i).copied().unwrap_or(0.0)).collect();
+    let arm_target =
+        |first: &[f64]| arm.iter().enumerate().map(|(i, _)| first.get(i).copied().unwrap_or(0.0)).collect();
     let limits = view.qpos_limits();
     let hand_target = |end: usize| -> Vec<f64> {
         let targets = view.get_target_qpos();
@@ -190,7 +193,10 @@ impl Phase {
 }
 
 fn print_table(phases: &[Value], sim: &SimulationManager, steps: u64, rate: f64) {
-    println!("\n{:<16} {:>9} {:>8} {:>16} {:>18}", "phase", "end step", "joints", "max error [mrad]", "max speed [mrad/s]");
+    println!(
+        "\n{:<16} {:>9} {:>8} {:>16} {:>18}",
+        "phase", "end step", "joints", "max error [mrad]", "max speed [mrad/s]"
+    );
     for phase in phases {
         println!(
             "{:<16} {:>9} {:>8} {:>16.3} {:>18.4}",

@@ -8,52 +8,52 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Errors end an example with a message and exit code 2.
-pub type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
+pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Flags of every example; each is accepted with dashes and with underscores.
 #[derive(Clone, Debug, Args)]
-pub struct Launcher {
+pub(crate) struct Launcher {
     /// Number of environments
     #[arg(long, alias = "num_envs", default_value_t = 1)]
-    pub num_envs: usize,
+    pub(crate) num_envs: usize,
     /// Number of steps; without it the example runs until Ctrl+C
     #[arg(long)]
-    pub steps: Option<u64>,
+    pub(crate) steps: Option<u64>,
     /// Run without a window
     #[arg(long)]
-    pub headless: bool,
+    pub(crate) headless: bool,
     /// Where physics runs
     #[arg(long, value_enum, default_value_t = Device::Cpu)]
-    pub device: Device,
+    pub(crate) device: Device,
     /// How images are drawn
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
-    pub renderer: Renderer,
+    pub(crate) renderer: Renderer,
     /// Distance of environments in the overview [m]
     #[arg(long, alias = "arena_space")]
-    pub arena_space: Option<f64>,
+    pub(crate) arena_space: Option<f64>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Threads that step; every core by default
     #[arg(long)]
-    pub threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Folder for pictures
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Folder for every stage of the pipeline: merged URDF, description, MJCF for both MuJoCo lines, meshes
     #[arg(long)]
-    pub dump: Option<PathBuf>,
+    pub(crate) dump: Option<PathBuf>,
     /// File for the report, as JSON
     #[arg(long)]
-    pub report: Option<PathBuf>,
+    pub(crate) report: Option<PathBuf>,
 }
 
 /// Where physics runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Device {
+pub(crate) enum Device {
     /// This machine's processor
     Cpu,
     /// A graphics card (not supported)
@@ -62,7 +62,7 @@ pub enum Device {
 
 /// How images are drawn. Nothing is drawn yet; the names are accepted so that scripts run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Renderer {
+pub(crate) enum Renderer {
     /// The default
     Auto,
     /// Rasterizer
@@ -80,7 +80,7 @@ impl Launcher {
     ///
     /// # Errors
     /// The device is not supported.
-    pub fn simulation(&self) -> Result<SimulationManagerCfg> {
+    pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
         if self.device == Device::Cuda {
             return Err("--device cuda is not supported: Kinetoscope simulates on the CPU; use --device cpu, \
                         and --threads to choose how many cores"
@@ -104,7 +104,7 @@ impl Launcher {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_report(&self, report: &serde_json::Value) -> Result {
+    pub(crate) fn write_report(&self, report: &serde_json::Value) -> Result {
         let Some(path) = &self.report else { return Ok(()) };
         let text = serde_json::to_string_pretty(report)? + "\n";
         std::fs::write(path, text).map_err(|e| format!("--report {}: {e}", path.display()))?;
@@ -117,12 +117,12 @@ impl Launcher {
 ///
 /// # Errors
 /// It is neither.
-pub fn user_or_asset(path: &Path) -> Result<PathBuf> {
+pub(crate) fn user_or_asset(path: &Path) -> Result<PathBuf> {
     if path.exists() { Ok(path.to_path_buf()) } else { Ok(assets::path(path)?) }
 }
 
 /// Runs an example: an error is printed and gives exit code 2.
-pub fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
+pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
     match example() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -134,7 +134,7 @@ pub fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
 
 /// The loop's clock: progress bar, Ctrl+C, number of steps.
 #[derive(Debug)]
-pub struct Progress {
+pub(crate) struct Progress {
     bar: ProgressBar,
     steps: Option<u64>,
     interrupted: Arc<AtomicBool>,
@@ -143,12 +143,15 @@ pub struct Progress {
 
 impl Progress {
     /// Starts the clock; `cycle` is the length of the bar where the number of steps is open.
-    pub fn new(launcher: &Launcher, cycle: u64) -> Self {
+    pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
-        // A second Ctrl+C ends the program at once, should the report hang on a slow disk.
+        // A second Ctrl+C ends the program at once, should the report hang on a slow disk. Some programs that send the
+        // signal send it twice, to the process and to its group: that is one Ctrl+C.
+        let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::SeqCst) {
+            flag.store(true, Ordering::SeqCst);
+            if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }
         });
@@ -163,23 +166,23 @@ impl Progress {
     }
 
     /// Ctrl+C was pressed or all steps are done.
-    pub fn stop(&self, step: u64) -> bool {
+    pub(crate) fn stop(&self, step: u64) -> bool {
         self.interrupted.load(Ordering::SeqCst) || self.steps.is_some_and(|steps| step >= steps)
     }
 
     /// Where a block of at most `length` steps ends.
-    pub fn end_of_block(&self, step: u64, length: u64) -> u64 {
+    pub(crate) fn end_of_block(&self, step: u64, length: u64) -> u64 {
         (step + length).min(self.steps.unwrap_or(u64::MAX))
     }
 
     /// Prints a line above the bar.
-    pub fn say(&self, message: &str) {
+    pub(crate) fn say(&self, message: &str) {
         // Without a terminal the bar is hidden and would swallow the line.
         if std::io::stderr().is_terminal() { self.bar.suspend(|| println!("{message}")) } else { println!("{message}") }
     }
 
     /// Moves the bar.
-    pub fn advance(&self, step: u64) {
+    pub(crate) fn advance(&self, step: u64) {
         if self.steps.is_none() && step > self.bar.length().unwrap_or(0) {
             self.bar.set_length(step);
         }
@@ -187,7 +190,7 @@ impl Progress {
     }
 
     /// Steps of all environments per second since the start; ends the bar.
-    pub fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
+    pub(crate) fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
         let seconds = self.start.elapsed().as_secs_f64();
         self.bar.finish_and_clear();
         steps as f64 * num_envs as f64 / seconds.max(1e-9)

@@ -97,7 +97,7 @@ pub enum Error {
         version: String,
     },
     /// A name is used already.
-    #[error("a robot called {0:?} exists already; give each robot a uid of its own")]
+    #[error("the uid {0:?} is taken; give each robot and each sensor a uid of its own")]
     DuplicateUid(String),
     /// A name that cannot be written to MJCF.
     #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
@@ -150,6 +150,31 @@ pub enum Error {
         joint: String,
         /// The value.
         value: f64,
+    },
+    /// A sensor's configuration is wrong.
+    #[error("sensor {sensor:?}: {error}")]
+    Sensor {
+        /// The sensor.
+        sensor: String,
+        /// What is wrong.
+        #[source]
+        error: sensors::SensorError,
+    },
+    /// A sensor needs a quantity that is not gathered.
+    #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
+    SensorRequires {
+        /// The sensor.
+        sensor: String,
+        /// What it needs.
+        missing: String,
+    },
+    /// A sensor failed in an earlier step and was not updated since.
+    #[error("sensor {sensor:?} stopped: {fault}")]
+    SensorFault {
+        /// The sensor.
+        sensor: String,
+        /// Why.
+        fault: String,
     },
     /// A file cannot be read or written.
     #[error("{path}: {error}")]

@@ -5,12 +5,15 @@ use crate::compile::{Simulation, compile};
 use crate::diagnostic::{Diagnostic, count_by_name};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
+use crate::gather;
 use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
+use crate::sensor_list::{SensorId, SensorList};
 use nalgebra::Vector3;
 use ndarray::Array2;
+use sensors::{Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -198,6 +201,7 @@ pub struct SimulationManager {
     robots: Vec<Arc<RobotData>>,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
+    sensors: SensorList,
 }
 
 impl SimulationManager {
@@ -213,7 +217,7 @@ impl SimulationManager {
             return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
         }
         let simulation = compile(&cfg, &[])?;
-        Ok(Self { cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation })
+        Ok(Self { cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation, sensors: SensorList::default() })
     }
 
     /// The configuration.
@@ -253,7 +257,42 @@ impl SimulationManager {
         self.simulation = simulation;
         self.robots = robots;
         self.diagnostics.extend(diagnostics);
+        if !self.sensors.is_empty() {
+            let context = self.sensor_context();
+            self.sensors.rebuild(&self.simulation, &context, self.cfg.substeps);
+        }
         Ok(RobotId(self.robots.len() - 1))
+    }
+
+    /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
+    /// sensor sees links and movable joints of all robots, in the order in which they were added. Adding a robot later
+    /// starts its history again.
+    ///
+    /// # Errors
+    /// The configuration is wrong, the name is taken, or the sensor needs a quantity that is not gathered.
+    pub fn add_sensor<C>(&mut self, uid: impl Into<String>, cfg: C) -> Result<SensorId<C::Sensor>>
+    where
+        C: SensorCfg + Send + 'static,
+    {
+        let context = self.sensor_context();
+        self.sensors.add(uid.into(), cfg, &self.simulation, &context, self.cfg.substeps)
+    }
+
+    /// A sensor, to read.
+    ///
+    /// # Errors
+    /// The sensor failed in an earlier step.
+    pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
+        self.sensors.get(id)
+    }
+
+    fn sensor_context(&self) -> SensorContext {
+        SensorContext {
+            num_envs: self.cfg.num_envs,
+            dt: self.cfg.physics_dt,
+            num_bodies: gather::body_count(&self.simulation),
+            num_joints: gather::joint_count(&self.simulation),
+        }
     }
 
     /// A robot, to read.
@@ -279,7 +318,15 @@ impl SimulationManager {
     }
 
     /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
+    /// Sensors tick after every step.
     pub fn update(&mut self, steps: u32) {
+        if !self.sensors.is_empty() {
+            for _ in 0..steps {
+                self.simulation.batch.step(self.cfg.substeps);
+                self.sensors.update(&self.simulation, self.cfg.substeps);
+            }
+            return;
+        }
         for _ in 0..steps / BLOCK {
             self.simulation.batch.step(BLOCK * self.cfg.substeps);
         }
@@ -293,6 +340,10 @@ impl SimulationManager {
     pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         self.simulation.reset(&chosen);
+        if !self.sensors.is_empty() {
+            let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
+            self.sensors.reset(&envs, &self.simulation, self.cfg.substeps);
+        }
         Ok(())
     }
 
