@@ -46,7 +46,7 @@ pub struct InspectCfg {
 pub enum InspectError {
     /// The files cannot be used.
     #[error(transparent)]
-    Load(#[from] Error),
+    Load(Box<Error>),
     /// A position is given for a joint that does not exist.
     #[error("qpos: there is no joint {name:?}; {}", list(.candidates, *.total))]
     JointUnknown {
@@ -88,6 +88,12 @@ pub enum InspectError {
     /// Dynamics cannot be computed.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
+}
+
+impl From<Error> for InspectError {
+    fn from(error: Error) -> Self {
+        Self::Load(Box::new(error))
+    }
 }
 
 /// Reads the files and reports.
@@ -178,7 +184,7 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
 }
 
 /// Warnings about limits.
-fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, Error> {
+fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
     let (_, mut diagnostics) = planned.map_err(|error| Error::Plan { robot: description.name.clone(), error })?;
     // Where a simulation starts is no property of the files.

@@ -304,7 +304,7 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_do_not_vanish() {
-        assert_eq!([number(1.0, 4), number(-0.5, 4), number(3.141_592_653, 4)], ["1", "-0.5", "3.1416"]);
+        assert_eq!([number(1.0, 4), number(-0.5, 4), number(2.792_52, 4)], ["1", "-0.5", "2.7925"]);
         assert_eq!([number(0.0, 4), number(-1e-17, 4), number(1e30, 4)], ["0", "-1.00e-17", "1.00e30"]);
         assert_eq!([fixed(0.0, 4), fixed(0.25, 4), fixed(2e-6, 6)], ["0.0000", "0.2500", "2.000e-6"]);
         assert_eq!(elided("depth_camera", 7), "dep…era");
