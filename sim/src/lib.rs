@@ -6,6 +6,7 @@
 //! ```
 
 pub mod batch;
+mod body_inertia;
 mod compile;
 pub mod description;
 pub mod diagnostic;
@@ -16,6 +17,7 @@ mod error;
 mod export;
 mod gather;
 pub mod inertia;
+pub mod inspect;
 mod manager;
 pub mod mj;
 pub mod mjcf;

@@ -4,10 +4,10 @@ use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Joint, JointEquality, JointType, MaterialAsset,
     MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
+use crate::body_inertia::{BodyInertia, RigidBody, fuse};
 use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::diagnostic::Diagnostic;
 use crate::drive::plan::JointPlan;
-use crate::inertia::RigidInertia;
 use crate::source::Source;
 use nalgebra::Vector3;
 use scene::Pose;
@@ -398,71 +398,17 @@ impl Emitter<'_, '_> {
     /// Mass properties of every body from the links fused into it, repaired where no rigid body has them.
     fn inertias(&mut self) {
         let masses = std::mem::take(&mut self.masses);
-        for (&body, links) in &masses {
-            let mut fused = RigidInertia::ZERO;
-            let mut place = None;
-            for &link in links {
-                let described = self.description.link(link);
-                let Some(inertial) = &described.inertial else { continue };
-                place.get_or_insert_with(|| inertial.source.clone());
-                let (_, body_from_link) = self.placed[link.0].unwrap_or((0, Pose::identity()));
-                fused = fused.combine(&RigidInertia::from_inertial(inertial).transformed(&body_from_link));
-            }
-            let moving = is_moving(&self.mjcf.bodies, body);
-            if fused.mass == 0.0 && fused.inertia.norm() == 0.0 {
-                if moving {
-                    let lightest = self.description.link(links[0]);
-                    self.diagnostics.push(Diagnostic::new(
-                        DiagnosticKind::MasslessLink,
-                        lightest.source.clone(),
-                        format!(
-                            "link {:?} moves but has no mass; MuJoCo needs some, so it gets {MASSLESS_MASS} kg and \
-                             {MASSLESS_MOMENT} kg m² (not counted in total_mass)",
-                            lightest.name
-                        ),
-                    ));
-                    fused.mass = MASSLESS_MASS;
-                    fused.inertia = nalgebra::Matrix3::identity() * MASSLESS_MOMENT;
-                } else {
-                    continue;
-                }
-            }
-            let (repaired, _) = fused.repaired();
-            self.report_faults(links, fused.check().is_err());
-            let (moments, axes) = repaired.principal();
-            self.mjcf.bodies[body].inertial =
-                Some(Inertial { mass: repaired.mass, com: repaired.com, axes, moments, source: place });
-        }
-    }
-}
-
-/// Stand-in mass of a moving body without any \[kg\]: a milligram disturbs no robot, and is far above MuJoCo's minimum.
-const MASSLESS_MASS: f64 = 1e-6;
-/// Its moment of inertia \[kg m²\]: that mass at 3 cm.
-const MASSLESS_MOMENT: f64 = 1e-9;
-
-impl Emitter<'_, '_> {
-    /// A warning for every link whose own inertia no rigid body can have.
-    fn report_faults(&mut self, links: &[LinkId], body_is_faulty: bool) {
-        for &link in links {
-            let described = self.description.link(link);
-            let Some(inertial) = &described.inertial else { continue };
-            let own = RigidInertia::from_inertial(inertial);
-            if own.mass == 0.0 && own.inertia.norm() == 0.0 {
+        for (body, links) in masses {
+            let pose =
+                |link: LinkId| self.placed[link.0].map_or_else(Pose::identity, |(_, body_from_link)| body_from_link);
+            let links = links.into_iter().map(|link| (link, pose(link))).collect();
+            let rigid = RigidBody { links, moves: is_moving(&self.mjcf.bodies, body) };
+            let Some(BodyInertia { inertia, source }) = fuse(self.description, &rigid, self.diagnostics) else {
                 continue;
-            }
-            if let Err(fault) = own.check() {
-                let outcome = match (links.len() > 1, body_is_faulty) {
-                    (true, false) => "sound after fusing with the links it is fixed to",
-                    (true, true) => "repaired after fusing with the links it is fixed to",
-                    (false, _) => "repaired",
-                };
-                self.diagnostics.push(Diagnostic::new(
-                    DiagnosticKind::InertiaRepaired,
-                    inertial.source.clone(),
-                    format!("link {:?}: {fault}; {outcome}, in the MJCF only", described.name),
-                ));
-            }
+            };
+            let (moments, axes) = inertia.principal();
+            self.mjcf.bodies[body].inertial =
+                Some(Inertial { mass: inertia.mass, com: inertia.com, axes, moments, source });
         }
     }
 

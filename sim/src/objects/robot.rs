@@ -158,7 +158,7 @@ fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
 }
 
 /// The convex hull of every collision mesh, one per file and scale, from the cache where it is there.
-fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
+pub(crate) fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
     let cache = HullCache::default_location();
     let mut hulls = BTreeMap::new();
     for link in &description.links {
