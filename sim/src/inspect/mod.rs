@@ -186,7 +186,8 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
 /// Warnings about limits.
 fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
-    let (_, mut diagnostics) = planned.map_err(|error| Error::Plan { robot: description.name.clone(), error })?;
+    let (_, mut diagnostics) =
+        planned.map_err(|error| Error::Plan { robot: description.name.clone(), error: Box::new(error) })?;
     // Where a simulation starts is no property of the files.
     diagnostics.retain(|d| d.kind != DiagnosticKind::InitialPositionClamped);
     Ok(diagnostics)
