@@ -1,0 +1,5 @@
+//! Drives: what a joint does when it is told to, law by law.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod law;
+mod worlds;
