@@ -26,7 +26,8 @@ fn rough(name: &str) -> Joint {
 /// q* within ±f / kp of q moves nothing; from farther away the joint stops f / kp before its target.
 #[test]
 fn a_drive_against_friction_stops_in_a_band_of_friction_over_stiffness() {
-    let (kp, kd) = (100.0, 5.0);
+    // Overdamped, so that it does not overshoot: kd² > 4 M kp. 3 s are 15 time constants.
+    let (kp, kd) = (100.0, 20.0);
     let band = F / kp;
     for share in [0.5, -0.9, 0.99] {
         let mut world = world(&[rough("j")], gains(kp, kd), weightless());
@@ -35,7 +36,12 @@ fn a_drive_against_friction_stops_in_a_band_of_friction_over_stiffness() {
         let moved = world.q()[0];
         println!("target at {share} of the band: moved {moved:.1e} rad in 3 s");
         assert!(moved.abs() <= creep(F, 3.0), "{moved}");
-        assert_close(world.effort()[0], kp * share * band, 1e-3, "the drive pushes with kp e all the while");
+        assert_close(
+            world.effort()[0],
+            kp * share * band,
+            kp * creep(F, 3.0),
+            "the drive pushes with kp e all the while",
+        );
     }
     for aim in [0.4, -0.4] {
         let mut world = world(&[rough("j")], gains(kp, kd), weightless());
@@ -144,6 +150,7 @@ fn an_arm_with_friction_rests_inside_its_band() {
         let left = kp * (aim[i] - world.q()[i]) - load[i];
         println!("joint {i}: friction carries {left:.4} N m of {f}");
         assert!(left.abs() <= f * (1.0 + 1e-3) && left.abs() > 0.5 * f, "joint {i}: {left}");
-        assert!(world.v()[i].abs() < 1e-4);
+        // creep() with what joint b feels, 1 / (M^-1)_bb = 8e-3 kg m².
+        assert!(world.v()[i].abs() < 3e-4, "joint {i}: {}", world.v()[i]);
     }
 }
