@@ -171,7 +171,7 @@ fn rk4_is_really_integrated_with_rk4() {
     for (drive, kp) in [(passive(), 0.0), (native(5.0, 0.0), 5.0)] {
         let (rk4, euler) = (drift(Integrator::Rk4, drive.clone(), kp), drift(Integrator::Euler, drive, kp));
         println!("kp {kp}: energy drifts by {rk4:.1e} J with RK4, {euler:.1e} J with Euler");
-        assert!(rk4 < 1e-5 && euler > 1e-2, "{rk4} {euler}");
+        assert!(rk4 < 1e-5 && euler > 1e-3, "{rk4} {euler}");
     }
 
     let cfg = SimulationManagerCfg { integrator: Integrator::Rk4, ..weightless() };
@@ -180,6 +180,6 @@ fn rk4_is_really_integrated_with_rk4() {
         let mut env = world.env();
         push(&mut env, &[0.0], &[3.0]);
         env.step(100);
-        assert_close(env.data().qvel()[0], 3.0 * f64::exp(-0.5 / 0.2), 1e-9, "decay over 1 s");
+        assert_close(env.data().qvel()[0], 3.0 * f64::exp(-0.5 / 0.2), 5e-9, "decay over 1 s");
     }
 }

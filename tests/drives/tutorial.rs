@@ -74,7 +74,7 @@ fn mujocos_own_actuators_diverge_with_these_gains() {
 fn limits_that_all_bind_are_held() {
     let mut joints = arm_and_hand();
     for (joint, limit) in
-        joints.iter_mut().zip([4.0, 140.0, 60.0, 0.15, 5.0, 0.08].into_iter().chain([0.03, 0.012, 0.003].repeat(4)))
+        joints.iter_mut().zip([4.0, 140.0, 60.0, 0.6, 5.0, 0.08].into_iter().chain([0.03, 0.012, 0.003].repeat(4)))
     {
         joint.limit = joint.limit.split("effort").next().unwrap().to_string();
         *joint = joint.clone().effort(limit);
