@@ -1,9 +1,10 @@
 //! One environment: an `mjData`, its drives, and what to do when a step does not go well.
 //!
-//! The loop is `drives -> mj_step2 -> mj_step1`: after it, positions, velocities, contacts and constraints are those of
-//! the new state. A step that needed more room than the buffers have is done again, from the state before it, with
-//! doubled buffers: the result is what large buffers would have given from the beginning. A step that ends in a state
-//! that is not finite is undone, and the environment stands still until it is reset.
+//! The loop is `drives -> mj_step2 -> mj_step1` (with RK4 `drives -> mj_step -> mj_step1`): after it, positions,
+//! velocities, contacts and constraints are those of the new state. A step that needed more room than the buffers have is
+//! done again, from the state before it, with doubled buffers: the result is what large buffers would have given from the
+//! beginning. A step that ends in a state that is not finite is undone, and the environment stands still until it is
+//! reset.
 
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Warning, WarningCounts};
@@ -191,7 +192,12 @@ impl Env {
 
     fn attempt(&mut self) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
-        self.data.step2()?;
+        if self.data.model().integrator() == mj::mjINT_RK4 {
+            // mj_step2 would integrate with Euler, whatever the model says.
+            self.data.step()?;
+        } else {
+            self.data.step2()?;
+        }
         self.data.step1()
     }
 

@@ -24,17 +24,22 @@ pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj
 }
 
 /// The largest time step \[s\] at which the explicit law is stable with MuJoCo's semi-implicit Euler step; infinite
-/// without gains.
+/// without gains. `damping` is that of the joints, which MuJoCo's Euler step takes implicitly.
 ///
-/// The step `v' = v - h M⁻¹ (Kp q + Kd v)`, `q' = q + h v'` is stable exactly while `4 M - 2 h Kd - h² Kp` is positive
-/// definite: seek `q = z^n u`, multiply by `u*` from the left and apply the Jury criterion to the scalar equation. It
-/// follows from bisection on the smallest eigenvalue.
-pub fn stable_timestep(mass_matrix: &DMatrix<f64>, kp: &DVector<f64>, kd: &DVector<f64>) -> f64 {
+/// The step `(M + h B) (v' - v) = -h (Kp q + Kd v + B v)`, `q' = q + h v'` is stable exactly while
+/// `4 M + 2 h B - 2 h Kd - h² Kp` is positive definite: seek `q = z^n u`, multiply by `u*` from the left and apply the
+/// Jury criterion to the scalar equation. The bound follows from bisection.
+pub fn stable_timestep(
+    mass_matrix: &DMatrix<f64>,
+    kp: &DVector<f64>,
+    kd: &DVector<f64>,
+    damping: &DVector<f64>,
+) -> f64 {
     if kp.iter().chain(kd.iter()).all(|&k| k == 0.0) || mass_matrix.is_empty() {
         return f64::INFINITY;
     }
     let stable = |h: f64| {
-        let margin = 4.0 * mass_matrix - DMatrix::from_diagonal(&(2.0 * h * kd + h * h * kp));
+        let margin = 4.0 * mass_matrix + DMatrix::from_diagonal(&(2.0 * h * (damping - kd) - h * h * kp));
         margin.cholesky().is_some()
     };
     // Bracket in decades, then bisect in the logarithm: the answer spans 1e-10 s (stiff fingers) to seconds.
@@ -60,15 +65,26 @@ pub fn stable_timestep(mass_matrix: &DMatrix<f64>, kp: &DVector<f64>, kd: &DVect
 /// computed.
 pub fn stable_timestep_of(description: &RobotDescription, plans: &[JointPlan], floating_base: bool) -> Option<f64> {
     let start = mass_matrix_at_start(description, plans, floating_base).ok()?;
-    let mut kp = DVector::zeros(start.matrix.nrows());
-    let mut kd = DVector::zeros(start.matrix.nrows());
+    let n = start.matrix.nrows();
+    let (mut kp, mut kd, mut damping) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
+    // A follower moves with its driver, `q = C u`: its inertia and damping are the driver's.
+    let mut coupling = DMatrix::identity(n, n);
     for (plan, &column) in plans.iter().zip(&start.columns) {
+        damping[column] = plan.damping;
         if let Some(actuator) = plan.actuator {
             kp[column] = actuator.kp;
             kd[column] = actuator.kd;
         }
+        let Some((driver, multiplier, _)) = plan.mimic else { continue };
+        let driver = plans.iter().position(|p| p.joint == driver)?;
+        coupling[(column, column)] = 0.0;
+        coupling[(column, start.columns[driver])] = multiplier;
     }
-    Some(stable_timestep(&start.matrix, &kp, &kd))
+    let free: Vec<usize> = (0..n).filter(|&i| coupling[(i, i)] != 0.0).collect();
+    let coupling = coupling.select_columns(&free);
+    let mass_matrix = coupling.transpose() * &start.matrix * &coupling;
+    let damping = (coupling.transpose() * DMatrix::from_diagonal(&damping) * &coupling).diagonal();
+    Some(stable_timestep(&mass_matrix, &kp.select_rows(&free), &kd.select_rows(&free), &damping))
 }
 
 /// A warning where the drives are not stable at the time step `dt` \[s\].
@@ -105,6 +121,7 @@ mod tests {
             &DMatrix::from_element(1, 1, m),
             &DVector::from_element(1, kp),
             &DVector::from_element(1, kd),
+            &DVector::zeros(1),
         );
         assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
         // The recurrence itself: decays just below the bound, grows just above it.

@@ -100,9 +100,6 @@ impl DriveState {
 
     /// Between `mj_step1` and `mj_step2`: makes every drive act on this step.
     pub fn apply(&self, data: &mut mj::Data) {
-        if self.table.drives.is_empty() && self.table.damped.is_empty() {
-            return;
-        }
         let table = &*self.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, data);

@@ -1,8 +1,8 @@
 //! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
 
 use super::document::{
-    Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Joint, JointEquality, JointType, MaterialAsset,
-    MeshAsset, MeshContent, Mjcf, Shape, Site,
+    Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
+    MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
 use crate::body_inertia::{BodyInertia, RigidBody, fuse};
 use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
@@ -21,8 +21,8 @@ pub const MAX_BODY_DEPTH: usize = 480;
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Purpose<'a> {
-    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; dry friction of driven joints is a
-    /// tendon where `friction_tendons`, since the joint's own friction row carries the drive.
+    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; where `friction_tendons`, dry friction
+    /// of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to us.
     Run {
         /// Drives are friction rows.
         friction_tendons: bool,
@@ -94,6 +94,19 @@ pub struct RobotLayout {
     pub links: Vec<LinkFrame>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_pairs: Vec<(String, String)>,
+    /// Joints whose damping is integrated with the drives: see [`crate::drive::implicit`].
+    pub damped: Vec<DampedJoint>,
+}
+
+/// A joint whose viscous damping was left out of the document; its armature holds the implicit half.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DampedJoint {
+    /// Name of the joint.
+    pub joint: String,
+    /// Number of its degrees of freedom.
+    pub dofs: usize,
+    /// The damping of each \[N m s/rad or N s/m\].
+    pub damping: f64,
 }
 
 /// A link's frame in its body.
@@ -143,6 +156,7 @@ pub fn add(
         depth: BTreeMap::new(),
         placed: vec![None; description.links.len()],
         masses: BTreeMap::new(),
+        damped: Vec::new(),
     };
     emitter.bodies()?;
     emitter.inertias();
@@ -157,7 +171,7 @@ pub fn add(
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
         .collect();
-    Ok(RobotLayout { links, base_pairs })
+    Ok(RobotLayout { links, base_pairs, damped: emitter.damped })
 }
 
 struct Emitter<'a, 'm> {
@@ -172,6 +186,7 @@ struct Emitter<'a, 'm> {
     placed: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
     masses: BTreeMap<usize, Vec<LinkId>>,
+    damped: Vec<DampedJoint>,
 }
 
 impl Emitter<'_, '_> {
@@ -195,7 +210,8 @@ impl Emitter<'_, '_> {
                 self.place(joint.child, parent_body, body_from_joint);
             } else {
                 let (parent, pose) = self.parent_for(joint.kind, parent_body, body_from_joint);
-                let joints = self.joints(id, parent);
+                let mut joints = self.joints(id, parent);
+                self.move_damping(&mut joints);
                 let body = self.push_body(joint.child, parent, pose, joints)?;
                 self.place(joint.child, body, Pose::identity());
             }
@@ -387,6 +403,23 @@ impl Emitter<'_, '_> {
                     armature: plan.armature,
                     ..plain("", kind, joint.axis.into_inner())
                 }]
+            }
+        }
+    }
+
+    /// Where drives are rows, damping B acts inside the solve as well: `h B` as armature (in the document, so that every
+    /// constant MuJoCo derives from the inertia has it) and `-B v` applied in each step.
+    fn move_damping(&mut self, joints: &mut [Joint]) {
+        // RK4 evaluates forces inside its step, where nothing of ours is called (and it takes no row drives).
+        if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {
+            return;
+        }
+        for joint in joints {
+            let damping = std::mem::take(&mut joint.damping);
+            if damping > 0.0 {
+                joint.armature += self.mjcf.option.timestep * damping;
+                let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
+                self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping });
             }
         }
     }

@@ -412,6 +412,63 @@ impl<'a> RobotMut<'a> {
         Ok(())
     }
 
+    /// Sets velocity targets \[rad/s or m/s\] of the drives; they stay until changed or reset, and are 0 at first. Rows
+    /// and columns as in [`set_qpos`](Self::set_qpos); columns of joints without a drive are accepted and ignored.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qvel<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("set_qvel", velocities.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                for (&joint, &value) in write.joints.iter().zip(row) {
+                    if let Some(drive) = robot.joints[joint].drive {
+                        env.drives.velocity[drive] = value;
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets efforts \[N m or N\] that are added to what the drives give, before the sum is clamped to their limits; they
+    /// stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets the effort as it
+    /// is, clamped to its own limit. Rows and columns as in [`set_qpos`](Self::set_qpos); columns of mimic joints are
+    /// accepted and ignored.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qf<'t>(
+        &mut self,
+        efforts: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("set_qf", efforts.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                for (&joint, &value) in write.joints.iter().zip(row) {
+                    let (indexing, plan) = (robot.joints[joint], &self.data.plans[joint]);
+                    if let Some(drive) = indexing.drive {
+                        env.drives.feedforward[drive] = value;
+                    } else if plan.mimic.is_none() {
+                        env.drives.applied[indexing.dof] = value.clamp(-plan.max_effort, plan.max_effort);
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
+
     /// Writes joint positions \[rad or m\] into the state, clamped to the limits; targets stay. Rows and columns as in
     /// [`set_qpos`](Self::set_qpos); mimic joints are written as given. A forward pass follows, so that everything that
     /// is read afterwards belongs to the new state.
