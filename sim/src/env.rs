@@ -57,8 +57,11 @@ pub struct Env {
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
-    /// The state before the running step, to go back to.
-    before: Motion,
+    /// The present state as it was before its forward pass, to go back to. The pass of 2.2.2 normalises quaternions in
+    /// place, and a second one would change their last bits.
+    state: Motion,
+    /// The state that a step leads to, before its forward pass.
+    next: Motion,
     /// What the user set, to carry into a larger `mjData`.
     inputs: Inputs,
 }
@@ -78,10 +81,12 @@ impl Env {
             steps: 0,
             warnings: WarningCounts::default(),
             growths: 0,
-            before: Motion::default(),
+            state: Motion::default(),
+            next: Motion::default(),
             inputs: Inputs::default(),
         };
-        env.refresh();
+        let initial = env.saved();
+        env.refresh(initial);
         Ok(env)
     }
 
@@ -90,10 +95,13 @@ impl Env {
         &self.data
     }
 
-    /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read.
+    /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read. A state that
+    /// is not finite is not kept: the environment diverges, in the state before the write.
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
+        self.state.restore(&mut self.data);
+        let good = self.saved();
         change(&mut self.data);
-        self.refresh();
+        self.refresh(good);
     }
 
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
@@ -106,14 +114,21 @@ impl Env {
         self.drives.gains = gains;
         self.status = EnvStatus::Running;
         self.steps = 0;
+        let initial = self.saved();
         change(&mut self.data, &mut self.drives);
-        self.refresh();
+        self.refresh(initial);
+    }
+
+    fn saved(&self) -> Motion {
+        let mut motion = Motion::default();
+        motion.save(&self.data);
+        motion
     }
 
     /// Positions, velocities and warm start, to carry over to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
         SavedArrays {
-            qpos: self.data.qpos().to_vec(),
+            qpos: self.state.qpos(self.data.model()).to_vec(),
             qvel: self.data.qvel().to_vec(),
             warmstart: self.data.qacc_warmstart().to_vec(),
         }
@@ -150,7 +165,6 @@ impl Env {
     }
 
     fn step_once(&mut self) {
-        self.before.save(&self.data);
         loop {
             let done = self.attempt();
             let raised = self.data.take_warnings();
@@ -158,6 +172,7 @@ impl Env {
                 Verdict::Good => {
                     self.warnings.add(&raised);
                     self.drives.read_efforts(&self.data);
+                    std::mem::swap(&mut self.state, &mut self.next);
                     self.steps += 1;
                     return;
                 }
@@ -177,12 +192,13 @@ impl Env {
     fn attempt(&mut self) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
         self.data.step2()?;
+        self.next.save(&self.data);
         self.data.step1()
     }
 
-    /// One forward pass over positions and velocities, growing the buffers as needed.
-    fn refresh(&mut self) {
-        self.before.save(&self.data);
+    /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
+    fn refresh(&mut self, good: Motion) {
+        self.state.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
@@ -193,11 +209,13 @@ impl Env {
                 }
                 Verdict::NeedsRoom => {
                     if let Err(reason) = self.enlarge() {
+                        self.state = good;
                         return self.quarantine(reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
+                    self.state = good;
                     return self.quarantine(reason);
                 }
             }
@@ -228,7 +246,7 @@ impl Env {
         let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
         self.inputs.save(&self.data);
         self.inputs.restore(&mut larger);
-        self.before.restore(&mut larger);
+        self.state.restore(&mut larger);
         self.data = larger;
         self.growths += 1;
         Ok(())
@@ -239,9 +257,8 @@ impl Env {
         self.inputs.save(&self.data);
         self.data.reset();
         self.inputs.restore(&mut self.data);
-        self.before.restore(&mut self.data);
-        // The last good state had a forward pass before; it may only fail where `before` itself is bad (a state that a
-        // user wrote), and then its derived quantities stay those of the initial state.
+        self.state.restore(&mut self.data);
+        // The last good state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
     }
