@@ -17,7 +17,7 @@ fn threads() -> usize {
 #[test]
 fn dropping_managers_frees_everything() {
     let dir = tempfile::tempdir().unwrap();
-    let output = run("leaks::scenario_200_managers", dir.path(), &[]);
+    let output = run("leaks::scenario_200_managers", dir.path(), &[("MALLOC_ARENA_MAX", "1")]);
     let out = text(&output.stdout);
     assert!(output.status.success(), "{out}\n{}", text(&output.stderr));
     assert!(out.contains("200 managers"), "{out}");
@@ -50,8 +50,9 @@ fn scenario_200_managers() {
         use_one();
     }
     let grown = resident().saturating_sub(warm);
-    // A leak of one environment in each manager would be 200 sixteenths of what all of one manager takes.
-    assert!(grown < one / 2, "{grown} bytes more; one manager takes {one}");
+    // A leak of one environment in each manager would be 200 sixteenths of what one manager takes; how full the
+    // allocator's free list happens to be differs by up to one manager.
+    assert!(grown < one, "{grown} bytes more; one manager takes {one}");
     // A joined thread leaves /proc when the kernel has finished with it, shortly after.
     for _ in 0..200 {
         if threads() == before {
