@@ -249,7 +249,7 @@ impl Simulation {
     }
 
     /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,
-    /// time.
+    /// time; and what happened to each environment: a diverged one stays out until it is reset.
     pub(crate) fn carry_over(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();
@@ -277,8 +277,8 @@ impl Simulation {
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
         for i in 0..self.batch.num_envs() {
-            let (state, time, targets) =
-                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone()));
+            let (state, time, targets, history) =
+                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -296,6 +296,7 @@ impl Simulation {
                     }
                     data.set_time(time);
                 });
+                env.take_history(&history);
             });
         }
     }

@@ -125,6 +125,21 @@ impl Env {
         motion
     }
 
+    /// Takes over what happened to `other`, whose state this one was given: steps, warnings, divergence.
+    pub(crate) fn take_history(&mut self, other: &History) {
+        self.steps = other.steps;
+        self.warnings.add(&other.warnings);
+        self.growths += other.growths;
+        if self.status == EnvStatus::Running {
+            self.status = other.status.clone();
+        }
+    }
+
+    /// What happened since the environment was made.
+    pub(crate) fn history(&self) -> History {
+        History { status: self.status.clone(), steps: self.steps, warnings: self.warnings, growths: self.growths }
+    }
+
     /// Positions, velocities and warm start, to carry over to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
         SavedArrays {
@@ -270,6 +285,15 @@ pub(crate) struct SavedArrays {
     pub qpos: Vec<f64>,
     pub qvel: Vec<f64>,
     pub warmstart: Vec<f64>,
+}
+
+/// What happened to an environment.
+#[derive(Clone, Debug)]
+pub(crate) struct History {
+    status: EnvStatus,
+    steps: u64,
+    warnings: WarningCounts,
+    growths: u32,
 }
 
 enum Verdict {
