@@ -6,7 +6,7 @@
 //! that is not finite is undone, and the environment stands still until it is reset.
 
 use crate::drive::table::{DriveState, DriveTable};
-use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Warning, WarningCounts};
+use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, Warning, WarningCounts};
 use std::sync::Arc;
 
 /// Whether an environment is being stepped.
@@ -191,8 +191,8 @@ impl Env {
                     self.steps += 1;
                     return;
                 }
-                Verdict::NeedsRoom => {
-                    if let Err(reason) = self.grow() {
+                Verdict::NeedsRoom(what) => {
+                    if let Err(reason) = self.grow(what) {
                         return self.quarantine(reason);
                     }
                 }
@@ -222,8 +222,8 @@ impl Env {
                     self.warnings.add(&raised);
                     return;
                 }
-                Verdict::NeedsRoom => {
-                    if let Err(reason) = self.enlarge() {
+                Verdict::NeedsRoom(what) => {
+                    if let Err(reason) = self.enlarge(what) {
                         self.state = good;
                         return self.quarantine(reason);
                     }
@@ -237,23 +237,23 @@ impl Env {
         }
     }
 
-    /// Goes back to the state before the step, with doubled buffers and a forward pass done.
-    fn grow(&mut self) -> Result<(), Divergence> {
+    /// Goes back to the state before the step, with larger buffers and a forward pass done.
+    fn grow(&mut self, mut what: Overflow) -> Result<(), Divergence> {
         loop {
-            self.enlarge()?;
+            self.enlarge(what)?;
             let done = self.data.step1();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => return Ok(()),
-                Verdict::NeedsRoom => {}
+                Verdict::NeedsRoom(next) => what = next,
                 Verdict::Bad(reason) => return Err(reason),
             }
         }
     }
 
-    /// Replaces the data by one with doubled buffers, in the state before the step.
-    fn enlarge(&mut self) -> Result<(), Divergence> {
-        let buffers = self.data.model().buffers().doubled();
+    /// Replaces the data by one with twice as much of `what`, in the state before the step.
+    fn enlarge(&mut self, what: Overflow) -> Result<(), Divergence> {
+        let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > LARGEST_ENVIRONMENT {
             return Err(Divergence::BuffersExhausted(buffers));
         }
@@ -298,18 +298,18 @@ pub(crate) struct History {
 
 enum Verdict {
     Good,
-    NeedsRoom,
+    NeedsRoom(Overflow),
     Bad(Divergence),
 }
 
 fn judge(done: Result<(), EngineError>, raised: &WarningCounts) -> Verdict {
     match done {
-        Err(error) if error.is_out_of_memory() => Verdict::NeedsRoom,
+        Err(error) if error.is_out_of_memory() => Verdict::NeedsRoom(raised.overflow().unwrap_or(Overflow::Stack)),
         Err(error) => Verdict::Bad(Divergence::Engine(error)),
-        Ok(()) if raised.overflow().is_some() => Verdict::NeedsRoom,
-        Ok(()) => match raised.diverged() {
-            Some(warning) => Verdict::Bad(Divergence::Warning(warning)),
-            None => Verdict::Good,
+        Ok(()) => match (raised.overflow(), raised.diverged()) {
+            (Some(what), _) => Verdict::NeedsRoom(what),
+            (None, Some(warning)) => Verdict::Bad(Divergence::Warning(warning)),
+            (None, None) => Verdict::Good,
         },
     }
 }
