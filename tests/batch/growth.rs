@@ -15,7 +15,7 @@ fn assert_quiet(sim: &SimulationManager) {
 }
 
 /// Runs `sim` from its start and the same environment with huge buffers, and compares after every 10 steps.
-fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32) {
+fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32, contacts: usize) {
     let huge = sim.batch().model().with_buffers(HUGE);
     let mut reference = sim.batch().read(0, |env| copy_of(&huge, env));
     let mut most = 0;
@@ -27,7 +27,7 @@ fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32) {
     }
     assert_eq!(sim.batch().read(0, bits_of), bits_of(&reference));
     assert_eq!(reference.growths(), 0, "the reference had room");
-    assert!(most > 40, "{most} contacts");
+    assert!(most >= contacts, "{most} contacts");
     assert_quiet(sim);
 }
 
@@ -38,7 +38,7 @@ fn more_contacts_than_room_grow_the_buffers_and_change_no_bit() {
     let robot = free_robot(dir.path(), "plate", &plate(14, 0), 0.15);
     sim.add_robot(RobotCfg { init_pose: kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.1], [0.0; 3]), ..robot })
         .unwrap();
-    compare_with_huge_buffers(&mut sim, 60);
+    compare_with_huge_buffers(&mut sim, 60, 100);
     assert!(sim.buffer_growths() > 0);
 }
 
@@ -46,10 +46,13 @@ fn more_contacts_than_room_grow_the_buffers_and_change_no_bit() {
 fn growth_with_drives_at_work_changes_no_bit() {
     let dir = tempfile::tempdir().unwrap();
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
-    // Tilted: contacts come one after the other, and the buffers grow several times in the middle of the motion.
-    let robot = sim.add_robot(free_robot(dir.path(), "plate", &plate(16, 5), 0.5)).unwrap();
-    sim.robot_mut(robot).set_qpos(&kinetoscope::ndarray::array![[0.9, -0.8, 0.7, 1.1, 0.3]], None, None).unwrap();
-    compare_with_huge_buffers(&mut sim, 150);
+    // A little tilted: contacts come one after the other, and the buffers grow several times in the middle of the
+    // motion.
+    let mut plate = free_robot(dir.path(), "plate", &plate(16, 5), 0.0);
+    plate.init_pose = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.1], [0.05, 0.04, 0.3]);
+    let robot = sim.add_robot(plate).unwrap();
+    sim.robot_mut(robot).set_qpos(&kinetoscope::ndarray::array![[-0.9, -0.8, -0.7, -1.1, -0.3]], None, None).unwrap();
+    compare_with_huge_buffers(&mut sim, 150, 60);
     assert!(sim.buffer_growths() > 0);
     let moved = sim.robot(robot).get_qf();
     assert!(moved.iter().any(|effort| effort.abs() > 0.1), "{moved}");
@@ -68,13 +71,9 @@ fn a_pile_of_robots_grows_the_buffers_and_changes_no_bit() {
         );
         sim.add_robot(robot).unwrap();
     }
-    let before = sim.buffer_growths();
-    compare_with_huge_buffers(&mut sim, 60);
-    // On 4.x the arena that the drives of 24 robots would need has room for the pile.
-    let model = sim.batch().model().clone();
-    if model.small_buffers().contacts < most_contacts(sim.batch()) && kinetoscope::sim::mj::TARGET == V2 {
-        assert!(sim.buffer_growths() > 0, "{before}");
-    }
+    compare_with_huge_buffers(&mut sim, 60, 24);
+    // On 4.x the arena of a scene of 24 robots has room for the pile.
+    assert!(sim.buffer_growths() > 0 || kinetoscope::sim::mj::TARGET != V2);
 }
 
 const V2: kinetoscope::sim::mj::Target = kinetoscope::sim::mj::Target::V2;
