@@ -250,7 +250,7 @@ impl Simulation {
     }
 
     /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,
-    /// time.
+    /// time; and what happened to each environment: a diverged one stays out until it is reset.
     pub(crate) fn carry_over(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();
@@ -297,7 +297,7 @@ impl Simulation {
                     }
                     data.set_time(time);
                 });
-                env.adopt(&history);
+                env.take_history(&history);
             });
         }
     }

@@ -7,7 +7,7 @@
 //! reset.
 
 use crate::drive::table::{DriveState, DriveTable};
-use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Warning, WarningCounts};
+use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, Warning, WarningCounts};
 use std::sync::Arc;
 
 /// Whether an environment is being stepped.
@@ -58,8 +58,11 @@ pub struct Env {
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
-    /// The state before the running step, to go back to.
-    before: Motion,
+    /// The present state as it was before its forward pass, to go back to. The pass of 2.2.2 normalises quaternions in
+    /// place, and a second one would change their last bits.
+    state: Motion,
+    /// The state that a step leads to, before its forward pass.
+    next: Motion,
     /// What the user set, to carry into a larger `mjData`.
     inputs: Inputs,
 }
@@ -79,10 +82,12 @@ impl Env {
             steps: 0,
             warnings: WarningCounts::default(),
             growths: 0,
-            before: Motion::default(),
+            state: Motion::default(),
+            next: Motion::default(),
             inputs: Inputs::default(),
         };
-        env.refresh();
+        let initial = env.saved();
+        env.refresh(initial);
         Ok(env)
     }
 
@@ -91,10 +96,13 @@ impl Env {
         &self.data
     }
 
-    /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read.
+    /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read. A state that
+    /// is not finite is not kept: the environment diverges, in the state before the write.
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
+        self.state.restore(&mut self.data);
+        let good = self.saved();
         change(&mut self.data);
-        self.refresh();
+        self.refresh(good);
     }
 
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
@@ -107,32 +115,39 @@ impl Env {
         self.drives.gains = gains;
         self.status = EnvStatus::Running;
         self.steps = 0;
+        let initial = self.saved();
         change(&mut self.data, &mut self.drives);
-        self.refresh();
+        self.refresh(initial);
+    }
+
+    fn saved(&self) -> Motion {
+        let mut motion = Motion::default();
+        motion.save(&self.data);
+        motion
+    }
+
+    /// Takes over what happened to `other`, whose state this one was given: steps, warnings, divergence.
+    pub(crate) fn take_history(&mut self, other: &History) {
+        self.steps = other.steps;
+        self.warnings.add(&other.warnings);
+        self.growths += other.growths;
+        if self.status == EnvStatus::Running {
+            self.status = other.status.clone();
+        }
+    }
+
+    /// What happened since the environment was made.
+    pub(crate) fn history(&self) -> History {
+        History { status: self.status.clone(), steps: self.steps, warnings: self.warnings, growths: self.growths }
     }
 
     /// Positions, velocities and warm start, to carry over to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
         SavedArrays {
-            qpos: self.data.qpos().to_vec(),
+            qpos: self.state.qpos(self.data.model()).to_vec(),
             qvel: self.data.qvel().to_vec(),
             warmstart: self.data.qacc_warmstart().to_vec(),
         }
-    }
-
-    /// Takes over what `old`, the same environment of an earlier model, has been through.
-    pub(crate) fn adopt(&mut self, old: &EnvHistory) {
-        self.steps = old.steps;
-        self.warnings.add(&old.warnings);
-        self.growths += old.growths;
-        if self.status == EnvStatus::Running {
-            self.status = old.status.clone();
-        }
-    }
-
-    /// What this environment has been through.
-    pub(crate) fn history(&self) -> EnvHistory {
-        EnvHistory { steps: self.steps, warnings: self.warnings, growths: self.growths, status: self.status.clone() }
     }
 
     /// Running or diverged.
@@ -166,7 +181,6 @@ impl Env {
     }
 
     fn step_once(&mut self) {
-        self.before.save(&self.data);
         loop {
             let done = self.attempt();
             let raised = self.data.take_warnings();
@@ -174,11 +188,12 @@ impl Env {
                 Verdict::Good => {
                     self.warnings.add(&raised);
                     self.drives.read_efforts(&self.data);
+                    std::mem::swap(&mut self.state, &mut self.next);
                     self.steps += 1;
                     return;
                 }
-                Verdict::NeedsRoom => {
-                    if let Err(reason) = self.grow() {
+                Verdict::NeedsRoom(what) => {
+                    if let Err(reason) = self.grow(what) {
                         return self.quarantine(reason);
                     }
                 }
@@ -198,12 +213,13 @@ impl Env {
         } else {
             self.data.step2()?;
         }
+        self.next.save(&self.data);
         self.data.step1()
     }
 
-    /// One forward pass over positions and velocities, growing the buffers as needed.
-    fn refresh(&mut self) {
-        self.before.save(&self.data);
+    /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
+    fn refresh(&mut self, good: Motion) {
+        self.state.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
@@ -212,36 +228,38 @@ impl Env {
                     self.warnings.add(&raised);
                     return;
                 }
-                Verdict::NeedsRoom => {
-                    if let Err(reason) = self.enlarge() {
+                Verdict::NeedsRoom(what) => {
+                    if let Err(reason) = self.enlarge(what) {
+                        self.state = good;
                         return self.quarantine(reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
+                    self.state = good;
                     return self.quarantine(reason);
                 }
             }
         }
     }
 
-    /// Goes back to the state before the step, with doubled buffers and a forward pass done.
-    fn grow(&mut self) -> Result<(), Divergence> {
+    /// Goes back to the state before the step, with larger buffers and a forward pass done.
+    fn grow(&mut self, mut what: Overflow) -> Result<(), Divergence> {
         loop {
-            self.enlarge()?;
+            self.enlarge(what)?;
             let done = self.data.step1();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => return Ok(()),
-                Verdict::NeedsRoom => {}
+                Verdict::NeedsRoom(next) => what = next,
                 Verdict::Bad(reason) => return Err(reason),
             }
         }
     }
 
-    /// Replaces the data by one with doubled buffers, in the state before the step.
-    fn enlarge(&mut self) -> Result<(), Divergence> {
-        let buffers = self.data.model().buffers().doubled();
+    /// Replaces the data by one with twice as much of `what`, in the state before the step.
+    fn enlarge(&mut self, what: Overflow) -> Result<(), Divergence> {
+        let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > LARGEST_ENVIRONMENT {
             return Err(Divergence::BuffersExhausted(buffers));
         }
@@ -249,7 +267,7 @@ impl Env {
         let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
         self.inputs.save(&self.data);
         self.inputs.restore(&mut larger);
-        self.before.restore(&mut larger);
+        self.state.restore(&mut larger);
         self.data = larger;
         self.growths += 1;
         Ok(())
@@ -260,21 +278,11 @@ impl Env {
         self.inputs.save(&self.data);
         self.data.reset();
         self.inputs.restore(&mut self.data);
-        self.before.restore(&mut self.data);
-        // The last good state had a forward pass before; it may only fail where `before` itself is bad (a state that a
-        // user wrote), and then its derived quantities stay those of the initial state.
+        self.state.restore(&mut self.data);
+        // The last good state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
     }
-}
-
-/// Counts and status of an environment.
-#[derive(Clone, Debug)]
-pub(crate) struct EnvHistory {
-    steps: u64,
-    warnings: WarningCounts,
-    growths: u32,
-    status: EnvStatus,
 }
 
 /// Copies of the arrays that carry a state from one model to another.
@@ -285,20 +293,29 @@ pub(crate) struct SavedArrays {
     pub warmstart: Vec<f64>,
 }
 
+/// What happened to an environment.
+#[derive(Clone, Debug)]
+pub(crate) struct History {
+    status: EnvStatus,
+    steps: u64,
+    warnings: WarningCounts,
+    growths: u32,
+}
+
 enum Verdict {
     Good,
-    NeedsRoom,
+    NeedsRoom(Overflow),
     Bad(Divergence),
 }
 
 fn judge(done: Result<(), EngineError>, raised: &WarningCounts) -> Verdict {
     match done {
-        Err(error) if error.is_out_of_memory() => Verdict::NeedsRoom,
+        Err(error) if error.is_out_of_memory() => Verdict::NeedsRoom(raised.overflow().unwrap_or(Overflow::Stack)),
         Err(error) => Verdict::Bad(Divergence::Engine(error)),
-        Ok(()) if raised.overflow().is_some() => Verdict::NeedsRoom,
-        Ok(()) => match raised.diverged() {
-            Some(warning) => Verdict::Bad(Divergence::Warning(warning)),
-            None => Verdict::Good,
+        Ok(()) => match (raised.overflow(), raised.diverged()) {
+            (Some(what), _) => Verdict::NeedsRoom(what),
+            (None, Some(warning)) => Verdict::Bad(Divergence::Warning(warning)),
+            (None, None) => Verdict::Good,
         },
     }
 }

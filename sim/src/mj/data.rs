@@ -99,9 +99,9 @@ impl WarningCounts {
         }
     }
 
-    /// Any position, velocity or acceleration was bad.
+    /// Any acceleration, position or velocity was bad: the first in the order of a step, which is the cause.
     pub fn diverged(&self) -> Option<Warning> {
-        [Warning::BadPosition, Warning::BadVelocity, Warning::BadAcceleration].into_iter().find(|&w| self.get(w) > 0)
+        [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
     }
 
     /// A buffer was too small.

@@ -1,5 +1,6 @@
 //! Compiled models: mutable until shared, then immutable.
 
+use super::data::Overflow;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -85,9 +86,16 @@ pub struct Buffers {
 }
 
 impl Buffers {
-    /// Twice as much of everything.
-    pub fn doubled(self) -> Self {
-        Self { contacts: self.contacts * 2, constraints: self.constraints * 2, arena_bytes: self.arena_bytes * 2 }
+    /// Twice as much of what was too small, and no more: on 2.2.2 rows that nobody needs are dear.
+    #[must_use]
+    pub fn enlarged(self, what: Overflow) -> Self {
+        let twice = |n: usize| n.max(1).saturating_mul(2);
+        // On 4.x all of them share the arena; on 2.2.2 the stack is made to fit the rows.
+        let larger = Self { arena_bytes: twice(self.arena_bytes), ..self };
+        match what {
+            Overflow::Contacts => Self { contacts: twice(self.contacts), ..larger },
+            Overflow::Constraints | Overflow::Stack => Self { constraints: twice(self.constraints), ..larger },
+        }
     }
 }
 
@@ -100,7 +108,7 @@ impl Model {
         &self.0.header
     }
 
-    /// The same model with other buffer sizes: only the struct is copied, the arrays are shared.
+    /// The same model with other buffer sizes, at least 1 of each: only the struct is copied, the arrays are shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
         // SAFETY: bitwise copy of a plain C struct; its pointers lead into `storage`, which the copy keeps alive.
@@ -193,12 +201,14 @@ impl Model {
 
 #[cfg(mj4)]
 fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
-    header.narena = buffers.arena_bytes as i64;
+    // MuJoCo cannot allocate nothing.
+    header.narena = buffers.arena_bytes.max(1) as i64;
 }
 
 #[cfg(not(mj4))]
 fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
-    let as_int = |n: usize| i32::try_from(n).unwrap_or(i32::MAX);
+    // With 0 MuJoCo leaves contacts or constraints out without a warning, drives among them.
+    let as_int = |n: usize| i32::try_from(n.max(1)).unwrap_or(i32::MAX);
     header.nconmax = as_int(buffers.contacts);
     header.njmax = as_int(buffers.constraints);
     // MuJoCo's own rule for nstack (user_model.cc, 2.2.2): 5 squares of all rows and degrees of freedom, plus a linear

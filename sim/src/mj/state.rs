@@ -1,6 +1,7 @@
 //! What decides the next step, saved and restored: continuing from it is bit-identical.
 
 use super::data::Data;
+use super::model::Model;
 use mujoco_sys::fields::data as arrays;
 
 /// What a step changes: time, positions, velocities, activations and the solver's warm start.
@@ -61,6 +62,11 @@ impl Motion {
         self.values.clear();
         self.values.push(data.time());
         self.save_arrays(data);
+    }
+
+    /// The positions of what was saved from a data of `model`.
+    pub(crate) fn qpos(&self, model: &Model) -> &[f64] {
+        &self.values[1..1 + model.nq()]
     }
 
     /// Puts the values into `data`, which is of the same model (its buffers may be larger).

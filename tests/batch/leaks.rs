@@ -1,0 +1,65 @@
+//! Dropping a manager frees its memory and ends its threads. Measured in a process of its own.
+
+use super::child::{is_child, run, text};
+use super::support::{arm_and_hand, cfg};
+use kinetoscope::prelude::*;
+
+/// Resident memory of this process \[bytes\]. Source: proc(5), the second number of `statm`, in pages.
+fn resident() -> usize {
+    let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
+    statm.split_whitespace().nth(1).unwrap().parse::<usize>().unwrap() * 4096
+}
+
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+#[test]
+fn dropping_managers_frees_everything() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = run("leaks::scenario_200_managers", dir.path(), &[("MALLOC_ARENA_MAX", "1")]);
+    let out = text(&output.stdout);
+    assert!(output.status.success(), "{out}\n{}", text(&output.stderr));
+    assert!(out.contains("200 managers"), "{out}");
+}
+
+fn use_one() -> (usize, usize) {
+    let mut sim = SimulationManager::new(cfg(16, 4)).unwrap();
+    sim.add_robot(arm_and_hand()).unwrap();
+    sim.update(3);
+    assert_eq!(sim.threads(), 4);
+    (resident(), threads())
+}
+
+#[test]
+fn scenario_200_managers() {
+    if !is_child() {
+        return;
+    }
+    let empty = resident();
+    let before = threads();
+    let mut first = (0, 0);
+    // The allocator keeps some of what was freed: the first twenty show how much.
+    for _ in 0..20 {
+        first = use_one();
+    }
+    assert_eq!(first.1, before + 3, "three workers and the caller");
+    let one = first.0.saturating_sub(empty);
+    let warm = resident();
+    for _ in 0..200 {
+        use_one();
+    }
+    let grown = resident().saturating_sub(warm);
+    // A leak of one environment in each manager would be 200 sixteenths of what one manager takes; how full the
+    // allocator's free list happens to be differs by up to one manager.
+    assert!(grown < one, "{grown} bytes more; one manager takes {one}");
+    // A joined thread leaves /proc when the kernel has finished with it, shortly after.
+    for _ in 0..200 {
+        if threads() == before {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert_eq!(threads(), before);
+    println!("200 managers: {grown} bytes more, one takes {one}");
+}

@@ -1,0 +1,14 @@
+//! Batches of environments: the same bits however they are run, buffers that grow, environments that diverge, errors of
+//! the engine, recompilation, and everything freed at the end.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod carry_over;
+mod child;
+mod determinism;
+mod engine_errors;
+mod growth;
+mod leaks;
+mod quarantine;
+mod sample_models;
+mod support;
+mod version;
