@@ -62,7 +62,16 @@ fn scenario_everything_goes_wrong() {
     for text in ["", "<mujoco><worldbody><geom size='-1'/></worldbody></mujoco>", "<mujoco><nonsense/></mujoco>"] {
         let _ = kinetoscope::sim::mj::compile(text, &[]).unwrap_err();
     }
-    let _ = kinetoscope::sim::mj::compile_file(Path::new("/no/such/file.xml")).unwrap_err();
+    let model = "<mujoco><asset><mesh file='empty.stl'/></asset></mujoco>";
+    for name in ["empty.stl", "model.xml", "", &"n".repeat(999), &"n".repeat(1000)] {
+        let asset = kinetoscope::sim::mj::Asset { name: name.into(), bytes: Vec::new() };
+        let filled = kinetoscope::sim::mj::Asset { bytes: vec![0; 10], ..asset.clone() };
+        let _ = kinetoscope::sim::mj::compile(model, &[asset]).unwrap_err();
+        let _ = kinetoscope::sim::mj::compile(model, &[filled.clone(), filled]).unwrap_err();
+    }
+    for path in ["/no/such/file.xml", "", "/", &"p".repeat(5000), "nul\0.xml"] {
+        let _ = kinetoscope::sim::mj::compile_file(Path::new(path)).unwrap_err();
+    }
     drop(sim);
     println!("it all went wrong as it should");
 }

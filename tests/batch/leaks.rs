@@ -17,7 +17,7 @@ fn threads() -> usize {
 #[test]
 fn dropping_managers_frees_everything() {
     let dir = tempfile::tempdir().unwrap();
-    let output = run("leaks::scenario_200_managers", dir.path(), &[("MALLOC_ARENA_MAX", "1")]);
+    let output = run("leaks::scenario_200_managers", dir.path(), &[]);
     let out = text(&output.stdout);
     assert!(output.status.success(), "{out}\n{}", text(&output.stderr));
     assert!(out.contains("200 managers"), "{out}");
@@ -45,13 +45,19 @@ fn scenario_200_managers() {
     }
     assert_eq!(first.1, before + 3, "three workers and the caller");
     let one = first.0.saturating_sub(empty);
-    let warm = resident();
-    for _ in 0..200 {
-        use_one();
-    }
-    let grown = resident().saturating_sub(warm);
-    // A leak of one environment in each manager would be 200 sixteenths of what one manager takes; how full the
-    // allocator's free list happens to be differs by up to one manager.
+    // The allocator keeps what it was given in ways that vary: the least of ten measurements is compared.
+    let least = || {
+        let used = (0..10).map(|_| {
+            (0..10).for_each(|_| {
+                use_one();
+            });
+            resident()
+        });
+        used.min().unwrap()
+    };
+    let warm = least();
+    let grown = least().saturating_sub(warm);
+    // A leak of one environment in each manager would be 100 sixteenths of what one manager takes.
     assert!(grown < one, "{grown} bytes more; one manager takes {one}");
     // A joined thread leaves /proc when the kernel has finished with it, shortly after.
     for _ in 0..200 {

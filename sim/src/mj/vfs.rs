@@ -33,6 +33,9 @@ pub enum LoadError {
 /// MuJoCo's virtual file system. On 2.2.2 the struct is 2 MB: it lives on the heap, never on a stack.
 struct Vfs(NonNull<mj::mjVFS>);
 
+/// Longest name of a file \[bytes\]: 2.2.2 has room for so many and a NUL.
+const LONGEST_NAME: usize = 999;
+
 impl Vfs {
     fn new() -> Self {
         let layout = Layout::new::<mj::mjVFS>();
@@ -94,6 +97,12 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     let mut vfs = Vfs::new();
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
+        // 2.2.2 would stop the process.
+        if asset.bytes.is_empty() || !(1..=LONGEST_NAME).contains(&asset.name.len()) {
+            let message =
+                format!("the asset {:?} is empty, or its name is not of 1 to {LONGEST_NAME} bytes", asset.name);
+            return Err(CompileError::new(&message).into());
+        }
         if !vfs.add(asset) {
             let message =
                 format!("the asset {:?} cannot be added: its name is used twice or it is too large", asset.name);
