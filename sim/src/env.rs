@@ -60,6 +60,8 @@ pub struct Env {
     growths: u32,
     /// The state before the running step, to go back to.
     before: Motion,
+    /// The drives' efforts in the step before it.
+    effort_before: Vec<f64>,
     /// What the user set, to carry into a larger `mjData`.
     inputs: Inputs,
 }
@@ -80,6 +82,7 @@ impl Env {
             warnings: WarningCounts::default(),
             growths: 0,
             before: Motion::default(),
+            effort_before: Vec::new(),
             inputs: Inputs::default(),
         };
         env.refresh();
@@ -152,23 +155,25 @@ impl Env {
 
     fn step_once(&mut self) {
         self.before.save(&self.data);
+        self.effort_before.clone_from(&self.drives.effort);
         loop {
             let done = self.attempt();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
                     self.warnings.add(&raised);
-                    self.drives.read_efforts(&self.data);
                     self.steps += 1;
                     return;
                 }
                 Verdict::NeedsRoom => {
                     if let Err(reason) = self.grow() {
+                        self.drives.effort.clone_from(&self.effort_before);
                         return self.quarantine(reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
+                    self.drives.effort.clone_from(&self.effort_before);
                     return self.quarantine(reason);
                 }
             }
@@ -183,6 +188,8 @@ impl Env {
         } else {
             self.data.step2()?;
         }
+        // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
+        self.drives.read_efforts(&self.data);
         self.data.step1()
     }
 
