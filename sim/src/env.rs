@@ -63,6 +63,8 @@ pub struct Env {
     state: Motion,
     /// The state that a step leads to, before its forward pass.
     next: Motion,
+    /// The drives' efforts in the step before the running one.
+    effort_before: Vec<f64>,
     /// What the user set, to carry into a larger `mjData`.
     inputs: Inputs,
 }
@@ -84,6 +86,7 @@ impl Env {
             growths: 0,
             state: Motion::default(),
             next: Motion::default(),
+            effort_before: Vec::new(),
             inputs: Inputs::default(),
         };
         let initial = env.saved();
@@ -181,24 +184,26 @@ impl Env {
     }
 
     fn step_once(&mut self) {
+        self.effort_before.clone_from(&self.drives.effort);
         loop {
             let done = self.attempt();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
                     self.warnings.add(&raised);
-                    self.drives.read_efforts(&self.data);
                     std::mem::swap(&mut self.state, &mut self.next);
                     self.steps += 1;
                     return;
                 }
                 Verdict::NeedsRoom(what) => {
                     if let Err(reason) = self.grow(what) {
+                        self.drives.effort.clone_from(&self.effort_before);
                         return self.quarantine(reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
+                    self.drives.effort.clone_from(&self.effort_before);
                     return self.quarantine(reason);
                 }
             }
@@ -213,6 +218,8 @@ impl Env {
         } else {
             self.data.step2()?;
         }
+        // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
+        self.drives.read_efforts(&self.data);
         self.next.save(&self.data);
         self.data.step1()
     }

@@ -62,7 +62,18 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
         .filter_map(|r| stable_timestep_of(r.description(), r.plans(), !r.cfg().fix_base))
         .fold(f64::INFINITY, f64::min);
     mjcf.comments.push("Written by Kinetoscope. Drives are plain MuJoCo actuators here.".into());
+    let followers = robots.iter().flat_map(|r| r.plans()).any(|plan| plan.mimic.is_some());
     match target {
+        // MuJoCo solves couplings before its implicit damping slows the drivers: followers run away from them. Its
+        // explicit integrator (2.2.2) and saturated drives of implicitfast (4.x) do not have that.
+        _ if followers && explicit.is_finite() => {
+            mjcf.option.integrator = if target == Target::V2 { Integrator::Euler } else { Integrator::ImplicitFast };
+            mjcf.comments.push(format!(
+                "MuJoCo {}: stable up to a time step of {explicit:.3e} s: joints that follow others (mimic) and stiff \
+                 drives do not go together in MuJoCo's implicit integrators.",
+                if target == Target::V2 { "2.2.2" } else { "4.x" }
+            ));
+        }
         // Measured (and so in docs/decisions/0004): on 2.2.2 the implicit integrator treats saturated actuators as
         // damped, which keeps any gains stable; since 3.5 it does not.
         Target::V2 => {
