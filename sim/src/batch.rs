@@ -115,16 +115,17 @@ impl Batch {
             wake: Condvar::new(),
             panicked: AtomicBool::new(false),
         });
-        let workers = (0..helpers)
-            .map(|i| {
-                let shared = Arc::clone(&shared);
-                std::thread::Builder::new()
-                    .name(format!("kinetoscope-{i}"))
-                    .spawn(move || work(&shared))
-                    .map_err(|e| BatchError::Thread(e.to_string()))
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { shared, workers, model: model.clone(), num_envs })
+        // Made before its workers: should one not start, dropping it ends those that did.
+        let mut batch = Self { shared, workers: Vec::with_capacity(helpers), model: model.clone(), num_envs };
+        for i in 0..helpers {
+            let shared = Arc::clone(&batch.shared);
+            let worker = std::thread::Builder::new()
+                .name(format!("kinetoscope-{i}"))
+                .spawn(move || work(&shared))
+                .map_err(|e| BatchError::Thread(e.to_string()))?;
+            batch.workers.push(worker);
+        }
+        Ok(batch)
     }
 
     /// The model all environments were made from.
@@ -169,10 +170,14 @@ impl Batch {
             spins += 1;
             if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
+        if !self.workers.is_empty() {
+            lock(&shared.job).job = None;
+        }
+        let theirs = shared.panicked.swap(false, Ordering::Relaxed);
         if let Err(panic) = mine {
             resume_unwind(panic);
         }
-        assert!(!shared.panicked.swap(false, Ordering::Relaxed), "a batch job panicked on a worker thread");
+        assert!(!theirs, "a batch job panicked on a worker thread");
     }
 
     /// Reads environment `index`.

@@ -17,7 +17,7 @@ pub enum EnvStatus {
     Running,
     /// A step failed: the environment stands in its last good state until it is reset.
     Diverged {
-        /// The step that failed, counted since the start of the environment.
+        /// The step that failed, counted since the last reset.
         step: u64,
         /// Why.
         reason: Divergence,
@@ -65,7 +65,7 @@ pub struct Env {
     next: Motion,
     /// The drives' efforts in the step before the running one.
     effort_before: Vec<f64>,
-    /// What the user set, to carry into a larger `mjData`.
+    /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
     inputs: Inputs,
 }
 
@@ -100,7 +100,8 @@ impl Env {
     }
 
     /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read. A state that
-    /// is not finite is not kept: the environment diverges, in the state before the write.
+    /// is not finite is not kept: the environment diverges, in the state before the write. `qfrc_applied` and the
+    /// controls of drives are not inputs here: [`DriveState`] sets them in every step.
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         self.state.restore(&mut self.data);
         let good = self.saved();
@@ -227,6 +228,7 @@ impl Env {
     /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
     fn refresh(&mut self, good: Motion) {
         self.state.save(&self.data);
+        self.inputs.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
@@ -272,7 +274,6 @@ impl Env {
         }
         let model = self.data.model().with_buffers(buffers);
         let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
-        self.inputs.save(&self.data);
         self.inputs.restore(&mut larger);
         self.state.restore(&mut larger);
         self.data = larger;
@@ -282,7 +283,6 @@ impl Env {
 
     fn quarantine(&mut self, reason: Divergence) {
         self.status = EnvStatus::Diverged { step: self.steps, reason };
-        self.inputs.save(&self.data);
         self.data.reset();
         self.inputs.restore(&mut self.data);
         self.state.restore(&mut self.data);

@@ -16,6 +16,7 @@ use ndarray::Array2;
 use sensors::{Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +39,7 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of all random numbers.
+    /// Seed of random numbers. Nothing in the simulation is random yet; reports and sensors with noise will use it.
     pub seed: u64,
     /// Threads that step; every core where unset.
     pub threads: Option<usize>,
@@ -192,11 +193,18 @@ pub struct EnvId(pub usize);
 
 /// Handle of a robot; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct RobotId(pub(crate) usize);
+pub struct RobotId {
+    manager: u64,
+    index: usize,
+}
+
+/// Tells managers of one process apart, so that a handle is not used with another one.
+static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 
 /// Robots in N environments. Environments never touch each other; dropping the manager frees everything.
 #[derive(Debug)]
 pub struct SimulationManager {
+    serial: u64,
     cfg: SimulationManagerCfg,
     robots: Vec<Arc<RobotData>>,
     diagnostics: Vec<Diagnostic>,
@@ -217,7 +225,9 @@ impl SimulationManager {
             return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
         }
         let simulation = compile(&cfg, &[])?;
-        Ok(Self { cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation, sensors: SensorList::default() })
+        let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
+        let sensors = SensorList::default();
+        Ok(Self { serial, cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation, sensors })
     }
 
     /// The configuration.
@@ -261,7 +271,7 @@ impl SimulationManager {
             let context = self.sensor_context();
             self.sensors.rebuild(&self.simulation, &context, self.cfg.substeps);
         }
-        Ok(RobotId(self.robots.len() - 1))
+        Ok(RobotId { manager: self.serial, index: self.robots.len() - 1 })
     }
 
     /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
@@ -296,13 +306,29 @@ impl SimulationManager {
     }
 
     /// A robot, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn robot(&self, id: RobotId) -> Robot<'_> {
-        Robot::new(&self.robots[id.0], &self.simulation, id.0)
+        let index = self.index_of(id);
+        Robot::new(&self.robots[index], &self.simulation, index)
     }
 
     /// A robot, to command and to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
-        RobotMut::new(&self.robots[id.0], &mut self.simulation, id.0)
+        let index = self.index_of(id);
+        RobotMut::new(&self.robots[index], &mut self.simulation, index)
+    }
+
+    #[track_caller]
+    fn index_of(&self, id: RobotId) -> usize {
+        assert!(id.manager == self.serial, "this robot's handle is of another SimulationManager");
+        id.index
     }
 
     /// The robot called `uid`.
@@ -310,7 +336,8 @@ impl SimulationManager {
     /// # Errors
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        self.robots.iter().position(|r| r.uid() == uid).map(RobotId).ok_or_else(|| Error::UnknownName {
+        let index = self.robots.iter().position(|r| r.uid() == uid);
+        index.map(|index| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
             what: "robot",
             name: uid.into(),
             candidates: self.robots.iter().map(|r| r.uid().to_string()).collect(),

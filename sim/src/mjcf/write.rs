@@ -183,7 +183,11 @@ impl Writer {
         if !mjcf.keyframes.is_empty() {
             self.open(Element::new("keyframe"), None);
             for key in &mjcf.keyframes {
-                self.leaf(Element::new("key").attr("name", &key.name).numbers("qpos", &key.qpos), None);
+                let mut element = Element::new("key").attr("name", &key.name).numbers("qpos", &key.qpos);
+                if !key.ctrl.is_empty() {
+                    element = element.numbers("ctrl", &key.ctrl);
+                }
+                self.leaf(element, None);
             }
             self.close("keyframe");
         }
