@@ -15,8 +15,12 @@ use scene::mesh::TriMesh;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// MuJoCo's XML reader refuses documents nested deeper than this many bodies (its limit is 500 elements).
-pub const MAX_BODY_DEPTH: usize = 480;
+/// MuJoCo's XML reader refuses documents nested deeper than this many bodies: its limit is 100 elements on 2.2.2 and 500
+/// on 4.x.
+pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
+    crate::mj::Target::V2 => 96,
+    crate::mj::Target::V4 => 480,
+};
 
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
