@@ -183,10 +183,19 @@ impl Emitter<'_, '_> {
         format!("{}/{name}", self.cfg.uid)
     }
 
+    /// The name of a joint that the file does not have: `own`, with primes where a joint of the file is called that.
+    fn unused(&self, own: &str) -> String {
+        let mut own = own.to_owned();
+        while self.description.joint_id(&own).is_some() {
+            own.push('\'');
+        }
+        self.name(&own)
+    }
+
     /// Links depth first from the root, a body for each that moves.
     fn bodies(&mut self) -> Result<(), EmitError> {
         let root = self.description.root;
-        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.name("base"), None)] };
+        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.unused("base"), None)] };
         let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
         self.place(root, body, Pose::identity());
         let mut stack: Vec<JointId> = self.description.link(root).child_joints.iter().rev().copied().collect();
@@ -353,7 +362,7 @@ impl Emitter<'_, '_> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);
         let plain = |suffix: &str, kind, axis| Joint {
-            name: format!("{name}{suffix}"),
+            name: if suffix.is_empty() { name.clone() } else { self.unused(&format!("{}{suffix}", joint.name)) },
             kind,
             axis,
             range: None,
