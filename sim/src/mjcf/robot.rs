@@ -304,8 +304,8 @@ impl Emitter<'_, '_> {
     fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &Source) -> String {
         let key = MeshKey::new(path, scale);
         let index = self.cfg.hulls.keys().position(|k| *k == key).unwrap_or(usize::MAX);
-        // Asset names are lower case and unique, whatever the files are called: 2.2.2 folds case.
-        let name = format!("{}_hull{index}", self.cfg.uid.to_lowercase());
+        // The slash keeps it apart from the names of exported meshes, the uid from other robots' hulls.
+        let name = format!("{}/hull{index}", self.cfg.uid);
         if !self.mjcf.meshes.iter().any(|m| m.name == name)
             && let Some(hull) = self.cfg.hulls.get(&key)
         {
