@@ -394,7 +394,7 @@ impl Emitter<'_, '_> {
                 let kind = if joint.kind == JointKind::Prismatic { JointType::Slide } else { JointType::Hinge };
                 let tendon = plan.actuator.is_some() && self.friction_is_tendon();
                 vec![Joint {
-                    range: plan.limit,
+                    range: plan.limit.map(open_range),
                     damping: plan.damping,
                     frictionloss: if tendon { 0.0 } else { plan.friction },
                     armature: plan.armature,
@@ -503,8 +503,8 @@ impl Emitter<'_, '_> {
                     gain,
                     kp: actuator.kp,
                     kd: actuator.kd,
-                    force_limit: Some(plan.max_effort).filter(|limit| limit.is_finite()),
-                    ctrl_range: positions.then_some(plan.usable),
+                    force_limit: Some(plan.max_effort.max(SMALLEST_EFFORT)).filter(|limit| limit.is_finite()),
+                    ctrl_range: positions.then_some(plan.usable).map(open_range),
                     source: Some(joint.source.clone()),
                 });
                 if plan.friction > 0.0 && self.friction_is_tendon() {
@@ -529,6 +529,16 @@ impl Emitter<'_, '_> {
             .map(|b| (bodies[base].name.clone(), bodies[b].name.clone()))
             .collect()
     }
+}
+
+/// MuJoCo refuses a force range of nothing \[N m or N\].
+const SMALLEST_EFFORT: f64 = 1e-12;
+
+/// MuJoCo refuses a range without extent: limits that are equal, which lock a joint, are moved apart by a hair.
+fn open_range([low, high]: [f64; 2]) -> [f64; 2] {
+    const HAIR: f64 = 1e-9;
+    let hair = HAIR * low.abs().max(1.0);
+    if high - low < hair { [low - hair, high + hair] } else { [low, high] }
 }
 
 /// The body or one above it has a joint.
