@@ -13,6 +13,7 @@ use crate::mjcf::robot::MeshKey;
 use crate::pattern;
 use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
+use ::scene::pose::to_row;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ndarray::{Array2, Array3, AsArray, Ix2};
 use std::collections::BTreeMap;
@@ -85,6 +86,7 @@ impl RobotData {
             return Err(Error::InvalidUid(cfg.uid));
         }
         check_integrator(&cfg, manager.integrator)?;
+        check_pose(&cfg.init_pose)?;
         let assembly = assemble(&cfg.urdf)?;
         let mut found = assembly.diagnostics;
         let description = assembly.description;
@@ -138,6 +140,17 @@ impl RobotData {
 
 /// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
 fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
+fn check_pose(pose: &Pose) -> Result<()> {
+    let fail = |expected| Err(Error::Config { field: "init_pose", value: format!("{:?}", to_row(pose)), expected });
+    if !to_row(pose).iter().all(|x| x.is_finite()) {
+        return fail("every number must be finite");
+    }
+    if (pose.rotation.norm() - 1.0).abs() > 1e-6 {
+        return fail("its rotation must be a unit quaternion (w, x, y, z in the last four numbers)");
+    }
+    Ok(())
+}
+
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
