@@ -98,7 +98,9 @@ impl RobotData {
                 part: part.clone(),
                 error,
             })?;
-            parts.insert(part.clone(), members);
+            if parts.insert(part.clone(), members).is_some() {
+                return Err(Error::ControlPartRepeated { robot: cfg.uid, part: part.clone() });
+            }
         }
         let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error };
         let (plans, mut planned) =
@@ -138,8 +140,6 @@ impl RobotData {
     }
 }
 
-/// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
-fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
 fn check_pose(pose: &Pose) -> Result<()> {
     let fail = |expected| Err(Error::Config { field: "init_pose", value: format!("{:?}", to_row(pose)), expected });
     if !to_row(pose).iter().all(|x| x.is_finite()) {
@@ -151,6 +151,8 @@ fn check_pose(pose: &Pose) -> Result<()> {
     Ok(())
 }
 
+/// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
+fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
