@@ -1,6 +1,7 @@
 //! Every stage of the pipeline as files: URDF, description, MJCF for both MuJoCo lines with real meshes.
 
 use crate::compile::{Simulation, document};
+use crate::diagnostic::Diagnostic;
 use crate::drive::actuator::stable_timestep_of;
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
@@ -21,6 +22,7 @@ pub(crate) fn dump(
     cfg: &SimulationManagerCfg,
     robots: &[Arc<RobotData>],
     simulation: &Simulation,
+    diagnostics: &[Diagnostic],
     dir: &Path,
 ) -> Result<()> {
     let meshes = dir.join("meshes");
@@ -32,7 +34,7 @@ pub(crate) fn dump(
         write_file(&dir.join(format!("{stem}.description.txt")), &format!("{:#?}\n", robot.description()))?;
         write_file(&dir.join(format!("{stem}.joints.txt")), &format!("{:#?}\n", robot.plans()))?;
     }
-    let diagnostics: String = simulation.diagnostics.iter().map(|d| format!("{d}\n")).collect();
+    let diagnostics: String = diagnostics.iter().map(|d| format!("{d}\n")).collect();
     write_file(&dir.join("diagnostics.txt"), &diagnostics)?;
     write_file(&dir.join("run.mjcf.xml"), &simulation.xml)?;
 

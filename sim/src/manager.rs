@@ -248,7 +248,14 @@ impl SimulationManager {
         let mut robots = self.robots.clone();
         robots.push(Arc::new(robot));
         let mut simulation = compile(&self.cfg, &robots)?;
-        diagnostics.append(&mut simulation.diagnostics);
+        // Compiling says again what it said of the robots before.
+        let mut known = self.simulation.diagnostics.clone();
+        for diagnostic in &simulation.diagnostics {
+            match known.iter().position(|d| d == diagnostic) {
+                Some(again) => drop(known.swap_remove(again)),
+                None => diagnostics.push(diagnostic.clone()),
+            }
+        }
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
         self.robots = robots;
@@ -380,7 +387,7 @@ impl SimulationManager {
     /// # Errors
     /// A file cannot be written, or a visual mesh or texture cannot be read.
     pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<()> {
-        crate::export::dump(&self.cfg, &self.robots, &self.simulation, dir.as_ref())
+        crate::export::dump(&self.cfg, &self.robots, &self.simulation, &self.diagnostics, dir.as_ref())
     }
 }
 
