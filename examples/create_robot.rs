@@ -64,7 +64,9 @@ fn run(args: &Args) -> launcher::Result {
         eprintln!("warning: {diagnostic}");
     }
     if let Some(dir) = &args.launcher.dump {
-        sim.dump(dir)?;
+        for left_out in sim.dump(dir)? {
+            eprintln!("warning: {left_out}");
+        }
         println!("Pipeline stages written to {}", dir.display());
     }
 

@@ -4,7 +4,7 @@ use crate::batch::Batch;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::table::{Drive, DriveTable, Gains, Realization};
 use crate::drive::{DriveModel, implicit};
-use crate::env::with_small_buffers;
+use crate::env::{Env, with_small_buffers};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
 use crate::mj::{self, ObjectKind};
@@ -231,6 +231,11 @@ impl Built {
 }
 
 impl Simulation {
+    /// The control input of a drive.
+    pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
+        self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
+    }
+
     /// Puts the chosen environments in the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = Arc::clone(&self.start);
@@ -305,11 +310,14 @@ impl Simulation {
 
 /// Pairs of bodies of one robot that touch in the initial pose.
 fn overlapping_pairs(built: &Built, robots: &[Arc<RobotData>]) -> Result<Vec<(String, String)>> {
-    let mut data = mj::Data::new(&built.model.with_buffers(built.model.buffers()))?;
-    for &(address, position) in &built.start.qpos {
-        data.qpos_mut()[address] = position;
-    }
-    data.step1()?;
+    // An environment, since its buffers grow until all contacts fit.
+    let mut env = Env::new(&with_small_buffers(&built.model), &built.table)?;
+    env.write(|data| {
+        for &(address, position) in &built.start.qpos {
+            data.qpos_mut()[address] = position;
+        }
+    });
+    let data = env.data();
     let model = &built.model;
     let mut pairs = BTreeSet::new();
     for contact in data.contact() {

@@ -50,6 +50,14 @@ pub enum Error {
         #[source]
         error: Box<PatternError>,
     },
+    /// Two control parts have the same name.
+    #[error("robot {robot:?}: control part {part:?} is given twice; join its patterns in one list")]
+    ControlPartRepeated {
+        /// The robot.
+        robot: String,
+        /// The part.
+        part: String,
+    },
     /// The robot cannot be written as MJCF.
     #[error(transparent)]
     Emit(#[from] EmitError),

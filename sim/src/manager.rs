@@ -136,7 +136,11 @@ impl SimulationManagerCfg {
             return fail("physics_dt", &self.physics_dt, "physics_dt / substeps must be at least 1e-9 seconds");
         }
         if !self.gravity.iter().all(|g| g.is_finite()) {
-            return fail("gravity", &self.gravity, "it must be finite, such as (0, 0, -9.81)");
+            return fail(
+                "gravity",
+                &format!("{:?}", self.gravity.as_slice()),
+                "it must be finite, such as (0, 0, -9.81)",
+            );
         }
         if !positive(self.impratio) {
             return fail("impratio", &self.impratio, "it must be above 0");
@@ -162,7 +166,11 @@ impl SimulationManagerCfg {
         }
         for light in &self.lights {
             if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
-                return fail("lights.direction", &light.direction, "it must be a finite vector other than zero");
+                return fail(
+                    "lights.direction",
+                    &format!("{:?}", light.direction.as_slice()),
+                    "it must be a finite vector other than zero",
+                );
             }
             if !light.color.iter().all(|c| (0.0..=1.0).contains(c)) {
                 return fail("lights.color", &format!("{:?}", light.color), "each component must be 0 to 1");
@@ -262,7 +270,14 @@ impl SimulationManager {
         let mut robots = self.robots.clone();
         robots.push(Arc::new(robot));
         let mut simulation = compile(&self.cfg, &robots)?;
-        diagnostics.append(&mut simulation.diagnostics);
+        // Compiling says again what it said of the robots before.
+        let mut known = self.simulation.diagnostics.clone();
+        for diagnostic in &simulation.diagnostics {
+            match known.iter().position(|d| d == diagnostic) {
+                Some(again) => drop(known.swap_remove(again)),
+                None => diagnostics.push(diagnostic.clone()),
+            }
+        }
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
         self.robots = robots;
@@ -463,12 +478,13 @@ impl SimulationManager {
     }
 
     /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both
-    /// MuJoCo lines with its meshes.
+    /// MuJoCo lines with its meshes. Returns what had to be left out: visual meshes and textures that cannot be read
+    /// (`diagnostics.txt` in `dir` has it too, after everything that was said before).
     ///
     /// # Errors
-    /// A file cannot be written, or a visual mesh or texture cannot be read.
-    pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<()> {
-        crate::export::dump(&self.cfg, &self.robots, &self.simulation, dir.as_ref())
+    /// A file cannot be written.
+    pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<Vec<Diagnostic>> {
+        crate::export::dump(&self.cfg, &self.robots, &self.simulation, &self.diagnostics, dir.as_ref())
     }
 }
 

@@ -15,8 +15,12 @@ use scene::mesh::TriMesh;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// MuJoCo's XML reader refuses documents nested deeper than this many bodies (its limit is 500 elements).
-pub const MAX_BODY_DEPTH: usize = 480;
+/// MuJoCo's XML reader refuses documents nested deeper than this many bodies: its limit is 100 elements on 2.2.2 and 500
+/// on 4.x.
+pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
+    crate::mj::Target::V2 => 96,
+    crate::mj::Target::V4 => 480,
+};
 
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
@@ -194,10 +198,20 @@ impl Emitter<'_, '_> {
         format!("{}/{name}", self.cfg.uid)
     }
 
+    /// The name of a joint that the file does not have: `own`, with primes where a joint of the file is called that.
+    fn unused(&self, own: &str) -> String {
+        let mut own = own.to_owned();
+        while self.description.joint_id(&own).is_some() {
+            own.push('\'');
+        }
+        self.name(&own)
+    }
+
     /// Links depth first from the root, a body for each that moves.
     fn bodies(&mut self) -> Result<(), EmitError> {
         let root = self.description.root;
-        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.name("base"), None)] };
+        let root_joints =
+            if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.unused("base"), None)] };
         let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
         self.place(root, body, Pose::identity());
         let mut stack: Vec<JointId> = self.description.link(root).child_joints.iter().rev().copied().collect();
@@ -307,8 +321,8 @@ impl Emitter<'_, '_> {
     fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &Source) -> String {
         let key = MeshKey::new(path, scale);
         let index = self.cfg.hulls.keys().position(|k| *k == key).unwrap_or(usize::MAX);
-        // Asset names are lower case and unique, whatever the files are called: 2.2.2 folds case.
-        let name = format!("{}_hull{index}", self.cfg.uid.to_lowercase());
+        // The slash keeps it apart from the names of exported meshes, the uid from other robots' hulls.
+        let name = format!("{}/hull{index}", self.cfg.uid);
         if !self.mjcf.meshes.iter().any(|m| m.name == name)
             && let Some(hull) = self.cfg.hulls.get(&key)
         {
@@ -365,7 +379,7 @@ impl Emitter<'_, '_> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);
         let plain = |suffix: &str, kind, axis| Joint {
-            name: format!("{name}{suffix}"),
+            name: if suffix.is_empty() { name.clone() } else { self.unused(&format!("{}{suffix}", joint.name)) },
             kind,
             axis,
             range: None,
@@ -397,7 +411,7 @@ impl Emitter<'_, '_> {
                 let kind = if joint.kind == JointKind::Prismatic { JointType::Slide } else { JointType::Hinge };
                 let tendon = plan.actuator.is_some() && self.friction_is_tendon();
                 vec![Joint {
-                    range: plan.limit,
+                    range: plan.limit.map(open_range),
                     damping: plan.damping,
                     frictionloss: if tendon { 0.0 } else { plan.friction },
                     armature: plan.armature,
@@ -469,8 +483,8 @@ impl Emitter<'_, '_> {
                     gain,
                     kp: actuator.kp,
                     kd: actuator.kd,
-                    force_limit: Some(plan.max_effort).filter(|limit| limit.is_finite()),
-                    ctrl_range: positions.then_some(plan.usable),
+                    force_limit: Some(plan.max_effort.max(SMALLEST_EFFORT)).filter(|limit| limit.is_finite()),
+                    ctrl_range: positions.then_some(plan.usable).map(open_range),
                     source: Some(joint.source.clone()),
                 });
                 if plan.friction > 0.0 && self.friction_is_tendon() {
@@ -495,6 +509,16 @@ impl Emitter<'_, '_> {
             .map(|b| (bodies[base].name.clone(), bodies[b].name.clone()))
             .collect()
     }
+}
+
+/// MuJoCo refuses a force range of nothing \[N m or N\].
+const SMALLEST_EFFORT: f64 = 1e-12;
+
+/// MuJoCo refuses a range without extent: limits that are equal, which lock a joint, are moved apart by a hair.
+fn open_range([low, high]: [f64; 2]) -> [f64; 2] {
+    const HAIR: f64 = 1e-9;
+    let hair = HAIR * low.abs().max(1.0);
+    if high - low < hair { [low - hair, high + hair] } else { [low, high] }
 }
 
 /// The body or one above it has a joint.

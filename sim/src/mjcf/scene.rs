@@ -36,5 +36,7 @@ pub fn add_ground(mjcf: &mut Mjcf, half_size: f64) {
 
 /// Adds a light from above.
 pub fn add_light(mjcf: &mut Mjcf, name: &str, direction: Vector3<f64>, color: [f64; 3]) {
+    // MuJoCo takes a short direction for none.
+    let direction = direction.normalize();
     mjcf.lights.push(Light { name: name.into(), position: Vector3::new(0.0, 0.0, 4.0), direction, diffuse: color });
 }

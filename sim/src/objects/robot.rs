@@ -14,6 +14,7 @@ use crate::pattern;
 use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
+use ::scene::pose::to_row;
 use ndarray::{Array2, Array3, AsArray, Ix2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -85,11 +86,9 @@ impl RobotData {
             return Err(Error::InvalidUid(cfg.uid));
         }
         check_integrator(&cfg, manager.integrator)?;
-        let transforms = cfg.urdf.components.iter().map(|c| ("component transform", &c.transform));
-        for (field, pose) in std::iter::once(("init_pose", &cfg.init_pose)).chain(transforms) {
-            if !::scene::pose::to_row(pose).iter().all(|x| x.is_finite()) {
-                return Err(Error::Config { field, value: format!("{pose}"), expected: "a pose must be finite" });
-            }
+        check_pose("init_pose", &cfg.init_pose)?;
+        for component in &cfg.urdf.components {
+            check_pose("component transform", &component.transform)?;
         }
         let assembly = assemble(&cfg.urdf)?;
         let mut found = assembly.diagnostics;
@@ -102,7 +101,9 @@ impl RobotData {
                 part: part.clone(),
                 error: Box::new(error),
             })?;
-            parts.insert(part.clone(), members);
+            if parts.insert(part.clone(), members).is_some() {
+                return Err(Error::ControlPartRepeated { robot: cfg.uid, part: part.clone() });
+            }
         }
         let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
         let (plans, mut planned) =
@@ -140,6 +141,17 @@ impl RobotData {
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
+}
+
+fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
+    let fail = |expected| Err(Error::Config { field, value: format!("{:?}", to_row(pose)), expected });
+    if !to_row(pose).iter().all(|x| x.is_finite()) {
+        return fail("every number must be finite");
+    }
+    if (pose.rotation.norm() - 1.0).abs() > 1e-6 {
+        return fail("its rotation must be a unit quaternion (w, x, y, z in the last four numbers)");
+    }
+    Ok(())
 }
 
 /// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.

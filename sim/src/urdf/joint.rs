@@ -167,9 +167,9 @@ fn read_limit(
     let (mut lower, mut upper) = (reader.number(limit, "lower")?, reader.number(limit, "upper")?);
     let (effort, velocity) =
         (reader.non_negative(limit, "effort", owner)?, reader.non_negative(limit, "velocity", owner)?);
-    if let (Some(l), Some(u)) = (lower, upper)
-        && l > u
-    {
+    // An end that is absent is 0, URDF's default.
+    let (l, u) = (lower.unwrap_or(0.0), upper.unwrap_or(0.0));
+    if l > u {
         let message = format!("{owner}: lower limit {l} is above upper limit {u}; both were ignored");
         let at = reader.source(limit);
         reader.warn(DiagnosticKind::LimitIgnored, at, message);

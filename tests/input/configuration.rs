@@ -1,0 +1,115 @@
+//! `SimulationManager::new`.
+
+use super::support::cfg;
+use kinetoscope::prelude::*;
+use kinetoscope::sim::{GroundCfg, LightCfg};
+use std::f64::{INFINITY, NAN};
+
+type Change = fn(&mut SimulationManagerCfg);
+
+/// A change of the default configuration, and what the message says.
+const REFUSED: &[(Change, &[&str])] = &[
+    (|c| c.num_envs = 0, &["num_envs is 0", "at least 1"]),
+    (|c| c.num_envs = 1 << 40, &["num_envs is 1099511627776", "at most"]),
+    (|c| c.num_envs = usize::MAX, &["num_envs is", "at most"]),
+    (|c| c.physics_dt = 0.0, &["physics_dt is 0", "above 0"]),
+    (|c| c.physics_dt = -0.01, &["physics_dt is -0.01"]),
+    (|c| c.physics_dt = NAN, &["physics_dt is NaN"]),
+    (|c| c.physics_dt = INFINITY, &["physics_dt is inf"]),
+    (|c| c.physics_dt = 2.0, &["physics_dt is 2", "at most 1 second"]),
+    (|c| c.physics_dt = 1e-300, &["physics_dt"]),
+    (|c| (c.physics_dt, c.substeps) = (1e-6, 10_000), &["physics_dt / substeps"]),
+    (|c| c.substeps = 0, &["substeps is 0"]),
+    (|c| c.substeps = u32::MAX, &["substeps is 4294967295"]),
+    (|c| c.threads = Some(0), &["threads is 0", "1 to 1024", "every core"]),
+    (|c| c.threads = Some(usize::MAX), &["threads is"]),
+    (|c| c.gravity.x = NAN, &["gravity is [NaN, 0.0, -9.81]"]),
+    (|c| c.gravity.z = -INFINITY, &["gravity"]),
+    (|c| c.impratio = 0.0, &["impratio is 0"]),
+    (|c| c.impratio = NAN, &["impratio is NaN"]),
+    (|c| c.solver_iterations = 0, &["solver_iterations is 0"]),
+    (|c| c.solver_iterations = u32::MAX, &["solver_iterations"]),
+    (|c| c.friction = [-1.0, 0.0, 0.0], &["friction"]),
+    (|c| c.friction[2] = NAN, &["friction"]),
+    (|c| c.arena_space = -1.0, &["arena_space is -1"]),
+    (|c| c.arena_space = NAN, &["arena_space is NaN"]),
+    (|c| c.ground = Some(GroundCfg { half_size: 0.0 }), &["ground.half_size is 0"]),
+    (|c| c.ground = Some(GroundCfg { half_size: NAN }), &["ground.half_size is NaN"]),
+    (|c| c.lights[0].direction.fill(0.0), &["lights.direction"]),
+    (|c| c.lights[0].direction.x = NAN, &["lights.direction is [NaN, 0.4, -1.0]"]),
+    (|c| c.lights[0].color[1] = 1.5, &["lights.color"]),
+    (|c| c.lights[0].color[1] = NAN, &["lights.color"]),
+];
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    for (i, (change, expected)) in REFUSED.iter().enumerate() {
+        let mut cfg = cfg(1);
+        change(&mut cfg);
+        let message = SimulationManager::new(cfg).unwrap_err().to_string();
+        for part in *expected {
+            assert!(message.contains(part), "row {i}: {part:?} is not in {message:?}");
+        }
+    }
+}
+
+/// Extreme and still numbers: they work, and what diverges is reported.
+const ACCEPTED: &[Change] = &[
+    |c| c.physics_dt = 1.0,
+    |c| (c.physics_dt, c.substeps) = (1e-5, 10_000),
+    |c| c.threads = Some(64),
+    |c| c.gravity.fill(0.0),
+    |c| c.gravity.z = -1e300,
+    |c| c.impratio = 1e-300,
+    |c| c.impratio = 1e300,
+    |c| c.friction = [0.0; 3],
+    |c| c.friction = [1e300; 3],
+    |c| c.solver_iterations = 1,
+    |c| c.ground = None,
+    |c| c.ground = Some(GroundCfg { half_size: 1e-300 }),
+    |c| c.ground = Some(GroundCfg { half_size: 1e300 }),
+    |c| c.lights = Vec::new(),
+    |c| c.lights = vec![LightCfg::default(); 200],
+    |c| c.lights[0].direction.fill(1e-100),
+    |c| c.arena_space = 1e300,
+    |c| c.cone = kinetoscope::sim::Cone::Elliptic,
+    |c| *c = SimulationManagerCfg { threads: Some(1), ..SimulationManagerCfg::manipulation() },
+    |c| *c = SimulationManagerCfg { threads: Some(1), ..SimulationManagerCfg::legged() },
+];
+
+#[test]
+fn extreme_numbers_work_or_are_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let link =
+        format!("{}<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>", super::support::INERTIAL);
+    let urdf = format!("<robot name=\"ball\"><link name=\"ball\">{link}</link></robot>");
+    for (i, change) in ACCEPTED.iter().enumerate() {
+        let mut cfg = cfg(3);
+        change(&mut cfg);
+        let mut sim = SimulationManager::new(cfg).unwrap_or_else(|e| panic!("row {i}: {e}"));
+        let robot = RobotCfg { fix_base: false, ..super::support::robot(dir.path(), "ball", &urdf) };
+        let ball = sim.add_robot(robot).unwrap_or_else(|e| panic!("row {i}: {e}"));
+        sim.update(20);
+        assert!(sim.robot(ball).link_pose("ball").unwrap().iter().all(|x| x.is_finite()), "row {i}");
+        assert!(sim.env_origins().iter().all(|x| !x.is_nan()), "row {i}");
+    }
+}
+
+#[test]
+fn integrators_that_do_not_fit_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let robot = super::support::robot(dir.path(), "r", &super::support::hinge());
+    for integrator in [Integrator::Rk4, Integrator::Implicit] {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { integrator, ..cfg(1) }).unwrap();
+        let message = sim.add_robot(robot.clone()).unwrap_err().to_string();
+        assert!(message.contains(integrator.name()) && message.contains("Euler"), "{message}");
+        let drive = DriveCfg { model: DriveModel::Actuator, ..Default::default() };
+        sim.add_robot(RobotCfg { drive, ..robot.clone() }).unwrap();
+        sim.update(3);
+    }
+    if kinetoscope::sim::mj::TARGET == kinetoscope::sim::mj::Target::V2 {
+        let cfg = SimulationManagerCfg { integrator: Integrator::ImplicitFast, ..cfg(1) };
+        let message = SimulationManager::new(cfg).unwrap_err().to_string();
+        assert!(message.contains("implicitfast") && message.contains("2.2.2"), "{message}");
+    }
+}

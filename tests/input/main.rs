@@ -1,0 +1,11 @@
+//! What users may give by mistake: every row is refused with a message that helps, or works; nothing is half done and
+//! nothing ends the process.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod accepted;
+mod configuration;
+mod names;
+mod refused;
+mod self_collision;
+mod support;
+mod writers;
