@@ -27,7 +27,9 @@ fn export(cfg: RobotCfg) -> Export {
     let xml = std::fs::read_to_string(&path).unwrap();
     let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
     let start = numbers(between(&xml, "<key name=\"start\" qpos=\"", "\""));
+    let ctrl = numbers(between(&xml, "\" ctrl=\"", "\""));
     let targets = world.sim.batch().read(0, |env| env.drives.position.clone());
+    assert_eq!(ctrl, targets, "the keyframe commands the start");
     Export { _folder: folder, path, xml, start, targets }
 }
 
@@ -104,22 +106,47 @@ fn without_followers_an_export_is_stable_as_it_says() {
     let chain = RobotCfg { urdf: UrdfCfg::single(&path), drive: tutorial_gains(), ..Default::default() };
     let export = export(RobotCfg { init_qpos: vec![("a2".into(), 0.4)], ..chain });
     let bound = named_step(&export);
-    // At every time step while drives do not saturate; 2.2.2 also while they do.
-    for h in [1e-3, 0.01, 0.05] {
-        assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
-    }
-    match (mj::TARGET, bound) {
-        (mj::Target::V2, None) => {
+    let bound = bound.expect("drives have limits: both lines name a step");
+    match mj::TARGET {
+        // Velocity-implicit: up to the named step, whether drives saturate or not.
+        mj::Target::V2 => {
+            assert!(bound > 0.05, "{bound}");
             for h in [1e-3, 0.01, 0.05] {
+                assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
                 assert!(export.run(h, 3000, 0.5).unwrap() < 1e-3, "{h}");
             }
         }
-        (mj::Target::V4, Some(bound)) => {
+        mj::Target::V4 => {
+            for h in [1e-3, 0.01, 0.05] {
+                assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
+            }
             let reach = export.run(0.98 * bound, 4000, 0.5).unwrap();
             println!("step {reach:.2e}");
             assert!(reach < 10.0, "{reach}");
             assert!(export.run(0.01, 400, 0.5).is_none(), "the control: saturated drives diverge at 0.01 s");
         }
-        other => panic!("{other:?}"),
     }
+}
+
+/// Implicit integrators take the damping of an actuator to the end of the step, its stiffness not: with little damping
+/// the bound is `h = (kd + sqrt(kd² + 4 M kp)) / kp`, and no drive needs to saturate for it.
+#[test]
+fn stiff_drives_with_little_damping_are_stable_up_to_the_step_that_is_named() {
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("robot.urdf");
+    let link = r#"<robot name="r"><link name="base"/><link name="tip"><inertial><mass value="0.01"/>
+        <inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/></inertial></link>
+        <joint name="j" type="continuous"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
+    std::fs::write(&path, link).unwrap();
+    let (m, kp, kd) = (1e-5, 1e4, 0.1_f64);
+    let drive = DriveCfg { stiffness: kp.into(), damping: kd.into(), ..Default::default() };
+    let export = export(RobotCfg { urdf: UrdfCfg::single(&path), drive, ..Default::default() });
+    let (bound, expected) = (named_step(&export).unwrap(), (kd + (kd * kd + 4.0 * m * kp).sqrt()) / kp);
+    assert!((bound / expected - 1.0).abs() < 1e-3, "{bound} {expected}");
+    // From 1 mrad beside the target. Below the bound the slowest mode decays by the root of det = M / (M + h kd), 4 % a
+    // step; above it, it grows.
+    let below = export.run(0.9 * bound, 4000, 1e-3).unwrap();
+    assert!(below < 1e-3, "{below}");
+    let above = export.run(1.1 * bound, 4000, 1e-3);
+    assert!(above.is_none_or(|speed| speed > 1e3), "the control: 10 % above it, it diverges: {above:?}");
 }
