@@ -154,3 +154,39 @@ fn an_arm_with_friction_rests_inside_its_band() {
         assert!(world.v()[i].abs() < 3e-4, "joint {i}: {}", world.v()[i]);
     }
 }
+
+/// Drives, their friction, friction of undriven joints and of a second robot are rows of one list: each drive's effort is
+/// its own law at the new state, and each undriven wheel decelerates by its own friction.
+#[test]
+fn rows_of_drives_and_of_friction_do_not_get_mixed_up() {
+    let (kp, kd) = (100.0, 10.0);
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("second.urdf");
+    std::fs::write(&path, urdf(&[Joint { friction: 0.3, ..Joint::wheel("free", M) }])).unwrap();
+    let joints = [
+        Joint { mimic: Some(("c".into(), 2.0)), friction: 0.1, ..Joint::wheel("b", M) },
+        Joint::wheel("a", M),
+        rough("c"),
+        Joint { friction: 0.5, ..Joint::wheel("d", M) }.effort(1.5),
+    ];
+    let mut world = world(&joints, gains(kp, kd), weightless());
+    let passive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
+    let cfg = RobotCfg { uid: "second".into(), urdf: UrdfCfg::single(&path), drive: passive, ..Default::default() };
+    world.sim.add_robot(cfg).unwrap_or_else(|e| panic!("{e}"));
+    let mut env = world.env();
+    let last = env.data().qvel().len() - 1;
+    env.write(|data| data.qvel_mut()[last] = 1.0);
+    let aim = [0.2, 0.1, -0.3];
+    env.drives.position.copy_from_slice(&aim);
+    let table = std::sync::Arc::clone(env.drives.table());
+    for k in 1..=20 {
+        step(&mut env);
+        for (i, drive) in table.drives.iter().enumerate() {
+            let (q, v) = (env.data().qpos()[drive.qpos], env.data().qvel()[drive.dof]);
+            let limit = drive.initial.max_effort;
+            let law = (kp * (aim[i] - q) - kd * v).clamp(-limit, limit);
+            assert_close(env.drives.effort[i], law, 1e-7, &format!("drive {i}"));
+        }
+        assert_close(env.data().qvel()[last], 1.0 - f64::from(k) * H * 0.3 / M, EXACT, "the wheel without a drive");
+    }
+}

@@ -163,7 +163,7 @@ pub(crate) fn world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg
     try_world(joints, drive, cfg).unwrap_or_else(|e| panic!("{e}"))
 }
 
-pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> Result<World> {
+pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> Result<World, Box<Error>> {
     let files = tempfile::tempdir().unwrap();
     let path = files.path().join("robot.urdf");
     std::fs::write(&path, urdf(joints)).unwrap();
@@ -208,10 +208,6 @@ impl World {
     /// Position targets of all joints.
     pub(crate) fn aim(&mut self, targets: &[f64]) {
         self.sim.robot_mut(self.robot).set_qpos(&row(targets), None, None).unwrap();
-    }
-
-    pub(crate) fn write(&mut self, positions: &[f64]) {
-        self.sim.robot_mut(self.robot).write_qpos(&row(positions), None, None).unwrap();
     }
 
     pub(crate) fn step(&mut self, steps: u32) {
@@ -321,7 +317,9 @@ pub(crate) fn vendor(name: &str) -> Option<PathBuf> {
 /// Six links of 6 to 1 kg and four fingers of three links of 20, 15 and 10 g, with the effort limits of such an arm
 /// (150 N m down to 28) and hand (2 N m). No dry friction, no damping, no rotor inertia.
 pub(crate) fn arm_and_hand() -> Vec<Joint> {
-    let arm: [(&str, f64, [f64; 3], f64, [f64; 3], f64, f64); 6] = [
+    // Name, height above the one before, axis, mass, moments, height of the centre of mass, effort limit.
+    type Row = (&'static str, f64, [f64; 3], f64, [f64; 3], f64, f64);
+    let arm: [Row; 6] = [
         ("a1", 0.15, [0.0, 0.0, 1.0], 6.0, [0.03, 0.03, 0.02], 0.05, 150.0),
         ("a2", 0.18, [0.0, 1.0, 0.0], 5.5, [0.08, 0.08, 0.012], 0.2, 150.0),
         ("a3", 0.4, [0.0, 1.0, 0.0], 3.5, [0.04, 0.04, 0.006], 0.15, 100.0),
