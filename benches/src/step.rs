@@ -116,9 +116,14 @@ impl Side for Bare<'_> {
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         let mut qpos = Vec::new();
         for data in self.shares.iter_mut().flatten() {
-            // Changes nothing but the quaternions, which 2.2.2 normalizes in place at the beginning of a step.
-            data.step1()?;
+            // 2.2.2 normalizes quaternions in place when a step begins, and ours has begun the next one. Normalizing twice
+            // would change the last bit, so this is undone.
+            let before = data.qpos().to_vec();
+            if self.case.bare == Loop::Step {
+                data.step1()?;
+            }
             qpos.extend_from_slice(data.qpos());
+            data.qpos_mut().copy_from_slice(&before);
         }
         Ok(Some(qpos))
     }
