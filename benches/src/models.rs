@@ -32,6 +32,8 @@ pub(crate) struct Case {
     pub(crate) model: Model,
     /// What the bare loop calls.
     pub(crate) bare: Loop,
+    /// The MJCF, where the model is not a file.
+    pub(crate) mjcf: Option<String>,
     /// States on one trajectory; environment `i` starts from one of them.
     states: Vec<State>,
 }
@@ -42,6 +44,20 @@ pub(crate) struct State {
     pub(crate) qpos: Vec<f64>,
     pub(crate) qvel: Vec<f64>,
     pub(crate) warmstart: Vec<f64>,
+}
+
+impl State {
+    /// The state of `data`.
+    pub(crate) fn of(data: &Data) -> Self {
+        Self { qpos: data.qpos().to_vec(), qvel: data.qvel().to_vec(), warmstart: data.qacc_warmstart().to_vec() }
+    }
+
+    /// Puts the state into `data`.
+    pub(crate) fn write(&self, data: &mut Data) {
+        data.qpos_mut().copy_from_slice(&self.qpos);
+        data.qvel_mut().copy_from_slice(&self.qvel);
+        data.qacc_warmstart_mut().copy_from_slice(&self.warmstart);
+    }
 }
 
 /// Number of different starts.
@@ -58,18 +74,18 @@ impl Case {
         }
         let mut compiled = mj::compile_file(Path::new(HUMANOID))?;
         compiled.prepare_for_stepping(false);
-        Self::new("humanoid", compiled.into_model(), Loop::Step).map(Some)
+        Self::new("humanoid", compiled.into_model(), None, Loop::Step).map(Some)
     }
 
     /// The bundled arm and hand, limp: the model that drives are written to, without the writes.
     pub(crate) fn sr5() -> Outcome<Self> {
         let (sim, _) = sr5(1, 1)?;
-        Self::new("SR5 + hand", sim.batch().model().clone(), Loop::Step21)
+        Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.mjcf().into()), Loop::Step21)
     }
 
-    fn new(name: &'static str, model: Model, bare: Loop) -> Outcome<Self> {
+    fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> Outcome<Self> {
         let model = model.with_buffers(model.small_buffers());
-        let mut case = Self { name, states: trajectory(&model)?, model, bare };
+        let mut case = Self { name, states: trajectory(&model)?, model, bare, mjcf };
         // Buffers that no environment has to grow, so that both sides use the same memory.
         let mut batch = case.batch(STARTS, 1)?;
         batch.step(STEPS);
@@ -107,10 +123,7 @@ impl Case {
 
     /// Writes start and controls of environment `index`.
     pub(crate) fn write(&self, index: usize, data: &mut Data) {
-        let state = self.state(index);
-        data.qpos_mut().copy_from_slice(&state.qpos);
-        data.qvel_mut().copy_from_slice(&state.qvel);
-        data.qacc_warmstart_mut().copy_from_slice(&state.warmstart);
+        self.state(index).write(data);
         data.ctrl_mut().copy_from_slice(&self.controls(index));
     }
 }
@@ -121,11 +134,7 @@ fn trajectory(model: &Model) -> Outcome<Vec<State>> {
     let mut states = Vec::new();
     for _ in 0..STARTS {
         batch.step(2);
-        states.push(batch.read(0, |env| State {
-            qpos: env.data().qpos().to_vec(),
-            qvel: env.data().qvel().to_vec(),
-            warmstart: env.data().qacc_warmstart().to_vec(),
-        }));
+        states.push(batch.read(0, |env| State::of(env.data())));
     }
     Ok(states)
 }
