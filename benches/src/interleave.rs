@@ -1,9 +1,10 @@
 //! Fair timing on a machine that others use too: sides take turns in short blocks, and ratios are taken turn by turn.
 //!
 //! A round runs one block of every side, then one more of every side in reverse order: a load that grows or fades during
-//! a round meets all sides alike. Results are medians over rounds.
+//! a round meets all sides alike. Results are medians over rounds; a round in which other programs kept the processor
+//! busy does not count.
 
-use crate::Outcome;
+use crate::{Outcome, foreign};
 use std::time::{Duration, Instant};
 
 /// One program that takes part. All sides do the same work.
@@ -14,11 +15,21 @@ pub(crate) trait Side {
     /// Does `steps` steps in every environment; returns the time they took.
     fn block(&mut self, steps: u32) -> Outcome<Duration>;
 
+    /// The process that does the work, where it is another one.
+    fn process(&self) -> Option<u32> {
+        None
+    }
+
     /// Positions after the last block, where they must be those of every other side.
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         Ok(None)
     }
 }
+
+/// Share of one core that other programs may take in a round that counts.
+const FOREIGN: f64 = 0.05;
+/// On a machine that is always busy we stop waiting for quiet rounds after this many times the length planned.
+const PATIENCE: f64 = 6.0;
 
 /// How to measure.
 #[derive(Clone, Copy, Debug)]
@@ -74,9 +85,14 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         steps *= 2;
     }
     restart_all(sides)?;
+    let processes: Vec<u32> = sides.iter().filter_map(|side| side.process()).collect();
     let start = Instant::now();
-    let mut done = 0;
-    while times[0].len() < FEWEST_ROUNDS || start.elapsed().as_secs_f64() < plan.seconds {
+    let (mut done, mut quiet, mut measured) = (0, Vec::new(), 0.0);
+    while quiet.iter().filter(|&&q| q).count() < FEWEST_ROUNDS || measured < plan.seconds {
+        if start.elapsed().as_secs_f64() > PATIENCE * plan.seconds && quiet.len() >= FEWEST_ROUNDS {
+            break;
+        }
+        let (begin, foreign_before) = (Instant::now(), foreign::seconds(&processes));
         let mut round = vec![Duration::ZERO; sides.len()];
         for (i, side) in sides.iter_mut().enumerate() {
             round[i] += side.block(steps)?;
@@ -87,12 +103,29 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         for (side, time) in times.iter_mut().zip(round) {
             side.push(time.as_secs_f64() / f64::from(2 * steps));
         }
+        let length = begin.elapsed().as_secs_f64();
+        let foreign = foreign::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
+        quiet.push(foreign <= FOREIGN * length);
+        measured += if foreign <= FOREIGN * length { length } else { 0.0 };
         done += 2 * steps;
         same_physics(sides)?;
         if done + 2 * steps > plan.restart_after {
             restart_all(sides)?;
             done = 0;
         }
+    }
+    let calm = quiet.iter().filter(|&&q| q).count();
+    if calm >= FEWEST_ROUNDS {
+        for side in &mut times {
+            let mut counts = quiet.iter();
+            side.retain(|_| counts.next() == Some(&true));
+        }
+    } else {
+        eprintln!(
+            "  note: the machine was busy in {} of {} rounds; all of them count",
+            quiet.len() - calm,
+            quiet.len()
+        );
     }
     Ok(Times(times))
 }
@@ -143,7 +176,7 @@ mod tests {
     fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
         let (mut ours, mut rival) = (Sleeper(20), Sleeper(10));
         let plan = Plan { seconds: 0.0, restart_after: 100 };
-        let times = measure(plan, &mut [&mut ours, &mut rival]  ).expect("sleeps");
+        let times = measure(plan, &mut [&mut ours, &mut rival]).expect("sleeps");
         assert!((times.ratio(0, 1) - 0.5).abs() < 1e-12);
         assert!((times.per_step(0) - 0.02).abs() < 1e-12);
     }

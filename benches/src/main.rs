@@ -3,6 +3,7 @@
 //! `cargo xtask bench` runs this on both lines of MuJoCo. A table goes to standard error, the rows as JSON to a file.
 
 mod drive;
+mod foreign;
 mod interleave;
 mod memory;
 mod models;

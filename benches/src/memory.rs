@@ -32,12 +32,12 @@ pub(crate) fn run(_: &Settings) -> Outcome<Vec<Row>> {
 /// Memory per extra environment \[KiB\].
 fn growth(side: &str, case: &str) -> Outcome<f64> {
     let resident = |envs: usize| -> Outcome<f64> {
-        let output = Command::new(std::env::current_exe()?)
-            .args(["--memory-of", side, case, &envs.to_string()])
-            .output()?;
+        let output =
+            Command::new(std::env::current_exe()?).args(["--memory-of", side, case, &envs.to_string()]).output()?;
         let text = String::from_utf8(output.stdout)?;
         text.trim().parse().map_err(|_| {
-            format!("a process that holds {envs} environments failed: {}", String::from_utf8_lossy(&output.stderr)).into()
+            format!("a process that holds {envs} environments failed: {}", String::from_utf8_lossy(&output.stderr))
+                .into()
         })
     };
     Ok((resident(MANY)? - resident(FEW)?) / (MANY - FEW) as f64 / 1024.0)

@@ -156,10 +156,7 @@ pub(crate) fn sr5(envs: usize, threads: usize) -> Outcome<(SimulationManager, Ro
             components: vec![ComponentCfg::new("arm", assets::path("sr5/SR5.urdf")?), hand],
             ..UrdfCfg::default()
         },
-        control_parts: vec![
-            ("arm".into(), vec!["JOINT[1-6]".into()]),
-            ("hand".into(), vec!["LEFT_HAND_.*".into()]),
-        ],
+        control_parts: vec![("arm".into(), vec!["JOINT[1-6]".into()]), ("hand".into(), vec!["LEFT_HAND_.*".into()])],
         drive: DriveCfg {
             stiffness: [("arm", 1e4), ("hand", 1e3)].into(),
             damping: [("arm", 1e3), ("hand", 1e2)].into(),

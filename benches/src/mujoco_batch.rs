@@ -131,6 +131,10 @@ impl Side for Rival {
         Ok(Duration::from_secs_f64(self.ask(&format!("block {steps}"))?.parse()?))
     }
 
+    fn process(&self) -> Option<u32> {
+        Some(self.process.id())
+    }
+
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         let hex = self.ask("qpos")?;
         let byte = |i: usize| u8::from_str_radix(hex.get(i..i + 2).unwrap_or(""), 16);
