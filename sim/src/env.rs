@@ -7,6 +7,7 @@
 
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Warning, WarningCounts};
+use std::cell::Cell;
 use std::sync::Arc;
 
 /// Whether an environment is being stepped.
@@ -47,6 +48,12 @@ impl std::fmt::Display for Divergence {
 /// Growth stops when one environment would take this much memory \[bytes\].
 const LARGEST_ENVIRONMENT: usize = 2 << 30;
 
+thread_local! {
+    /// The state before the running step, to go back to. It serves one step at a time: one per thread stays in the cache,
+    /// one per environment would not.
+    static BEFORE: Cell<Motion> = Cell::default();
+}
+
 /// One environment of a batch.
 #[derive(Debug)]
 pub struct Env {
@@ -57,8 +64,6 @@ pub struct Env {
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
-    /// The state before the running step, to go back to.
-    before: Motion,
     /// What the user set, to carry into a larger `mjData`.
     inputs: Inputs,
 }
@@ -78,7 +83,6 @@ impl Env {
             steps: 0,
             warnings: WarningCounts::default(),
             growths: 0,
-            before: Motion::default(),
             inputs: Inputs::default(),
         };
         env.refresh();
@@ -150,7 +154,13 @@ impl Env {
     }
 
     fn step_once(&mut self) {
-        self.before.save(&self.data);
+        let mut before = BEFORE.take();
+        before.save(&self.data);
+        self.step_from(&before);
+        BEFORE.set(before);
+    }
+
+    fn step_from(&mut self, before: &Motion) {
         loop {
             let done = self.attempt();
             let raised = self.data.take_warnings();
@@ -162,13 +172,13 @@ impl Env {
                     return;
                 }
                 Verdict::NeedsRoom => {
-                    if let Err(reason) = self.grow() {
-                        return self.quarantine(reason);
+                    if let Err(reason) = self.grow(before) {
+                        return self.quarantine(before, reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
-                    return self.quarantine(reason);
+                    return self.quarantine(before, reason);
                 }
             }
         }
@@ -182,7 +192,13 @@ impl Env {
 
     /// One forward pass over positions and velocities, growing the buffers as needed.
     fn refresh(&mut self) {
-        self.before.save(&self.data);
+        let mut before = BEFORE.take();
+        before.save(&self.data);
+        self.refresh_from(&before);
+        BEFORE.set(before);
+    }
+
+    fn refresh_from(&mut self, before: &Motion) {
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
@@ -192,22 +208,22 @@ impl Env {
                     return;
                 }
                 Verdict::NeedsRoom => {
-                    if let Err(reason) = self.enlarge() {
-                        return self.quarantine(reason);
+                    if let Err(reason) = self.enlarge(before) {
+                        return self.quarantine(before, reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
-                    return self.quarantine(reason);
+                    return self.quarantine(before, reason);
                 }
             }
         }
     }
 
     /// Goes back to the state before the step, with doubled buffers and a forward pass done.
-    fn grow(&mut self) -> Result<(), Divergence> {
+    fn grow(&mut self, before: &Motion) -> Result<(), Divergence> {
         loop {
-            self.enlarge()?;
+            self.enlarge(before)?;
             let done = self.data.step1();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
@@ -219,7 +235,7 @@ impl Env {
     }
 
     /// Replaces the data by one with doubled buffers, in the state before the step.
-    fn enlarge(&mut self) -> Result<(), Divergence> {
+    fn enlarge(&mut self, before: &Motion) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().doubled();
         if self.data.bytes() > LARGEST_ENVIRONMENT {
             return Err(Divergence::BuffersExhausted(buffers));
@@ -228,18 +244,18 @@ impl Env {
         let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
         self.inputs.save(&self.data);
         self.inputs.restore(&mut larger);
-        self.before.restore(&mut larger);
+        before.restore(&mut larger);
         self.data = larger;
         self.growths += 1;
         Ok(())
     }
 
-    fn quarantine(&mut self, reason: Divergence) {
+    fn quarantine(&mut self, before: &Motion, reason: Divergence) {
         self.status = EnvStatus::Diverged { step: self.steps, reason };
         self.inputs.save(&self.data);
         self.data.reset();
         self.inputs.restore(&mut self.data);
-        self.before.restore(&mut self.data);
+        before.restore(&mut self.data);
         // The last good state had a forward pass before; it may only fail where `before` itself is bad (a state that a
         // user wrote), and then its derived quantities stay those of the initial state.
         let _ = self.data.step1();
