@@ -8,6 +8,7 @@
 
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, Warning, WarningCounts};
+use std::cell::Cell;
 use std::sync::Arc;
 
 /// Whether an environment is being stepped.
@@ -61,10 +62,6 @@ pub struct Env {
     /// The present state as it was before its forward pass, to go back to. The pass of 2.2.2 normalises quaternions in
     /// place, and a second one would change their last bits.
     state: Motion,
-    /// The state that a step leads to, before its forward pass.
-    next: Motion,
-    /// The drives' efforts in the step before the running one.
-    effort_before: Vec<f64>,
     /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
     inputs: Inputs,
 }
@@ -85,8 +82,6 @@ impl Env {
             warnings: WarningCounts::default(),
             growths: 0,
             state: Motion::default(),
-            next: Motion::default(),
-            effort_before: Vec::new(),
             inputs: Inputs::default(),
         };
         let initial = env.saved();
@@ -185,33 +180,37 @@ impl Env {
     }
 
     fn step_once(&mut self) {
-        self.effort_before.clone_from(&self.drives.effort);
+        let mut end = END.take();
+        self.step_to(&mut end);
+        END.set(end);
+    }
+
+    fn step_to(&mut self, end: &mut End) {
         loop {
-            let done = self.attempt();
+            let done = self.attempt(end);
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
                     self.warnings.add(&raised);
-                    std::mem::swap(&mut self.state, &mut self.next);
+                    self.state.copy_from(&end.state);
+                    self.drives.effort.clone_from(&end.efforts);
                     self.steps += 1;
                     return;
                 }
                 Verdict::NeedsRoom(what) => {
                     if let Err(reason) = self.grow(what) {
-                        self.drives.effort.clone_from(&self.effort_before);
                         return self.quarantine(reason);
                     }
                 }
                 Verdict::Bad(reason) => {
                     self.warnings.add(&raised);
-                    self.drives.effort.clone_from(&self.effort_before);
                     return self.quarantine(reason);
                 }
             }
         }
     }
 
-    fn attempt(&mut self) -> Result<(), EngineError> {
+    fn attempt(&mut self, end: &mut End) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
         if self.data.model().integrator() == mj::mjINT_RK4 {
             // mj_step2 would integrate with Euler, whatever the model says.
@@ -220,8 +219,8 @@ impl Env {
             self.data.step2()?;
         }
         // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
-        self.drives.read_efforts(&self.data);
-        self.next.save(&self.data);
+        self.drives.read_efforts(&self.data, &mut end.efforts);
+        end.state.save(&self.data);
         self.data.step1()
     }
 
@@ -307,6 +306,20 @@ pub(crate) struct History {
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
+}
+
+/// What a step leads to, kept only where the step is good.
+#[derive(Default)]
+struct End {
+    /// The new state before its forward pass.
+    state: Motion,
+    /// Efforts of the drives in the step.
+    efforts: Vec<f64>,
+}
+
+thread_local! {
+    /// One per thread, not per environment: a thousand of them would not stay in the cache.
+    static END: Cell<End> = const { Cell::new(End { state: Motion::EMPTY, efforts: Vec::new() }) };
 }
 
 enum Verdict {

@@ -113,14 +113,13 @@ impl DriveState {
         }
     }
 
-    /// After `mj_step2`: reads the effort every drive gave.
-    pub fn read_efforts(&mut self, data: &mj::Data) {
-        for (i, drive) in self.table.drives.iter().enumerate() {
-            self.effort[i] = match drive.realization {
-                Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
-                Realization::Actuator => data.actuator_force()[drive.ctrl],
-            };
-        }
+    /// After `mj_step2`: the effort every drive gave.
+    pub(crate) fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
+        efforts.clear();
+        efforts.extend(self.table.drives.iter().enumerate().map(|(i, drive)| match drive.realization {
+            Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
+            Realization::Actuator => data.actuator_force()[drive.ctrl],
+        }));
     }
 }
 
