@@ -57,19 +57,19 @@ fn press(world: &World, mut outside: impl FnMut(&mj::Data) -> f64) -> (f64, f64,
     let (model, mut drives) = world.sim.batch().read(0, |env| (env.data().model().clone(), env.drives.clone()));
     drives.position.fill(AIM);
     let mut data = mj::Data::new(&model).unwrap();
-    let (mut sum, mut count) = (0.0, 0);
+    let (mut sum, mut count, mut efforts) = (0.0, 0, Vec::new());
     for k in 0..100 {
         data.step1().unwrap();
         drives.applied[0] = outside(&data);
         drives.apply(&mut data);
         data.step2().unwrap();
-        drives.read_efforts(&data);
+        drives.read_efforts(&data, &mut efforts);
         if k >= 80 {
             sum += (0..data.contact().len()).map(|i| data.contact_force(i)[0]).sum::<f64>();
             count += 1;
         }
     }
-    let effort = drives.effort.first().copied().unwrap_or(0.0);
+    let effort = efforts.first().copied().unwrap_or(0.0);
     (sum / f64::from(count), data.qpos()[0], data.qvel()[0], effort)
 }
 

@@ -114,7 +114,7 @@ impl DriveState {
     }
 
     /// After `mj_step2`: the effort every drive gave.
-    pub(crate) fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
+    pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table.drives.iter().enumerate().map(|(i, drive)| match drive.realization {
             Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
