@@ -115,8 +115,7 @@ fn export_meshes(robots: &[Arc<RobotData>], mjcf: &mut Mjcf, dir: &Path) -> Resu
                     continue;
                 };
                 let mesh = mesh.scaled((*scale).into());
-                let stem = unique_name(path, &mut names);
-                let parts = export_parts(&mesh, &stem, mjcf, &mut textures, dir)?;
+                let parts = export_parts(&mesh, &plain_name(path), &mut names, mjcf, &mut textures, dir)?;
                 assets.parts.insert(key, parts);
             }
         }
@@ -129,6 +128,7 @@ type TextureKey = Vec<u8>;
 fn export_parts(
     mesh: &TriMesh,
     stem: &str,
+    names: &mut BTreeSet<String>,
     mjcf: &mut Mjcf,
     textures: &mut BTreeMap<TextureKey, String>,
     dir: &Path,
@@ -140,6 +140,7 @@ fn export_parts(
             continue;
         }
         let name = if mesh.parts.len() == 1 { stem.to_string() } else { format!("{stem}_{i}") };
+        let name = unique_name(&name, names);
         let file = format!("meshes/{name}.obj");
         let path = dir.join(&file);
         let out = BufWriter::new(std::fs::File::create(&path).map_err(at(&path))?);
@@ -196,11 +197,15 @@ fn export_texture(
     Ok(Some(texture))
 }
 
-/// A lower-case name of letters, digits and underscores that no other mesh has.
-fn unique_name(path: &Path, names: &mut BTreeSet<String>) -> String {
+/// The name of a file in lower-case letters, digits and underscores.
+fn plain_name(path: &Path) -> String {
     let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let plain: String = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    let mut name = plain.clone();
+    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+/// A name that no other mesh file of the export has.
+fn unique_name(plain: &str, names: &mut BTreeSet<String>) -> String {
+    let mut name = plain.to_owned();
     let mut count = 1;
     while !names.insert(name.clone()) {
         count += 1;
