@@ -132,7 +132,11 @@ impl SimulationManagerCfg {
             return fail("physics_dt", &self.physics_dt, "physics_dt / substeps must be at least 1e-9 seconds");
         }
         if !self.gravity.iter().all(|g| g.is_finite()) {
-            return fail("gravity", &format!("{:?}", self.gravity.as_slice()), "it must be finite, such as (0, 0, -9.81)");
+            return fail(
+                "gravity",
+                &format!("{:?}", self.gravity.as_slice()),
+                "it must be finite, such as (0, 0, -9.81)",
+            );
         }
         if !positive(self.impratio) {
             return fail("impratio", &self.impratio, "it must be above 0");
@@ -158,7 +162,11 @@ impl SimulationManagerCfg {
         }
         for light in &self.lights {
             if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
-                return fail("lights.direction", &format!("{:?}", light.direction.as_slice()), "it must be a finite vector other than zero");
+                return fail(
+                    "lights.direction",
+                    &format!("{:?}", light.direction.as_slice()),
+                    "it must be a finite vector other than zero",
+                );
             }
             if !light.color.iter().all(|c| (0.0..=1.0).contains(c)) {
                 return fail("lights.color", &format!("{:?}", light.color), "each component must be 0 to 1");

@@ -37,7 +37,8 @@ fn a_robot_in_motion_is_bit_equal_after_another_was_added() {
     let arm = sim.add_robot(arm_and_hand()).unwrap();
     let legs = sim.add_robot(free_robot(dir.path(), "walker", &walker(), 0.4)).unwrap();
     for robot in [arm, legs] {
-        let targets = Array2::from_shape_fn((n, sim.robot(robot).dof()), |(e, j)| 0.2 + 0.1 * e as f64 + 0.01 * j as f64);
+        let targets =
+            Array2::from_shape_fn((n, sim.robot(robot).dof()), |(e, j)| 0.2 + 0.1 * e as f64 + 0.01 * j as f64);
         sim.robot_mut(robot).set_qpos(&targets, None, None).unwrap();
     }
     for steps in [37, 120, 3] {

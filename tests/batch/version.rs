@@ -80,8 +80,7 @@ fn a_library_of_another_version_is_a_clear_error() {
             eprintln!("skipped: this needs readelf and cc");
             return;
         }
-        let output =
-            run("version::scenario_start", dir.path(), &[("LD_LIBRARY_PATH", dir.path().to_str().unwrap())]);
+        let output = run("version::scenario_start", dir.path(), &[("LD_LIBRARY_PATH", dir.path().to_str().unwrap())]);
         let (out, err) = (text(&output.stdout), text(&output.stderr));
         assert!(output.status.success(), "{:?}: {out}\n{err}", output.status);
         for expected in [

@@ -32,13 +32,25 @@ fn rows() -> Vec<(String, String)> {
         ("inertia of nothing", hinge_with(&mass("1", "0"), LIMIT)),
         ("no mass", hinge_with("", LIMIT)),
         ("mass 0", hinge_with(&mass("0", "0"), LIMIT)),
-        ("limits 1e308", hinge_with(INERTIAL, r#"<limit lower="-1e308" upper="1e308" effort="1e308" velocity="1e308"/>"#)),
+        (
+            "limits 1e308",
+            hinge_with(INERTIAL, r#"<limit lower="-1e308" upper="1e308" effort="1e308" velocity="1e308"/>"#),
+        ),
         ("effort 1e-308", hinge_with(INERTIAL, r#"<limit lower="-1" upper="1" effort="1e-308" velocity="1"/>"#)),
         ("limits equal", hinge_with(INERTIAL, r#"<limit lower="0.5" upper="0.5" effort="10" velocity="1"/>"#)),
-        ("limits nearly equal", hinge_with(INERTIAL, r#"<limit lower="0.5" upper="0.50000000000000011" effort="10" velocity="1"/>"#)),
-        ("limits in the wrong order", hinge_with(INERTIAL, r#"<limit lower="1" upper="-1" effort="10" velocity="1"/>"#)),
+        (
+            "limits nearly equal",
+            hinge_with(INERTIAL, r#"<limit lower="0.5" upper="0.50000000000000011" effort="10" velocity="1"/>"#),
+        ),
+        (
+            "limits in the wrong order",
+            hinge_with(INERTIAL, r#"<limit lower="1" upper="-1" effort="10" velocity="1"/>"#),
+        ),
         ("only a lower limit, above 0", hinge_with(INERTIAL, r#"<limit lower="1" effort="10" velocity="1"/>"#)),
-        ("efforts of nothing, actuator", hinge_with(INERTIAL, r#"<limit lower="-1" upper="1" effort="1e-300" velocity="1"/>"#)),
+        (
+            "efforts of nothing, actuator",
+            hinge_with(INERTIAL, r#"<limit lower="-1" upper="1" effort="1e-300" velocity="1"/>"#),
+        ),
         ("only an upper limit, below 0", hinge_with(INERTIAL, r#"<limit upper="-1" effort="10" velocity="1"/>"#)),
         ("only a lower limit", hinge_with(INERTIAL, r#"<limit lower="-1" effort="10" velocity="1"/>"#)),
         ("damping 1e300", hinge_with(INERTIAL, &format!("{LIMIT}<dynamics damping=\"1e300\" friction=\"1e300\"/>"))),
@@ -47,7 +59,12 @@ fn rows() -> Vec<(String, String)> {
         ("one link of nothing", "<robot name=\"r\"><link name=\"l\"/></robot>".into()),
         (
             "only fixed joints",
-            format!("<robot name=\"r\">{}{}{}</robot>", links(&["a", "b", "c"]), joint("fixed", "a", "b", ""), joint("fixed", "b", "c", "")),
+            format!(
+                "<robot name=\"r\">{}{}{}</robot>",
+                links(&["a", "b", "c"]),
+                joint("fixed", "a", "b", ""),
+                joint("fixed", "b", "c", "")
+            ),
         ),
         (
             "tiny and huge shapes",
@@ -73,12 +90,19 @@ fn rows() -> Vec<(String, String)> {
             )
         )
     };
-    for (multiplier, offset) in [("0", "0"), ("0", "5"), ("1e308", "0"), ("1e-308", "1e308"), ("-1e-320", "3"), ("-1", "1e300")] {
+    for (multiplier, offset) in
+        [("0", "0"), ("0", "5"), ("1e308", "0"), ("1e-308", "1e308"), ("-1e-320", "3"), ("-1", "1e300")]
+    {
         rows.push(("mimic", mimic(multiplier, offset)));
     }
     for kind in ["planar", "floating"] {
         // In the middle, at the root, at the end, twice in a row.
-        for joints in [["revolute", kind, "revolute"], [kind, "revolute", "prismatic"], ["fixed", "continuous", kind], [kind, kind, kind]] {
+        for joints in [
+            ["revolute", kind, "revolute"],
+            [kind, "revolute", "prismatic"],
+            ["fixed", "continuous", kind],
+            [kind, kind, kind],
+        ] {
             let limit = |k: &str| if ["revolute", "prismatic"].contains(&k) { LIMIT } else { "" };
             let [a, b, c] = joints;
             rows.push((

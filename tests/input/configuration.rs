@@ -80,7 +80,8 @@ const ACCEPTED: &[Change] = &[
 #[test]
 fn extreme_numbers_work_or_are_reported() {
     let dir = tempfile::tempdir().unwrap();
-    let link = format!("{}<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>", super::support::INERTIAL);
+    let link =
+        format!("{}<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>", super::support::INERTIAL);
     let urdf = format!("<robot name=\"ball\"><link name=\"ball\">{link}</link></robot>");
     for (i, change) in ACCEPTED.iter().enumerate() {
         let mut cfg = cfg(3);

@@ -31,7 +31,8 @@ fn two_links(dir: &Path, uid: &str, first: &str, second: &str) -> RobotCfg {
              <dynamics damping=\"0.1\" friction=\"0.1\"/></joint>"
         )
     };
-    let urdf = format!("<robot name=\"{}\"><link name=\"root\"/>{}{}</robot>", escaped(first), link(first), link(second));
+    let urdf =
+        format!("<robot name=\"{}\"><link name=\"root\"/>{}{}</robot>", escaped(first), link(first), link(second));
     RobotCfg { self_collision: true, ..robot(dir, uid, &urdf) }
 }
 
@@ -101,7 +102,8 @@ fn names_of_any_kind_work() {
 fn names_that_the_document_makes_up_do_not_clash() {
     let dir = tempfile::tempdir().unwrap();
     for kind in ["planar", "floating"] {
-        let mut urdf = format!("<robot name=\"r\"><link name=\"root\">{INERTIAL}</link><link name=\"m\">{INERTIAL}</link>");
+        let mut urdf =
+            format!("<robot name=\"r\"><link name=\"root\">{INERTIAL}</link><link name=\"m\">{INERTIAL}</link>");
         urdf += "<joint name=\"m\" type=\"continuous\"><parent link=\"root\"/><child link=\"m\"/></joint>";
         for (name, kind) in [("x", kind), ("x.x", "continuous"), ("x.yaw", "continuous"), ("x.ball", "continuous")] {
             urdf += &format!(

@@ -24,8 +24,7 @@ fn text(urdf: String) -> Box<dyn Fn(&Path) -> RobotCfg> {
 fn mesh(file: &'static str, content: Vec<u8>) -> Box<dyn Fn(&Path) -> RobotCfg> {
     Box::new(move |dir| {
         std::fs::write(dir.join(file), &content).unwrap();
-        let collision =
-            format!("{INERTIAL}<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>");
+        let collision = format!("{INERTIAL}<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>");
         robot(dir, "new", &hinge_with(&collision, "<limit effort=\"1\" velocity=\"1\"/>"))
     })
 }
@@ -222,7 +221,11 @@ fn a_refused_robot_leaves_the_simulation_as_it_was() {
                 assert!(message.len() < 4000, "{what}: {} characters", message.len());
             }
         }
-        assert_eq!(before, (bits(&sim), sim.mjcf().to_owned(), sim.diagnostics().len(), sim.warning_counts()), "{what}");
+        assert_eq!(
+            before,
+            (bits(&sim), sim.mjcf().to_owned(), sim.diagnostics().len(), sim.warning_counts()),
+            "{what}"
+        );
         sim.update(2);
         calm.update(2);
         assert_eq!(bits(&sim), bits(&calm), "{what}: the simulation goes on");
@@ -269,7 +272,8 @@ fn thirty_robots_are_the_most() {
 #[test]
 fn a_chain_as_deep_as_allowed_works() {
     let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(SimulationManagerCfg { gravity: nalgebra::Vector3::zeros(), ..cfg(1) }).unwrap();
+    let mut sim =
+        SimulationManager::new(SimulationManagerCfg { gravity: nalgebra::Vector3::zeros(), ..cfg(1) }).unwrap();
     let id = sim.add_robot(robot(dir.path(), "chain", &chain(kinetoscope::sim::mjcf::robot::MAX_BODY_DEPTH))).unwrap();
     sim.update(2);
     assert_eq!(sim.robot(id).dof(), kinetoscope::sim::mjcf::robot::MAX_BODY_DEPTH - 1);

@@ -24,11 +24,7 @@ fn star(arms: usize, spheres: usize) -> String {
 }
 
 fn overlaps(sim: &SimulationManager) -> Vec<String> {
-    sim.diagnostics()
-        .iter()
-        .filter(|d| d.kind == DiagnosticKind::InitialOverlap)
-        .map(|d| d.message.clone())
-        .collect()
+    sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::InitialOverlap).map(|d| d.message.clone()).collect()
 }
 
 #[test]

@@ -195,7 +195,8 @@ impl Emitter<'_, '_> {
     /// Links depth first from the root, a body for each that moves.
     fn bodies(&mut self) -> Result<(), EmitError> {
         let root = self.description.root;
-        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.unused("base"), None)] };
+        let root_joints =
+            if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.unused("base"), None)] };
         let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
         self.place(root, body, Pose::identity());
         let mut stack: Vec<JointId> = self.description.link(root).child_joints.iter().rev().copied().collect();
