@@ -186,7 +186,7 @@ impl Env {
             match judge(done, &raised) {
                 Verdict::Good => {
                     self.warnings.add(&raised);
-                    self.drives.read_efforts(&self.data);
+                    self.drives.keep_efforts();
                     std::mem::swap(&mut self.state, &mut self.next);
                     self.steps += 1;
                     return;
@@ -207,6 +207,8 @@ impl Env {
     fn attempt(&mut self) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
         self.data.step2()?;
+        // Before step1 makes new rows: on 4.x it puts them where the forces were.
+        self.drives.read_efforts(&self.data);
         self.next.save(&self.data);
         self.data.step1()
     }

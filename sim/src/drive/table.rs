@@ -65,6 +65,8 @@ pub struct DriveState {
     pub feedforward: Vec<f64>,
     /// Effort each drive gave in the last step \[N m or N\].
     pub effort: Vec<f64>,
+    /// Effort each drive gives in the running step, which may yet be undone.
+    running_effort: Vec<f64>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Vec<f64>,
 }
@@ -80,6 +82,7 @@ impl DriveState {
             velocity: vec![0.0; n],
             feedforward: vec![0.0; n],
             effort: vec![0.0; n],
+            running_effort: vec![0.0; n],
             applied: vec![0.0; model.nv()],
         }
     }
@@ -116,10 +119,15 @@ impl DriveState {
         }
     }
 
-    /// After `mj_step2`: reads the effort every drive gave.
+    /// The step is done: its efforts are those of the last step.
+    pub fn keep_efforts(&mut self) {
+        std::mem::swap(&mut self.effort, &mut self.running_effort);
+    }
+
+    /// Right after `mj_step2`: reads the effort every drive gave.
     pub fn read_efforts(&mut self, data: &mj::Data) {
         for (i, drive) in self.table.drives.iter().enumerate() {
-            self.effort[i] = match drive.realization {
+            self.running_effort[i] = match drive.realization {
                 Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
                 Realization::Actuator => data.actuator_force()[drive.ctrl],
             };
