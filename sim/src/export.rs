@@ -99,6 +99,13 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
     if target == Target::V4 && limited && !followers && implicit.is_finite() {
         mjcf.comments.push(format!("While no drive saturates, up to {implicit:.3e} s."));
     }
+    // Whoever opens the file finds a robot that holds its start, however slowly its time passes.
+    let holds_up_to = if followers { explicit } else { implicit };
+    if mjcf.option.timestep > 0.9 * holds_up_to {
+        mjcf.comments
+            .push(format!("The time step is smaller than the simulation's {} s for that.", mjcf.option.timestep));
+        mjcf.option.timestep = two_digits(0.9 * holds_up_to);
+    }
     let (start, model) = (&simulation.start, simulation.batch.model());
     let mut qpos = model.qpos0().to_vec();
     for &(address, position) in &start.qpos {
@@ -118,6 +125,11 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
     if !qpos.is_empty() {
         mjcf.keyframes.push(Keyframe { name: "start".into(), qpos, ctrl });
     }
+}
+
+/// A number that reads well: two digits, at most 5 % off.
+fn two_digits(x: f64) -> f64 {
+    format!("{x:.1e}").parse().unwrap_or(x)
 }
 
 /// Writes every visual mesh once, one file per material, and declares them in `mjcf`.

@@ -5,6 +5,7 @@
 mod carry_over;
 mod child;
 mod determinism;
+mod efforts;
 mod engine_errors;
 mod growth;
 mod leaks;

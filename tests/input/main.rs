@@ -4,6 +4,7 @@
 
 mod accepted;
 mod configuration;
+mod located;
 mod names;
 mod refused;
 mod self_collision;

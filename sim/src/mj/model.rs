@@ -177,6 +177,16 @@ impl Model {
         self.header().ngeom as usize
     }
 
+    /// Number of meshes.
+    pub fn nmesh(&self) -> usize {
+        self.header().nmesh as usize
+    }
+
+    /// Number of textures.
+    pub fn ntex(&self) -> usize {
+        self.header().ntex as usize
+    }
+
     /// Number of tendons.
     pub fn ntendon(&self) -> usize {
         self.header().ntendon as usize

@@ -237,6 +237,8 @@ pub enum GeomRole {
         contype: i32,
         /// MuJoCo's `conaffinity`.
         conaffinity: i32,
+        /// It is seen as well: the ground, objects. Collision shapes of robots stand behind their visuals.
+        seen: bool,
     },
     /// Is only seen.
     Visual,

@@ -12,13 +12,14 @@ const ALL_BITS: i32 = i32::MAX;
 pub const MAX_ROBOTS: usize = 30;
 
 /// Contact bits of the ground and of objects: they collide with everything.
-pub const WORLD_CONTACT: GeomRole = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS };
+pub const WORLD_CONTACT: GeomRole = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: true };
 
 /// Contact bits of robot number `index`: it collides with the world and with other robots, and with itself where
 /// `self_collision`.
 pub fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
     let bit = 1 << (index + 1).min(MAX_ROBOTS);
-    GeomRole::Collision { contype: bit, conaffinity: if self_collision { ALL_BITS } else { ALL_BITS & !bit } }
+    let conaffinity = if self_collision { ALL_BITS } else { ALL_BITS & !bit };
+    GeomRole::Collision { contype: bit, conaffinity, seen: false }
 }
 
 /// Adds a ground plane at z = 0 \[m\].

@@ -361,9 +361,11 @@ impl Writer {
         };
         element = element.pose(&geom.pose);
         element = match geom.role {
-            GeomRole::Collision { contype, conaffinity } => {
-                element.attr("contype", contype).attr("conaffinity", conaffinity).attr("group", 3)
-            }
+            // MuJoCo's viewers show groups 0 to 2.
+            GeomRole::Collision { contype, conaffinity, seen } => element
+                .attr("contype", contype)
+                .attr("conaffinity", conaffinity)
+                .attr("group", if seen { 0 } else { 3 }),
             GeomRole::Visual => element.attr("contype", 0).attr("conaffinity", 0).attr("group", 2),
         };
         element = element.opt("material", geom.material.as_ref());

@@ -1,0 +1,56 @@
+//! The MJCF of the bundled robots, for both lines of MuJoCo, as it is kept in `tests/data`.
+//!
+//! `KINETOSCOPE_BLESS=1` writes the files anew (`cargo xtask bless`).
+
+use super::robots::{bundled, bundled_hand, simulation};
+use kinetoscope::sim::mj::{TARGET, Target};
+use std::path::Path;
+
+/// Compares with `tests/data/<name>`; where they differ, writes what was found beside it.
+fn compare(name: &str, found: &str) -> Result<(), String> {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    if std::env::var_os("KINETOSCOPE_BLESS").is_some_and(|v| !v.is_empty() && v != "0") {
+        std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
+        std::fs::write(&golden, found).unwrap();
+        return Ok(());
+    }
+    let expected = std::fs::read_to_string(&golden).unwrap_or_default();
+    if expected == found {
+        return Ok(());
+    }
+    let actual = golden.with_extension("actual.xml");
+    std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
+    std::fs::write(&actual, found).unwrap();
+    let line = expected.lines().zip(found.lines()).position(|(a, b)| a != b);
+    let line = line.unwrap_or_else(|| expected.lines().count().min(found.lines().count()));
+    let nth = |text: &str| text.lines().nth(line).unwrap_or("(ends)").trim().to_owned();
+    Err(format!(
+        "tests/data/{name}, line {}:\n  golden: {}\n  found:  {}\nall of it is in {}; \
+         if it is right, run `cargo xtask bless`",
+        line + 1,
+        nth(&expected),
+        nth(found),
+        actual.display()
+    ))
+}
+
+#[test]
+fn golden_mjcf_of_the_bundled_robots() {
+    let mut wrong = Vec::new();
+    for cfg in [bundled(), bundled_hand()] {
+        let name = cfg.uid.clone();
+        let (sim, _) = simulation(cfg);
+        let dir = tempfile::tempdir().unwrap();
+        sim.dump(dir.path()).unwrap();
+        let run = match TARGET {
+            Target::V2 => "run2",
+            Target::V4 => "run4",
+        };
+        // The exports are written for both lines by every build; what runs is written for its own.
+        for (file, golden) in [("robot.mjcf2.xml", "mjcf2"), ("robot.mjcf4.xml", "mjcf4"), ("run.mjcf.xml", run)] {
+            let text = std::fs::read_to_string(dir.path().join(file)).unwrap();
+            wrong.extend(compare(&format!("{name}.{golden}.xml"), &text).err());
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
