@@ -3,7 +3,6 @@
 use super::support::cfg;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{GroundCfg, LightCfg};
-use std::f64::{INFINITY, NAN};
 
 type Change = fn(&mut SimulationManagerCfg);
 
@@ -14,8 +13,8 @@ const REFUSED: &[(Change, &[&str])] = &[
     (|c| c.num_envs = usize::MAX, &["num_envs is", "at most"]),
     (|c| c.physics_dt = 0.0, &["physics_dt is 0", "above 0"]),
     (|c| c.physics_dt = -0.01, &["physics_dt is -0.01"]),
-    (|c| c.physics_dt = NAN, &["physics_dt is NaN"]),
-    (|c| c.physics_dt = INFINITY, &["physics_dt is inf"]),
+    (|c| c.physics_dt = f64::NAN, &["physics_dt is NaN"]),
+    (|c| c.physics_dt = f64::INFINITY, &["physics_dt is inf"]),
     (|c| c.physics_dt = 2.0, &["physics_dt is 2", "at most 1 second"]),
     (|c| c.physics_dt = 1e-300, &["physics_dt"]),
     (|c| (c.physics_dt, c.substeps) = (1e-6, 10_000), &["physics_dt / substeps"]),
@@ -23,22 +22,22 @@ const REFUSED: &[(Change, &[&str])] = &[
     (|c| c.substeps = u32::MAX, &["substeps is 4294967295"]),
     (|c| c.threads = Some(0), &["threads is 0", "1 to 1024", "every core"]),
     (|c| c.threads = Some(usize::MAX), &["threads is"]),
-    (|c| c.gravity.x = NAN, &["gravity is [NaN, 0.0, -9.81]"]),
-    (|c| c.gravity.z = -INFINITY, &["gravity"]),
+    (|c| c.gravity.x = f64::NAN, &["gravity is [NaN, 0.0, -9.81]"]),
+    (|c| c.gravity.z = f64::NEG_INFINITY, &["gravity"]),
     (|c| c.impratio = 0.0, &["impratio is 0"]),
-    (|c| c.impratio = NAN, &["impratio is NaN"]),
+    (|c| c.impratio = f64::NAN, &["impratio is NaN"]),
     (|c| c.solver_iterations = 0, &["solver_iterations is 0"]),
     (|c| c.solver_iterations = u32::MAX, &["solver_iterations"]),
     (|c| c.friction = [-1.0, 0.0, 0.0], &["friction"]),
-    (|c| c.friction[2] = NAN, &["friction"]),
+    (|c| c.friction[2] = f64::NAN, &["friction"]),
     (|c| c.arena_space = -1.0, &["arena_space is -1"]),
-    (|c| c.arena_space = NAN, &["arena_space is NaN"]),
+    (|c| c.arena_space = f64::NAN, &["arena_space is NaN"]),
     (|c| c.ground = Some(GroundCfg { half_size: 0.0 }), &["ground.half_size is 0"]),
-    (|c| c.ground = Some(GroundCfg { half_size: NAN }), &["ground.half_size is NaN"]),
+    (|c| c.ground = Some(GroundCfg { half_size: f64::NAN }), &["ground.half_size is NaN"]),
     (|c| c.lights[0].direction.fill(0.0), &["lights.direction"]),
-    (|c| c.lights[0].direction.x = NAN, &["lights.direction is [NaN, 0.4, -1.0]"]),
+    (|c| c.lights[0].direction.x = f64::NAN, &["lights.direction is [NaN, 0.4, -1.0]"]),
     (|c| c.lights[0].color[1] = 1.5, &["lights.color"]),
-    (|c| c.lights[0].color[1] = NAN, &["lights.color"]),
+    (|c| c.lights[0].color[1] = f64::NAN, &["lights.color"]),
 ];
 
 #[test]

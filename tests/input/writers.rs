@@ -3,7 +3,6 @@
 use super::support::{INERTIAL, bits, cfg, robot};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use std::f64::{INFINITY, NAN};
 
 fn three_joints(sim: &mut SimulationManager) -> RobotId {
     let dir = tempfile::tempdir().unwrap();
@@ -40,9 +39,9 @@ fn arrays_that_do_not_fit_are_refused_and_nothing_is_written() {
         (zeros((4, 1)), Some(&[usize::MAX]), None, &["joint 18446744073709551615"]),
         (zeros((1, 3)), None, Some(&[4]), &["environment 4 does not exist", "there are 4 (0 to 3)"]),
         (zeros((2, 3)), None, Some(&[0, usize::MAX]), &["environment 18446744073709551615"]),
-        (array![[0.5, NAN, 0.5]], None, None, &["[0, 1]", "\"j2\"", "NaN", "finite"]),
-        (array![[0.5, 0.5, INFINITY]], None, None, &["[0, 2]", "\"j3\"", "inf"]),
-        (array![[0.5], [-INFINITY]], Some(&[2]), Some(&[0, 3]), &["[1, 0]", "\"j3\"", "-inf"]),
+        (array![[0.5, f64::NAN, 0.5]], None, None, &["[0, 1]", "\"j2\"", "NaN", "finite"]),
+        (array![[0.5, 0.5, f64::INFINITY]], None, None, &["[0, 2]", "\"j3\"", "inf"]),
+        (array![[0.5], [f64::NEG_INFINITY]], Some(&[2]), Some(&[0, 3]), &["[1, 0]", "\"j3\"", "-inf"]),
     ];
     let before = bits(&sim);
     for (i, (values, joints, envs, expected)) in rows.iter().enumerate() {
