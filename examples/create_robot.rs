@@ -41,8 +41,8 @@ struct Args {
 
 /// Steps of one phase.
 const PHASE: u64 = 1000;
-/// Steps between looks at Ctrl+C and the progress bar.
-const BLOCK: u64 = 50;
+/// Environment steps between looks at Ctrl+C and the progress bar: a tenth of a second or so.
+const BLOCK: u64 = 4096;
 
 fn main() -> ExitCode {
     launcher::run("create_robot", || run(&Args::parse()))
@@ -64,7 +64,9 @@ fn run(args: &Args) -> launcher::Result {
         eprintln!("warning: {diagnostic}");
     }
     if let Some(dir) = &args.launcher.dump {
-        sim.dump(dir)?;
+        for left_out in sim.dump(dir)? {
+            eprintln!("warning: {left_out}");
+        }
         println!("Pipeline stages written to {}", dir.display());
     }
 
@@ -80,7 +82,8 @@ fn run(args: &Args) -> launcher::Result {
             let targets = phase.targets(sim.num_envs());
             sim.robot_mut(robot).set_qpos(&targets, Some(&phase.joints), None)?;
         }
-        let end = progress.end_of_block(step, BLOCK.min(PHASE - step % PHASE));
+        let block = (BLOCK / sim.num_envs() as u64).clamp(1, PHASE - step % PHASE);
+        let end = progress.end_of_block(step, block);
         sim.update((end - step) as u32);
         step = end;
         progress.advance(step);

@@ -1,4 +1,4 @@
-//! Kinetoscope: robots from URDF, thousands of MuJoCo environments, on any CPU.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 pub mod assets;

@@ -1,1 +1,112 @@
-fn main() {}
+//! Ours and the rivals, one after the other in one run: `kinetoscope-benches [NAME]... [--json FILE] [--seconds S]`.
+//!
+//! `cargo xtask bench` runs this on both lines of MuJoCo. A table goes to standard error, the rows as JSON to a file.
+
+mod drive;
+mod foreign;
+mod interleave;
+mod memory;
+mod models;
+mod mujoco_batch;
+mod row;
+mod startup;
+mod step;
+
+use clap::Parser;
+use row::Row;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// The list of benchmarks: name and function, in the order in which they run.
+const BENCHES: &[(&str, Bench)] = &[
+    ("step", step::run),
+    ("drive", drive::run),
+    ("mujoco-batch", mujoco_batch::run),
+    ("startup", startup::run),
+    ("memory", memory::run),
+];
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+type Bench = fn(&Settings) -> Outcome<Vec<Row>>;
+
+/// How long to measure.
+#[derive(Clone, Copy, Debug)]
+struct Settings {
+    /// Time for one comparison \[s\], setting up not counted.
+    seconds: f64,
+}
+
+/// Ours and the rivals in one run.
+#[derive(Debug, Parser)]
+#[command(name = "kinetoscope-benches")]
+struct Args {
+    /// Only these benchmarks: step, drive, mujoco-batch, startup, memory
+    names: Vec<String>,
+    /// Also write all rows, as JSON, to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Time for one comparison [s]
+    #[arg(long, default_value_t = 10.0)]
+    seconds: f64,
+    /// Build one side of the memory benchmark and print the memory of this process
+    #[arg(long, hide = true, num_args = 3, value_names = ["SIDE", "CASE", "ENVS"])]
+    memory_of: Option<Vec<String>>,
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("kinetoscope-benches: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Outcome<()> {
+    if let Some(child) = &args.memory_of {
+        return memory::child(child);
+    }
+    let known: Vec<&str> = BENCHES.iter().map(|(name, _)| *name).collect();
+    if let Some(name) = args.names.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(format!("no benchmark {name:?}; known are {}", known.join(", ")).into());
+    }
+    if !(args.seconds.is_finite() && args.seconds > 0.0) {
+        return Err(format!("--seconds {}: it must be above 0", args.seconds).into());
+    }
+    let settings = Settings { seconds: args.seconds };
+    let mut rows = Vec::new();
+    for (name, bench) in BENCHES {
+        if args.names.is_empty() || args.names.iter().any(|wanted| wanted == name) {
+            eprintln!("{name} ...");
+            rows.extend(bench(&settings)?);
+        }
+    }
+    eprint!("\n{}", row::table(&rows));
+    if let Some(path) = &args.json {
+        let text = serde_json::to_string_pretty(&rows)? + "\n";
+        std::fs::write(path, text).map_err(|e| format!("--json {}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent_and_names_every_benchmark() {
+        Args::command().debug_assert();
+        let help = Args::command().render_help().to_string();
+        for (name, _) in BENCHES {
+            assert!(help.contains(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_an_error_that_lists_the_known_ones() {
+        let error = run(&Args::parse_from(["x", "setp"])).map_err(|e| e.to_string()).err().unwrap_or_default();
+        assert!(error.contains("setp") && error.contains("startup"), "{error}");
+    }
+}

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Errors end an example with a message and exit code 2.
 pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -146,9 +146,12 @@ impl Progress {
     pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
-        // A second Ctrl+C ends the program at once, should the report hang on a slow disk.
+        // A second Ctrl+C ends the program at once, should the report hang on a slow disk. Some programs that send the
+        // signal send it twice, to the process and to its group: that is one Ctrl+C.
+        let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::SeqCst) {
+            flag.store(true, Ordering::SeqCst);
+            if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }
         });

@@ -1,17 +1,20 @@
 //! N environments on worker threads: the same bits for any number of threads and environments.
 //!
-//! Environments are grouped in chunks; workers take chunks from a counter. Which thread steps an environment decides
-//! nothing, since environments share only the immutable model.
+//! Environments are grouped in chunks. Every thread has a share of the chunks: it takes those first, so that an environment
+//! mostly stays in the cache of one core, and then helps with what is left of the other shares. Which thread steps an
+//! environment decides nothing, since environments share only the immutable model.
 
 use crate::drive::table::DriveTable;
 use crate::env::Env;
 use crate::mj::{EngineError, Model};
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
+/// Work on one environment, given its index.
+pub type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
 
 /// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
 const SPINS_BEFORE_SLEEP: u32 = 20_000;
@@ -52,8 +55,8 @@ pub struct Batch {
 struct Shared {
     chunks: Vec<Mutex<Vec<Env>>>,
     chunk_size: usize,
-    /// The next chunk to take.
-    next: AtomicUsize,
+    /// One share of the chunks for each thread.
+    shares: Vec<Share>,
     /// Workers that have finished the current job.
     finished: AtomicUsize,
     /// Counts jobs; a worker waits for the next number.
@@ -61,6 +64,14 @@ struct Shared {
     job: Mutex<JobSlot>,
     wake: Condvar,
     panicked: AtomicBool,
+}
+
+/// A range of chunks. Each is alone in its cache lines: threads count up their own without slowing down each other.
+#[repr(align(128))]
+struct Share {
+    /// The next chunk to take.
+    next: AtomicUsize,
+    chunks: Range<usize>,
 }
 
 impl std::fmt::Debug for Shared {
@@ -93,9 +104,9 @@ impl Batch {
         if threads == 0 {
             return Err(BatchError::NoThreads);
         }
-        // Several chunks per thread even out environments that take longer; more than 16 environments in one gain
-        // nothing.
-        let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 16);
+        // Several chunks per thread even out environments that take longer. Threads wait for the last chunk of a step: more
+        // than 4 environments in one gain nothing.
+        let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
         let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
         for first in (0..num_envs).step_by(chunk_size) {
             let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
@@ -103,27 +114,30 @@ impl Batch {
                 .collect();
             chunks.push(Mutex::new(chunk?));
         }
-        let helpers = (threads - 1).min(chunks.len().saturating_sub(1));
+        let count = chunks.len();
+        let threads = threads.min(count);
+        let share = |t: usize| t * count / threads..(t + 1) * count / threads;
         let shared = Arc::new(Shared {
             chunks,
             chunk_size,
-            next: AtomicUsize::new(0),
+            shares: (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect(),
             finished: AtomicUsize::new(0),
             epoch: AtomicU64::new(0),
             job: Mutex::default(),
             wake: Condvar::new(),
             panicked: AtomicBool::new(false),
         });
-        let workers = (0..helpers)
-            .map(|i| {
-                let shared = Arc::clone(&shared);
-                std::thread::Builder::new()
-                    .name(format!("kinetoscope-{i}"))
-                    .spawn(move || work(&shared))
-                    .map_err(|e| BatchError::Thread(e.to_string()))
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { shared, workers, model: model.clone(), num_envs })
+        // Made before its workers: should one not start, dropping it ends those that did.
+        let mut batch = Self { shared, workers: Vec::with_capacity(threads - 1), model: model.clone(), num_envs };
+        for thread in 1..threads {
+            let shared = Arc::clone(&batch.shared);
+            let worker = std::thread::Builder::new()
+                .name(format!("kinetoscope-{thread}"))
+                .spawn(move || work(&shared, thread))
+                .map_err(|e| BatchError::Thread(e.to_string()))?;
+            batch.workers.push(worker);
+        }
+        Ok(batch)
     }
 
     /// The model all environments were made from.
@@ -150,9 +164,11 @@ impl Batch {
     ///
     /// # Panics
     /// `job` panicked.
-    pub fn run(&mut self, job: Arc<dyn Fn(usize, &mut Env) + Send + Sync>) {
+    pub fn run(&mut self, job: Job) {
         let shared = &*self.shared;
-        shared.next.store(0, Ordering::Relaxed);
+        for share in &shared.shares {
+            share.next.store(share.chunks.start, Ordering::Relaxed);
+        }
         shared.finished.store(0, Ordering::Relaxed);
         if !self.workers.is_empty() {
             let mut slot = lock(&shared.job);
@@ -162,16 +178,20 @@ impl Batch {
             drop(slot);
             shared.wake.notify_all();
         }
-        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(&*job)));
+        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &*job)));
         let mut spins = 0_u32;
         while shared.finished.load(Ordering::Acquire) < self.workers.len() {
             spins += 1;
             if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
+        if !self.workers.is_empty() {
+            lock(&shared.job).job = None;
+        }
+        let theirs = shared.panicked.swap(false, Ordering::Relaxed);
         if let Err(panic) = mine {
             resume_unwind(panic);
         }
-        assert!(!shared.panicked.swap(false, Ordering::Relaxed), "a batch job panicked on a worker thread");
+        assert!(!theirs, "a batch job panicked on a worker thread");
     }
 
     /// Reads environment `index`.
@@ -207,12 +227,18 @@ impl Batch {
 }
 
 impl Shared {
-    fn take_chunks(&self, job: &(dyn Fn(usize, &mut Env) + Send + Sync)) {
-        loop {
-            let c = self.next.fetch_add(1, Ordering::Relaxed);
-            let Some(chunk) = self.chunks.get(c) else { return };
-            for (i, env) in lock(chunk).iter_mut().enumerate() {
-                job(c * self.chunk_size + i, env);
+    /// Does the share of `thread`, then what is left of the shares after it.
+    fn take_chunks(&self, thread: usize, job: &(dyn Fn(usize, &mut Env) + Send + Sync)) {
+        let (before, from) = self.shares.split_at(thread);
+        for share in from.iter().chain(before) {
+            loop {
+                let c = share.next.fetch_add(1, Ordering::Relaxed);
+                if c >= share.chunks.end {
+                    break;
+                }
+                for (i, env) in lock(&self.chunks[c]).iter_mut().enumerate() {
+                    job(c * self.chunk_size + i, env);
+                }
             }
         }
     }
@@ -233,11 +259,11 @@ impl Shared {
     }
 }
 
-fn work(shared: &Shared) {
+fn work(shared: &Shared, thread: usize) {
     let mut seen = 0;
     while let Some((epoch, job)) = shared.wait_for_job(seen) {
         seen = epoch;
-        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(&*job))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(thread, &*job))).is_err() {
             shared.panicked.store(true, Ordering::Relaxed);
         }
         drop(job);

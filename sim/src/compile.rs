@@ -150,7 +150,7 @@ fn set_up_drives(
     let mut indices = Vec::new();
     let mut start = Start::default();
     let mut row_drives: Vec<(usize, usize)> = Vec::new();
-    let (mut row_actuators, mut native_actuators, mut damped) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut row_actuators, mut native_actuators) = (Vec::new(), Vec::new());
     for (data, layout) in robots.iter().zip(layouts) {
         let implicit = data.cfg().drive.model == DriveModel::Implicit;
         let mut joints = Vec::new();
@@ -158,9 +158,6 @@ fn set_up_drives(
             let name = format!("{}/{}", data.uid(), data.description().joint(plan.joint).name);
             let (qpos, dof) = compiled.joint_address(&name).ok_or_else(|| missing("joint", &name))?;
             start.qpos.push((qpos, plan.initial));
-            if implicit {
-                damped.push(dof);
-            }
             let mut drive = None;
             if let Some(actuator) = plan.actuator {
                 let ctrl = compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing("actuator", &name))?;
@@ -178,6 +175,10 @@ fn set_up_drives(
             }
             joints.push(JointIndexing { qpos, dof, drive });
         }
+        for damped in &layout.damped {
+            let (_, dof) = compiled.joint_address(&damped.joint).ok_or_else(|| missing("joint", &damped.joint))?;
+            table.damped.extend((dof..dof + damped.dofs).map(|dof| (dof, damped.damping)));
+        }
         let links = layout
             .links
             .iter()
@@ -189,7 +190,7 @@ fn set_up_drives(
         indices.push(RobotIndex { joints, links });
     }
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
-    table.damped = implicit::prepare(&mut compiled, &dofs, &row_actuators, &damped);
+    implicit::prepare(&mut compiled, &dofs, &row_actuators);
     compiled.unlimit_controls(&native_actuators);
     compiled.prepare_for_stepping(!row_drives.is_empty());
     let model = compiled.into_model();
@@ -230,6 +231,11 @@ impl Built {
 }
 
 impl Simulation {
+    /// The control input of a drive.
+    pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
+        self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
+    }
+
     /// Puts the chosen environments in the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = Arc::clone(&self.start);

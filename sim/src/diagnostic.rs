@@ -38,6 +38,8 @@ pub enum DiagnosticKind {
     InitialOverlap,
     /// The initial position was outside the joint's limits and was moved to the nearest one.
     InitialPositionClamped,
+    /// A position was given for a joint that follows another one elsewhere.
+    MimicPositionIgnored,
     /// A unit axis was expected; the axis was normalised.
     AxisNormalized,
     /// A colour was outside 0..1 and was clamped.
@@ -63,6 +65,7 @@ impl DiagnosticKind {
             Self::ActuatorUnstable => "actuator-unstable",
             Self::InitialOverlap => "initial-overlap",
             Self::InitialPositionClamped => "initial-position-clamped",
+            Self::MimicPositionIgnored => "mimic-position-ignored",
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",
         }

@@ -1,12 +1,14 @@
 //! One environment: an `mjData`, its drives, and what to do when a step does not go well.
 //!
-//! The loop is `drives -> mj_step2 -> mj_step1`: after it, positions, velocities, contacts and constraints are those of
-//! the new state. A step that needed more room than the buffers have is done again, from the state before it, with
-//! doubled buffers: the result is what large buffers would have given from the beginning. A step that ends in a state
-//! that is not finite is undone, and the environment stands still until it is reset.
+//! The loop is `drives -> mj_step2 -> mj_step1` (with RK4 `drives -> mj_step -> mj_step1`): after it, positions,
+//! velocities, contacts and constraints are those of the new state. A step that needed more room than the buffers have is
+//! done again, from the state before it, with doubled buffers: the result is what large buffers would have given from the
+//! beginning. A step that ends in a state that is not finite is undone, and the environment stands still until it is
+//! reset.
 
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, Warning, WarningCounts};
+use std::cell::Cell;
 use std::sync::Arc;
 
 /// Whether an environment is being stepped.
@@ -16,7 +18,7 @@ pub enum EnvStatus {
     Running,
     /// A step failed: the environment stands in its last good state until it is reset.
     Diverged {
-        /// The step that failed, counted since the start of the environment.
+        /// The step that failed, counted since the last reset.
         step: u64,
         /// Why.
         reason: Divergence,
@@ -60,9 +62,7 @@ pub struct Env {
     /// The present state as it was before its forward pass, to go back to. The pass of 2.2.2 normalises quaternions in
     /// place, and a second one would change their last bits.
     state: Motion,
-    /// The state that a step leads to, before its forward pass.
-    next: Motion,
-    /// What the user set, to carry into a larger `mjData`.
+    /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
     inputs: Inputs,
 }
 
@@ -82,7 +82,6 @@ impl Env {
             warnings: WarningCounts::default(),
             growths: 0,
             state: Motion::default(),
-            next: Motion::default(),
             inputs: Inputs::default(),
         };
         let initial = env.saved();
@@ -96,7 +95,8 @@ impl Env {
     }
 
     /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read. A state that
-    /// is not finite is not kept: the environment diverges, in the state before the write.
+    /// is not finite is not kept: the environment diverges, in the state before the write. `qfrc_applied` and the
+    /// controls of drives are not inputs here: [`DriveState`] sets them in every step.
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         self.state.restore(&mut self.data);
         let good = self.saved();
@@ -180,14 +180,20 @@ impl Env {
     }
 
     fn step_once(&mut self) {
+        let mut end = END.take();
+        self.step_to(&mut end);
+        END.set(end);
+    }
+
+    fn step_to(&mut self, end: &mut End) {
         loop {
-            let done = self.attempt();
+            let done = self.attempt(end);
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
                     self.warnings.add(&raised);
-                    self.drives.keep_efforts();
-                    std::mem::swap(&mut self.state, &mut self.next);
+                    self.state.copy_from(&end.state);
+                    self.drives.effort.clone_from(&end.efforts);
                     self.steps += 1;
                     return;
                 }
@@ -204,18 +210,24 @@ impl Env {
         }
     }
 
-    fn attempt(&mut self) -> Result<(), EngineError> {
+    fn attempt(&mut self, end: &mut End) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
-        self.data.step2()?;
-        // Before step1 makes new rows: on 4.x it puts them where the forces were.
-        self.drives.read_efforts(&self.data);
-        self.next.save(&self.data);
+        if self.data.model().integrator() == mj::mjINT_RK4 {
+            // mj_step2 would integrate with Euler, whatever the model says.
+            self.data.step()?;
+        } else {
+            self.data.step2()?;
+        }
+        // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
+        self.drives.read_efforts(&self.data, &mut end.efforts);
+        end.state.save(&self.data);
         self.data.step1()
     }
 
     /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
     fn refresh(&mut self, good: Motion) {
         self.state.save(&self.data);
+        self.inputs.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
@@ -261,7 +273,6 @@ impl Env {
         }
         let model = self.data.model().with_buffers(buffers);
         let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
-        self.inputs.save(&self.data);
         self.inputs.restore(&mut larger);
         self.state.restore(&mut larger);
         self.data = larger;
@@ -271,7 +282,6 @@ impl Env {
 
     fn quarantine(&mut self, reason: Divergence) {
         self.status = EnvStatus::Diverged { step: self.steps, reason };
-        self.inputs.save(&self.data);
         self.data.reset();
         self.inputs.restore(&mut self.data);
         self.state.restore(&mut self.data);
@@ -296,6 +306,20 @@ pub(crate) struct History {
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
+}
+
+/// What a step leads to, kept only where the step is good.
+#[derive(Default)]
+struct End {
+    /// The new state before its forward pass.
+    state: Motion,
+    /// Efforts of the drives in the step.
+    efforts: Vec<f64>,
+}
+
+thread_local! {
+    /// One per thread, not per environment: a thousand of them would not stay in the cache.
+    static END: Cell<End> = const { Cell::new(End { state: Motion::EMPTY, efforts: Vec::new() }) };
 }
 
 enum Verdict {

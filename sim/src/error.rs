@@ -28,7 +28,7 @@ pub enum Error {
         link: String,
         /// What is wrong with the file.
         #[source]
-        error: scene::mesh::MeshError,
+        error: Box<scene::mesh::MeshError>,
     },
     /// A drive property or a start position is wrong.
     #[error("robot {robot:?}: {error}")]
@@ -37,7 +37,7 @@ pub enum Error {
         robot: String,
         /// What is wrong.
         #[source]
-        error: PlanError,
+        error: Box<PlanError>,
     },
     /// A control part's patterns are wrong.
     #[error("robot {robot:?}, control part {part:?}: {error}")]
@@ -48,7 +48,7 @@ pub enum Error {
         part: String,
         /// What is wrong.
         #[source]
-        error: PatternError,
+        error: Box<PatternError>,
     },
     /// Two control parts have the same name.
     #[error("robot {robot:?}: control part {part:?} is given twice; join its patterns in one list")]
@@ -105,7 +105,7 @@ pub enum Error {
         version: String,
     },
     /// A name is used already.
-    #[error("a robot called {0:?} exists already; give each robot a uid of its own")]
+    #[error("the uid {0:?} is taken; give each robot and each sensor a uid of its own")]
     DuplicateUid(String),
     /// A name that cannot be written to MJCF.
     #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
@@ -158,6 +158,31 @@ pub enum Error {
         joint: String,
         /// The value.
         value: f64,
+    },
+    /// A sensor's configuration is wrong.
+    #[error("sensor {sensor:?}: {error}")]
+    Sensor {
+        /// The sensor.
+        sensor: String,
+        /// What is wrong.
+        #[source]
+        error: Box<sensors::SensorError>,
+    },
+    /// A sensor needs a quantity that is not gathered.
+    #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
+    SensorRequires {
+        /// The sensor.
+        sensor: String,
+        /// What it needs.
+        missing: String,
+    },
+    /// A sensor failed in an earlier step and was not updated since.
+    #[error("sensor {sensor:?} stopped: {fault}")]
+    SensorFault {
+        /// The sensor.
+        sensor: String,
+        /// Why.
+        fault: String,
     },
     /// A file cannot be read or written.
     #[error("{path}: {error}")]

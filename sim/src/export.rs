@@ -1,8 +1,8 @@
 //! Every stage of the pipeline as files: URDF, description, MJCF for both MuJoCo lines with real meshes.
 
 use crate::compile::{Simulation, document};
-use crate::diagnostic::Diagnostic;
-use crate::drive::actuator::stable_timestep_of;
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
 use crate::mj::Target;
@@ -24,7 +24,7 @@ pub(crate) fn dump(
     simulation: &Simulation,
     diagnostics: &[Diagnostic],
     dir: &Path,
-) -> Result<()> {
+) -> Result<Vec<Diagnostic>> {
     let meshes = dir.join("meshes");
     std::fs::create_dir_all(&meshes).map_err(at(&meshes))?;
     for robot in robots {
@@ -34,19 +34,20 @@ pub(crate) fn dump(
         write_file(&dir.join(format!("{stem}.description.txt")), &format!("{:#?}\n", robot.description()))?;
         write_file(&dir.join(format!("{stem}.joints.txt")), &format!("{:#?}\n", robot.plans()))?;
     }
-    let diagnostics: String = diagnostics.iter().map(|d| format!("{d}\n")).collect();
-    write_file(&dir.join("diagnostics.txt"), &diagnostics)?;
     write_file(&dir.join("run.mjcf.xml"), &simulation.xml)?;
 
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
-    let assets = export_meshes(robots, &mut empty, dir)?;
+    let mut left_out = Vec::new();
+    let assets = export_meshes(robots, &mut empty, dir, &mut left_out)?;
+    let text: String = diagnostics.iter().chain(&left_out).map(|d| format!("{d}\n")).collect();
+    write_file(&dir.join("diagnostics.txt"), &text)?;
     for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, robots, &simulation.excluded, &purpose, empty.clone())?;
         prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
         write_file(&dir.join(file), &write::write(&mjcf, target).xml)?;
     }
-    Ok(())
+    Ok(left_out)
 }
 
 fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
@@ -59,45 +60,73 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
 
 /// What a viewer without our drives needs to know and to have.
 fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: Target, simulation: &Simulation) {
-    let explicit = robots
-        .iter()
-        .filter_map(|r| stable_timestep_of(r.description(), r.plans(), !r.cfg().fix_base))
-        .fold(f64::INFINITY, f64::min);
+    let bound = |scheme| {
+        robots
+            .iter()
+            .filter_map(|r| stable_timestep_of(scheme, r.description(), r.plans(), !r.cfg().fix_base))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let (explicit, implicit) = (bound(Scheme::Explicit), bound(Scheme::ImplicitDamping));
+    let plans = || robots.iter().flat_map(|r| r.plans());
+    let followers = plans().any(|plan| plan.mimic.is_some());
+    let limited = plans().any(|plan| plan.actuator.is_some() && plan.max_effort.is_finite());
+    let (version, integrator) = match target {
+        Target::V2 => ("2.2.2", Integrator::Implicit),
+        Target::V4 => ("4.x", Integrator::ImplicitFast),
+    };
+    mjcf.option.integrator = integrator;
     mjcf.comments.push("Written by Kinetoscope. Drives are plain MuJoCo actuators here.".into());
-    match target {
-        // Measured (and so in docs/decisions/0004): on 2.2.2 the implicit integrator treats saturated actuators as
-        // damped, which keeps any gains stable; since 3.5 it does not.
-        Target::V2 => {
-            mjcf.option.integrator = Integrator::Implicit;
-            mjcf.comments.push(
-                "MuJoCo 2.2.2: stable at every time step with the implicit integrator; saturated drives are sluggish."
-                    .into(),
-            );
+    // Why each bound holds, and how it was measured: docs/decisions/0004.
+    let (largest, why) = if followers && explicit.is_finite() {
+        // MuJoCo solves couplings before its implicit damping slows the drivers: followers run away from them. Its
+        // explicit integrator (2.2.2) and saturated drives of implicitfast (4.x) do not have that.
+        if target == Target::V2 {
+            mjcf.option.integrator = Integrator::Euler;
         }
-        Target::V4 => {
-            mjcf.option.integrator = Integrator::ImplicitFast;
-            mjcf.comments.push(if explicit.is_finite() {
-                format!(
-                    "MuJoCo 4.x: stable up to a time step of {explicit:.3e} s where drives saturate at their force \
-                     limits, at every time step while they do not."
-                )
-            } else {
-                "MuJoCo 4.x: stable at every time step.".into()
-            });
-        }
+        (explicit, ": joints that follow others (mimic) and stiff drives do not go together in implicit integrators.")
+    } else if target == Target::V2 {
+        (implicit, "; saturated drives are sluggish.")
+    } else if limited {
+        (explicit.min(implicit), ", where drives saturate at their force limits.")
+    } else {
+        (implicit, ".")
+    };
+    mjcf.comments.push(if largest.is_finite() {
+        format!("MuJoCo {version}: stable up to a time step of {largest:.3e} s{why}")
+    } else {
+        format!("MuJoCo {version}: stable at every time step.")
+    });
+    if target == Target::V4 && limited && !followers && implicit.is_finite() {
+        mjcf.comments.push(format!("While no drive saturates, up to {implicit:.3e} s."));
     }
-    let start = &simulation.start;
-    let mut qpos = simulation.batch.model().qpos0().to_vec();
+    let (start, model) = (&simulation.start, simulation.batch.model());
+    let mut qpos = model.qpos0().to_vec();
     for &(address, position) in &start.qpos {
         qpos[address] = position;
     }
+    let mut ctrl = vec![0.0; model.nu()];
+    for (robot, index) in robots.iter().zip(&simulation.robots) {
+        for (plan, joint) in robot.plans().iter().zip(&index.joints) {
+            // Without stiffness the control is a velocity or an effort: zero at the start.
+            if let (Some(drive), Some(actuator)) = (joint.drive, plan.actuator)
+                && actuator.kp > 0.0
+            {
+                ctrl[simulation.drive_ctrl(drive)] = plan.initial;
+            }
+        }
+    }
     if !qpos.is_empty() {
-        mjcf.keyframes.push(Keyframe { name: "start".into(), qpos });
+        mjcf.keyframes.push(Keyframe { name: "start".into(), qpos, ctrl });
     }
 }
 
 /// Writes every visual mesh once, one file per material, and declares them in `mjcf`.
-fn export_meshes(robots: &[Arc<RobotData>], mjcf: &mut Mjcf, dir: &Path) -> Result<VisualAssets> {
+fn export_meshes(
+    robots: &[Arc<RobotData>],
+    mjcf: &mut Mjcf,
+    dir: &Path,
+    left_out: &mut Vec<Diagnostic>,
+) -> Result<VisualAssets> {
     let mut assets = VisualAssets::default();
     let mut textures: BTreeMap<TextureKey, String> = BTreeMap::new();
     let mut names = BTreeSet::new();
@@ -109,13 +138,28 @@ fn export_meshes(robots: &[Arc<RobotData>], mjcf: &mut Mjcf, dir: &Path) -> Resu
                 if assets.parts.contains_key(&key) {
                     continue;
                 }
-                // Missing and unreadable visuals were reported when the robot was added.
-                let Ok(mesh) = scene::mesh::load(path) else {
-                    assets.parts.insert(key, Vec::new());
-                    continue;
+                let mesh = match scene::mesh::load(path) {
+                    Ok(mesh) => mesh,
+                    Err(error) => {
+                        assets.parts.insert(key, Vec::new());
+                        left_out.push(Diagnostic::new(
+                            DiagnosticKind::VisualMeshInvalid,
+                            visual.source.clone(),
+                            format!("link {:?}: the visual mesh is left out of the export: {error}", link.name),
+                        ));
+                        continue;
+                    }
                 };
+                for texture in unreadable_textures(&mesh) {
+                    left_out.push(Diagnostic::new(
+                        DiagnosticKind::TextureMissing,
+                        visual.source.clone(),
+                        format!("link {:?}: a texture is left out of the export: {texture}", link.name),
+                    ));
+                }
                 let mesh = mesh.scaled((*scale).into());
-                let parts = export_parts(&mesh, &plain_name(path), &mut names, mjcf, &mut textures, dir)?;
+                let stem = asset_stem(path);
+                let parts = export_parts(&mesh, &stem, &mut names, mjcf, &mut textures, dir)?;
                 assets.parts.insert(key, parts);
             }
         }
@@ -139,8 +183,8 @@ fn export_parts(
         if part.triangles.len() < 2 {
             continue;
         }
-        let name = if mesh.parts.len() == 1 { stem.to_string() } else { format!("{stem}_{i}") };
-        let name = unique_name(&name, names);
+        let wanted = if mesh.parts.len() == 1 { stem.to_string() } else { format!("{stem}_{i}") };
+        let name = unique_name(wanted, names);
         let file = format!("meshes/{name}.obj");
         let path = dir.join(&file);
         let out = BufWriter::new(std::fs::File::create(&path).map_err(at(&path))?);
@@ -167,6 +211,20 @@ fn export_material(
         None => None,
     };
     Ok(MaterialAsset { name: format!("{name}_material"), rgba: material.rgba.map(f64::from), texture })
+}
+
+/// What is wrong with the textures that a mesh file names.
+fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
+    let sources = mesh.materials.iter().filter_map(|m| m.texture.as_ref());
+    sources
+        .filter_map(|source| match source {
+            TextureSource::File(path) => match std::fs::read(path) {
+                Ok(bytes) => image::load_from_memory(&bytes).err().map(|e| format!("{}: {e}", path.display())),
+                Err(error) => Some(format!("{}: {error}", path.display())),
+            },
+            TextureSource::Embedded(bytes) => image::load_from_memory(bytes).err().map(|e| e.to_string()),
+        })
+        .collect()
 }
 
 /// MuJoCo reads PNG only: other images are converted. A texture that is missing or unreadable leaves the colour.
@@ -197,19 +255,20 @@ fn export_texture(
     Ok(Some(texture))
 }
 
-/// The name of a file in lower-case letters, digits and underscores.
-fn plain_name(path: &Path) -> String {
+/// A lower-case name of letters, digits and underscores; hulls of collision meshes are called otherwise.
+fn asset_stem(path: &Path) -> String {
     let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();
-    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+    let plain: String = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    format!("visual_{plain}")
 }
 
-/// A name that no other mesh file of the export has.
-fn unique_name(plain: &str, names: &mut BTreeSet<String>) -> String {
-    let mut name = plain.to_owned();
+/// `wanted`, or with a number behind it where that name is taken.
+fn unique_name(wanted: String, names: &mut BTreeSet<String>) -> String {
+    let mut name = wanted.clone();
     let mut count = 1;
     while !names.insert(name.clone()) {
         count += 1;
-        name = format!("{plain}_v{count}");
+        name = format!("{wanted}_v{count}");
     }
     name
 }

@@ -57,13 +57,13 @@ pub enum InertiaFault {
     #[error("the inertia tensor is not symmetric")]
     NotSymmetric,
     /// A principal moment is negative, zero, or too small for MuJoCo.
-    #[error("the smallest principal moment {smallest} kg m² is not positive")]
+    #[error("the smallest principal moment {smallest:.6e} kg m² is not positive")]
     NotPositiveDefinite {
         /// The smallest principal moment \[kg m²\].
         smallest: f64,
     },
     /// The two smaller principal moments do not add up to the largest.
-    #[error("principal moments {a} + {b} < {c} kg m²: no rigid body has them")]
+    #[error("principal moments {a:.6e} + {b:.6e} < {c:.6e} kg m²: no rigid body has them")]
     Triangle {
         /// The smallest \[kg m²\].
         a: f64,

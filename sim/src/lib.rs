@@ -6,6 +6,7 @@
 //! ```
 
 pub mod batch;
+mod body_inertia;
 mod compile;
 pub mod description;
 pub mod diagnostic;
@@ -14,13 +15,15 @@ pub mod dynamics;
 pub mod env;
 mod error;
 mod export;
+mod gather;
 pub mod inertia;
+pub mod inspect;
 mod manager;
-#[allow(unsafe_code, reason = "the wall to MuJoCo")]
 pub mod mj;
 pub mod mjcf;
 pub mod objects;
 pub mod pattern;
+mod sensor_list;
 pub mod source;
 pub mod urdf;
 
@@ -32,5 +35,6 @@ pub use inertia::{InertiaFault, RigidInertia};
 pub use manager::{EnvId, GroundCfg, LightCfg, RobotId, SimulationManager, SimulationManagerCfg};
 pub use mjcf::document::{Cone, Integrator};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
+pub use sensor_list::SensorId;
 pub use source::Source;
 pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};

@@ -5,14 +5,18 @@ use crate::compile::{Simulation, compile};
 use crate::diagnostic::{Diagnostic, count_by_name};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
+use crate::gather;
 use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
+use crate::sensor_list::{SensorId, SensorList};
 use nalgebra::Vector3;
 use ndarray::Array2;
+use sensors::{Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +39,7 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of all random numbers.
+    /// Seed of random numbers. Nothing in the simulation is random yet; reports and sensors with noise will use it.
     pub seed: u64,
     /// Threads that step; every core where unset.
     pub threads: Option<usize>,
@@ -197,15 +201,23 @@ pub struct EnvId(pub usize);
 
 /// Handle of a robot; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct RobotId(pub(crate) usize);
+pub struct RobotId {
+    manager: u64,
+    index: usize,
+}
+
+/// Tells managers of one process apart, so that a handle is not used with another one.
+static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 
 /// Robots in N environments. Environments never touch each other; dropping the manager frees everything.
 #[derive(Debug)]
 pub struct SimulationManager {
+    serial: u64,
     cfg: SimulationManagerCfg,
     robots: Vec<Arc<RobotData>>,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
+    sensors: SensorList,
 }
 
 impl SimulationManager {
@@ -221,7 +233,9 @@ impl SimulationManager {
             return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
         }
         let simulation = compile(&cfg, &[])?;
-        Ok(Self { cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation })
+        let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
+        let sensors = SensorList::default();
+        Ok(Self { serial, cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation, sensors })
     }
 
     /// The configuration.
@@ -268,17 +282,68 @@ impl SimulationManager {
         self.simulation = simulation;
         self.robots = robots;
         self.diagnostics.extend(diagnostics);
-        Ok(RobotId(self.robots.len() - 1))
+        if !self.sensors.is_empty() {
+            let context = self.sensor_context();
+            self.sensors.rebuild(&self.simulation, &context, self.cfg.substeps);
+        }
+        Ok(RobotId { manager: self.serial, index: self.robots.len() - 1 })
+    }
+
+    /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
+    /// sensor sees links and movable joints of all robots, in the order in which they were added. Adding a robot later
+    /// starts its history again.
+    ///
+    /// # Errors
+    /// The configuration is wrong, the name is taken, or the sensor needs a quantity that is not gathered.
+    pub fn add_sensor<C>(&mut self, uid: impl Into<String>, cfg: C) -> Result<SensorId<C::Sensor>>
+    where
+        C: SensorCfg + Send + 'static,
+    {
+        let context = self.sensor_context();
+        self.sensors.add(uid.into(), cfg, &self.simulation, &context, self.cfg.substeps)
+    }
+
+    /// A sensor, to read.
+    ///
+    /// # Errors
+    /// The sensor failed in an earlier step.
+    pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
+        self.sensors.get(id)
+    }
+
+    fn sensor_context(&self) -> SensorContext {
+        SensorContext {
+            num_envs: self.cfg.num_envs,
+            dt: self.cfg.physics_dt,
+            num_bodies: gather::body_count(&self.simulation),
+            num_joints: gather::joint_count(&self.simulation),
+        }
     }
 
     /// A robot, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn robot(&self, id: RobotId) -> Robot<'_> {
-        Robot::new(&self.robots[id.0], &self.simulation, id.0)
+        let index = self.index_of(id);
+        Robot::new(&self.robots[index], &self.simulation, index)
     }
 
     /// A robot, to command and to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
-        RobotMut::new(&self.robots[id.0], &mut self.simulation, id.0)
+        let index = self.index_of(id);
+        RobotMut::new(&self.robots[index], &mut self.simulation, index)
+    }
+
+    #[track_caller]
+    fn index_of(&self, id: RobotId) -> usize {
+        assert!(id.manager == self.serial, "this robot's handle is of another SimulationManager");
+        id.index
     }
 
     /// The robot called `uid`.
@@ -286,7 +351,8 @@ impl SimulationManager {
     /// # Errors
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        self.robots.iter().position(|r| r.uid() == uid).map(RobotId).ok_or_else(|| Error::UnknownName {
+        let index = self.robots.iter().position(|r| r.uid() == uid);
+        index.map(|index| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
             what: "robot",
             name: uid.into(),
             candidates: self.robots.iter().map(|r| r.uid().to_string()).collect(),
@@ -294,7 +360,15 @@ impl SimulationManager {
     }
 
     /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
+    /// Sensors tick after every step.
     pub fn update(&mut self, steps: u32) {
+        if !self.sensors.is_empty() {
+            for _ in 0..steps {
+                self.simulation.batch.step(self.cfg.substeps);
+                self.sensors.update(&self.simulation, self.cfg.substeps);
+            }
+            return;
+        }
         for _ in 0..steps / BLOCK {
             self.simulation.batch.step(BLOCK * self.cfg.substeps);
         }
@@ -308,6 +382,10 @@ impl SimulationManager {
     pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         self.simulation.reset(&chosen);
+        if !self.sensors.is_empty() {
+            let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
+            self.sensors.reset(&envs, &self.simulation, self.cfg.substeps);
+        }
         Ok(())
     }
 
@@ -372,6 +450,16 @@ impl SimulationManager {
         counts
     }
 
+    /// Counts of MuJoCo's warnings in one environment, by name.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn env_warning_counts(&self, env: EnvId) -> Result<BTreeMap<&'static str, u64>> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        let counts = self.simulation.batch.read(env.0, |env| *env.warnings());
+        Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
+    }
+
     /// How often contact and constraint buffers were doubled, over all environments.
     pub fn buffer_growths(&self) -> u64 {
         let mut growths = 0;
@@ -390,11 +478,12 @@ impl SimulationManager {
     }
 
     /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both
-    /// MuJoCo lines with its meshes.
+    /// MuJoCo lines with its meshes. Returns what had to be left out: visual meshes and textures that cannot be read
+    /// (`diagnostics.txt` in `dir` has it too, after everything that was said before).
     ///
     /// # Errors
-    /// A file cannot be written, or a visual mesh or texture cannot be read.
-    pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<()> {
+    /// A file cannot be written.
+    pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<Vec<Diagnostic>> {
         crate::export::dump(&self.cfg, &self.robots, &self.simulation, &self.diagnostics, dir.as_ref())
     }
 }

@@ -63,7 +63,7 @@ fn rows() -> Vec<Row> {
         ("uid with slash", change(|c| c.uid = "a/b".into()), &["uid \"a/b\"", "no slash"]),
         ("uid with control character", change(|c| c.uid = "a\nb".into()), &["uid \"a\\nb\""]),
         ("uid too long", change(|c| c.uid = "x".repeat(65)), &["1 to 64"]),
-        ("uid used", change(|c| c.uid = "first".into()), &["\"first\" exists already", "uid of its own"]),
+        ("uid used", change(|c| c.uid = "first".into()), &["\"first\" is taken", "uid of its own"]),
         ("no file", change(|c| c.urdf = UrdfCfg::single("/no/such.urdf")), &["/no/such.urdf", "no such file"]),
         ("no component", change(|c| c.urdf.components.clear()), &["no component", "UrdfCfg::single"]),
         ("a folder", change(|c| c.urdf = UrdfCfg::single("/")), &["is a folder"]),

@@ -3,9 +3,8 @@
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
 use std::path::PathBuf;
-use std::time::Instant;
 
-use super::{HullCache, HullCfg, MeshMaterial, TextureSource, TriMesh, convex_hull, load};
+use super::{MeshMaterial, TextureSource, TriMesh, load};
 
 /// A small generator (xorshift64*) so that every run tests the same.
 pub(super) struct Random(pub(super) u64);
@@ -160,35 +159,5 @@ fn vendor_stl_agrees_with_trimesh() {
         let mesh = load(path).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (triangles, vertices), "{name}");
         assert_bounds(name, &mesh, lo, hi);
-    }
-}
-
-/// Times for the report; run with `--release -- --ignored --nocapture times`.
-#[test]
-#[ignore = "prints times"]
-fn times() {
-    for extension in ["dae", "stl"] {
-        let (mut loading, mut hulls, mut hits, mut count) = (0.0, 0.0, 0.0, 0);
-        let scratch = tempfile::tempdir().unwrap();
-        let cache = HullCache::at(scratch.path());
-        for path in files(extension) {
-            let start = Instant::now();
-            let mesh = load(&path).unwrap();
-            let loaded = start.elapsed().as_secs_f64() * 1e3;
-            let start = Instant::now();
-            let hull = convex_hull(&mesh.positions, &HullCfg::default()).unwrap();
-            let hulled = start.elapsed().as_secs_f64() * 1e3;
-            let cached = || cache.hull_of_file(&path, [1.0; 3], &HullCfg::default()).unwrap();
-            cached();
-            let start = Instant::now();
-            assert_eq!(cached(), hull);
-            hits += start.elapsed().as_secs_f64() * 1e3;
-            let (n, name) = (mesh.triangles.len(), path.file_name().unwrap().display().to_string());
-            println!("{name:24} {n:6} triangles: {loaded:7.2} ms, hull {hulled:6.2} ms, {}", hull.positions.len());
-            loading += loaded;
-            hulls += hulled;
-            count += 1;
-        }
-        println!("{count} {extension}: loading {loading:.1} ms, hulls {hulls:.1} ms, from the cache {hits:.1} ms");
     }
 }

@@ -23,18 +23,38 @@ pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj
     };
 }
 
-/// The largest time step \[s\] at which the explicit law is stable with MuJoCo's semi-implicit Euler step; infinite
-/// without gains.
+/// How MuJoCo integrates an actuator's damping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// At the start of the step: integrator Euler, and saturated actuators of `implicitfast` on 4.x.
+    Explicit,
+    /// At the end of the step: integrators `implicit` and `implicitfast`. Stiffness stays at the start.
+    ImplicitDamping,
+}
+
+/// The largest time step \[s\] at which the law is stable in MuJoCo; infinite without gains. `damping` is that of the
+/// joints, which MuJoCo takes at the end of the step in either scheme.
 ///
-/// The step `v' = v - h M⁻¹ (Kp q + Kd v)`, `q' = q + h v'` is stable exactly while `4 M - 2 h Kd - h² Kp` is positive
-/// definite: seek `q = z^n u`, multiply by `u*` from the left and apply the Jury criterion to the scalar equation. It
-/// follows from bisection on the smallest eigenvalue.
-pub fn stable_timestep(mass_matrix: &DMatrix<f64>, kp: &DVector<f64>, kd: &DVector<f64>) -> f64 {
+/// The explicit step `(M + h B) (v' - v) = -h (Kp q + Kd v + B v)`, `q' = q + h v'` is stable exactly while
+/// `4 M + 2 h B - 2 h Kd - h² Kp` is positive definite; with Kd at the end of the step like B, while
+/// `4 M + 2 h (B + Kd) - h² Kp` is. To see it, seek `q = z^n u`, multiply by `u*` from the left and apply the Jury
+/// criterion to the scalar equation. The bound follows from bisection.
+pub fn stable_timestep(
+    scheme: Scheme,
+    mass_matrix: &DMatrix<f64>,
+    kp: &DVector<f64>,
+    kd: &DVector<f64>,
+    damping: &DVector<f64>,
+) -> f64 {
+    let implicit = match scheme {
+        Scheme::Explicit => damping - kd,
+        Scheme::ImplicitDamping => damping + kd,
+    };
     if kp.iter().chain(kd.iter()).all(|&k| k == 0.0) || mass_matrix.is_empty() {
         return f64::INFINITY;
     }
     let stable = |h: f64| {
-        let margin = 4.0 * mass_matrix - DMatrix::from_diagonal(&(2.0 * h * kd + h * h * kp));
+        let margin = 4.0 * mass_matrix + DMatrix::from_diagonal(&(2.0 * h * &implicit - h * h * kp));
         margin.cholesky().is_some()
     };
     // Bracket in decades, then bisect in the logarithm: the answer spans 1e-10 s (stiff fingers) to seconds.
@@ -58,17 +78,33 @@ pub fn stable_timestep(mass_matrix: &DMatrix<f64>, kp: &DVector<f64>, kd: &DVect
 
 /// [`stable_timestep`] of a robot's drives at its start positions; `None` where the description's dynamics cannot be
 /// computed.
-pub fn stable_timestep_of(description: &RobotDescription, plans: &[JointPlan], floating_base: bool) -> Option<f64> {
+pub fn stable_timestep_of(
+    scheme: Scheme,
+    description: &RobotDescription,
+    plans: &[JointPlan],
+    floating_base: bool,
+) -> Option<f64> {
     let start = mass_matrix_at_start(description, plans, floating_base).ok()?;
-    let mut kp = DVector::zeros(start.matrix.nrows());
-    let mut kd = DVector::zeros(start.matrix.nrows());
+    let n = start.matrix.nrows();
+    let (mut kp, mut kd, mut damping) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
+    // A follower moves with its driver, `q = C u`: its inertia and damping are the driver's.
+    let mut coupling = DMatrix::identity(n, n);
     for (plan, &column) in plans.iter().zip(&start.columns) {
+        damping[column] = plan.damping;
         if let Some(actuator) = plan.actuator {
             kp[column] = actuator.kp;
             kd[column] = actuator.kd;
         }
+        let Some((driver, multiplier, _)) = plan.mimic else { continue };
+        let driver = plans.iter().position(|p| p.joint == driver)?;
+        coupling[(column, column)] = 0.0;
+        coupling[(column, start.columns[driver])] = multiplier;
     }
-    Some(stable_timestep(&start.matrix, &kp, &kd))
+    let free: Vec<usize> = (0..n).filter(|&i| coupling[(i, i)] != 0.0).collect();
+    let coupling = coupling.select_columns(&free);
+    let mass_matrix = coupling.transpose() * &start.matrix * &coupling;
+    let damping = (coupling.transpose() * DMatrix::from_diagonal(&damping) * &coupling).diagonal();
+    Some(stable_timestep(scheme, &mass_matrix, &kp.select_rows(&free), &kd.select_rows(&free), &damping))
 }
 
 /// A warning where the drives are not stable at the time step `dt` \[s\].
@@ -78,7 +114,7 @@ pub fn warn_if_unstable(
     floating_base: bool,
     dt: f64,
 ) -> Option<Diagnostic> {
-    let largest = stable_timestep_of(description, plans, floating_base)?;
+    let largest = stable_timestep_of(Scheme::Explicit, description, plans, floating_base)?;
     (dt >= largest).then(|| {
         Diagnostic::new(
             DiagnosticKind::ActuatorUnstable,
@@ -96,26 +132,33 @@ pub fn warn_if_unstable(
 mod tests {
     use super::*;
 
-    /// One joint: `h² kp + 2 h kd = 4 M` has the positive root `h = (sqrt(kd² + 4 M kp) - kd) / kp`.
+    /// One joint: `h² kp + 2 h kd = 4 M` has the positive root `h = (sqrt(kd² + 4 M kp) - kd) / kp`; with the sign of kd
+    /// turned for implicit damping. The recurrences themselves decay just below the bound and grow just above it.
     #[test]
     fn one_joint_agrees_with_the_root_and_with_a_simulation() {
         let (m, kp, kd) = (0.3, 200.0, 4.0_f64);
-        let expected = ((kd * kd + 4.0 * m * kp).sqrt() - kd) / kp;
-        let found = stable_timestep(
-            &DMatrix::from_element(1, 1, m),
-            &DVector::from_element(1, kp),
-            &DVector::from_element(1, kd),
-        );
-        assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
-        // The recurrence itself: decays just below the bound, grows just above it.
-        for (factor, decays) in [(0.99, true), (1.01, false)] {
-            let h = factor * found;
-            let (mut q, mut v) = (1.0, 0.0);
-            for _ in 0..5000 {
-                v += h / m * (-kp * q - kd * v);
-                q += h * v;
+        for (scheme, sign) in [(Scheme::Explicit, 1.0), (Scheme::ImplicitDamping, -1.0)] {
+            let expected = ((kd * kd + 4.0 * m * kp).sqrt() - sign * kd) / kp;
+            let found = stable_timestep(
+                scheme,
+                &DMatrix::from_element(1, 1, m),
+                &DVector::from_element(1, kp),
+                &DVector::from_element(1, kd),
+                &DVector::zeros(1),
+            );
+            assert!((found / expected - 1.0).abs() < 1e-6, "{scheme:?}: {found} {expected}");
+            for (factor, decays) in [(0.99, true), (1.01, false)] {
+                let h = factor * found;
+                let (mut q, mut v) = (1.0, 0.0);
+                for _ in 0..5000 {
+                    v = match scheme {
+                        Scheme::Explicit => v - h / m * (kp * q + kd * v),
+                        Scheme::ImplicitDamping => (m * v - h * kp * q) / (m + h * kd),
+                    };
+                    q += h * v;
+                }
+                assert_eq!(q.abs() + h * v.abs() < 1.0, decays, "{scheme:?}, factor {factor}: q {q:e}");
             }
-            assert_eq!(q.abs() + h * v.abs() < 1.0, decays, "factor {factor}: q {q:e}");
         }
     }
 }

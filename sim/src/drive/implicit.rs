@@ -13,7 +13,8 @@
 //!
 //! The identity needs `v' = v + h a` with the solver's `a`. MuJoCo's implicit joint damping would change `a` after the
 //! solve: a damping B on a light link would slow it by `1 + h B / M`. It therefore moves here as well: with the
-//! armature raised by `h B` and `-B v` applied, `(M + h B) a = tau - B v`, the same implicit damping inside the solve.
+//! armature raised by `h B` (`mjcf::robot`) and `-B v` applied, `(M + h B) a = tau - B v`, the same implicit damping
+//! inside the solve.
 
 use super::table::{Drive, DriveTable, Gains, Target};
 use crate::mj;
@@ -69,27 +70,11 @@ pub(super) fn apply_damping(table: &DriveTable, data: &mut mj::Data) {
 }
 
 /// Edits a compiled model so that the drives of `dofs` are rows: their actuators' gain and bias become zero (`ctrl`
-/// still holds the target), every degree of freedom in `dofs` gets a friction row, and the damping of `damped` moves
-/// from the model to the table that is returned.
-pub fn prepare(
-    compiled: &mut mj::Compiled,
-    dofs: &[usize],
-    actuators: &[usize],
-    damped: &[usize],
-) -> Vec<(usize, f64)> {
-    let h = compiled.timestep();
+/// still holds the target) and every degree of freedom in `dofs` gets a friction row.
+pub fn prepare(compiled: &mut mj::Compiled, dofs: &[usize], actuators: &[usize]) {
     for &dof in dofs {
         // Any positive value makes MuJoCo build the row; `apply` writes the limit.
         compiled.dof_frictionloss_mut()[dof] = 1.0;
     }
     compiled.clear_actuator_gains(actuators);
-    let mut moved = Vec::new();
-    for &dof in damped {
-        let damping = std::mem::take(&mut compiled.dof_damping_mut()[dof]);
-        if damping > 0.0 {
-            compiled.dof_armature_mut()[dof] += h * damping;
-            moved.push((dof, damping));
-        }
-    }
-    moved
 }

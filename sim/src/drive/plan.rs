@@ -119,7 +119,7 @@ pub fn plan(
 
 /// Position limits; a continuous joint has none, whatever the file says. A single missing end is 0, URDF's default; with
 /// both missing (or refused with a warning) the joint is not limited.
-fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
+pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
     (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])
 }

@@ -65,8 +65,6 @@ pub struct DriveState {
     pub feedforward: Vec<f64>,
     /// Effort each drive gave in the last step \[N m or N\].
     pub effort: Vec<f64>,
-    /// Effort each drive gives in the running step, which may yet be undone.
-    running_effort: Vec<f64>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Vec<f64>,
 }
@@ -82,7 +80,6 @@ impl DriveState {
             velocity: vec![0.0; n],
             feedforward: vec![0.0; n],
             effort: vec![0.0; n],
-            running_effort: vec![0.0; n],
             applied: vec![0.0; model.nv()],
         }
     }
@@ -103,9 +100,6 @@ impl DriveState {
 
     /// Between `mj_step1` and `mj_step2`: makes every drive act on this step.
     pub fn apply(&self, data: &mut mj::Data) {
-        if self.table.drives.is_empty() && self.table.damped.is_empty() {
-            return;
-        }
         let table = &*self.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, data);
@@ -119,19 +113,13 @@ impl DriveState {
         }
     }
 
-    /// The step is done: its efforts are those of the last step.
-    pub fn keep_efforts(&mut self) {
-        std::mem::swap(&mut self.effort, &mut self.running_effort);
-    }
-
-    /// Right after `mj_step2`: reads the effort every drive gave.
-    pub fn read_efforts(&mut self, data: &mj::Data) {
-        for (i, drive) in self.table.drives.iter().enumerate() {
-            self.running_effort[i] = match drive.realization {
-                Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
-                Realization::Actuator => data.actuator_force()[drive.ctrl],
-            };
-        }
+    /// After `mj_step2`: the effort every drive gave.
+    pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
+        efforts.clear();
+        efforts.extend(self.table.drives.iter().enumerate().map(|(i, drive)| match drive.realization {
+            Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
+            Realization::Actuator => data.actuator_force()[drive.ctrl],
+        }));
     }
 }
 

@@ -103,8 +103,6 @@ model_arrays! {
 }
 
 model_arrays_mut! {
-    dof_damping_mut = dof_damping_mut: f64;
-    dof_armature_mut = dof_armature_mut: f64;
     dof_frictionloss_mut = dof_frictionloss_mut: f64;
     actuator_gainprm_mut = actuator_gainprm_mut: f64;
     actuator_biasprm_mut = actuator_biasprm_mut: f64;

@@ -3,11 +3,13 @@
 //! This is the only place of hand-written unsafe code and the only one that knows MuJoCo versions. What it guarantees:
 //!
 //! * No input makes MuJoCo end the process: its error handler unwinds to [`guard`](self), which returns an
-//!   [`EngineError`]; its console and log file stay silent.
+//!   [`EngineError`]; it writes no log file and no warnings. (The hull library inside 2.2.2 prints to stderr when a mesh is
+//!   flat; `mjcf` gives it none.)
 //! * A model never changes while it is shared; [`Data`] keeps its model alive.
 //! * A slice has the length that MuJoCo's own `mjxmacro.h` declares (`mujoco_sys::fields`).
 //!
 //! Names are MuJoCo's own (`qpos`, `geom`, `efc_aref`) in this module and in `mjcf` only.
+#![allow(unsafe_code, reason = "the wall to MuJoCo")]
 
 mod arrays;
 mod data;

@@ -223,7 +223,7 @@ fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
     header.njmax = as_int(buffers.constraints);
     // MuJoCo's own rule for nstack (user_model.cc, 2.2.2): 5 squares of all rows and degrees of freedom, plus a linear
     // part; in numbers of 8 bytes.
-    let square = buffers.constraints + header.neq as usize + header.nv as usize;
+    let square = buffers.constraints.saturating_add(header.neq as usize + header.nv as usize);
     let linear = [
         header.nq,
         header.nv,
@@ -240,7 +240,8 @@ fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
     .iter()
     .map(|&n| n as usize)
     .sum::<usize>();
-    header.nstack = as_int((5 * square * square + 20 * linear).max(1000));
+    let numbers = square.saturating_mul(square).saturating_mul(5).saturating_add(20 * linear);
+    header.nstack = as_int(numbers.max(1000));
 }
 
 impl Compiled {

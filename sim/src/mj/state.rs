@@ -57,6 +57,14 @@ copied_arrays!(
 );
 
 impl Motion {
+    /// No state at all.
+    pub const EMPTY: Self = Self { values: Vec::new() };
+
+    /// Takes the values of `other`, reusing this memory.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.values.clone_from(&other.values);
+    }
+
     /// Takes the values from `data`, reusing this memory.
     pub fn save(&mut self, data: &Data) {
         self.values.clear();

@@ -98,9 +98,12 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
         // 2.2.2 would stop the process.
-        if asset.bytes.is_empty() || !(1..=LONGEST_NAME).contains(&asset.name.len()) {
-            let message =
-                format!("the asset {:?} is empty, or its name is not of 1 to {LONGEST_NAME} bytes", asset.name);
+        let base_name = (1..=LONGEST_NAME).contains(&asset.name.len()) && !asset.name.contains(['/', '\\']);
+        if asset.bytes.is_empty() || !base_name {
+            let message = format!(
+                "the asset {:?} is empty, or its name is not a base name (no slash) of 1 to {LONGEST_NAME} bytes",
+                asset.name
+            );
             return Err(CompileError::new(&message).into());
         }
         if !vfs.add(asset) {

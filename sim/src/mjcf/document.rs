@@ -337,6 +337,8 @@ pub struct Keyframe {
     pub name: String,
     /// Positions of all joints in MuJoCo's order.
     pub qpos: Vec<f64>,
+    /// Controls of all actuators in order.
+    pub ctrl: Vec<f64>,
 }
 
 impl Mjcf {

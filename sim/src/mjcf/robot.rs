@@ -1,13 +1,13 @@
 //! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
 
 use super::document::{
-    Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Joint, JointEquality, JointType, MaterialAsset,
-    MeshAsset, MeshContent, Mjcf, Shape, Site,
+    Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
+    MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
+use crate::body_inertia::{BodyInertia, RigidBody, fuse};
 use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::diagnostic::Diagnostic;
 use crate::drive::plan::JointPlan;
-use crate::inertia::RigidInertia;
 use crate::source::Source;
 use nalgebra::Vector3;
 use scene::Pose;
@@ -25,8 +25,8 @@ pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Purpose<'a> {
-    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; dry friction of driven joints is a
-    /// tendon where `friction_tendons`, since the joint's own friction row carries the drive.
+    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; where `friction_tendons`, dry friction
+    /// of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to us.
     Run {
         /// Drives are friction rows.
         friction_tendons: bool,
@@ -98,6 +98,19 @@ pub struct RobotLayout {
     pub links: Vec<LinkFrame>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_pairs: Vec<(String, String)>,
+    /// Joints whose damping is integrated with the drives: see [`crate::drive::implicit`].
+    pub damped: Vec<DampedJoint>,
+}
+
+/// A joint whose viscous damping was left out of the document; its armature holds the implicit half.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DampedJoint {
+    /// Name of the joint.
+    pub joint: String,
+    /// Number of its degrees of freedom.
+    pub dofs: usize,
+    /// The damping of each \[N m s/rad or N s/m\].
+    pub damping: f64,
 }
 
 /// A link's frame in its body.
@@ -147,6 +160,7 @@ pub fn add(
         depth: BTreeMap::new(),
         placed: vec![None; description.links.len()],
         masses: BTreeMap::new(),
+        damped: Vec::new(),
     };
     emitter.bodies()?;
     emitter.inertias();
@@ -161,7 +175,7 @@ pub fn add(
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
         .collect();
-    Ok(RobotLayout { links, base_pairs })
+    Ok(RobotLayout { links, base_pairs, damped: emitter.damped })
 }
 
 struct Emitter<'a, 'm> {
@@ -176,6 +190,7 @@ struct Emitter<'a, 'm> {
     placed: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
     masses: BTreeMap<usize, Vec<LinkId>>,
+    damped: Vec<DampedJoint>,
 }
 
 impl Emitter<'_, '_> {
@@ -209,7 +224,8 @@ impl Emitter<'_, '_> {
                 self.place(joint.child, parent_body, body_from_joint);
             } else {
                 let (parent, pose) = self.parent_for(joint.kind, parent_body, body_from_joint);
-                let joints = self.joints(id, parent);
+                let mut joints = self.joints(id, parent);
+                self.move_damping(&mut joints);
                 let body = self.push_body(joint.child, parent, pose, joints)?;
                 self.place(joint.child, body, Pose::identity());
             }
@@ -405,6 +421,23 @@ impl Emitter<'_, '_> {
         }
     }
 
+    /// Where drives are rows, damping B acts inside the solve as well: `h B` as armature (in the document, so that every
+    /// constant MuJoCo derives from the inertia has it) and `-B v` applied in each step.
+    fn move_damping(&mut self, joints: &mut [Joint]) {
+        // RK4 evaluates forces inside its step, where nothing of ours is called (and it takes no row drives).
+        if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {
+            return;
+        }
+        for joint in joints {
+            let damping = std::mem::take(&mut joint.damping);
+            if damping > 0.0 {
+                joint.armature += self.mjcf.option.timestep * damping;
+                let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
+                self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping });
+            }
+        }
+    }
+
     fn friction_is_tendon(&self) -> bool {
         matches!(self.cfg.purpose, Purpose::Run { friction_tendons: true })
     }
@@ -412,71 +445,17 @@ impl Emitter<'_, '_> {
     /// Mass properties of every body from the links fused into it, repaired where no rigid body has them.
     fn inertias(&mut self) {
         let masses = std::mem::take(&mut self.masses);
-        for (&body, links) in &masses {
-            let mut fused = RigidInertia::ZERO;
-            let mut place = None;
-            for &link in links {
-                let described = self.description.link(link);
-                let Some(inertial) = &described.inertial else { continue };
-                place.get_or_insert_with(|| inertial.source.clone());
-                let (_, body_from_link) = self.placed[link.0].unwrap_or((0, Pose::identity()));
-                fused = fused.combine(&RigidInertia::from_inertial(inertial).transformed(&body_from_link));
-            }
-            let moving = is_moving(&self.mjcf.bodies, body);
-            if fused.mass == 0.0 && fused.inertia.norm() == 0.0 {
-                if moving {
-                    let lightest = self.description.link(links[0]);
-                    self.diagnostics.push(Diagnostic::new(
-                        DiagnosticKind::MasslessLink,
-                        lightest.source.clone(),
-                        format!(
-                            "link {:?} moves but has no mass; MuJoCo needs some, so it gets {MASSLESS_MASS} kg and \
-                             {MASSLESS_MOMENT} kg m² (not counted in total_mass)",
-                            lightest.name
-                        ),
-                    ));
-                    fused.mass = MASSLESS_MASS;
-                    fused.inertia = nalgebra::Matrix3::identity() * MASSLESS_MOMENT;
-                } else {
-                    continue;
-                }
-            }
-            let (repaired, _) = fused.repaired();
-            self.report_faults(links, fused.check().is_err());
-            let (moments, axes) = repaired.principal();
-            self.mjcf.bodies[body].inertial =
-                Some(Inertial { mass: repaired.mass, com: repaired.com, axes, moments, source: place });
-        }
-    }
-}
-
-/// Stand-in mass of a moving body without any \[kg\]: a milligram disturbs no robot, and is far above MuJoCo's minimum.
-const MASSLESS_MASS: f64 = 1e-6;
-/// Its moment of inertia \[kg m²\]: that mass at 3 cm.
-const MASSLESS_MOMENT: f64 = 1e-9;
-
-impl Emitter<'_, '_> {
-    /// A warning for every link whose own inertia no rigid body can have.
-    fn report_faults(&mut self, links: &[LinkId], body_is_faulty: bool) {
-        for &link in links {
-            let described = self.description.link(link);
-            let Some(inertial) = &described.inertial else { continue };
-            let own = RigidInertia::from_inertial(inertial);
-            if own.mass == 0.0 && own.inertia.norm() == 0.0 {
+        for (body, links) in masses {
+            let pose =
+                |link: LinkId| self.placed[link.0].map_or_else(Pose::identity, |(_, body_from_link)| body_from_link);
+            let links = links.into_iter().map(|link| (link, pose(link))).collect();
+            let rigid = RigidBody { links, moves: is_moving(&self.mjcf.bodies, body) };
+            let Some(BodyInertia { inertia, source }) = fuse(self.description, &rigid, self.diagnostics) else {
                 continue;
-            }
-            if let Err(fault) = own.check() {
-                let outcome = match (links.len() > 1, body_is_faulty) {
-                    (true, false) => "sound after fusing with the links it is fixed to",
-                    (true, true) => "repaired after fusing with the links it is fixed to",
-                    (false, _) => "repaired",
-                };
-                self.diagnostics.push(Diagnostic::new(
-                    DiagnosticKind::InertiaRepaired,
-                    inertial.source.clone(),
-                    format!("link {:?}: {fault}; {outcome}, in the MJCF only", described.name),
-                ));
-            }
+            };
+            let (moments, axes) = inertia.principal();
+            self.mjcf.bodies[body].inertial =
+                Some(Inertial { mass: inertia.mass, com: inertia.com, axes, moments, source });
         }
     }
 

@@ -34,10 +34,21 @@ impl Text {
 
 /// Writes the document for `target`.
 pub fn write(mjcf: &Mjcf, target: Target) -> Text {
-    let mut out = Writer { xml: String::new(), sources: Vec::new(), depth: 0, target };
+    let mut out = Writer {
+        xml: String::new(),
+        sources: Vec::new(),
+        depth: 0,
+        target,
+        friction: [2.0 * mjcf.option.timestep, 1.0],
+    };
     out.document(mjcf);
     Text { xml: out.xml, sources: out.sources }
 }
+
+/// Impedance of dry friction: MuJoCo's largest. At rest friction is a stiff damper: a joint under a load below its friction
+/// creeps by (1 - d) / d of the speed that the load would give it in the damper's time constant, here one time step. With
+/// MuJoCo's defaults (0.9, 10 ms) it slides out of the band in which friction holds it within a second.
+const FRICTION_IMPEDANCE: &str = "0.9999 0.9999 0.001 0.5 2";
 
 /// Impedance of a mimic coupling: MuJoCo's largest, 0.9999. The coupling yields by (1 - d) / d of the acceleration that
 /// its load would cause; a finger link of 10 g under its own weight would hang 30 mrad low at MuJoCo's default 0.95.
@@ -48,6 +59,8 @@ struct Writer {
     sources: Vec<Option<Source>>,
     depth: usize,
     target: Target,
+    /// `solreffriction` of dry friction in joints.
+    friction: [f64; 2],
 }
 
 /// One element under construction.
@@ -170,7 +183,11 @@ impl Writer {
         if !mjcf.keyframes.is_empty() {
             self.open(Element::new("keyframe"), None);
             for key in &mjcf.keyframes {
-                self.leaf(Element::new("key").attr("name", &key.name).numbers("qpos", &key.qpos), None);
+                let mut element = Element::new("key").attr("name", &key.name).numbers("qpos", &key.qpos);
+                if !key.ctrl.is_empty() {
+                    element = element.numbers("ctrl", &key.ctrl);
+                }
+                self.leaf(element, None);
             }
             self.close("keyframe");
         }
@@ -326,6 +343,9 @@ impl Writer {
                 element = element.attr(name, number(value));
             }
         }
+        if joint.frictionloss != 0.0 {
+            element = element.numbers("solreffriction", &self.friction).attr("solimpfriction", FRICTION_IMPEDANCE);
+        }
         self.leaf(element, joint.source.as_ref());
     }
 
@@ -378,8 +398,11 @@ impl Writer {
         if !mjcf.friction_tendons.is_empty() {
             self.open(Element::new("tendon"), None);
             for tendon in &mjcf.friction_tendons {
-                let element =
-                    Element::new("fixed").attr("name", &tendon.name).attr("frictionloss", number(tendon.frictionloss));
+                let element = Element::new("fixed")
+                    .attr("name", &tendon.name)
+                    .attr("frictionloss", number(tendon.frictionloss))
+                    .numbers("solreffriction", &self.friction)
+                    .attr("solimpfriction", FRICTION_IMPEDANCE);
                 self.open(element, None);
                 self.leaf(Element::new("joint").attr("joint", &tendon.joint).attr("coef", 1), None);
                 self.close("fixed");

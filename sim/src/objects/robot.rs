@@ -86,7 +86,10 @@ impl RobotData {
             return Err(Error::InvalidUid(cfg.uid));
         }
         check_integrator(&cfg, manager.integrator)?;
-        check_pose(&cfg.init_pose)?;
+        check_pose("init_pose", &cfg.init_pose)?;
+        for component in &cfg.urdf.components {
+            check_pose("component transform", &component.transform)?;
+        }
         let assembly = assemble(&cfg.urdf)?;
         let mut found = assembly.diagnostics;
         let description = assembly.description;
@@ -96,13 +99,13 @@ impl RobotData {
             let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
                 robot: cfg.uid.clone(),
                 part: part.clone(),
-                error,
+                error: Box::new(error),
             })?;
             if parts.insert(part.clone(), members).is_some() {
                 return Err(Error::ControlPartRepeated { robot: cfg.uid, part: part.clone() });
             }
         }
-        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error };
+        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
         found.append(&mut planned);
@@ -140,8 +143,8 @@ impl RobotData {
     }
 }
 
-fn check_pose(pose: &Pose) -> Result<()> {
-    let fail = |expected| Err(Error::Config { field: "init_pose", value: format!("{:?}", to_row(pose)), expected });
+fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
+    let fail = |expected| Err(Error::Config { field, value: format!("{:?}", to_row(pose)), expected });
     if !to_row(pose).iter().all(|x| x.is_finite()) {
         return fail("every number must be finite");
     }
@@ -167,7 +170,7 @@ fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
 }
 
 /// The convex hull of every collision mesh, one per file and scale, from the cache where it is there.
-fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
+pub(crate) fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
     let cache = HullCache::default_location();
     let mut hulls = BTreeMap::new();
     for link in &description.links {
@@ -180,7 +183,7 @@ fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTre
             let hull = cache.hull_of_file(path, (*scale).into(), cfg).map_err(|error| Error::CollisionMesh {
                 at: collision.source.clone(),
                 link: link.name.clone(),
-                error,
+                error: Box::new(error),
             })?;
             hulls.insert(key, hull);
         }
@@ -369,7 +372,8 @@ impl<'a> Robot<'a> {
     }
 }
 
-fn body_pose(data: &mj::Data, body: usize) -> Pose {
+/// Pose of a MuJoCo body in the environment.
+pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
     let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
     ::scene::pose::from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
 }
@@ -413,6 +417,63 @@ impl<'a> RobotMut<'a> {
                     if let Some(drive) = robot.joints[joint].drive {
                         let [low, high] = self.data.plans[joint].usable;
                         env.drives.position[drive] = value.clamp(low, high);
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets velocity targets \[rad/s or m/s\] of the drives; they stay until changed or reset, and are 0 at first. Rows
+    /// and columns as in [`set_qpos`](Self::set_qpos); columns of joints without a drive are accepted and ignored.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qvel<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("set_qvel", velocities.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                for (&joint, &value) in write.joints.iter().zip(row) {
+                    if let Some(drive) = robot.joints[joint].drive {
+                        env.drives.velocity[drive] = value;
+                    }
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets efforts \[N m or N\] that are added to what the drives give, before the sum is clamped to their limits; they
+    /// stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets the effort as it
+    /// is, clamped to its own limit. Rows and columns as in [`set_qpos`](Self::set_qpos); columns of mimic joints are
+    /// accepted and ignored.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qf<'t>(
+        &mut self,
+        efforts: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked("set_qf", efforts.into(), joint_ids, env_ids)?;
+        let robot = &self.simulation.robots[self.index];
+        for (env, row) in &write.rows {
+            self.simulation.batch.write(*env, |env| {
+                for (&joint, &value) in write.joints.iter().zip(row) {
+                    let (indexing, plan) = (robot.joints[joint], &self.data.plans[joint]);
+                    if let Some(drive) = indexing.drive {
+                        env.drives.feedforward[drive] = value;
+                    } else if plan.mimic.is_none() {
+                        env.drives.applied[indexing.dof] = value.clamp(-plan.max_effort, plan.max_effort);
                     }
                 }
             });

@@ -1,0 +1,109 @@
+//! What drives cost: the arm and hand on their way between two poses, against the same model stepped from the same states
+//! without the drives' writes.
+
+use crate::interleave::{Plan, Side, measure};
+use crate::models::{State, drive_sr5, sr5};
+use crate::row::Row;
+use crate::step::read_back;
+use crate::{Outcome, Settings};
+use kinetoscope::prelude::*;
+use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::drive::table::DriveTable;
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const ENVS: usize = 64;
+/// A driven step may cost 1.3 times one without drives.
+const WANTED: f64 = 1.0 / 1.3;
+/// Steps between restarts: the undriven arm has fallen little.
+const STEPS: u32 = 16;
+/// Steps between changes of the targets.
+const PHASE: u32 = 200;
+
+type States = Rc<RefCell<Vec<State>>>;
+
+/// With drives; goes on where it is, and says where that is.
+struct Driven {
+    sim: SimulationManager,
+    robot: RobotId,
+    states: States,
+    steps: u32,
+    closed: bool,
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+}
+
+impl Side for Driven {
+    fn restart(&mut self) -> Outcome<()> {
+        if self.steps >= PHASE {
+            self.steps = 0;
+            self.closed = !self.closed;
+            drive_sr5(&mut self.sim, self.robot, self.closed)?;
+        }
+        let mut states = self.states.borrow_mut();
+        states.clear();
+        self.sim.batch().for_each(|_, env| states.push(State::of(env.data())));
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        self.steps += steps;
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.sim.update(1);
+            read_back(self.sim.batch(), &mut self.qpos, &mut self.qvel);
+        }
+        Ok(start.elapsed())
+    }
+}
+
+/// Without the writes; starts where the driven side stands.
+struct Undriven {
+    batch: Batch,
+    states: States,
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+}
+
+impl Side for Undriven {
+    fn restart(&mut self) -> Outcome<()> {
+        for (i, state) in self.states.borrow().iter().enumerate() {
+            self.batch.write(i, |env| env.write(|data| state.write(data)));
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.batch.step(1);
+            read_back(&self.batch, &mut self.qpos, &mut self.qvel);
+        }
+        Ok(start.elapsed())
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let (mut sim, robot) = sr5(ENVS, 1)?;
+    drive_sr5(&mut sim, robot, false)?;
+    let model = sim.batch().model().clone();
+    let states = States::default();
+    let (qpos, qvel) = (vec![0.0; ENVS * model.nq()], vec![0.0; ENVS * model.nv()]);
+    let mut undriven = Undriven {
+        batch: Batch::new(&model, &Arc::new(DriveTable::default()), ENVS, 1)?,
+        states: Rc::clone(&states),
+        qpos: qpos.clone(),
+        qvel: qvel.clone(),
+    };
+    let mut driven = Driven { sim, robot, states, steps: 0, closed: false, qpos, qvel };
+    let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
+    let times = measure(plan, &mut [&mut driven, &mut undriven])?;
+    let micros = |side: usize| 1e6 * times.per_step(side) / ENVS as f64;
+    Ok(vec![
+        Row::new("drive", format!("SR5 + hand, {ENVS} envs"), "us/env-step", 1, micros(0))
+            .against("same model, no drives", micros(1), times.ratio(0, 1))
+            .wanted(WANTED),
+    ])
+}

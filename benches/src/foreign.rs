@@ -1,0 +1,58 @@
+//! How much processor time other programs take while we measure.
+
+use std::fs;
+
+/// Unit of times below /proc \[s\]: Linux shows them in hundredths of a second on every architecture.
+const TICK: f64 = 0.01;
+
+/// Processor time \[s\] that neither this process nor the processes `ours` have used since the machine started; `None`
+/// where there is no /proc.
+pub(crate) fn seconds(ours: &[u32]) -> Option<f64> {
+    let busy = busy_ticks(&fs::read_to_string("/proc/stat").ok()?)?;
+    let mut own = process_ticks(&fs::read_to_string("/proc/self/stat").ok()?)?;
+    for pid in ours {
+        own += process_ticks(&fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
+    }
+    Some((busy as f64 - own as f64) * TICK)
+}
+
+/// All but `idle` and `iowait` in the first line of /proc/stat; `guest` times are part of `user` already.
+fn busy_ticks(stat: &str) -> Option<u64> {
+    let line = stat.lines().next()?.strip_prefix("cpu ")?;
+    let ticks: Vec<u64> = line.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
+    Some(ticks.iter().take(8).enumerate().filter(|(i, _)| *i != 3 && *i != 4).map(|(_, t)| t).sum())
+}
+
+/// `utime + stime` of a line such as `12 (a name) S 1 ...`, threads that have ended included.
+fn process_ticks(stat: &str) -> Option<u64> {
+    let mut fields = stat.get(stat.rfind(')')? + 1..)?.split_whitespace().skip(11);
+    Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn idle_and_guest_times_do_not_count() {
+        assert_eq!(busy_ticks("cpu  1 2 4 1000 2000 8 16 32 4000 8000\ncpu0 1"), Some(63));
+    }
+
+    #[test]
+    fn a_name_with_blanks_and_parentheses_is_skipped() {
+        assert_eq!(process_ticks("7 (a) b) S 1 2 3 4 5 6 7 8 9 10 30 12 0 0"), Some(42));
+    }
+
+    #[test]
+    fn our_own_work_is_not_foreign() {
+        let (Some(before), start) = (seconds(&[]), std::time::Instant::now()) else { return };
+        let mut x = 1_u64;
+        while start.elapsed().as_secs_f64() < 0.3 {
+            x = std::hint::black_box(x.wrapping_mul(3));
+        }
+        let all = seconds(&[]).unwrap_or(f64::NAN) - before;
+        // Others may work at the same time: at most all other cores.
+        let others = (std::thread::available_parallelism().map_or(1, usize::from) - 1) as f64;
+        assert!(all < 0.3 * others + 0.15, "{all}");
+    }
+}

@@ -1,0 +1,190 @@
+//! Fair timing on a machine that others use too: sides take turns in short blocks, and ratios are taken turn by turn.
+//!
+//! A round runs one block of every side, then one more of every side in reverse order: a load that grows or fades during
+//! a round meets all sides alike. Results are medians over rounds; a round in which other programs kept the processor
+//! busy does not count.
+
+use crate::{Outcome, foreign};
+use std::time::{Duration, Instant};
+
+/// One program that takes part. All sides do the same work.
+pub(crate) trait Side {
+    /// Goes to where the work starts, not timed.
+    fn restart(&mut self) -> Outcome<()>;
+
+    /// Does `steps` steps in every environment; returns the time they took.
+    fn block(&mut self, steps: u32) -> Outcome<Duration>;
+
+    /// The process that does the work, where it is another one.
+    fn process(&self) -> Option<u32> {
+        None
+    }
+
+    /// Positions after the last block, where they must be those of every other side.
+    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+        Ok(None)
+    }
+}
+
+/// Share of one core that other programs may take in a round that counts.
+const FOREIGN: f64 = 0.05;
+/// On a machine that is always busy we stop waiting for quiet rounds after this many times the length planned.
+const PATIENCE: f64 = 6.0;
+
+/// How to measure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    /// Length of the measurement \[s\].
+    pub(crate) seconds: f64,
+    /// Work starts again when a side has done this many steps.
+    pub(crate) restart_after: u32,
+}
+
+/// A shorter block would count the start of threads.
+const SHORTEST_BLOCK: Duration = Duration::from_millis(50);
+/// A median of fewer rounds is not one.
+const FEWEST_ROUNDS: usize = 5;
+
+/// Time per step \[s\] of every round: `times[side][round]`.
+#[derive(Debug)]
+pub(crate) struct Times(Vec<Vec<f64>>);
+
+impl Times {
+    /// Median of one side \[s per step\].
+    pub(crate) fn per_step(&self, side: usize) -> f64 {
+        median(self.0[side].clone())
+    }
+
+    /// Median over rounds of a number computed from the times of all sides.
+    pub(crate) fn median_of(&self, number: impl Fn(&[f64]) -> f64) -> f64 {
+        let rounds = self.0.first().map_or(0, Vec::len);
+        let of_round = |round: usize| self.0.iter().map(|side| side[round]).collect::<Vec<f64>>();
+        median((0..rounds).map(|round| number(&of_round(round))).collect())
+    }
+
+    /// How many times faster `ours` is than `rival`.
+    pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
+        self.median_of(|t| t[rival] / t[ours])
+    }
+}
+
+/// Measures all sides; after every round, not timed, their states must agree.
+pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times> {
+    let mut times = vec![Vec::new(); sides.len()];
+    restart_all(sides)?;
+    // The first round warms up and tells how many steps make a block.
+    let mut steps = 1_u32;
+    loop {
+        let mut shortest = Duration::MAX;
+        for side in sides.iter_mut() {
+            shortest = shortest.min(side.block(steps)?);
+        }
+        if shortest >= SHORTEST_BLOCK || steps * 4 > plan.restart_after {
+            break;
+        }
+        steps *= 2;
+    }
+    restart_all(sides)?;
+    let processes: Vec<u32> = sides.iter().filter_map(|side| side.process()).collect();
+    let start = Instant::now();
+    let (mut done, mut quiet, mut measured) = (0, Vec::new(), 0.0);
+    while quiet.iter().filter(|&&q| q).count() < FEWEST_ROUNDS || measured < plan.seconds {
+        if start.elapsed().as_secs_f64() > PATIENCE * plan.seconds && quiet.len() >= FEWEST_ROUNDS {
+            break;
+        }
+        let (begin, foreign_before) = (Instant::now(), foreign::seconds(&processes));
+        let mut round = vec![Duration::ZERO; sides.len()];
+        for (i, side) in sides.iter_mut().enumerate() {
+            round[i] += side.block(steps)?;
+        }
+        for (i, side) in sides.iter_mut().enumerate().rev() {
+            round[i] += side.block(steps)?;
+        }
+        for (side, time) in times.iter_mut().zip(round) {
+            side.push(time.as_secs_f64() / f64::from(2 * steps));
+        }
+        let length = begin.elapsed().as_secs_f64();
+        let foreign = foreign::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
+        quiet.push(foreign <= FOREIGN * length);
+        measured += if foreign <= FOREIGN * length { length } else { 0.0 };
+        done += 2 * steps;
+        same_physics(sides)?;
+        if done + 2 * steps > plan.restart_after {
+            restart_all(sides)?;
+            done = 0;
+        }
+    }
+    let calm = quiet.iter().filter(|&&q| q).count();
+    if calm >= FEWEST_ROUNDS {
+        for side in &mut times {
+            let mut counts = quiet.iter();
+            side.retain(|_| counts.next() == Some(&true));
+        }
+    } else {
+        eprintln!(
+            "  note: the machine was busy in {} of {} rounds; all of them count",
+            quiet.len() - calm,
+            quiet.len()
+        );
+    }
+    Ok(Times(times))
+}
+
+fn restart_all(sides: &mut [&mut dyn Side]) -> Outcome<()> {
+    sides.iter_mut().try_for_each(|side| side.restart())
+}
+
+/// All sides have done the same steps from the same starts: they must be in the same state, bit by bit.
+fn same_physics(sides: &mut [&mut dyn Side]) -> Outcome<()> {
+    let mut states = Vec::new();
+    for side in sides.iter_mut() {
+        states.extend(side.qpos()?);
+    }
+    if states.windows(2).all(|pair| pair[0] == pair[1]) {
+        return Ok(());
+    }
+    Err("ours and a rival are in different states: they did not do the same work".into())
+}
+
+/// Median; NaN of nothing.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[n / 2],
+        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Sleeper(u64);
+
+    impl Side for Sleeper {
+        fn restart(&mut self) -> Outcome<()> {
+            Ok(())
+        }
+
+        fn block(&mut self, steps: u32) -> Outcome<Duration> {
+            Ok(Duration::from_millis(self.0 * u64::from(steps)))
+        }
+    }
+
+    #[test]
+    fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
+        let (mut ours, mut rival) = (Sleeper(20), Sleeper(10));
+        let plan = Plan { seconds: 0.0, restart_after: 100 };
+        let times = measure(plan, &mut [&mut ours, &mut rival]).expect("sleeps");
+        assert!((times.ratio(0, 1) - 0.5).abs() < 1e-12);
+        assert!((times.per_step(0) - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert!(median(Vec::new()).is_nan());
+    }
+}

@@ -1,0 +1,86 @@
+//! Memory per extra environment, against one `mjData`: what resident memory grows by from 64 to 1024 of them, each count
+//! in a process of its own, after a few steps (memory that was never touched takes no room).
+
+use crate::models::{Case, drive_sr5, sr5};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::sim::mj::Data;
+use std::process::Command;
+
+const FEW: usize = 64;
+const MANY: usize = 1024;
+/// An environment may take 1.1 times one `mjData`.
+const WANTED: f64 = 1.0 / 1.1;
+const STEPS: u32 = 20;
+const HUMANOID: &str = "humanoid";
+const SR5: &str = "SR5 + hand";
+const OURS: &str = "ours";
+const BARE: &str = "bare";
+
+pub(crate) fn run(_: &Settings) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for case in [HUMANOID, SR5] {
+        if case == HUMANOID && Case::humanoid()?.is_none() {
+            continue;
+        }
+        let (ours, bare) = (growth(OURS, case)?, growth(BARE, case)?);
+        rows.push(Row::new("memory", case, "KiB/env", 1, ours).against("one mjData", bare, bare / ours).wanted(WANTED));
+    }
+    Ok(rows)
+}
+
+/// Memory per extra environment \[KiB\].
+fn growth(side: &str, case: &str) -> Outcome<f64> {
+    let resident = |envs: usize| -> Outcome<f64> {
+        let output =
+            Command::new(std::env::current_exe()?).args(["--memory-of", side, case, &envs.to_string()]).output()?;
+        let text = String::from_utf8(output.stdout)?;
+        text.trim().parse().map_err(|_| {
+            format!("a process that holds {envs} environments failed: {}", String::from_utf8_lossy(&output.stderr))
+                .into()
+        })
+    };
+    Ok((resident(MANY)? - resident(FEW)?) / (MANY - FEW) as f64 / 1024.0)
+}
+
+/// The other process: makes environments, steps them, prints the resident memory \[bytes\].
+pub(crate) fn child(args: &[String]) -> Outcome<()> {
+    let [side, case, envs] = args else { return Err("side, case and number of environments".into()) };
+    let envs: usize = envs.parse()?;
+    let case_of = |name: &str| -> Outcome<Case> {
+        if name == SR5 { Case::sr5() } else { Case::humanoid()?.ok_or_else(|| "no humanoid".into()) }
+    };
+    if side == BARE {
+        let case = case_of(case)?;
+        let mut datas = Vec::new();
+        for i in 0..envs {
+            let mut data = Data::new(&case.model)?;
+            case.write(i, &mut data);
+            for _ in 0..STEPS {
+                data.step()?;
+            }
+            datas.push(data);
+        }
+        print_resident()
+    } else if case == SR5 {
+        let (mut sim, robot) = sr5(envs, 1)?;
+        drive_sr5(&mut sim, robot, true)?;
+        sim.update(STEPS);
+        print_resident()
+    } else {
+        let mut batch = case_of(case)?.batch(envs, 1)?;
+        batch.step(STEPS);
+        print_resident()
+    }
+}
+
+/// Called while everything that counts is alive.
+fn print_resident() -> Outcome<()> {
+    let status = std::fs::read_to_string("/proc/self/status")?;
+    let kib = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok())
+        .ok_or("no VmRSS in /proc/self/status")?;
+    println!("{}", kib * 1024);
+    Ok(())
+}

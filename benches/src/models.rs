@@ -1,0 +1,186 @@
+//! What is stepped: Debian's humanoid and the bundled arm with its hand, from many different states.
+
+use crate::Outcome;
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::drive::table::DriveTable;
+use kinetoscope::sim::mj::{self, Data, Model};
+use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
+use std::sync::Arc;
+
+/// MuJoCo's humanoid as Debian's package libmujoco-samples installs it.
+pub(crate) const HUMANOID: &str = "/usr/share/mujoco/model/humanoid/humanoid.xml";
+
+/// What a bare loop does in one step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Loop {
+    /// `mj_step`.
+    Step,
+    /// `mj_step2`, then `mj_step1`, as our own loop.
+    Step21,
+}
+
+/// A model, and states to start from.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    /// Name in the results.
+    pub(crate) name: &'static str,
+    /// The model with room for every contact that occurs.
+    pub(crate) model: Model,
+    /// What the bare loop calls.
+    pub(crate) bare: Loop,
+    /// The MJCF, where the model is not a file.
+    pub(crate) mjcf: Option<String>,
+    /// States on one trajectory; environment `i` starts from one of them.
+    states: Vec<State>,
+}
+
+/// A state to start from.
+#[derive(Clone, Debug)]
+pub(crate) struct State {
+    pub(crate) qpos: Vec<f64>,
+    pub(crate) qvel: Vec<f64>,
+    pub(crate) warmstart: Vec<f64>,
+}
+
+impl State {
+    /// The state of `data`.
+    pub(crate) fn of(data: &Data) -> Self {
+        Self { qpos: data.qpos().to_vec(), qvel: data.qvel().to_vec(), warmstart: data.qacc_warmstart().to_vec() }
+    }
+
+    /// Puts the state into `data`.
+    pub(crate) fn write(&self, data: &mut Data) {
+        data.qpos_mut().copy_from_slice(&self.qpos);
+        data.qvel_mut().copy_from_slice(&self.qvel);
+        data.qacc_warmstart_mut().copy_from_slice(&self.warmstart);
+    }
+}
+
+/// Number of different starts.
+const STARTS: usize = 128;
+/// Steps from a start to the next restart.
+pub(crate) const STEPS: u32 = 96;
+
+impl Case {
+    /// Debian's humanoid, falling with small constant torques; `None`, with a message, where it is not installed.
+    pub(crate) fn humanoid() -> Outcome<Option<Self>> {
+        if !Path::new(HUMANOID).exists() {
+            eprintln!("skipped: {HUMANOID} is not there (Debian's package libmujoco-samples)");
+            return Ok(None);
+        }
+        let mut compiled = mj::compile_file(Path::new(HUMANOID))?;
+        compiled.prepare_for_stepping(false);
+        Self::new("humanoid", compiled.into_model(), None, Loop::Step).map(Some)
+    }
+
+    /// The bundled arm and hand, limp: the model that drives are written to, without the writes.
+    pub(crate) fn sr5() -> Outcome<Self> {
+        let (sim, _) = sr5(1, 1)?;
+        Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.mjcf().into()), Loop::Step21)
+    }
+
+    fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> Outcome<Self> {
+        let model = model.with_buffers(model.small_buffers());
+        let mut case = Self { name, states: trajectory(&model)?, model, bare, mjcf };
+        // Buffers that no environment has to grow, so that both sides use the same memory.
+        let mut batch = case.batch(STARTS, 1)?;
+        batch.step(STEPS);
+        let mut grown = case.model.buffers();
+        batch.for_each(|_, env| {
+            let own = env.data().model().buffers();
+            grown.contacts = grown.contacts.max(own.contacts);
+            grown.constraints = grown.constraints.max(own.constraints);
+            grown.arena_bytes = grown.arena_bytes.max(own.arena_bytes);
+        });
+        case.model = case.model.with_buffers(grown);
+        Ok(case)
+    }
+
+    /// Environments at their starts, without drives.
+    pub(crate) fn batch(&self, envs: usize, threads: usize) -> Outcome<Batch> {
+        let mut batch = Batch::new(&self.model, &Arc::new(DriveTable::default()), envs, threads)?;
+        self.restart(&mut batch);
+        Ok(batch)
+    }
+
+    /// Puts all environments to their starts.
+    pub(crate) fn restart(&self, batch: &mut Batch) {
+        let case = self.clone();
+        batch.run(Arc::new(move |i, env| env.reset(|data, _| case.write(i, data))));
+    }
+
+    /// The start of environment `index`.
+    pub(crate) fn state(&self, index: usize) -> &State {
+        &self.states[index * 37 % STARTS]
+    }
+
+    /// Controls of environment `index`, constant.
+    pub(crate) fn controls(&self, index: usize) -> Vec<f64> {
+        let phase = 0.7 * (index % STARTS) as f64;
+        (0..self.model.nu()).map(|k| 0.2 * (1.3 * k as f64 + phase).sin()).collect()
+    }
+
+    /// Writes start and controls of environment `index`.
+    pub(crate) fn write(&self, index: usize, data: &mut Data) {
+        self.state(index).write(data);
+        data.ctrl_mut().copy_from_slice(&self.controls(index));
+    }
+}
+
+/// Every second state of one environment from the initial state on.
+fn trajectory(model: &Model) -> Outcome<Vec<State>> {
+    let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1)?;
+    let mut states = Vec::new();
+    for _ in 0..STARTS {
+        batch.step(2);
+        states.push(batch.read(0, |env| State::of(env.data())));
+    }
+    Ok(states)
+}
+
+/// The bundled arm and hand as in the example `create_robot`.
+pub(crate) fn sr5(envs: usize, threads: usize) -> Outcome<(SimulationManager, RobotId)> {
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        num_envs: envs,
+        threads: Some(threads),
+        ..SimulationManagerCfg::default()
+    })?;
+    let hand = ComponentCfg {
+        transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
+        ..ComponentCfg::new("hand", assets::path("revo1_left/revo1_left.urdf")?)
+    };
+    let robot = sim.add_robot(RobotCfg {
+        uid: "sr5".into(),
+        urdf: UrdfCfg {
+            components: vec![ComponentCfg::new("arm", assets::path("sr5/SR5.urdf")?), hand],
+            ..UrdfCfg::default()
+        },
+        control_parts: vec![("arm".into(), vec!["JOINT[1-6]".into()]), ("hand".into(), vec!["LEFT_HAND_.*".into()])],
+        drive: DriveCfg {
+            stiffness: [("arm", 1e4), ("hand", 1e3)].into(),
+            damping: [("arm", 1e3), ("hand", 1e2)].into(),
+            ..DriveCfg::default()
+        },
+        ..RobotCfg::default()
+    })?;
+    Ok((sim, robot))
+}
+
+/// Sends arm and hand to one of two poses.
+pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> Outcome<()> {
+    let arm = sim.robot(robot).get_joint_ids("arm")?;
+    let hand = sim.robot(robot).get_joint_ids("hand")?;
+    let limits = sim.robot(robot).qpos_limits();
+    let wrist = if closed { 0.3 } else { -0.3 };
+    let pose = [0.0, 0.5, -1.5, wrist, -0.5, 0.0];
+    let envs = sim.num_envs();
+    let arm_targets = Array2::from_shape_fn((envs, arm.len()), |(_, j)| pose[j]);
+    let hand_targets = Array2::from_shape_fn((envs, hand.len()), |(_, j)| limits[(0, hand[j].0, usize::from(closed))]);
+    sim.robot_mut(robot).set_qpos(&arm_targets, Some(&arm), None)?;
+    sim.robot_mut(robot).set_qpos(&hand_targets, Some(&hand), None)?;
+    Ok(())
+}

@@ -1,0 +1,113 @@
+//! One comparison: what is written as JSON and shown as a table.
+
+use kinetoscope::sim::mj;
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// Ours against one rival.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Row {
+    /// Name of the benchmark.
+    pub(crate) bench: String,
+    /// What was measured.
+    pub(crate) case: String,
+    /// Unit of `ours` and `rival`.
+    pub(crate) unit: String,
+    /// Our number.
+    pub(crate) ours: f64,
+    /// The rival's number; `None` where it is not on the machine.
+    pub(crate) rival: Option<f64>,
+    /// Who the rival is.
+    pub(crate) rival_name: String,
+    /// Above 1 ours is better.
+    pub(crate) ratio: Option<f64>,
+    /// Threads of both.
+    pub(crate) threads: usize,
+    /// Version of MuJoCo.
+    pub(crate) mujoco: String,
+    /// The ratio we want at least; not part of the results.
+    #[serde(skip)]
+    pub(crate) wanted: Option<f64>,
+}
+
+impl Row {
+    /// A row of this build, without a rival.
+    pub(crate) fn new(bench: &str, case: impl Into<String>, unit: &str, threads: usize, ours: f64) -> Self {
+        Self {
+            bench: bench.into(),
+            case: case.into(),
+            unit: unit.into(),
+            ours,
+            rival: None,
+            rival_name: "-".into(),
+            ratio: None,
+            threads,
+            mujoco: mj::version_string(),
+            wanted: None,
+        }
+    }
+
+    /// The same row with its rival.
+    pub(crate) fn against(mut self, rival_name: &str, rival: f64, ratio: f64) -> Self {
+        self.rival_name = rival_name.into();
+        self.rival = Some(rival);
+        self.ratio = Some(ratio);
+        self
+    }
+
+    /// The same row with the ratio we want at least.
+    pub(crate) fn wanted(mut self, ratio: f64) -> Self {
+        self.wanted = Some(ratio);
+        self
+    }
+
+    fn misses(&self) -> bool {
+        matches!((self.ratio, self.wanted), (Some(ratio), Some(wanted)) if ratio < wanted)
+    }
+}
+
+/// All rows as text; a ratio below the one wanted is marked.
+pub(crate) fn table(rows: &[Row]) -> String {
+    let mut out = format!(
+        "{:<13} {:<44} {:>7} {:>7} {:>12} {:>12} {:<11} {:<22} {:>6}\n",
+        "bench", "case", "threads", "MuJoCo", "ours", "rival", "unit", "rival is", "ratio"
+    );
+    for row in rows {
+        let number = |value: Option<f64>, digits| value.map_or("-".into(), |x| format!("{x:.digits$}"));
+        let digits = if row.ours >= 1000.0 { 0 } else { 3 };
+        let _ = write!(
+            out,
+            "{:<13} {:<44} {:>7} {:>7} {:>12} {:>12} {:<11} {:<22} {:>6}",
+            row.bench,
+            row.case,
+            row.threads,
+            row.mujoco,
+            number(Some(row.ours), digits),
+            number(row.rival, digits),
+            row.unit,
+            row.rival_name,
+            number(row.ratio, 3),
+        );
+        match row.wanted {
+            Some(wanted) if row.misses() => drop(writeln!(out, "  MISSES {wanted:.2}")),
+            Some(wanted) => drop(writeln!(out, "  >= {wanted:.2}")),
+            None => out.push('\n'),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_has_the_agreed_keys_and_a_miss_is_marked() {
+        let row = Row::new("step", "arm, 64 envs", "env-steps/s", 2, 90.0).against("bare loop", 100.0, 0.9);
+        let json = serde_json::to_value(&row).unwrap_or_default();
+        let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();
+        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "rival", "rival_name", "threads", "unit"]);
+        assert!(table(&[row.clone().wanted(0.97)]).contains("MISSES"));
+        assert!(!table(&[row.wanted(0.8)]).contains("MISSES"));
+    }
+}

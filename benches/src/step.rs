@@ -1,0 +1,166 @@
+//! Batched stepping with all positions and velocities read back, against bare loops of MuJoCo calls on as many threads.
+//!
+//! Both sides start from the same states and do the same physics; that is checked, bit by bit, after every round.
+
+use crate::interleave::{Plan, Side, measure};
+use crate::models::{Case, Loop, STEPS};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::mj::Data;
+use std::time::{Duration, Instant};
+
+const ENVS: [usize; 2] = [64, 1024];
+const WANTED: f64 = 0.97;
+
+/// Ours: a batch, and where its state is copied to after every step.
+pub(crate) struct Ours<'c> {
+    case: &'c Case,
+    batch: Batch,
+    pub(crate) qpos: Vec<f64>,
+    qvel: Vec<f64>,
+}
+
+impl<'c> Ours<'c> {
+    pub(crate) fn new(case: &'c Case, envs: usize, threads: usize) -> Outcome<Self> {
+        let (qpos, qvel) = (vec![0.0; envs * case.model.nq()], vec![0.0; envs * case.model.nv()]);
+        Ok(Self { case, batch: case.batch(envs, threads)?, qpos, qvel })
+    }
+}
+
+/// Copies positions and velocities of all environments to two arrays.
+pub(crate) fn read_back(batch: &Batch, qpos: &mut [f64], qvel: &mut [f64]) {
+    let (nq, nv) = (batch.model().nq(), batch.model().nv());
+    batch.for_each(|i, env| {
+        qpos[i * nq..(i + 1) * nq].copy_from_slice(env.data().qpos());
+        qvel[i * nv..(i + 1) * nv].copy_from_slice(env.data().qvel());
+    });
+}
+
+impl Side for Ours<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        self.case.restart(&mut self.batch);
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.batch.step(1);
+            read_back(&self.batch, &mut self.qpos, &mut self.qvel);
+        }
+        Ok(start.elapsed())
+    }
+
+    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+        Ok(Some(self.qpos.clone()))
+    }
+}
+
+/// The rival: every thread steps its share of `mjData` again and again; nobody waits and nothing is read.
+struct Bare<'c> {
+    case: &'c Case,
+    shares: Vec<Vec<Data>>,
+}
+
+impl<'c> Bare<'c> {
+    fn new(case: &'c Case, envs: usize, threads: usize) -> Outcome<Self> {
+        let share = envs.div_ceil(threads);
+        let mut shares = Vec::new();
+        for first in (0..envs).step_by(share) {
+            let datas: Result<Vec<Data>, _> =
+                (first..(first + share).min(envs)).map(|_| Data::new(&case.model)).collect();
+            shares.push(datas?);
+        }
+        Ok(Self { case, shares })
+    }
+}
+
+fn bare_step(data: &mut Data, what: Loop) -> bool {
+    match what {
+        Loop::Step => data.step().is_ok(),
+        Loop::Step21 => data.step2().and_then(|()| data.step1()).is_ok(),
+    }
+}
+
+impl Side for Bare<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        for (i, data) in self.shares.iter_mut().flatten().enumerate() {
+            data.reset();
+            self.case.write(i, data);
+            if self.case.bare == Loop::Step21 {
+                data.step1()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let what = self.case.bare;
+        let start = Instant::now();
+        let run = move |share: &mut Vec<Data>| (0..steps).all(|_| share.iter_mut().all(|data| bare_step(data, what)));
+        let good = match &mut *self.shares {
+            [share] => run(share),
+            // This thread takes part, as it does in ours.
+            [share, others @ ..] => std::thread::scope(|scope| {
+                let others: Vec<_> = others.iter_mut().map(|share| scope.spawn(move || run(share))).collect();
+                let mine = run(share);
+                others.into_iter().all(|thread| thread.join().unwrap_or(false)) && mine
+            }),
+            [] => true,
+        };
+        let time = start.elapsed();
+        if good { Ok(time) } else { Err("MuJoCo stopped in a bare loop".into()) }
+    }
+
+    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+        let mut qpos = Vec::new();
+        for data in self.shares.iter_mut().flatten() {
+            // 2.2.2 normalizes quaternions in place when a step begins, and ours has begun the next one. Normalizing twice
+            // would change the last bit, so this is undone.
+            let before = data.qpos().to_vec();
+            if self.case.bare == Loop::Step {
+                data.step1()?;
+            }
+            qpos.extend_from_slice(data.qpos());
+            data.qpos_mut().copy_from_slice(&before);
+        }
+        Ok(Some(qpos))
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let (mut rows, mut scaling) = (Vec::new(), Vec::new());
+    for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
+        for envs in ENVS {
+            let name = format!("{}, {envs} envs", case.name);
+            eprintln!("  {name}");
+            // Half the time in each comparison with one and with two threads.
+            let plan = Plan { seconds: 2.0 * settings.seconds, restart_after: STEPS };
+            let mut ours = [Ours::new(&case, envs, 1)?, Ours::new(&case, envs, 2)?];
+            let mut bare = [Bare::new(&case, envs, 1)?, Bare::new(&case, envs, 2)?];
+            let [ours1, ours2] = &mut ours;
+            let [bare1, bare2] = &mut bare;
+            let times = measure(plan, &mut [ours1, bare1, ours2, bare2])?;
+            for (threads, side) in [(1, 0), (2, 2)] {
+                let rate = |side: usize| envs as f64 / times.per_step(side);
+                rows.push(
+                    Row::new("step", &name, "env-steps/s", threads, rate(side))
+                        .against("bare loop", rate(side + 1), times.ratio(side, side + 1))
+                        .wanted(WANTED),
+                );
+            }
+            scaling.push(
+                Row::new("scaling", &name, "speed-up", 2, times.median_of(|t| t[0] / t[2]))
+                    .against(
+                        "bare loop",
+                        times.median_of(|t| t[1] / t[3]),
+                        times.median_of(|t| (t[0] / t[2]) / (t[1] / t[3])),
+                    )
+                    .wanted(WANTED),
+            );
+        }
+    }
+    rows.append(&mut scaling);
+    Ok(rows)
+}

@@ -1,0 +1,127 @@
+//! What a robot is, before MuJoCo sees it: tree, joints, masses, dynamics, and everything odd in its files.
+//!
+//! ```text
+//! cargo run --release --example inspect_robot -- sr5/SR5.urdf revo1_left/revo1_left.urdf --qpos JOINT2=0.5
+//! ```
+
+use clap::Parser;
+use kinetoscope::assets;
+use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
+use kinetoscope::sim::urdf::{ComponentCfg, UrdfCfg};
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Prints tree, joints, masses, dynamics and warnings of a robot, as its files describe it: nothing is repaired.
+#[derive(Debug, Parser)]
+#[command(name = "inspect_robot", after_help = HELP)]
+struct Args {
+    /// URDF files; each further one hangs from the tip of the one before
+    #[arg(required = true, value_name = "FILE.urdf")]
+    files: Vec<PathBuf>,
+    /// Let the root move freely: six more rows of the dynamics, ahead of the joints
+    #[arg(long, alias = "floating_base")]
+    floating_base: bool,
+    /// Folder of a package of package:// addresses; may be repeated
+    #[arg(long, value_name = "NAME=DIR", value_parser = package)]
+    package: Vec<(String, PathBuf)>,
+    /// Joint positions [rad or m], 0 where not given; mimic joints follow their driver
+    #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position)]
+    qpos: Vec<(String, f64)>,
+    /// Write the report to a file as JSON; `-` writes JSON to the terminal instead of the tables
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Several files: two are the components `arm` and `hand`, more are `part1`, `part2` and so on; fixed joints such as
+`arm_TO_hand_CONNECTOR` hang each from the tip of the one before. A relative FILE that does not exist is looked for
+among the assets of this crate.
+
+JSON: SI units, quaternions w x y z, gravity (0, 0, -9.81). `links` and `joints` have fixed ones too; `pose` is
+x y z qw qx qy qz in the world; `com` of a link is in its frame, `inertia` about the centre of mass in link axes, `axis` in
+the frame of the joint. `mass_matrix` and `gravity_torque` have one row per joint of `joint_names`; `columns` names all rows,
+with --floating-base first base.vx .. base.wz (velocity of the root in world axes, angular velocity in its own axes),
+and last those of floating and planar joints. null where there is no value.
+
+Exit code: 0 loaded, 1 loaded with warnings (something was repaired, ignored or missing), 2 refused.";
+
+const LOADED: u8 = 0;
+const REPAIRED: u8 = 1;
+const REFUSED: u8 = 2;
+
+fn main() -> ExitCode {
+    ExitCode::from(run(std::env::args_os(), &mut std::io::stdout().lock(), &mut std::io::stderr().lock()))
+}
+
+/// The program with its arguments, what it prints, and its exit code.
+pub(crate) fn run(args: impl IntoIterator<Item = OsString>, out: &mut dyn Write, err: &mut dyn Write) -> u8 {
+    // A closed pipe, as behind `| head`, is no error of ours: what cannot be written is left out.
+    let args = match Args::try_parse_from(args) {
+        Ok(args) => args,
+        Err(error) => {
+            let _ = if error.use_stderr() { write!(err, "{error}") } else { write!(out, "{error}") };
+            return if error.use_stderr() { REFUSED } else { LOADED };
+        }
+    };
+    let report = inspect(&cfg(&args)).map_err(|e| e.to_string());
+    match report.and_then(|report| print(&report, args.json.as_deref(), out).map(|()| report)) {
+        Ok(report) if report.warnings.is_empty() => LOADED,
+        Ok(_) => REPAIRED,
+        Err(message) => {
+            let _ = writeln!(err, "inspect_robot: {message}");
+            REFUSED
+        }
+    }
+}
+
+fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<(), String> {
+    if let Some(path) = json {
+        let text = serde_json::to_string_pretty(report).map_err(|e| e.to_string())? + "\n";
+        if path == Path::new("-") {
+            let _ = out.write_all(text.as_bytes());
+            return Ok(());
+        }
+        std::fs::write(path, text).map_err(|e| format!("--json {}: {e}", path.display()))?;
+    }
+    let _ = write!(out, "{report}");
+    Ok(())
+}
+
+fn cfg(args: &Args) -> InspectCfg {
+    let files: Vec<PathBuf> = args.files.iter().map(|file| user_or_asset(file)).collect();
+    let mut components: Vec<ComponentCfg> = Vec::new();
+    for (i, file) in files.iter().enumerate() {
+        let name = match (files.len(), i) {
+            (1, _) => "robot".to_owned(),
+            (2, 0) => "arm".to_owned(),
+            (2, _) => "hand".to_owned(),
+            _ => format!("part{}", i + 1),
+        };
+        let parent = components.last().map(|before| before.name.clone());
+        components.push(ComponentCfg { parent, ..ComponentCfg::new(name, file) });
+    }
+    let urdf = UrdfCfg { components, packages: args.package.iter().cloned().collect(), ..Default::default() };
+    InspectCfg { urdf, floating_base: args.floating_base, qpos: args.qpos.clone() }
+}
+
+/// A file of the user, else an asset, else the path as it is: the loader says that there is none.
+fn user_or_asset(file: &Path) -> PathBuf {
+    if file.exists() { file.to_path_buf() } else { assets::path(file).unwrap_or_else(|_| file.to_path_buf()) }
+}
+
+fn package(text: &str) -> Result<(String, PathBuf), String> {
+    let (name, folder) = text.split_once('=').ok_or("write NAME=DIR, such as my_robot=robots/my_robot")?;
+    if name.is_empty() {
+        return Err("the package has no name; write NAME=DIR".to_owned());
+    }
+    let folder = PathBuf::from(folder);
+    if folder.is_dir() { Ok((name.to_owned(), folder)) } else { Err(format!("{} is no folder", folder.display())) }
+}
+
+fn position(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.rsplit_once('=').ok_or("write NAME=VALUE,NAME=VALUE, such as joint1=0.5,joint2=-1")?;
+    let value = value.trim().parse().map_err(|_| format!("{value:?} is no number of radians or metres"))?;
+    Ok((name.trim().to_owned(), value))
+}

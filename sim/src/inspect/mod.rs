@@ -1,0 +1,219 @@
+//! What a robot is, before MuJoCo sees it: the tree, mass properties, dynamics at a position, and everything odd.
+//!
+//! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
+//! convex hulls included, and finds the same warnings. Masses and dynamics are those of the files, computed by
+//! [`dynamics`](crate::dynamics): nothing is repaired, MuJoCo is not used.
+
+mod report;
+mod text;
+
+pub use report::{JointReport, LinkReport, MimicReport, Report, Warning};
+
+use crate::body_inertia::{fuse, rigid_bodies};
+use crate::description::{Geometry, JointId, JointKind, RobotDescription};
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::drive::DriveCfg;
+use crate::drive::plan::plan;
+use crate::dynamics::{Configuration, DynamicsError, Kinematics};
+use crate::error::Error;
+use crate::objects::robot::collision_hulls;
+use crate::pattern::{closest, list};
+use crate::source::Source;
+use crate::urdf::{UrdfCfg, assemble};
+use nalgebra::Vector3;
+use scene::mesh::{HullCfg, load};
+use std::collections::{BTreeMap, HashMap};
+
+/// Gravity \[m/s²\].
+const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+/// A position given for a mimic joint may differ this much from what its driver implies \[rad or m\] without a warning.
+const MIMIC_SLACK: f64 = 1e-6;
+
+/// What to inspect.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InspectCfg {
+    /// The files.
+    pub urdf: UrdfCfg,
+    /// Whether the root moves freely.
+    pub floating_base: bool,
+    /// Positions \[rad or m\] by joint name; 0 for joints that are not named. Mimic joints follow their driver.
+    pub qpos: Vec<(String, f64)>,
+}
+
+/// Why a robot was refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InspectError {
+    /// The files cannot be used.
+    #[error(transparent)]
+    Load(Box<Error>),
+    /// A position is given for a joint that does not exist.
+    #[error("qpos: there is no joint {name:?}; {}", list(.candidates, *.total))]
+    JointUnknown {
+        /// The name given.
+        name: String,
+        /// Joints that have a position, the closest first.
+        candidates: Vec<String>,
+        /// How many there are.
+        total: usize,
+    },
+    /// A position is given for a joint without a single degree of freedom.
+    #[error("{at}: qpos: joint {name:?} is {kind}; only revolute, continuous and prismatic joints have a position")]
+    JointUnmovable {
+        /// The joint.
+        at: Source,
+        /// Its name.
+        name: String,
+        /// Its type.
+        kind: &'static str,
+    },
+    /// Two positions are given for one joint.
+    #[error("qpos: joint {name:?} has two positions, {first} and {second}; give one")]
+    PositionRepeated {
+        /// The joint.
+        name: String,
+        /// The first.
+        first: f64,
+        /// The second.
+        second: f64,
+    },
+    /// A position is infinite or not a number.
+    #[error("qpos: joint {name:?} is at {value}, which is not finite")]
+    PositionNotFinite {
+        /// The joint.
+        name: String,
+        /// The position.
+        value: f64,
+    },
+    /// Dynamics cannot be computed.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+}
+
+impl From<Error> for InspectError {
+    fn from(error: Error) -> Self {
+        Self::Load(Box::new(error))
+    }
+}
+
+/// Reads the files and reports.
+///
+/// # Errors
+/// Whatever [`add_robot`](crate::SimulationManager::add_robot) refuses in the files, and wrong positions.
+pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
+    let assembly = assemble(&cfg.urdf).map_err(Error::from)?;
+    let (description, mut diagnostics) = (assembly.description, assembly.diagnostics);
+    let configuration = configuration(&description, cfg, &mut diagnostics)?;
+    collision_hulls(&description, &HullCfg::default())?;
+    check_visual_meshes(&description, &mut diagnostics);
+    for body in rigid_bodies(&description, cfg.floating_base) {
+        fuse(&description, &body, &mut diagnostics);
+    }
+    diagnostics.extend(joint_diagnostics(&description, cfg.floating_base)?);
+    sort_by_place(&mut diagnostics, cfg);
+    let kinematics = Kinematics::new(&description, &configuration)?;
+    let qpos = configuration.resolved_positions(&description)?;
+    Ok(Report::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
+}
+
+/// Where the robot is to be, in the order of the drivable joints.
+fn configuration(
+    description: &RobotDescription,
+    cfg: &InspectCfg,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Result<Configuration, InspectError> {
+    let drivable: Vec<JointId> = description.drivable_joints().map(|(id, _)| id).collect();
+    let mut given: Vec<Option<f64>> = vec![None; drivable.len()];
+    for (name, value) in &cfg.qpos {
+        let Some(id) = description.joint_id(name) else {
+            let names = drivable.iter().map(|&id| description.joint(id).name.as_str());
+            let candidates = closest(name, names).into_iter().map(str::to_owned).collect();
+            return Err(InspectError::JointUnknown { name: name.clone(), candidates, total: drivable.len() });
+        };
+        let joint = description.joint(id);
+        let Some(column) = drivable.iter().position(|&d| d == id) else {
+            let (at, name, kind) = (joint.source.clone(), name.clone(), joint.kind.name());
+            return Err(InspectError::JointUnmovable { at, name, kind });
+        };
+        if !value.is_finite() {
+            return Err(InspectError::PositionNotFinite { name: name.clone(), value: *value });
+        }
+        if let Some(first) = given[column].replace(*value) {
+            return Err(InspectError::PositionRepeated { name: name.clone(), first, second: *value });
+        }
+    }
+    let mut configuration = Configuration::zero(description);
+    configuration.floating_base = cfg.floating_base;
+    configuration.joint_positions = given.iter().map(|q| q.unwrap_or(0.0)).collect();
+    let resolved = configuration.resolved_positions(description)?;
+    for ((id, given), followed) in drivable.into_iter().zip(given).zip(resolved) {
+        let joint = description.joint(id);
+        if let (Some(mimic), Some(given)) = (&joint.mimic, given)
+            && (given - followed).abs() > MIMIC_SLACK
+        {
+            let driver = &description.joint(description.mimic_driver(id).0).name;
+            let message = format!(
+                "joint {:?} follows {driver:?} to {followed}; the position {given} given for it was ignored",
+                joint.name
+            );
+            diagnostics.push(Diagnostic::new(DiagnosticKind::MimicPositionIgnored, mimic.source.clone(), message));
+        }
+    }
+    Ok(configuration)
+}
+
+/// A warning for every visual whose mesh exists and cannot be read; those that do not exist have one already.
+fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Diagnostic>) {
+    let mut faults: HashMap<&std::path::Path, Option<String>> = HashMap::new();
+    for link in &description.links {
+        for visual in &link.visuals {
+            let Geometry::Mesh { uri, path, .. } = &visual.geometry else { continue };
+            if !path.is_file() {
+                continue;
+            }
+            let fault = faults.entry(path).or_insert_with(|| load(path).err().map(|e| e.to_string()));
+            if let Some(fault) = fault {
+                let message = format!(
+                    "link {:?}: visual mesh {uri:?} cannot be used: {fault}; the visual is left out",
+                    link.name
+                );
+                diagnostics.push(Diagnostic::new(DiagnosticKind::VisualMeshInvalid, visual.source.clone(), message));
+            }
+        }
+    }
+}
+
+/// Warnings about limits.
+fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
+    let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
+    let (_, mut diagnostics) =
+        planned.map_err(|error| Error::Plan { robot: description.name.clone(), error: Box::new(error) })?;
+    // Where a simulation starts is no property of the files.
+    diagnostics.retain(|d| d.kind != DiagnosticKind::InitialPositionClamped);
+    Ok(diagnostics)
+}
+
+/// Files in the order given, then lines.
+fn sort_by_place(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
+    let files: Vec<_> = cfg.urdf.components.iter().map(|c| &c.urdf).collect();
+    diagnostics.sort_by_key(|d| {
+        d.source.as_ref().map(|s| (files.iter().position(|f| **f == *s.file).unwrap_or(usize::MAX), s.line))
+    });
+}
+
+/// Names of the generalized velocities after those of the base and of the drivable joints.
+fn free_joint_columns(description: &RobotDescription) -> Vec<String> {
+    let mut columns = Vec::new();
+    for joint in &description.joints {
+        let parts: &[&str] = match joint.kind {
+            JointKind::Floating => &FREE_COLUMNS,
+            JointKind::Planar => &["vx", "vy", "wz"],
+            _ => &[],
+        };
+        columns.extend(parts.iter().map(|part| format!("{}.{part}", joint.name)));
+    }
+    columns
+}
+
+/// Velocity of the origin along x, y, z, then angular velocity about x, y, z.
+const FREE_COLUMNS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];

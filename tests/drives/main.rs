@@ -1,0 +1,16 @@
+//! Drives: what a joint does when it is told to, law by law.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod damping;
+mod export;
+mod friction;
+mod grip;
+mod law;
+mod limits;
+mod mimic;
+mod modes;
+mod native;
+mod robots;
+mod soft;
+mod tutorial;
+mod worlds;

@@ -1,0 +1,128 @@
+//! Sensors in a running simulation: schedule, values, resets, and a sensor of a user's own.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use kinetoscope::ndarray::array;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::SceneState;
+use kinetoscope::sensors::{JointStateCfg, Requires, Sensor, SensorCfg, SensorContext, SensorError};
+
+fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
+    let cfg = SimulationManagerCfg { num_envs, ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    let robot = sim.add_robot(RobotCfg { urdf, ..Default::default() }).unwrap();
+    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
+    (sim, robot)
+}
+
+/// A sensor with a period of 5 steps holds what the robot had at the last multiple of 5, newest first.
+#[test]
+fn a_joint_sensor_samples_on_its_ticks() {
+    let (mut sim, robot) = arm(2);
+    let cfg = JointStateCfg { update_period: 0.05, history_length: 3, ..Default::default() };
+    let id = sim.add_sensor("joints", cfg).unwrap();
+    let mut sampled = Vec::new();
+    for step in 1..=17_u32 {
+        sim.update(1);
+        if step % 5 == 0 {
+            sampled.push(sim.robot(robot).get_qpos());
+        }
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.sample_counts().to_vec(), vec![u64::from(step / 5); 2], "step {step}");
+        if let Some(last) = sampled.last() {
+            assert_eq!(sensor.positions(), last.view(), "step {step}");
+        }
+    }
+    let history = sim.sensor(id).unwrap().position_history();
+    for (age, expected) in sampled.iter().rev().enumerate() {
+        for env in 0..2 {
+            for joint in 0..6 {
+                assert_eq!(history[(env, age, joint)], expected[(env, joint)], "age {age}");
+            }
+        }
+    }
+    assert!((sim.sensor(id).unwrap().stamps()[0] - 0.15).abs() < 1e-12);
+}
+
+/// A reset starts one environment's clock again and leaves the other's alone.
+#[test]
+fn a_reset_restarts_the_clock_of_its_environment_only() {
+    let (mut sim, robot) = arm(2);
+    let cfg = JointStateCfg { update_period: 0.05, ..Default::default() };
+    let id = sim.add_sensor("joints", cfg).unwrap();
+    sim.update(7);
+    sim.reset(Some(&[EnvId(1)])).unwrap();
+    assert_eq!(sim.sensor(id).unwrap().positions().row(1), sim.robot(robot).get_qpos().row(1), "nothing stale");
+    sim.update(3);
+    assert_eq!(sim.sensor(id).unwrap().sample_counts().to_vec(), [2, 0]);
+    sim.update(2);
+    assert_eq!(sim.sensor(id).unwrap().sample_counts().to_vec(), [2, 1]);
+}
+
+/// Sensors see the drives' efforts: at rest, that of the vertical JOINT1 is zero and that of JOINT2 is gravity's.
+#[test]
+fn efforts_are_those_of_the_drives() {
+    let (mut sim, robot) = arm(1);
+    let id = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+    sim.update(400);
+    assert_eq!(sim.sensor(id).unwrap().efforts(), sim.robot(robot).get_qf().view());
+    assert!(sim.robot(robot).get_qf()[(0, 1)].abs() > 5.0);
+}
+
+/// Height of the last link: what a user's crate would bring.
+#[derive(Debug)]
+struct Height(Vec<f64>);
+
+struct HeightCfg;
+
+impl SensorCfg for HeightCfg {
+    type Sensor = Height;
+
+    fn requires(&self) -> Requires {
+        Requires::POSES
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Height, SensorError> {
+        Ok(Height(vec![f64::NAN; context.num_envs]))
+    }
+}
+
+impl Sensor for Height {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        let poses = state
+            .body_poses
+            .as_ref()
+            .ok_or(SensorError::MissingFields { sensor: "height", missing: Requires::POSES })?;
+        for (env, height) in self.0.iter_mut().enumerate() {
+            *height = poses[(env, poses.dim().1 - 1, 2)];
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.update(state)
+    }
+}
+
+#[test]
+fn a_sensor_of_another_crate_is_added_like_any_other() {
+    let (mut sim, robot) = arm(3);
+    let id = sim.add_sensor("height", HeightCfg).unwrap();
+    for _ in 0..2 {
+        sim.update(10);
+        let expected = sim.robot(robot).link_pose("ee_link").unwrap();
+        assert_eq!(sim.sensor(id).unwrap().0, expected.column(2).to_vec());
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let (mut sim, _) = arm(1);
+    let odd = JointStateCfg { update_period: 0.013, ..Default::default() };
+    let text = sim.add_sensor("odd", odd).unwrap_err().to_string();
+    assert!(text.contains("odd") && text.contains("0.013"), "{text}");
+    sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+    assert!(matches!(sim.add_sensor("joints", JointStateCfg::default()), Err(Error::DuplicateUid(_))));
+    let beyond = JointStateCfg { joints: Some(vec![6]), ..Default::default() };
+    assert!(sim.add_sensor("beyond", beyond).is_err());
+}
