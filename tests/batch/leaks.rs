@@ -57,8 +57,9 @@ fn scenario_200_managers() {
     };
     let warm = least();
     let grown = least().saturating_sub(warm);
-    // A leak of one environment in each manager would be 100 sixteenths of what one manager takes.
-    assert!(grown < one, "{grown} bytes more; one manager takes {one}");
+    // A leak of one environment in each manager would be 100 sixteenths of what one manager takes;
+    // what the allocator keeps was seen to differ by 1.1.
+    assert!(grown < 2 * one, "{grown} bytes more; one manager takes {one}");
     // A joined thread leaves /proc when the kernel has finished with it, shortly after.
     for _ in 0..200 {
         if threads() == before {

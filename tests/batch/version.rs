@@ -11,10 +11,16 @@ fn tool(program: &str, args: &[&str]) -> Option<String> {
     output.status.success().then(|| text(&output.stdout))
 }
 
-/// The name of the MuJoCo library that this binary asks the loader for, and the symbols it asks MuJoCo for: functions
-/// and variables with their sizes.
-#[expect(clippy::type_complexity, reason = "soname, functions, data with sizes")]
-fn wanted() -> Option<(String, Vec<String>, Vec<(String, usize)>)> {
+/// What this binary wants of MuJoCo.
+struct Wanted {
+    /// The name of the library that it asks the loader for.
+    soname: String,
+    functions: Vec<String>,
+    /// Names and sizes.
+    variables: Vec<(String, usize)>,
+}
+
+fn wanted() -> Option<Wanted> {
     let exe = std::env::current_exe().unwrap().to_string_lossy().into_owned();
     let dynamic = tool("readelf", &["-d", &exe])?;
     let soname = dynamic.lines().find(|l| l.contains("NEEDED") && l.contains("libmujoco"))?;
@@ -36,11 +42,11 @@ fn wanted() -> Option<(String, Vec<String>, Vec<(String, usize)>)> {
             _ => {}
         }
     }
-    Some((soname, functions, variables))
+    Some(Wanted { soname, functions, variables })
 }
 
 fn build_stub(dir: &Path, version: i32) -> Option<()> {
-    let (soname, functions, variables) = wanted()?;
+    let Wanted { soname, functions, variables } = wanted()?;
     let handlers = ["mju_user_error", "mju_user_warning"];
     let mut source = String::from("extern void abort(void);\n");
     for name in functions {

@@ -41,7 +41,7 @@ fn arrays_that_do_not_fit_are_refused_and_nothing_is_written() {
         (zeros((2, 3)), None, Some(&[0, usize::MAX]), &["environment 18446744073709551615"]),
         (array![[0.5, f64::NAN, 0.5]], None, None, &["[0, 1]", "\"j2\"", "NaN", "finite"]),
         (array![[0.5, 0.5, f64::INFINITY]], None, None, &["[0, 2]", "\"j3\"", "inf"]),
-        (array![[0.5], [-f64::INFINITY]], Some(&[2]), Some(&[0, 3]), &["[1, 0]", "\"j3\"", "-inf"]),
+        (array![[0.5], [f64::NEG_INFINITY]], Some(&[2]), Some(&[0, 3]), &["[1, 0]", "\"j3\"", "-inf"]),
     ];
     let before = bits(&sim);
     for (i, (values, joints, envs, expected)) in rows.iter().enumerate() {
