@@ -4,7 +4,6 @@
 use crate::interleave::{Plan, Side, measure};
 use crate::models::{State, drive_sr5, sr5};
 use crate::row::Row;
-use crate::step::read_back;
 use crate::{Outcome, Settings};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
@@ -83,6 +82,15 @@ impl Side for Undriven {
         }
         Ok(start.elapsed())
     }
+}
+
+/// Copies positions and velocities of all environments to two arrays.
+fn read_back(batch: &Batch, qpos: &mut [f64], qvel: &mut [f64]) {
+    let (nq, nv) = (batch.model().nq(), batch.model().nv());
+    batch.for_each(|i, env| {
+        qpos[i * nq..(i + 1) * nq].copy_from_slice(env.data().qpos());
+        qvel[i * nv..(i + 1) * nv].copy_from_slice(env.data().qvel());
+    });
 }
 
 pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {

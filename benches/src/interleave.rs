@@ -79,7 +79,7 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         for side in sides.iter_mut() {
             shortest = shortest.min(side.block(steps)?);
         }
-        if shortest >= SHORTEST_BLOCK || steps * 4 > plan.restart_after {
+        if shortest >= SHORTEST_BLOCK || steps * 4 + 2 > plan.restart_after {
             break;
         }
         steps *= 2;
@@ -87,6 +87,7 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
     restart_all(sides)?;
     let processes: Vec<u32> = sides.iter().filter_map(|side| side.process()).collect();
     let start = Instant::now();
+    let per_round = 2 * (steps + 1);
     let (mut done, mut quiet, mut measured) = (0, Vec::new(), 0.0);
     while quiet.iter().filter(|&&q| q).count() < FEWEST_ROUNDS || measured < plan.seconds {
         if start.elapsed().as_secs_f64() > PATIENCE * plan.seconds && quiet.len() >= FEWEST_ROUNDS {
@@ -95,10 +96,10 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         let (begin, foreign_before) = (Instant::now(), foreign::seconds(&processes));
         let mut round = vec![Duration::ZERO; sides.len()];
         for (i, side) in sides.iter_mut().enumerate() {
-            round[i] += side.block(steps)?;
+            round[i] += warm_block(*side, steps)?;
         }
         for (i, side) in sides.iter_mut().enumerate().rev() {
-            round[i] += side.block(steps)?;
+            round[i] += warm_block(*side, steps)?;
         }
         for (side, time) in times.iter_mut().zip(round) {
             side.push(time.as_secs_f64() / f64::from(2 * steps));
@@ -107,9 +108,9 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         let foreign = foreign::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
         quiet.push(foreign <= FOREIGN * length);
         measured += if foreign <= FOREIGN * length { length } else { 0.0 };
-        done += 2 * steps;
+        done += per_round;
         same_physics(sides)?;
-        if done + 2 * steps > plan.restart_after {
+        if done + per_round > plan.restart_after {
             restart_all(sides)?;
             done = 0;
         }
@@ -128,6 +129,13 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         );
     }
     Ok(Times(times))
+}
+
+/// One step that is not timed brings data and threads where the side wants them: the sides before it have filled the
+/// caches with theirs.
+fn warm_block(side: &mut dyn Side, steps: u32) -> Outcome<Duration> {
+    side.block(1)?;
+    side.block(steps)
 }
 
 fn restart_all(sides: &mut [&mut dyn Side]) -> Outcome<()> {

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// Names a python that can import mujoco 4; `cargo xtask bench` sets it.
 const PYTHON: &str = "KINETOSCOPE_PYTHON4";
-const ENVS: usize = 1024;
+const ENVS: [usize; 2] = [64, 1024];
 const THREADS: [usize; 2] = [1, 2];
 
 pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
@@ -29,14 +29,14 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     };
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
-        for threads in THREADS {
-            let mut ours = Ours::new(&case, ENVS, threads)?;
-            let mut rival = Rival::start(&python, &case, threads)?;
+        for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
+            let mut ours = Ours::new(&case, envs, threads)?;
+            let mut rival = Rival::start(&python, &case, envs, threads)?;
             let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
             let times = measure(plan, &mut [&mut ours, &mut rival])?;
-            let rate = |side: usize| ENVS as f64 / times.per_step(side);
+            let rate = |side: usize| envs as f64 / times.per_step(side);
             rows.push(
-                Row::new("mujoco-batch", format!("{}, {ENVS} envs", case.name), "env-steps/s", threads, rate(0))
+                Row::new("mujoco-batch", format!("{}, {envs} envs", case.name), "env-steps/s", threads, rate(0))
                     .against("mujoco.batch", rate(1), times.ratio(0, 1)),
             );
         }
@@ -54,10 +54,10 @@ struct Rival {
 }
 
 impl Rival {
-    fn start(python: &OsString, case: &Case, threads: usize) -> Outcome<Self> {
+    fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         let job = folder.path().join("job.json");
-        std::fs::write(&job, self::job(case, threads, folder.path())?.to_string())?;
+        std::fs::write(&job, self::job(case, envs, threads, folder.path())?.to_string())?;
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("rivals/mujoco_batch.py");
         let mut process =
             Command::new(python).arg(script).arg(job).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
@@ -85,7 +85,7 @@ impl Drop for Rival {
 }
 
 /// What the script is told: the model as ours is after compiling, and the starts.
-fn job(case: &Case, threads: usize, folder: &Path) -> Outcome<serde_json::Value> {
+fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> Outcome<serde_json::Value> {
     let m = &case.model;
     let file = match &case.mjcf {
         Some(text) => {
@@ -95,7 +95,7 @@ fn job(case: &Case, threads: usize, folder: &Path) -> Outcome<serde_json::Value>
         }
         None => crate::models::HUMANOID.into(),
     };
-    let starts = |pick: &dyn Fn(usize) -> Vec<f64>| (0..ENVS).map(pick).collect::<Vec<_>>();
+    let starts = |pick: &dyn Fn(usize) -> Vec<f64>| (0..envs).map(pick).collect::<Vec<_>>();
     let mut arrays = json!({
         "dof_frictionloss": m.dof_frictionloss(),
         "dof_armature": m.dof_armature(),
@@ -111,7 +111,7 @@ fn job(case: &Case, threads: usize, folder: &Path) -> Outcome<serde_json::Value>
         "model": file,
         "islands": case.mjcf.is_none(),
         "arrays": arrays,
-        "envs": ENVS,
+        "envs": envs,
         "threads": threads,
         "starts": {
             "qpos": starts(&|i| case.state(i).qpos.clone()),

@@ -28,15 +28,6 @@ impl<'c> Ours<'c> {
     }
 }
 
-/// Copies positions and velocities of all environments to two arrays.
-pub(crate) fn read_back(batch: &Batch, qpos: &mut [f64], qvel: &mut [f64]) {
-    let (nq, nv) = (batch.model().nq(), batch.model().nv());
-    batch.for_each(|i, env| {
-        qpos[i * nq..(i + 1) * nq].copy_from_slice(env.data().qpos());
-        qvel[i * nv..(i + 1) * nv].copy_from_slice(env.data().qvel());
-    });
-}
-
 impl Side for Ours<'_> {
     fn restart(&mut self) -> Outcome<()> {
         self.case.restart(&mut self.batch);
@@ -46,8 +37,8 @@ impl Side for Ours<'_> {
     fn block(&mut self, steps: u32) -> Outcome<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
-            self.batch.step(1);
-            read_back(&self.batch, &mut self.qpos, &mut self.qvel);
+            let outs = [&mut self.qpos[..], &mut self.qvel[..]];
+            self.batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], outs);
         }
         Ok(start.elapsed())
     }

@@ -13,8 +13,18 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Work on one environment, given its index.
-pub type Job = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
+/// What is done with an environment, given its index.
+pub type EnvJob = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
+
+/// What is done with a chunk, given the index of its first environment.
+type Job = Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>;
+
+/// Environments that one thread takes together.
+struct Chunk {
+    envs: Vec<Env>,
+    /// What [`Batch::step_and_read`] read, environment by environment.
+    read: Vec<f64>,
+}
 
 /// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
 const SPINS_BEFORE_SLEEP: u32 = 20_000;
@@ -53,7 +63,7 @@ pub struct Batch {
 }
 
 struct Shared {
-    chunks: Vec<Mutex<Vec<Env>>>,
+    chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
@@ -112,7 +122,7 @@ impl Batch {
             let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
                 .map(|index| Env::new(model, drives).map_err(|error| BatchError::Environment { index, error }))
                 .collect();
-            chunks.push(Mutex::new(chunk?));
+            chunks.push(Mutex::new(Chunk { envs: chunk?, read: Vec::new() }));
         }
         let count = chunks.len();
         let threads = threads.min(count);
@@ -160,11 +170,69 @@ impl Batch {
         self.run(Arc::new(move |_, env: &mut Env| env.step(count)));
     }
 
+    /// Does `count` steps in every environment and copies what `read` picks to `outs`, which have one row for each
+    /// environment: `batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel])`.
+    ///
+    /// The thread that stepped an environment reads it at once, while it is in that core's cache; to read 1024 humanoids
+    /// after the step takes 2 % of it.
+    ///
+    /// # Panics
+    /// `outs` do not have the sizes that `read` gives, or `read` panicked.
+    #[track_caller]
+    pub fn step_and_read<const K: usize>(
+        &mut self,
+        count: u32,
+        read: impl for<'e> Fn(&'e Env) -> [&'e [f64]; K] + Send + Sync + 'static,
+        mut outs: [&mut [f64]; K],
+    ) {
+        let widths = self.read(0, |env| read(env).map(<[f64]>::len));
+        for (out, width) in outs.iter().zip(widths) {
+            assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
+        }
+        let job: Job = Arc::new(move |_, chunk: &mut Chunk| {
+            chunk.read.clear();
+            for env in &mut chunk.envs {
+                env.step(count);
+                for (values, width) in read(env).into_iter().zip(widths) {
+                    assert!(
+                        values.len() == width,
+                        "{} numbers from one environment, {width} from another",
+                        values.len()
+                    );
+                    chunk.read.extend_from_slice(values);
+                }
+            }
+        });
+        self.run_chunks(&job);
+        let mut index = 0;
+        for chunk in &self.shared.chunks {
+            let chunk = lock(chunk);
+            let mut values = &chunk.read[..];
+            for _ in &chunk.envs {
+                for (out, width) in outs.iter_mut().zip(widths) {
+                    let (mine, rest) = values.split_at(width);
+                    out[index * width..(index + 1) * width].copy_from_slice(mine);
+                    values = rest;
+                }
+                index += 1;
+            }
+        }
+    }
+
     /// Runs `job` once for every environment, in parallel.
     ///
     /// # Panics
     /// `job` panicked.
-    pub fn run(&mut self, job: Job) {
+    pub fn run(&mut self, job: EnvJob) {
+        let job: Job = Arc::new(move |first, chunk: &mut Chunk| {
+            for (i, env) in chunk.envs.iter_mut().enumerate() {
+                job(first + i, env);
+            }
+        });
+        self.run_chunks(&job);
+    }
+
+    fn run_chunks(&mut self, job: &Job) {
         let shared = &*self.shared;
         for share in &shared.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
@@ -173,12 +241,12 @@ impl Batch {
         if !self.workers.is_empty() {
             let mut slot = lock(&shared.job);
             slot.epoch += 1;
-            slot.job = Some(Arc::clone(&job));
+            slot.job = Some(Arc::clone(job));
             shared.epoch.store(slot.epoch, Ordering::Release);
             drop(slot);
             shared.wake.notify_all();
         }
-        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &*job)));
+        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &**job)));
         let mut spins = 0_u32;
         while shared.finished.load(Ordering::Acquire) < self.workers.len() {
             spins += 1;
@@ -202,13 +270,13 @@ impl Batch {
     pub fn read<T>(&self, index: usize, read: impl FnOnce(&Env) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
-        read(&chunk[index % self.shared.chunk_size])
+        read(&chunk.envs[index % self.shared.chunk_size])
     }
 
     /// Reads all environments in order.
     pub fn for_each(&self, mut read: impl FnMut(usize, &Env)) {
         for (c, chunk) in self.shared.chunks.iter().enumerate() {
-            for (i, env) in lock(chunk).iter().enumerate() {
+            for (i, env) in lock(chunk).envs.iter().enumerate() {
                 read(c * self.shared.chunk_size + i, env);
             }
         }
@@ -222,13 +290,13 @@ impl Batch {
     pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut Env) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
-        write(&mut chunk[index % self.shared.chunk_size])
+        write(&mut chunk.envs[index % self.shared.chunk_size])
     }
 }
 
 impl Shared {
     /// Does the share of `thread`, then what is left of the shares after it.
-    fn take_chunks(&self, thread: usize, job: &(dyn Fn(usize, &mut Env) + Send + Sync)) {
+    fn take_chunks(&self, thread: usize, job: &(dyn Fn(usize, &mut Chunk) + Send + Sync)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
@@ -236,9 +304,7 @@ impl Shared {
                 if c >= share.chunks.end {
                     break;
                 }
-                for (i, env) in lock(&self.chunks[c]).iter_mut().enumerate() {
-                    job(c * self.chunk_size + i, env);
-                }
+                job(c * self.chunk_size, &mut lock(&self.chunks[c]));
             }
         }
     }
@@ -280,5 +346,56 @@ impl Drop for Batch {
         for worker in self.workers.drain(..) {
             let _ = worker.join();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mj;
+
+    const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 1 0 0" size="0.1"/></body></worldbody></mujoco>"#;
+
+    fn pendulums(envs: usize, threads: usize) -> Batch {
+        let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
+        let mut batch = Batch::new(&model, &Arc::default(), envs, threads).expect("small");
+        batch.run(Arc::new(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64)));
+        batch
+    }
+
+    #[test]
+    fn what_is_read_with_a_step_is_what_is_there_after_it() {
+        for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
+            let mut batch = pendulums(envs, threads);
+            let (mut qpos, mut qvel) = (vec![f64::NAN; envs], vec![f64::NAN; envs]);
+            batch.step_and_read(7, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel]);
+            let mut other = pendulums(envs, 1);
+            other.step(7);
+            for b in [&batch, &other] {
+                b.for_each(|i, env| assert_eq!((env.data().qpos()[0], env.data().qvel()[0]), (qpos[i], qvel[i])));
+            }
+        }
+    }
+
+    #[test]
+    fn every_environment_is_stepped_once_whoever_helps() {
+        let mut batch = pendulums(50, 4);
+        for step in 1..=20 {
+            // The first share is slow: the others help with it.
+            batch.run(Arc::new(|i, env| {
+                if i < 12 {
+                    std::thread::sleep(std::time::Duration::from_micros(50));
+                }
+                env.step(1);
+            }));
+            batch.for_each(|_, env| assert_eq!(env.steps(), step));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "5 numbers for 3 x 1")]
+    fn an_array_of_the_wrong_size_is_refused() {
+        pendulums(3, 1).step_and_read(1, |env| [env.data().qpos()], [&mut [0.0; 5]]);
     }
 }
