@@ -29,7 +29,7 @@ pub(crate) trait Side {
 /// Share of one core that other programs may take in a round that counts.
 const FOREIGN: f64 = 0.05;
 /// On a machine that is always busy we stop waiting for quiet rounds after this many times the length planned.
-const PATIENCE: f64 = 6.0;
+const PATIENCE: f64 = 4.0;
 
 /// How to measure.
 #[derive(Clone, Copy, Debug)]

@@ -46,7 +46,7 @@ struct Args {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Time for one comparison [s]
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 8.0)]
     seconds: f64,
     /// Build one side of the memory benchmark and print the memory of this process
     #[arg(long, hide = true, num_args = 3, value_names = ["SIDE", "CASE", "ENVS"])]

@@ -55,6 +55,12 @@ impl Row {
         self
     }
 
+    /// The same row, for a rival that is not on the machine.
+    pub(crate) fn without(mut self, rival_name: &str) -> Self {
+        self.rival_name = rival_name.into();
+        self
+    }
+
     /// The same row with the ratio we want at least.
     pub(crate) fn wanted(mut self, ratio: f64) -> Self {
         self.wanted = Some(ratio);
