@@ -45,7 +45,7 @@ struct Args {
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Time for one comparison [s]
+    /// Time for one comparison, in seconds
     #[arg(long, default_value_t = 8.0)]
     seconds: f64,
     /// Build one side of the memory benchmark and print the memory of this process

@@ -31,7 +31,7 @@ pub(crate) struct Launcher {
     /// How images are drawn
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     pub(crate) renderer: Renderer,
-    /// Distance of environments in the overview [m]
+    /// Distance of environments in the overview, in metres
     #[arg(long, alias = "arena_space")]
     pub(crate) arena_space: Option<f64>,
     /// Seed of all random numbers
