@@ -134,12 +134,11 @@ impl Model {
         /// Rows of a contact with a pyramidal cone of dimension 3.
         const ROWS_PER_CONTACT: usize = 4;
         let m = self.header();
-        let count = |n: i64| n.max(0) as usize;
-        let always = 6 * count(m.neq as i64) + 2 * count(m.nv as i64) + 2 * count(m.ntendon as i64);
+        let always = 6 * m.neq as usize + 2 * m.nv as usize + 2 * m.ntendon as usize;
         // The arena holds Jacobians, the solver's Hessian and its stack; found to fit the bundled robots without
         // growing. A scene that needs more grows at its first step.
         let rows = always + CONTACTS * ROWS_PER_CONTACT;
-        let nv = count(m.nv as i64);
+        let nv = m.nv as usize;
         Buffers {
             contacts: CONTACTS,
             constraints: rows,
