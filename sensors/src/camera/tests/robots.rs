@@ -51,9 +51,9 @@ fn sr5_is_drawn_from_its_own_meshes() {
         poses.push(PoseF32::from(&world));
     }
     let mut scene = RenderScene::new(instances).unwrap();
-    scene.lights[0].direction = [-0.6, 0.5, -1.0];
+    scene.lights[0].direction = [0.1, 0.8, -1.0];
     scene.haze = Some(scene::Haze { color: None, start: 4.0, end: 40.0 });
-    let view = View::look_at([640, 480], 0.7, [1.7, -1.4, 1.1], [0.15, 0., 0.5], [0., 0., 1.]).unwrap();
+    let view = View::look_at([640, 480], 0.7, [1.5, -1.1, 1.0], [0.3, 0.1, 0.45], [0., 0., 1.]).unwrap();
     let frame = save("sr5", &scene, &poses, &view);
     let mask = frame.mask.unwrap();
     assert!((1..=7).all(|id| mask.contains(&id)), "every link is seen");
@@ -93,7 +93,7 @@ fn anymal_is_drawn_with_its_textures() {
         }
     }
     let mut scene = RenderScene::new(instances).unwrap();
-    scene.lights[0].direction = [-0.6, 0.5, -1.0];
+    scene.lights[0].direction = [0.1, 0.8, -1.0];
     let view = View::look_at([640, 480], 0.6, [1.3, -0.9, 0.9], [0.0, 0., 0.3], [0., 0., 1.]).unwrap();
     save("anymal", &scene, &poses, &view);
     report("ANYmal base", &scene, &poses, &view);

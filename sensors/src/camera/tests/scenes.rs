@@ -142,6 +142,6 @@ pub(super) fn figure() -> (RenderScene, Vec<PoseF32>) {
         add(shape, [x, y, 0.1], [x, y, 0.1001]);
     }
     let mut scene = RenderScene::new(instances).unwrap();
-    scene.lights[0].direction = [-0.5, 0.35, -1.0];
+    scene.lights[0].direction = [0.3, 0.7, -1.0];
     (scene, poses)
 }

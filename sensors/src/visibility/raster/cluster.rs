@@ -56,13 +56,15 @@ pub(crate) fn draw<S: Simd>(
     let nearest = pass.projection.nearest();
     let first = cluster.first as usize;
     for k in first..first + cluster.count as usize {
-        let corners = mesh.corners()[k].map(usize::from);
+        let [a, b, c] = mesh.corners()[k];
+        let corners = [usize::from(a), usize::from(b), usize::from(c)];
         let id = pass.first_id + k as u32;
         if corners.iter().any(|&i| v.clip[i] != 0.0) {
             clipped(s, tile, v, corners, pass, id);
             continue;
         }
-        let mut p = corners.map(|i| [v.snapped[0][i], v.snapped[1][i]]);
+        let snapped = |i: usize| [v.snapped[0][i], v.snapped[1][i]];
+        let mut p = [snapped(corners[0]), snapped(corners[1]), snapped(corners[2])];
         let double = |a: [i32; 2], b: [i32; 2]| i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0]);
         let edge = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
         let area = double(edge(1), edge(2));
@@ -73,7 +75,8 @@ pub(crate) fn draw<S: Simd>(
         if area < 0 {
             p.swap(1, 2);
         }
-        let camera = corners.map(|i| [v.camera[0][i], v.camera[1][i], v.camera[2][i]]);
+        let seen = |i: usize| [v.camera[0][i], v.camera[1][i], v.camera[2][i]];
+        let camera = [seen(corners[0]), seen(corners[1]), seen(corners[2])];
         let at = [v.screen[0][corners[0]], v.screen[1][corners[0]]];
         let g = gradient(pass.projection, camera, at, &camera);
         triangle::draw(s, tile, p, &g, nearest, id);
@@ -88,7 +91,8 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
     let (guard, zero) = (splat(s, GUARD), splat(s, 0.0));
     for i in (0..cluster.lane_count as usize).step_by(LANES) {
         let from = cluster.first_lane as usize + i;
-        let [x, y, z] = [0, 1, 2].map(|a| load(s, &mesh.lanes()[a][from..]));
+        let [x, y, z] = mesh.lanes();
+        let (x, y, z) = (load(s, &x[from..]), load(s, &y[from..]), load(s, &z[from..]));
         let row = |k: usize| x * r[k][0] + y * r[k][1] + z * r[k][2] + t[k];
         let c = [row(0), row(1), row(2)];
         let (sx, sy) = if projection.parallel {

@@ -1,7 +1,7 @@
 //! The tile rasterizer: fills a visibility buffer with the nearest surface at every sample.
 //!
 //! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover. The
-//! picture is drawn in bands that stay in the cache ([`Tile`]); things are drawn front to back, and blocks that are full
+//! picture is drawn in bands that stay in the cache; things are drawn front to back, and blocks that are full
 //! of nearer things are skipped.
 
 mod cluster;
