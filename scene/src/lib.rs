@@ -3,9 +3,19 @@
 //! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
 #![forbid(unsafe_code)]
 
+pub mod light;
+pub mod material;
 pub mod mesh;
 pub mod pose;
+pub mod pose_f32;
+pub mod render_scene;
+pub mod shape;
 pub mod state;
 
+pub use light::{Haze, Headlight, Hemisphere, Light, LightKind, Sky};
+pub use material::{Material, Texture, TextureKind};
 pub use pose::Pose;
+pub use pose_f32::PoseF32;
+pub use render_scene::{Instance, RenderScene, RenderSceneError};
+pub use shape::{RenderMesh, Shape};
 pub use state::SceneState;

@@ -8,11 +8,15 @@
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
+pub mod camera;
 pub mod error;
 pub mod history;
 pub mod joint_state;
+pub(crate) mod lanes;
+pub mod resolve;
 pub mod schedule;
 pub mod sensor;
+pub mod visibility;
 
 pub use error::SensorError;
 pub use history::History;

@@ -1,0 +1,190 @@
+//! How surfaces look.
+
+use std::sync::Arc;
+use std::sync::OnceLock;
+
+/// The look of a surface, with MuJoCo's parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Colour and opacity in 0..=1, the colour meant for the screen as it is (sRGB); it multiplies the texture.
+    pub rgba: [f32; 4],
+    /// Image on the surface.
+    pub texture: Option<Arc<Texture>>,
+    /// How often a 2D texture repeats over the shape, or per metre with `tex_uniform`.
+    pub tex_repeat: [f32; 2],
+    /// Whether `tex_repeat` is per metre.
+    pub tex_uniform: bool,
+    /// Own light, as a multiple of the colour.
+    pub emission: f32,
+    /// Strength of highlights in 0..=1.
+    pub specular: f32,
+    /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
+    pub shininess: f32,
+    /// How much of the sky the surface mirrors, in 0..=1.
+    pub reflectance: f32,
+}
+
+impl Default for Material {
+    /// MuJoCo's defaults for a geom without a material: grey, half glossy.
+    fn default() -> Self {
+        Self {
+            rgba: [0.5, 0.5, 0.5, 1.0],
+            texture: None,
+            tex_repeat: [1.0, 1.0],
+            tex_uniform: false,
+            emission: 0.0,
+            specular: 0.5,
+            shininess: 0.5,
+            reflectance: 0.0,
+        }
+    }
+}
+
+impl Material {
+    /// A plain colour.
+    pub fn from_rgba(rgba: [f32; 4]) -> Self {
+        Self { rgba, ..Self::default() }
+    }
+}
+
+/// How an image lies on a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureKind {
+    /// By texture coordinates, or by x and y of the shape.
+    TwoD,
+    /// By direction from the middle of the shape. The image is six squares from top to bottom: +x, -x, +y, -y, +z, -z.
+    Cube,
+}
+
+/// An image for surfaces, with all its smaller versions (a mip chain, averaged in linear light).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    kind: TextureKind,
+    levels: Vec<Level>,
+}
+
+/// One size of a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Colours (sRGB) from the top left, four bytes each; the fourth is not used.
+    pub pixels: Vec<[u8; 4]>,
+}
+
+/// Why pixels do not make a texture.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TextureError {
+    /// The sizes are zero, too large or do not fit the number of bytes.
+    #[error("a texture of {width} x {height} pixels with {channels} channels cannot have {bytes} bytes")]
+    Size {
+        /// Pixels per row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Bytes per pixel; 3 or 4 are allowed.
+        channels: u32,
+        /// Bytes given.
+        bytes: usize,
+    },
+    /// A cube texture is not six squares.
+    #[error("a cube texture is six squares from top to bottom, not {width} x {height}")]
+    NotSixSquares {
+        /// Pixels per row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+}
+
+impl Texture {
+    /// A texture of `channels` (3 or 4) bytes per pixel (sRGB) from the top left. Opacity is not used.
+    ///
+    /// # Errors
+    ///
+    /// Where the sizes do not fit the bytes, or a cube is not six squares.
+    pub fn new(kind: TextureKind, width: u32, height: u32, channels: u32, data: &[u8]) -> Result<Self, TextureError> {
+        let expected = u64::from(width) * u64::from(height) * u64::from(channels);
+        if !(3..=4).contains(&channels) || expected == 0 || expected != data.len() as u64 || width.max(height) > 1 << 16
+        {
+            return Err(TextureError::Size { width, height, channels, bytes: data.len() });
+        }
+        if kind == TextureKind::Cube && u64::from(height) != 6 * u64::from(width) {
+            return Err(TextureError::NotSixSquares { width, height });
+        }
+        let pixels = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
+        let mut levels = vec![Level { width, height, pixels }];
+        // The faces of a cube must not mix: halve only while a face has an even side.
+        let shrinks = |l: &Level| match kind {
+            TextureKind::TwoD => l.width > 1 || l.height > 1,
+            TextureKind::Cube => l.width.is_multiple_of(2),
+        };
+        while let Some(last) = levels.last().filter(|l| shrinks(l)) {
+            let next = last.half();
+            levels.push(next);
+        }
+        Ok(Self { kind, levels })
+    }
+
+    /// Squares of two colours, as MuJoCo's builtin "checker": two by two of them, `size` pixels in all.
+    pub fn checker(size: u32, a: [u8; 3], b: [u8; 3]) -> Self {
+        let size = size.clamp(2, 4096) & !1;
+        let pick = |k: u32| if (k % size < size / 2) == (k / size < size / 2) { a } else { b };
+        let data: Vec<u8> = (0..size * size).flat_map(pick).collect();
+        let pixels = data.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]).collect();
+        let mut levels = vec![Level { width: size, height: size, pixels }];
+        while let Some(last) = levels.last().filter(|l| l.width > 1) {
+            let next = last.half();
+            levels.push(next);
+        }
+        Self { kind: TextureKind::TwoD, levels }
+    }
+
+    /// How the image lies on a surface.
+    pub fn kind(&self) -> TextureKind {
+        self.kind
+    }
+
+    /// The image in all its sizes, the largest first.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+}
+
+impl Level {
+    /// Half the size, each pixel the mean of four in linear light.
+    fn half(&self) -> Self {
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let table = srgb_to_linear();
+        let at = |x: u32, y: u32| self.pixels[(y.min(self.height - 1) * self.width + x.min(self.width - 1)) as usize];
+        let pixel = |k: u32| {
+            let (x, y) = (2 * (k % width), 2 * (k / width));
+            let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            let mean = |c: usize| four.iter().map(|p| table[p[c] as usize]).sum::<f32>() / 4.0;
+            [linear_to_srgb8(mean(0)), linear_to_srgb8(mean(1)), linear_to_srgb8(mean(2)), 255]
+        };
+        Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+}
+
+/// Linear light of every sRGB byte.
+pub fn srgb_to_linear() -> &'static [f32; 256] {
+    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(|k| decode_srgb(k as f32 / 255.0)))
+}
+
+/// Linear light of an sRGB value in 0..=1. Source: IEC 61966-2-1.
+pub fn decode_srgb(x: f32) -> f32 {
+    let x = f64::from(x.clamp(0.0, 1.0));
+    (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
+}
+
+/// The sRGB byte of linear light in 0..=1. Source: IEC 61966-2-1.
+fn linear_to_srgb8(x: f32) -> u8 {
+    let x = f64::from(x.clamp(0.0, 1.0));
+    let y = if x <= 0.003_130_8 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    (y * 255.0 + 0.5) as u8
+}

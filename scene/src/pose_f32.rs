@@ -1,0 +1,91 @@
+//! Poses as the renderer uses them: a rotation matrix and a translation in single precision.
+
+use crate::Pose;
+
+/// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`. Named as algebra: `world_from_instance`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseF32 {
+    /// Rows of the rotation matrix.
+    pub rotation: [[f32; 3]; 3],
+    /// Translation \[m\].
+    pub translation: [f32; 3],
+}
+
+impl Default for PoseF32 {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl From<&Pose> for PoseF32 {
+    fn from(pose: &Pose) -> Self {
+        let m = pose.to_homogeneous();
+        Self {
+            rotation: [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)] as f32)),
+            translation: [0, 1, 2].map(|i| m[(i, 3)] as f32),
+        }
+    }
+}
+
+impl PoseF32 {
+    /// No rotation, no translation.
+    pub const IDENTITY: Self = Self { rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], translation: [0., 0., 0.] };
+
+    /// A pure translation \[m\].
+    pub const fn from_translation(translation: [f32; 3]) -> Self {
+        Self { translation, ..Self::IDENTITY }
+    }
+
+    /// Rotates a direction.
+    pub fn rotate(&self, v: [f32; 3]) -> [f32; 3] {
+        self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+    }
+
+    /// Rotates a direction by the inverse.
+    pub fn rotate_inverse(&self, v: [f32; 3]) -> [f32; 3] {
+        let r = &self.rotation;
+        [0, 1, 2].map(|j| r[0][j] * v[0] + r[1][j] * v[1] + r[2][j] * v[2])
+    }
+
+    /// Maps a point.
+    pub fn apply(&self, p: [f32; 3]) -> [f32; 3] {
+        let (q, t) = (self.rotate(p), self.translation);
+        [q[0] + t[0], q[1] + t[1], q[2] + t[2]]
+    }
+
+    /// Maps a point by the inverse.
+    pub fn apply_inverse(&self, p: [f32; 3]) -> [f32; 3] {
+        let t = self.translation;
+        self.rotate_inverse([p[0] - t[0], p[1] - t[1], p[2] - t[2]])
+    }
+
+    /// `self⁻¹ * other`, computed in double precision: two poses far from the origin but close to each other keep their
+    /// digits.
+    pub fn inverse_times(&self, other: &Self) -> Self {
+        let a = self.rotation.map(|r| r.map(f64::from));
+        let b = other.rotation.map(|r| r.map(f64::from));
+        let d = [0, 1, 2].map(|i| f64::from(other.translation[i]) - f64::from(self.translation[i]));
+        let column = |j: usize, v: [f64; 3]| a[0][j] * v[0] + a[1][j] * v[1] + a[2][j] * v[2];
+        Self {
+            rotation: [0, 1, 2].map(|i| [0, 1, 2].map(|j| column(i, [b[0][j], b[1][j], b[2][j]]) as f32)),
+            translation: [0, 1, 2].map(|i| column(i, d) as f32),
+        }
+    }
+
+    /// Whether every number is finite and the matrix is a rotation up to rounding.
+    pub fn is_rigid(&self) -> bool {
+        let r = &self.rotation;
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let cross = [
+            r[0][1] * r[1][2] - r[0][2] * r[1][1],
+            r[0][2] * r[1][0] - r[0][0] * r[1][2],
+            r[0][0] * r[1][1] - r[0][1] * r[1][0],
+        ];
+        let near = |x: f32, y: f32| (x - y).abs() < 1e-3;
+        self.translation.iter().all(|t| t.is_finite())
+            && near(dot(r[0], r[0]), 1.)
+            && near(dot(r[1], r[1]), 1.)
+            && near(dot(r[0], r[1]), 0.)
+            && near(dot(cross, r[2]), 1.)
+    }
+}

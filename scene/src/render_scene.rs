@@ -1,0 +1,162 @@
+//! Everything that can be seen, without the poses.
+
+use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
+use crate::material::Material;
+use crate::shape::Shape;
+
+/// A thing to draw: a shape with a look and an identity.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Its surface.
+    pub shape: Shape,
+    /// Its look. With alpha 0 it is not drawn at all.
+    pub material: Material,
+    /// What the mask channel says of it; never 0, which means nothing.
+    pub mask_id: i32,
+    /// The geom group; a view may leave groups out.
+    pub group: u8,
+    /// Whether it is drawn.
+    pub visible: bool,
+}
+
+impl Instance {
+    /// A visible instance in group 0.
+    pub fn new(shape: impl Into<Shape>, material: Material, mask_id: i32) -> Self {
+        Self { shape: shape.into(), material, mask_id, group: 0, visible: true }
+    }
+}
+
+/// What can be seen in an environment, without the poses: immutable, shared by all environments and threads. Each
+/// frame brings one pose per instance.
+#[derive(Clone, Debug)]
+pub struct RenderScene {
+    instances: Vec<Instance>,
+    first_ids: Vec<u32>,
+    linear_colors: Vec<[f32; 3]>,
+    /// The lamps.
+    pub lights: Vec<Light>,
+    /// The lamp on every camera.
+    pub headlight: Headlight,
+    /// Light from all around.
+    pub ambient: Hemisphere,
+    /// What is behind everything.
+    pub sky: Sky,
+    /// Far things fade.
+    pub haze: Option<Haze>,
+}
+
+/// What is wrong with a scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderSceneError {
+    /// A mask id is 0.
+    #[error("instance {instance} has mask id 0, which means that nothing was hit")]
+    ZeroMaskId {
+        /// Which instance.
+        instance: usize,
+    },
+    /// A size is not positive and finite.
+    #[error("instance {instance}, a {shape}, has a size of {size}; sizes are positive and finite")]
+    Size {
+        /// Which instance.
+        instance: usize,
+        /// The kind of shape.
+        shape: &'static str,
+        /// The size.
+        size: f32,
+    },
+    /// A colour or another number of a material is not finite.
+    #[error("the material of instance {instance} has a number that is not finite")]
+    Material {
+        /// Which instance.
+        instance: usize,
+    },
+    /// There are more triangles than ids.
+    #[error("the scene has more than {limit} triangles")]
+    TooManyTriangles {
+        /// The limit.
+        limit: u32,
+    },
+}
+
+impl RenderScene {
+    /// Ids that a shape without triangles occupies: one for each face of a box.
+    pub const IDS_OF_PRIMITIVE: u32 = 8;
+    /// The largest number of ids.
+    pub const MAX_IDS: u32 = u32::MAX / 2;
+
+    /// A scene with the default lights: one from above and the headlight.
+    ///
+    /// # Errors
+    ///
+    /// Sizes that are not positive, numbers that are not finite, mask ids of 0.
+    pub fn new(instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
+        let mut first_ids = vec![0u32];
+        let mut next = 0u32;
+        for (index, instance) in instances.iter().enumerate() {
+            if instance.mask_id == 0 {
+                return Err(RenderSceneError::ZeroMaskId { instance: index });
+            }
+            if let Some(size) = instance.shape.bad_size() {
+                return Err(RenderSceneError::Size { instance: index, shape: instance.shape.name(), size });
+            }
+            let m = &instance.material;
+            let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
+            if m.rgba.iter().chain(&numbers).any(|x| !x.is_finite()) {
+                return Err(RenderSceneError::Material { instance: index });
+            }
+            let ids = instance.mesh().map_or(Self::IDS_OF_PRIMITIVE as usize, |mesh| mesh.triangles().len());
+            next = u32::try_from(ids)
+                .ok()
+                .and_then(|ids| next.checked_add(ids))
+                .filter(|&n| n < Self::MAX_IDS)
+                .ok_or(RenderSceneError::TooManyTriangles { limit: Self::MAX_IDS })?;
+            first_ids.push(next);
+        }
+        let linear = |i: &Instance| {
+            let [r, g, b, _] = i.material.rgba;
+            [r, g, b].map(crate::material::decode_srgb)
+        };
+        Ok(Self {
+            linear_colors: instances.iter().map(linear).collect(),
+            instances,
+            first_ids,
+            lights: vec![Light::default()],
+            headlight: Headlight::default(),
+            ambient: Hemisphere::default(),
+            sky: Sky::default(),
+            haze: None,
+        })
+    }
+
+    /// The instances; poses come in the same order.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// Ids of each instance: `first_ids()[k]..first_ids()[k + 1]`. A mesh has one per triangle.
+    pub fn first_ids(&self) -> &[u32] {
+        &self.first_ids
+    }
+
+    /// The colour of each instance's material in linear light.
+    pub fn linear_colors(&self) -> &[[f32; 3]] {
+        &self.linear_colors
+    }
+
+    /// Number of triangles of all meshes.
+    pub fn triangle_count(&self) -> usize {
+        self.instances.iter().filter_map(Instance::mesh).map(|m| m.triangles().len()).sum()
+    }
+}
+
+impl Instance {
+    /// The triangles, for shapes that are made of them.
+    pub fn mesh(&self) -> Option<&crate::RenderMesh> {
+        match &self.shape {
+            Shape::Mesh(shape) => Some(&shape.mesh),
+            Shape::HeightField(shape) => Some(shape.mesh()),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! A stretched ball.
+
+use super::sphere::Sphere;
+use super::ShapeImpl;
+use crate::mesh::TriMesh;
+
+/// A ball stretched along its axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipsoid {
+    /// Half lengths along x, y and z \[m\].
+    pub radii: [f32; 3],
+}
+
+impl ShapeImpl for Ellipsoid {
+    fn tessellate(&self, segments: usize) -> TriMesh {
+        Sphere { radius: 1.0 }.tessellate(segments).scaled(self.radii.map(f64::from))
+    }
+
+    fn aabb(&self) -> [[f32; 3]; 2] {
+        [self.radii.map(|r| -r), self.radii]
+    }
+
+    fn sizes(&self) -> Vec<f32> {
+        self.radii.to_vec()
+    }
+}

@@ -1,0 +1,81 @@
+//! Terrain.
+
+use super::{RenderMesh, ShapeImpl};
+use crate::mesh::TriMesh;
+use std::sync::Arc;
+
+/// Terrain: heights over a regular grid, with walls and a floor below.
+#[derive(Clone, Debug)]
+pub struct HeightField {
+    size: [f32; 4],
+    mesh: Arc<RenderMesh>,
+}
+
+impl HeightField {
+    /// A height field as MuJoCo has it. `size` = half length along x, half length along y, height of elevation 1, depth of
+    /// the floor below zero \[m\]; `elevation` holds `rows` rows (along y) of `columns` numbers (along x) in 0..=1.
+    /// `None` where there are fewer than two rows or columns, or not as many numbers as the grid has.
+    pub fn new(size: [f32; 4], rows: usize, columns: usize, elevation: &[f32]) -> Option<Self> {
+        if rows < 2 || columns < 2 || elevation.len() != rows.checked_mul(columns)? {
+            return None;
+        }
+        let [x, y, top, bottom] = size;
+        let at = |r: usize, c: usize, z: f32| {
+            [x * (2.0 * c as f32 / (columns - 1) as f32 - 1.0), y * (2.0 * r as f32 / (rows - 1) as f32 - 1.0), z]
+        };
+        let index = |r: usize, c: usize| (r * columns + c) as u32;
+        let mut positions: Vec<_> = (0..rows)
+            .flat_map(|r| (0..columns).map(move |c| (r, c)))
+            .map(|(r, c)| at(r, c, top * elevation[r * columns + c]))
+            .collect();
+        let mut triangles = Vec::new();
+        for r in 0..rows - 1 {
+            for c in 0..columns - 1 {
+                let (a, b, d, e) = (index(r, c), index(r, c + 1), index(r + 1, c), index(r + 1, c + 1));
+                triangles.extend([[a, b, e], [a, e, d]]);
+            }
+        }
+        let mut rim: Vec<(usize, usize)> = (0..columns - 1).map(|c| (0, c)).collect();
+        rim.extend((0..rows - 1).map(|r| (r, columns - 1)));
+        rim.extend((1..columns).rev().map(|c| (rows - 1, c)));
+        rim.extend((1..rows).rev().map(|r| (r, 0)));
+        let first = positions.len() as u32;
+        positions.extend(rim.iter().map(|&(r, c)| at(r, c, -bottom)));
+        let count = rim.len();
+        for k in 0..count {
+            let next = (k + 1) % count;
+            let (a, b) = (index(rim[k].0, rim[k].1), index(rim[next].0, rim[next].1));
+            let (c, d) = (first + k as u32, first + next as u32);
+            triangles.extend([[c, d, b], [c, b, a]]);
+            if k >= 1 && k + 1 < count {
+                triangles.push([first, d, c]);
+            }
+        }
+        let mesh = TriMesh::from_triangles(positions, triangles);
+        Some(Self { size, mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+    }
+
+    /// Half length along x, half length along y, height of elevation 1, depth of the floor below zero \[m\].
+    pub fn size(&self) -> [f32; 4] {
+        self.size
+    }
+
+    /// The triangles.
+    pub fn mesh(&self) -> &Arc<RenderMesh> {
+        &self.mesh
+    }
+}
+
+impl ShapeImpl for HeightField {
+    fn tessellate(&self, _segments: usize) -> TriMesh {
+        self.mesh.to_tri_mesh()
+    }
+
+    fn aabb(&self) -> [[f32; 3]; 2] {
+        self.mesh.bounds()
+    }
+
+    fn sizes(&self) -> Vec<f32> {
+        self.size.to_vec()
+    }
+}

@@ -1,0 +1,273 @@
+//! Triangles prepared for drawing: normals, clusters, bounds.
+
+use super::crease::{corner_normals, cross, dot, sub, unit, weld};
+use crate::mesh::{MeshPart, TriMesh};
+use std::collections::HashMap;
+
+/// A mesh prepared for drawing, once per asset and shared by all environments.
+///
+/// Triangles are sorted along a space-filling curve and cut into [`Cluster`]s of at most [`RenderMesh::CLUSTER`], which
+/// are what the rasterizer culls and transforms.
+#[derive(Clone, Debug, Default)]
+pub struct RenderMesh {
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    uvs: Option<Vec<[f32; 2]>>,
+    triangles: Vec<[u32; 3]>,
+    clusters: Vec<Cluster>,
+    lanes: [Vec<f32>; 3],
+    corners: Vec<[u8; 3]>,
+    bounds: [[f32; 3]; 2],
+}
+
+/// A handful of neighbouring triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cluster {
+    /// The first triangle, in [`RenderMesh::triangles`].
+    pub first: u32,
+    /// Number of triangles.
+    pub count: u32,
+    /// The first vertex, in [`RenderMesh::lanes`].
+    pub first_lane: u32,
+    /// Number of vertices, rounded up to a multiple of 16 (the last is repeated).
+    pub lane_count: u32,
+    /// Middle of the bounding sphere \[m\].
+    pub center: [f32; 3],
+    /// Radius of the bounding sphere \[m\].
+    pub radius: f32,
+    /// Whether every triangle belongs to a closed surface with its front outside: from outside, its back is never seen.
+    pub closed: bool,
+    /// Axis of the cone that holds all normals.
+    pub cone_axis: [f32; 3],
+    /// Cosine of the half angle of that cone; -1 if there is no useful cone.
+    pub cone_cos: f32,
+}
+
+impl RenderMesh {
+    /// The crease angle used for meshes without normals \[rad\]: 30°. Chamfers of CAD parts (45°) stay sharp, cylinders of
+    /// 16 sides (22.5°) look round.
+    pub const CREASE: f32 = std::f32::consts::FRAC_PI_6;
+    /// Triangles per cluster, at most.
+    pub const CLUSTER: usize = 64;
+
+    /// Prepares all triangles; where the mesh has no normals, they are smooth up to the `crease` angle \[rad\].
+    ///
+    /// # Panics
+    ///
+    /// Where `mesh` breaks the promises of [`TriMesh`].
+    pub fn new(mesh: &TriMesh, crease: f32) -> Self {
+        let corner_normals = corner_normals(mesh, crease);
+        let closed = closed_triangles(mesh);
+        let mut order: Vec<(u32, u32)> = curve(mesh).into_iter().zip(0..).collect();
+        order.sort_unstable();
+        let mut out = Self { uvs: mesh.uvs.as_ref().map(|_| Vec::new()), ..Self::default() };
+        out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
+        let mut seen = HashMap::new();
+        for &(_, k) in &order {
+            let (t, normals) = (mesh.triangles[k as usize], corner_normals[k as usize]);
+            let triangle = [0, 1, 2].map(|c| {
+                let (i, n) = (t[c] as usize, normals[c]);
+                *seen.entry((t[c], n.map(f32::to_bits))).or_insert_with(|| {
+                    out.positions.push(mesh.positions[i]);
+                    out.normals.push(n);
+                    if let (Some(to), Some(from)) = (&mut out.uvs, &mesh.uvs) {
+                        to.push(from[i]);
+                    }
+                    out.positions.len() as u32 - 1
+                })
+            });
+            out.triangles.push(triangle);
+        }
+        for first in (0..order.len()).step_by(Self::CLUSTER) {
+            let end = (first + Self::CLUSTER).min(order.len());
+            let all_closed = order[first..end].iter().all(|&(_, k)| closed[k as usize]);
+            out.push_cluster(first, end, all_closed);
+        }
+        out
+    }
+
+    /// Prepares the triangles of one part (one material) of a mesh.
+    pub fn of_part(mesh: &TriMesh, part: &MeshPart, crease: f32) -> Self {
+        let triangles = mesh.triangles[part.triangles.clone()].to_vec();
+        let mut map = HashMap::new();
+        let mut out = TriMesh { normals: mesh.normals.as_ref().map(|_| vec![]), ..TriMesh::default() };
+        out.uvs = mesh.uvs.as_ref().map(|_| vec![]);
+        for t in triangles {
+            let t = t.map(|i| {
+                *map.entry(i).or_insert_with(|| {
+                    out.positions.push(mesh.positions[i as usize]);
+                    if let (Some(to), Some(from)) = (&mut out.normals, &mesh.normals) {
+                        to.push(from[i as usize]);
+                    }
+                    if let (Some(to), Some(from)) = (&mut out.uvs, &mesh.uvs) {
+                        to.push(from[i as usize]);
+                    }
+                    out.positions.len() as u32 - 1
+                })
+            });
+            out.triangles.push(t);
+        }
+        Self::new(&out, crease)
+    }
+
+    fn push_cluster(&mut self, first: usize, end: usize, closed: bool) {
+        let first_lane = self.lanes[0].len();
+        let mut local: HashMap<[u32; 3], u8> = HashMap::new();
+        let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
+        let mut axis = [0.0f32; 3];
+        let mut faces = Vec::new();
+        for k in first..end {
+            let p = self.triangles[k].map(|i| self.positions[i as usize]);
+            let corner = p.map(|p| {
+                let next = (self.lanes[0].len() - first_lane) as u8;
+                *local.entry(p.map(f32::to_bits)).or_insert_with(|| {
+                    for a in 0..3 {
+                        self.lanes[a].push(p[a]);
+                        (lo[a], hi[a]) = (lo[a].min(p[a]), hi[a].max(p[a]));
+                    }
+                    next
+                })
+            });
+            self.corners.push(corner);
+            if let Some(n) = unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))) {
+                axis = [0, 1, 2].map(|a| axis[a] + n[a]);
+                faces.push(n);
+            }
+        }
+        let lane_count = (self.lanes[0].len() - first_lane).next_multiple_of(16);
+        for lane in &mut self.lanes {
+            let last = lane.last().copied().unwrap_or(0.0);
+            lane.resize(first_lane + lane_count, last);
+        }
+        let center = [0, 1, 2].map(|a| (lo[a] + hi[a]) / 2.0);
+        let far = (first_lane..first_lane + lane_count)
+            .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), center))
+            .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
+        let cone_axis = unit(axis).unwrap_or([0., 0., 1.]);
+        let cone_cos = faces.iter().map(|&n| dot(n, cone_axis)).fold(1.0, f32::min);
+        self.clusters.push(Cluster {
+            first: first as u32,
+            count: (end - first) as u32,
+            first_lane: first_lane as u32,
+            lane_count: lane_count as u32,
+            center,
+            // A little more than measured: rounding must never cull.
+            radius: far * 1.0001,
+            closed,
+            cone_axis,
+            cone_cos: if cone_cos > 0.05 { cone_cos - 1e-3 } else { -1.0 },
+        });
+    }
+
+    /// Vertex positions \[m\].
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// Unit vertex normals.
+    pub fn normals(&self) -> &[[f32; 3]] {
+        &self.normals
+    }
+
+    /// Texture coordinates, origin at the lower left of the image.
+    pub fn uvs(&self) -> Option<&[[f32; 2]]> {
+        self.uvs.as_deref()
+    }
+
+    /// Vertex indices of each triangle, in drawing order.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The clusters; they cover the triangles one after the other.
+    pub fn clusters(&self) -> &[Cluster] {
+        &self.clusters
+    }
+
+    /// Positions of the clusters' vertices, one array per axis.
+    pub fn lanes(&self) -> &[Vec<f32>; 3] {
+        &self.lanes
+    }
+
+    /// Corners of each triangle as vertices of its cluster.
+    pub fn corners(&self) -> &[[u8; 3]] {
+        &self.corners
+    }
+
+    /// Smallest and largest coordinates \[m\]; zero without triangles.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        self.bounds
+    }
+
+    /// The mesh as it is drawn.
+    pub fn to_tri_mesh(&self) -> TriMesh {
+        let mut mesh = TriMesh::from_triangles(self.positions.clone(), self.triangles.clone());
+        mesh.normals = Some(self.normals.clone());
+        mesh.uvs.clone_from(&self.uvs);
+        mesh
+    }
+}
+
+/// The position of each triangle on a space-filling curve (Morton code of its middle, 10 bits per axis).
+fn curve(mesh: &TriMesh) -> Vec<u32> {
+    let (lo, hi) = mesh.bounds().unwrap_or_default();
+    let extent = (0..3).map(|a| hi[a] - lo[a]).fold(1e-30, f32::max);
+    let spread = |v: u32| (0..10).fold(0u32, |out, bit| out | (v >> bit & 1) << (3 * bit));
+    let code = |t: &[u32; 3]| {
+        (0..3).fold(0, |code, a| {
+            let middle = t.iter().map(|&i| mesh.positions[i as usize][a]).sum::<f32>() / 3.0;
+            code | spread((((middle - lo[a]) / extent) * 1023.0) as u32) << a
+        })
+    };
+    mesh.triangles.iter().map(code).collect()
+}
+
+/// Which triangles belong to a connected surface where every edge has exactly one neighbour with the opposite direction,
+/// and that encloses a positive volume.
+fn closed_triangles(mesh: &TriMesh) -> Vec<bool> {
+    let welded = weld(&mesh.positions);
+    let mut edges: HashMap<(u32, u32), u32> = HashMap::with_capacity(mesh.triangles.len() * 3);
+    let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
+    for t in &mesh.triangles {
+        let t = corners(t);
+        for k in 0..3 {
+            *edges.entry((t[k], t[(k + 1) % 3])).or_default() += 1;
+        }
+    }
+    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    for t in &mesh.triangles {
+        let t = corners(t);
+        for k in 1..3 {
+            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    // Per component: whether it is closed so far, and six times its volume.
+    let mut components: HashMap<u32, (bool, f64)> = HashMap::new();
+    let middle = mesh.bounds().map_or([0.; 3], |(lo, hi)| [0, 1, 2].map(|a| f64::from(lo[a] + hi[a]) / 2.0));
+    for t in &mesh.triangles {
+        let w = corners(t);
+        let whole = (0..3).all(|k| {
+            let (a, b) = (w[k], w[(k + 1) % 3]);
+            a != b && edges.get(&(a, b)) == Some(&1) && edges.get(&(b, a)) == Some(&1)
+        });
+        let p = t.map(|i| [0, 1, 2].map(|a| f64::from(mesh.positions[i as usize][a]) - middle[a]));
+        let six = p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1])
+            + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2])
+            + p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+        let entry = components.entry(root(&mut parent, w[0])).or_insert((true, 0.0));
+        *entry = (entry.0 && whole, entry.1 + six);
+    }
+    let of = |t: &[u32; 3]| {
+        let component = root(&mut parent, corners(t)[0]);
+        components.get(&component).is_some_and(|&(whole, six)| whole && six > 0.0)
+    };
+    mesh.triangles.iter().map(of).collect()
+}

@@ -1,0 +1,74 @@
+//! What holds for every shape.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+use super::*;
+use std::sync::Arc;
+
+fn all() -> Vec<Shape> {
+    let tetrahedron = Sphere { radius: 0.3 }.tessellate(12);
+    vec![
+        Plane { half: [1.0, 2.0] }.into(),
+        Sphere { radius: 0.5 }.into(),
+        Capsule { radius: 0.2, half_length: 0.4 }.into(),
+        Ellipsoid { radii: [0.1, 0.2, 0.3] }.into(),
+        Cylinder { radius: 0.2, half_length: 0.4 }.into(),
+        Box { half: [0.1, 0.2, 0.3] }.into(),
+        Mesh { mesh: Arc::new(RenderMesh::new(&tetrahedron, RenderMesh::CREASE)) }.into(),
+        HeightField::new([1., 2., 0.5, 0.1], 3, 4, &[0.5; 12]).unwrap().into(),
+    ]
+}
+
+#[test]
+fn tessellations_are_closed_face_outward_and_fill_the_bounds() {
+    let volumes = [0.0, 0.524, 0.13404, 0.02513, 0.10053, 0.048, 0.10077, 2.8];
+    assert_eq!(all().len(), Shape::MODULES.len(), "one of each");
+    assert_eq!(all()[5].name(), "box");
+    for (shape, volume) in all().iter().zip(volumes) {
+        let mesh = shape.tessellate(128);
+        mesh.validate().unwrap();
+        let (lo, hi) = mesh.bounds().unwrap();
+        let [a, b] = shape.aabb();
+        for k in 0..3 {
+            assert!((lo[k] - a[k]).abs() < 1e-3 && (hi[k] - b[k]).abs() < 1e-3, "{} {lo:?} {a:?}", shape.name());
+        }
+        if volume > 0.0 {
+            assert!((mesh.signed_volume() / volume - 1.0).abs() < 0.06, "{} {}", shape.name(), mesh.signed_volume());
+            let closed = RenderMesh::new(&mesh, 0.5).clusters().iter().all(|c| c.closed);
+            assert!(closed, "{} is closed", shape.name());
+        }
+    }
+}
+
+#[test]
+fn clusters_hold_every_triangle_once() {
+    let mesh = Sphere { radius: 1.0 }.tessellate(64);
+    let drawn = RenderMesh::new(&mesh, RenderMesh::CREASE);
+    assert_eq!(drawn.triangles().len(), mesh.triangles.len());
+    let mut next = 0;
+    for c in drawn.clusters() {
+        assert_eq!(c.first, next);
+        next += c.count;
+        assert_eq!(c.lane_count % 16, 0);
+        for k in c.first..next {
+            for (corner, &i) in drawn.corners()[k as usize].iter().zip(&drawn.triangles()[k as usize]) {
+                let lane = c.first_lane as usize + *corner as usize;
+                let p = [0, 1, 2].map(|a| drawn.lanes()[a][lane]);
+                assert_eq!(p, drawn.positions()[i as usize]);
+                let d = crease::sub(p, c.center);
+                assert!(crease::dot(d, d).sqrt() <= c.radius);
+                assert!(crease::dot(drawn.normals()[i as usize], p) > 0.99, "smooth");
+            }
+        }
+    }
+    assert_eq!(next as usize, mesh.triangles.len());
+    let sharp = RenderMesh::new(&Box { half: [1.0; 3] }.tessellate(0), RenderMesh::CREASE);
+    assert_eq!(sharp.positions().len(), 24, "a box has a normal per face and corner");
+    assert!(RenderMesh::new(&TriMesh::default(), 0.5).clusters().is_empty());
+}
+
+#[test]
+fn sizes_must_be_positive() {
+    assert_eq!(Shape::from(Sphere { radius: -1.0 }).bad_size(), Some(-1.0));
+    assert!(Shape::from(Box { half: [1.0, f32::NAN, 1.0] }).bad_size().unwrap().is_nan());
+    assert_eq!(Shape::from(Plane::INFINITE).bad_size(), None);
+    assert!(HeightField::new([1.; 4], 1, 3, &[0.; 3]).is_none());
+}

@@ -1,0 +1,19 @@
+//! Colour (sRGB, see the tone curve) and opacity (always 255).
+
+use super::{Channel, PixelGroup, Stage};
+
+/// Colour (sRGB, see the tone curve) and opacity (always 255).
+#[derive(Clone, Copy, Debug)]
+pub struct Color;
+
+impl Channel for Color {
+    type Number = u8;
+    const NAME: &'static str = "color";
+    const COMPONENTS: usize = 4;
+    const STAGE: Stage = Stage::Color;
+
+    #[inline(always)]
+    fn write(group: &PixelGroup, lane: usize, out: &mut [u8]) {
+        out.copy_from_slice(&group.color[lane]);
+    }
+}

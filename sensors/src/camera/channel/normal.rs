@@ -1,0 +1,21 @@
+//! Normal of the surface itself, turned to the camera.
+
+use super::{Channel, PixelGroup, Stage};
+
+/// Normal of the surface itself, turned to the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Normal;
+
+impl Channel for Normal {
+    type Number = f32;
+    const NAME: &'static str = "normal";
+    const COMPONENTS: usize = 3;
+    const STAGE: Stage = Stage::Geometry;
+
+    #[inline(always)]
+    fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {
+        for (out, axis) in out.iter_mut().zip(&group.normal) {
+            *out = axis[lane];
+        }
+    }
+}

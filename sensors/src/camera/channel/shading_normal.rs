@@ -1,0 +1,21 @@
+//! Normal that light sees: smooth where the surface is meant to be.
+
+use super::{Channel, PixelGroup, Stage};
+
+/// Normal that light sees: smooth where the surface is meant to be.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadingNormal;
+
+impl Channel for ShadingNormal {
+    type Number = f32;
+    const NAME: &'static str = "shading_normal";
+    const COMPONENTS: usize = 3;
+    const STAGE: Stage = Stage::Geometry;
+
+    #[inline(always)]
+    fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {
+        for (out, axis) in out.iter_mut().zip(&group.shading_normal) {
+            *out = axis[lane];
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Pictures held against independent judges.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+mod degenerate;
+mod determinism;
+mod golden;
+mod pictures;
+mod reference;
+mod robots;
+mod scenes;
+mod watertight;

@@ -1,0 +1,147 @@
+//! Scenes for tests, the same on every run.
+
+use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
+use scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
+use std::sync::Arc;
+
+/// A small generator (xorshift64*) so that every run tests the same.
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    pub(super) fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    /// Uniform in lo..hi.
+    pub(super) fn within(&mut self, lo: f64, hi: f64) -> f64 {
+        lo + (hi - lo) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(super) fn vector(&mut self, lo: f64, hi: f64) -> [f64; 3] {
+        [self.within(lo, hi), self.within(lo, hi), self.within(lo, hi)]
+    }
+
+    pub(super) fn pose(&mut self, reach: f64) -> PoseF32 {
+        let q = nalgebra::Quaternion::new(
+            self.within(-1., 1.),
+            self.within(-1., 1.),
+            self.within(-1., 1.),
+            self.within(-1., 1.),
+        );
+        let t = self.vector(-reach, reach);
+        let pose = scene::Pose::from_parts(
+            nalgebra::Translation3::new(t[0], t[1], t[2]),
+            nalgebra::UnitQuaternion::from_quaternion(q),
+        );
+        PoseF32::from(&pose)
+    }
+}
+
+/// Two of every shape, each somewhere within `reach` \[m\].
+pub(super) fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
+    let shapes = every_shape().into_iter().chain(every_shape());
+    let mut color = || random.within(0.1, 1.0) as f32;
+    let mut instances: Vec<Instance> = shapes
+        .zip(1..)
+        .map(|(shape, id)| Instance::new(shape, Material::from_rgba([color(), color(), color(), 1.0]), id))
+        .collect();
+    instances.push(checker_plane());
+    let mut poses: Vec<PoseF32> = (1..instances.len()).map(|_| random.pose(reach)).collect();
+    poses.push(PoseF32::from_translation([0., 0., -1.0]));
+    (RenderScene::new(instances).unwrap(), poses)
+}
+
+pub(super) fn checker_plane() -> Instance {
+    let checker = Texture::checker(64, [110, 120, 130], [140, 150, 160]);
+    let material = Material {
+        rgba: [1.0; 4],
+        texture: Some(Arc::new(checker)),
+        tex_repeat: [1.0, 1.0],
+        tex_uniform: true,
+        specular: 0.1,
+        ..Material::default()
+    };
+    Instance::new(Plane::INFINITE, material, 100)
+}
+
+/// A bumpy ball of triangles.
+pub(super) fn bumpy(segments: usize) -> Arc<RenderMesh> {
+    let mut mesh = Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
+    for p in &mut mesh.positions {
+        let k = 1.0 + 0.15 * (20.0 * p[0]).sin() * (17.0 * p[1]).cos() * (15.0 * p[2]).sin();
+        *p = p.map(|x| x * k);
+    }
+    Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE))
+}
+
+/// One of every kind of shape.
+pub(super) fn every_shape() -> Vec<Shape> {
+    let elevation: Vec<f32> = (0..12 * 9).map(|k| ((k * 37 % 23) as f32) / 23.0).collect();
+    vec![
+        Plane { half: [0.6, 0.4] }.into(),
+        Sphere { radius: 0.3 }.into(),
+        Capsule { radius: 0.15, half_length: 0.3 }.into(),
+        Ellipsoid { radii: [0.4, 0.2, 0.1] }.into(),
+        Cylinder { radius: 0.2, half_length: 0.25 }.into(),
+        Box { half: [0.2, 0.3, 0.1] }.into(),
+        Mesh { mesh: bumpy(24) }.into(),
+        HeightField::new([0.5, 0.4, 0.2, 0.1], 9, 12, &elevation).unwrap().into(),
+    ]
+}
+
+/// About 25 primitives that stand like a person, on a checkered ground.
+pub(super) fn figure() -> (RenderScene, Vec<PoseF32>) {
+    let skin = Material { rgba: [0.8, 0.6, 0.4, 1.0], ..Material::default() };
+    let mut instances = vec![checker_plane()];
+    let mut poses = vec![PoseF32::IDENTITY];
+    let mut add = |shape: Shape, from: [f64; 3], to: [f64; 3]| {
+        let (a, b) = (nalgebra::Vector3::from(from), nalgebra::Vector3::from(to));
+        let along = b - a;
+        let rotation = nalgebra::UnitQuaternion::rotation_between(&nalgebra::Vector3::z(), &along)
+            .unwrap_or_else(nalgebra::UnitQuaternion::identity);
+        let middle = (a + b) / 2.0;
+        instances.push(Instance::new(shape, skin.clone(), instances.len() as i32));
+        poses.push(PoseF32::from(&scene::Pose::from_parts(middle.into(), rotation)));
+    };
+    let limb = |r: f32, a: [f64; 3], b: [f64; 3]| -> Shape {
+        let length = (nalgebra::Vector3::from(b) - nalgebra::Vector3::from(a)).norm();
+        Capsule { radius: r, half_length: 0.5 * length as f32 }.into()
+    };
+    let ball = |r: f32| -> Shape { Sphere { radius: r }.into() };
+    add(ball(0.09), [0., 0., 1.6], [0., 0., 1.6001]);
+    for (r, z) in [(0.07, 1.36), (0.07, 1.28), (0.06, 1.15), (0.06, 1.05), (0.09, 0.95)] {
+        let (a, b) = ([0., -0.07, z], [0., 0.07, z]);
+        add(limb(r, a, b), a, b);
+    }
+    for side in [-1.0, 1.0] {
+        let at = |x: f64, y: f64, z: f64| [x, side * y, z];
+        let joints = [
+            (0.06, at(0., 0.1, 0.9), at(0.03, 0.12, 0.5)),
+            (0.049, at(0.03, 0.12, 0.47), at(0., 0.12, 0.12)),
+            (0.027, at(-0.04, 0.11, 0.03), at(0.14, 0.09, 0.03)),
+            (0.027, at(-0.04, 0.13, 0.03), at(0.14, 0.14, 0.03)),
+            (0.04, at(0., 0.18, 1.36), at(0.1, 0.34, 1.2)),
+            (0.031, at(0.11, 0.34, 1.2), at(0.25, 0.2, 1.28)),
+        ];
+        for (r, a, b) in joints {
+            add(limb(r, a, b), a, b);
+        }
+        add(ball(0.04), at(0.27, 0.19, 1.29), at(0.27, 0.19, 1.2901));
+        add(ball(0.05), at(0., 0.17, 1.37), at(0., 0.17, 1.3701));
+    }
+    for k in 0..3 {
+        let (x, y) = (0.5 + 0.2 * k as f64, -0.5 + 0.4 * k as f64);
+        let shape: Shape = match k {
+            0 => Box { half: [0.1, 0.1, 0.1] }.into(),
+            1 => Cylinder { radius: 0.08, half_length: 0.1 }.into(),
+            _ => Ellipsoid { radii: [0.14, 0.1, 0.1] }.into(),
+        };
+        add(shape, [x, y, 0.1], [x, y, 0.1001]);
+    }
+    let mut scene = RenderScene::new(instances).unwrap();
+    scene.lights[0].direction = [0.3, 0.7, -1.0];
+    (scene, poses)
+}

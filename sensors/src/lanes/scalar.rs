@@ -1,0 +1,137 @@
+//! The reference: plain loops over arrays.
+
+use super::{LANES, Simd};
+
+/// No instruction set but what every machine has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scalar;
+
+// One copy of each loop: inlined into the kernels they would make functions of a hundred thousand instructions.
+#[inline(never)]
+fn pairs<A: Copy, B: Copy, R>(a: &[A; LANES], b: &[B; LANES], f: impl Fn(A, B) -> R) -> [R; LANES] {
+    std::array::from_fn(|k| f(a[k], b[k]))
+}
+
+#[inline(never)]
+fn choose<T: Copy>(m: &[bool; LANES], a: &[T; LANES], b: &[T; LANES]) -> [T; LANES] {
+    std::array::from_fn(|k| if m[k] { a[k] } else { b[k] })
+}
+
+impl Simd for Scalar {
+    type F = [f32; LANES];
+    type I = [i32; LANES];
+    type U = [u32; LANES];
+    type M = [bool; LANES];
+
+    fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
+        f()
+    }
+    fn splat(self, x: f32) -> Self::F {
+        [x; LANES]
+    }
+    fn splat_i(self, x: i32) -> Self::I {
+        [x; LANES]
+    }
+    fn splat_u(self, x: u32) -> Self::U {
+        [x; LANES]
+    }
+    fn load(self, x: &[f32; LANES]) -> Self::F {
+        *x
+    }
+    fn load_i(self, x: &[i32; LANES]) -> Self::I {
+        *x
+    }
+    fn load_u(self, x: &[u32; LANES]) -> Self::U {
+        *x
+    }
+    fn array(x: Self::F) -> [f32; LANES] {
+        x
+    }
+    fn array_i(x: Self::I) -> [i32; LANES] {
+        x
+    }
+    fn array_u(x: Self::U) -> [u32; LANES] {
+        x
+    }
+    fn bits(m: Self::M) -> u64 {
+        (0..LANES).fold(0, |bits, k| bits | u64::from(m[k]) << k)
+    }
+    fn add(a: Self::F, b: Self::F) -> Self::F {
+        pairs(&a, &b, |a, b| a + b)
+    }
+    fn sub(a: Self::F, b: Self::F) -> Self::F {
+        pairs(&a, &b, |a, b| a - b)
+    }
+    fn mul(a: Self::F, b: Self::F) -> Self::F {
+        pairs(&a, &b, |a, b| a * b)
+    }
+    fn div(a: Self::F, b: Self::F) -> Self::F {
+        pairs(&a, &b, |a, b| a / b)
+    }
+    fn lt(a: Self::F, b: Self::F) -> Self::M {
+        pairs(&a, &b, |a, b| a < b)
+    }
+    fn le(a: Self::F, b: Self::F) -> Self::M {
+        pairs(&a, &b, |a, b| a <= b)
+    }
+    fn eq(a: Self::F, b: Self::F) -> Self::M {
+        pairs(&a, &b, |a, b| a == b)
+    }
+    fn add_i(a: Self::I, b: Self::I) -> Self::I {
+        pairs(&a, &b, |a, b| a.wrapping_add(b))
+    }
+    fn mul_i(a: Self::I, b: Self::I) -> Self::I {
+        pairs(&a, &b, |a, b| a.wrapping_mul(b))
+    }
+    fn or_i(a: Self::I, b: Self::I) -> Self::I {
+        pairs(&a, &b, |a, b| a | b)
+    }
+    fn ge_i(a: Self::I, b: Self::I) -> Self::M {
+        pairs(&a, &b, |a, b| a >= b)
+    }
+    fn add_u(a: Self::U, b: Self::U) -> Self::U {
+        pairs(&a, &b, |a, b| a.wrapping_add(b))
+    }
+    fn ge_u(a: Self::U, b: Self::U) -> Self::M {
+        pairs(&a, &b, |a, b| a >= b)
+    }
+    fn eq_u(a: Self::U, b: Self::U) -> Self::M {
+        pairs(&a, &b, |a, b| a == b)
+    }
+    fn and(a: Self::M, b: Self::M) -> Self::M {
+        pairs(&a, &b, |a, b| a & b)
+    }
+    fn or(a: Self::M, b: Self::M) -> Self::M {
+        pairs(&a, &b, |a, b| a | b)
+    }
+    fn neg(a: Self::F) -> Self::F {
+        pairs(&a, &a, |a, _| -a)
+    }
+    fn byte0(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a & 255) as f32)
+    }
+    fn byte1(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a >> 8 & 255) as f32)
+    }
+    fn byte2(a: Self::I) -> Self::F {
+        pairs(&a, &a, |a, _| (a >> 16 & 255) as f32)
+    }
+    fn sqrt(a: Self::F) -> Self::F {
+        pairs(&a, &a, |a, _| a.sqrt())
+    }
+    fn to_int(a: Self::F) -> Self::I {
+        pairs(&a, &a, |a, _| a as i32)
+    }
+    fn not(a: Self::M) -> Self::M {
+        pairs(&a, &a, |a, _| !a)
+    }
+    fn select(m: Self::M, a: Self::F, b: Self::F) -> Self::F {
+        choose(&m, &a, &b)
+    }
+    fn select_i(m: Self::M, a: Self::I, b: Self::I) -> Self::I {
+        choose(&m, &a, &b)
+    }
+    fn select_u(m: Self::M, a: Self::U, b: Self::U) -> Self::U {
+        choose(&m, &a, &b)
+    }
+}

@@ -1,0 +1,142 @@
+//! Sixteen samples: which instances they see, and what each channel makes of it.
+
+use super::shade::{Lighting, shade, sky};
+use super::shadow::ShadowMap;
+use super::surface::{Source, surface};
+use crate::camera::channel::PixelGroup;
+use crate::lanes::{F, LANES, M, Simd, U, V3, load, load_u, select, splat, splat_u, store};
+use crate::visibility::Projection;
+use crate::visibility::raster::Placed;
+use crate::visibility::raster::tile::NOTHING;
+use scene::{PoseF32, RenderScene};
+
+/// What the pixels of a frame have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Context<'a> {
+    pub(crate) projection: &'a Projection,
+    pub(crate) scene: &'a RenderScene,
+    pub(crate) poses: &'a [PoseF32],
+    pub(crate) placed: &'a [Placed],
+    pub(crate) lighting: &'a Lighting,
+    pub(crate) shadows: &'a [ShadowMap],
+    /// Width of a pixel at depth 1.
+    pub(crate) pixel: f32,
+}
+
+impl<'a> Context<'a> {
+    /// The instance that an id belongs to.
+    #[inline(always)]
+    pub(crate) fn instance(&self, id: u32, last: usize) -> usize {
+        let first = self.scene.first_ids();
+        if id >= first[last] && id < first[last + 1] {
+            return last;
+        }
+        first.partition_point(|&f| f <= id) - 1
+    }
+
+    #[inline(always)]
+    pub(crate) fn source(&self, index: usize) -> Source<'a> {
+        Source {
+            instance: &self.scene.instances()[index],
+            world_from_instance: &self.poses[index],
+            placed: &self.placed[index],
+            first_id: self.scene.first_ids()[index],
+            color: self.scene.linear_colors()[index],
+        }
+    }
+}
+
+/// Linear colours of sixteen samples.
+pub(crate) type Colors = [[f32; LANES]; 3];
+
+/// Resolves sixteen samples at (u, v): geometry into `pixels`, colour into `colors`, each only if wanted.
+///
+/// One copy per instruction set, so its arguments are in memory.
+#[inline(never)]
+pub(crate) fn resolve<S: Simd>(
+    s: S,
+    context: &Context<'_>,
+    ids: &[u32; LANES],
+    at: [&[f32; LANES]; 2],
+    pixels: Option<&mut PixelGroup>,
+    colors: Option<&mut Colors>,
+) {
+    s.vectorize(
+        #[inline(always)]
+        || resolve_lanes(s, context, load_u(s, ids), load(s, at[0]), load(s, at[1]), pixels, colors),
+    );
+}
+
+#[inline(always)]
+fn resolve_lanes<S: Simd>(
+    s: S,
+    context: &Context<'_>,
+    ids: U<S>,
+    u: F<S>,
+    v: F<S>,
+    mut pixels: Option<&mut PixelGroup>,
+    mut colors: Option<&mut Colors>,
+) {
+    let projection = context.projection;
+    let direction = projection.world_directions(s, u, v);
+    let length = direction.dot(direction).sqrt();
+    let view = direction.scale(1.0 / length);
+    let zero = splat(s, 0.0);
+    let nothing = splat_u(s, NOTHING);
+    let missed = ids.simd_eq(nothing);
+    let mut depth = splat(s, f32::INFINITY);
+    let none = V3::splat(s, [0.0; 3]);
+    let (mut normal, mut shading, mut position) = (none, none, none);
+    let mut color = none;
+    let mut mask = [0i32; LANES];
+    if colors.is_some() && missed.any_true() {
+        color = sky(s, context.lighting, view);
+    }
+    let list: [u32; LANES] = ids.array();
+    let mut left = (!missed).to_bitmask();
+    let mut last = 0;
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        last = context.instance(list[lane], last);
+        let source = context.source(last);
+        let end = context.scene.first_ids()[last + 1];
+        let here: M<S> = ids.simd_ge(splat_u(s, source.first_id)) & ids.simd_lt(splat_u(s, end));
+        let bits = here.to_bitmask();
+        left &= !bits;
+        let at = surface(s, projection, &source, ids, here, u, v);
+        if pixels.is_some() {
+            depth = select(here, at.depth, depth);
+            normal = V3::select(here, at.normal, normal);
+            shading = V3::select(here, at.shading, shading);
+            position = V3::select(here, at.position, position);
+            let id = source.instance.mask_id;
+            for (lane, mask) in mask.iter_mut().enumerate() {
+                *mask = if bits >> lane & 1 == 1 { id } else { *mask };
+            }
+        }
+        if colors.is_some() {
+            let Context { scene, lighting, shadows, pixel, .. } = *context;
+            let distance = at.depth * length;
+            let seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, pixel, here);
+            color = V3::select(here, seen, color);
+        }
+    }
+    if let Some(pixels) = &mut pixels {
+        store(depth, &mut pixels.depth);
+        store(depth * length, &mut pixels.distance);
+        pixels.mask = mask;
+        for (to, v) in [(&mut pixels.normal, normal), (&mut pixels.shading_normal, shading)] {
+            store(v.x, &mut to[0]);
+            store(v.y, &mut to[1]);
+            store(v.z, &mut to[2]);
+        }
+        store(select(missed, zero, position.x), &mut pixels.position[0]);
+        store(select(missed, zero, position.y), &mut pixels.position[1]);
+        store(select(missed, zero, position.z), &mut pixels.position[2]);
+    }
+    if let Some(colors) = &mut colors {
+        store(color.x, &mut colors[0]);
+        store(color.y, &mut colors[1]);
+        store(color.z, &mut colors[2]);
+    }
+}

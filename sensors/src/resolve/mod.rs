@@ -1,0 +1,11 @@
+//! From the visibility buffer to channels: every channel is computed from the same hit.
+//!
+//! Colour is computed in linear light; `tone` says how it reaches the screen.
+
+pub(crate) mod group;
+pub(crate) mod multisample;
+pub(crate) mod shade;
+pub(crate) mod shadow;
+pub(crate) mod surface;
+pub(crate) mod texture;
+pub(crate) mod tone;

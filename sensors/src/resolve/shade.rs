@@ -1,0 +1,233 @@
+//! How much light of which colour a surface sends to the camera.
+
+use super::shadow::ShadowMap;
+use super::surface::{Source, Surface, planar_uv};
+use super::{texture, tone};
+use crate::lanes::{F, LANES, M, Simd, V3, abs, load, max, min, root, select, splat};
+use scene::{Light, LightKind, RenderScene};
+
+/// The largest number of lamps that are drawn.
+pub(crate) const MAX_LIGHTS: usize = 16;
+
+/// A light prepared for a frame.
+#[derive(Clone, Copy, Debug)]
+struct Lamp {
+    light: Light,
+    /// Unit vector along which it shines.
+    along: [f32; 3],
+    cutoff_cos: f32,
+    exponent: u32,
+    shadow: Option<usize>,
+}
+
+/// What colours need besides the surface, prepared once per frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lighting {
+    lamps: Vec<Lamp>,
+    zenith: [f32; 3],
+    horizon: [f32; 3],
+    nadir: [f32; 3],
+    haze: Option<[f32; 3]>,
+}
+
+pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
+}
+
+/// The cosine of an angle in degrees, by its series: `cos()` is not the same on every machine.
+fn cos_deg(deg: f32) -> f32 {
+    let x = f64::from(deg.clamp(0.0, 180.0)) * (std::f64::consts::PI / 180.0);
+    let (mut sum, mut term) = (1.0f64, 1.0f64);
+    for k in 1..16 {
+        term *= -(x * x) / f64::from((2 * k - 1) * (2 * k));
+        sum += term;
+    }
+    sum as f32
+}
+
+impl Lighting {
+    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadow: impl Fn(usize) -> Option<usize>) {
+        let sky = scene.sky;
+        (self.zenith, self.horizon, self.nadir) =
+            (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
+        self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
+        self.lamps.clear();
+        for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
+            let (cutoff_cos, exponent) = match light.kind {
+                LightKind::Spot { cutoff_deg, exponent } => (cos_deg(cutoff_deg), exponent.clamp(0.0, 128.0) as u32),
+                LightKind::Directional | LightKind::Point => (-2.0, 0),
+            };
+            self.lamps.push(Lamp {
+                light: *light,
+                along: unit(light.direction),
+                cutoff_cos,
+                exponent,
+                shadow: shadow(k),
+            });
+        }
+    }
+}
+
+/// x to an integer power, by squaring.
+#[inline(always)]
+fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
+    let (mut result, mut square) = (splat(s, 1.0), x);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result = result * square;
+        }
+        square = square * square;
+        exponent >>= 1;
+    }
+    result
+}
+
+/// The sky in a direction (unit).
+#[inline(always)]
+pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>) -> V3<S> {
+    let k = root(s, min(abs(direction.z), splat(s, 1.0)));
+    let up = direction.z.simd_gt(splat(s, 0.0));
+    let mix = |c: usize| {
+        let (h, z, n) = (lighting.horizon[c], lighting.zenith[c], lighting.nadir[c]);
+        k * select(up, splat(s, z - h), splat(s, n - h)) + h
+    };
+    V3 { x: mix(0), y: mix(1), z: mix(2) }
+}
+
+/// The colour of a surface, linear, seen along `view` (unit, away from the camera) from a distance. `pixel` is the width of
+/// a pixel at depth 1.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "inlined into its few callers")]
+pub(crate) fn shade<S: Simd>(
+    s: S,
+    scene: &RenderScene,
+    lighting: &Lighting,
+    shadows: &[ShadowMap],
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    distance: F<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> V3<S> {
+    let material = &source.instance.material;
+    let base = albedo(s, source, at, view, pixel, lanes);
+    let zero = splat(s, 0.0);
+    let n = at.shading;
+    // Ambient: between ground and sky by the normal's height.
+    let up = n.z * 0.5 + 0.5;
+    let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
+    let ambient = |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission);
+    let mut diffuse = [ambient(0), ambient(1), ambient(2)];
+    let mut gloss = [zero, zero, zero];
+    let exponent = ((material.shininess * 128.0 + 0.5) as u32).clamp(1, 128);
+    let headlight = &scene.headlight;
+    if headlight.active {
+        let facing = max(-n.dot(view), zero);
+        let shine = power(s, facing, exponent) * material.specular;
+        for k in 0..3 {
+            diffuse[k] += facing * headlight.diffuse[k] + headlight.ambient[k];
+            gloss[k] += shine * headlight.specular[k];
+        }
+    }
+    for lamp in &lighting.lamps {
+        let light = &lamp.light;
+        let (to, strength) = if light.kind == LightKind::Directional {
+            (V3::splat(s, lamp.along.map(|x| -x)), splat(s, 1.0))
+        } else {
+            let to = V3::splat(s, light.position).sub(at.position);
+            let d = to.dot(to).sqrt();
+            let a = light.attenuation;
+            let fall = d * d * a[2] + d * a[1] + a[0];
+            let mut strength = 1.0 / max(fall, splat(s, 1e-6));
+            let to = to.unit(s);
+            if let LightKind::Spot { .. } = light.kind {
+                let axis = -to.dot(V3::splat(s, lamp.along));
+                let inside = axis.simd_ge(splat(s, lamp.cutoff_cos));
+                strength = select(inside, strength * power(s, max(axis, zero), lamp.exponent), zero);
+            }
+            (to, strength)
+        };
+        let facing = max(n.dot(to), zero);
+        let mut lit = strength;
+        if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
+            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+            if matters.any_true() {
+                lit = lit * map.light(s, at.position, at.normal, matters);
+            }
+        }
+        let half = to.sub(view).unit(s);
+        let shine = power(s, max(n.dot(half), zero), exponent) * material.specular;
+        let shine = select(facing.simd_gt(zero), shine, zero);
+        for k in 0..3 {
+            diffuse[k] += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+            gloss[k] += shine * lit * light.specular[k];
+        }
+    }
+    let mut color =
+        V3 { x: base.x * diffuse[0] + gloss[0], y: base.y * diffuse[1] + gloss[1], z: base.z * diffuse[2] + gloss[2] };
+    if material.reflectance > 0.0 {
+        let mirrored = view.sub(n.scale(n.dot(view) * 2.0));
+        let k = splat(s, material.reflectance.clamp(0.0, 1.0));
+        color = color.scale(1.0 - k).add(sky(s, lighting, mirrored).scale(k));
+    }
+    if let Some(haze) = scene.haze {
+        let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
+        let k = min(max(k, zero), splat(s, 1.0));
+        let k = k * k * (3.0 - k * 2.0);
+        let behind = match lighting.haze {
+            Some(c) => V3::splat(s, c),
+            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }),
+        };
+        color = color.scale(1.0 - k).add(behind.scale(k));
+    }
+    color
+}
+
+/// The colour of the surface itself, linear.
+#[inline(always)]
+fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
+    let (instance, flat) = (source.instance, source.color);
+    let material = &instance.material;
+    let Some(image) = material.texture.as_deref() else { return V3::splat(s, flat) };
+    // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
+    let slant = max(-at.normal.dot(view), splat(s, 0.02));
+    let width = at.depth * pixel / root(s, slant);
+    let mut out = [[0.0f32; LANES]; 3];
+    let bits = lanes.to_bitmask();
+    let lanes_seen = || (0..LANES).filter(|lane| bits >> lane & 1 == 1);
+    let mut put = |lane: usize, c: [f32; 4]| (out[0][lane], out[1][lane], out[2][lane]) = (c[0], c[1], c[2]);
+    if texture::is_cube(image) {
+        let [lo, hi] = instance.shape.aabb();
+        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+        let scale = half.map(|h| if h > 0.0 && h.is_finite() { 1.0 / h } else { 1.0 });
+        let d = [(at.local.x * scale[0]).array(), (at.local.y * scale[1]).array(), (at.local.z * scale[2]).array()];
+        let largest = scale.iter().copied().fold(0.0, f32::max);
+        let width: [f32; LANES] = (width * largest).array();
+        for lane in lanes_seen() {
+            let d = [d[0][lane], d[1][lane], d[2][lane]];
+            put(lane, texture::sample_cube(image, d, width[lane]));
+        }
+    } else {
+        let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
+        let (uv, density) = if has_uvs {
+            (at.uv, at.uv_density)
+        } else {
+            let (uv, scale) = planar_uv(instance, at.local);
+            (uv, splat(s, scale[0].abs().max(scale[1].abs())))
+        };
+        let bytes = texture::sample(s, image, uv[0], uv[1], width * density, lanes);
+        return V3 {
+            x: tone::decode_bytes(bytes[0]) * flat[0],
+            y: tone::decode_bytes(bytes[1]) * flat[1],
+            z: tone::decode_bytes(bytes[2]) * flat[2],
+        };
+    }
+    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
+    V3 {
+        x: tone::decode_bytes(load(s, &out[0])) * flat[0],
+        y: tone::decode_bytes(load(s, &out[1])) * flat[1],
+        z: tone::decode_bytes(load(s, &out[2])) * flat[2],
+    }
+}

@@ -1,0 +1,86 @@
+//! What a camera sees: which surface at which pixel.
+
+pub(crate) mod primitive;
+mod projection;
+pub mod raster;
+pub mod view;
+
+pub(crate) use projection::Projection;
+pub use view::View;
+
+/// Why a picture cannot be drawn.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// The picture has no pixels or too many.
+    #[error("a picture of {width} x {height} pixels cannot be drawn; both sides are 1 to {limit}")]
+    Size {
+        /// Pixels per row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// The largest side.
+        limit: usize,
+    },
+    /// Focal lengths or the principal point are no good.
+    #[error("intrinsics fx {fx}, fy {fy}, cx {cx}, cy {cy}: all must be finite, fx and fy positive")]
+    Intrinsics {
+        /// Focal length along x \[pixels\].
+        fx: f32,
+        /// Focal length along y \[pixels\].
+        fy: f32,
+        /// Principal point, x \[pixels\].
+        cx: f32,
+        /// Principal point, y \[pixels\].
+        cy: f32,
+    },
+    /// The range of depths is empty.
+    #[error("near {near} m and far {far} m: both must be finite, with 0 < near < far")]
+    Range {
+        /// Smallest depth \[m\].
+        near: f32,
+        /// Largest depth \[m\].
+        far: f32,
+    },
+    /// The camera's pose is not finite, or no rotation.
+    #[error("the camera's pose is not a rigid transform: {pose:?}")]
+    CameraPose {
+        /// The pose.
+        pose: scene::PoseF32,
+    },
+    /// An instance's pose is not finite, or no rotation.
+    #[error("the pose of instance {instance} is not a rigid transform: {pose:?}")]
+    InstancePose {
+        /// Which instance.
+        instance: usize,
+        /// The pose.
+        pose: scene::PoseF32,
+    },
+    /// There are not as many poses as instances.
+    #[error("{found} poses for {expected} instances")]
+    PoseCount {
+        /// Instances of the scene.
+        expected: usize,
+        /// Poses given.
+        found: usize,
+    },
+    /// A buffer has the wrong length.
+    #[error("the {channel} buffer has {found} numbers; the picture needs {expected}")]
+    BufferSize {
+        /// The channel.
+        channel: &'static str,
+        /// How many numbers the picture has.
+        expected: usize,
+        /// How many the buffer has.
+        found: usize,
+    },
+    /// The eye is where the target is.
+    #[error("the eye and the target of a view are the same point, or not finite")]
+    LookAt,
+    /// A number of samples that is not offered.
+    #[error("{samples} samples per pixel; 1 and 4 are possible")]
+    Samples {
+        /// The number.
+        samples: u8,
+    },
+}

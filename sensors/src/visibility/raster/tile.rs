@@ -1,0 +1,119 @@
+//! The visibility buffer: nearness and id of the nearest surface, for a part of the picture.
+
+/// Pixels along the side of a block.
+pub(crate) const BLOCK: usize = 8;
+/// Pixels in a block.
+pub(crate) const AREA: usize = BLOCK * BLOCK;
+/// The id where nothing is.
+pub(crate) const NOTHING: u32 = u32::MAX;
+
+/// Where the samples of a pixel are, from its centre, in 1/256 pixel. The first is the centre, which all channels but the
+/// colour see; the other four are the rotated grid that graphics cards use.
+pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
+/// The largest offset of a sample.
+pub(crate) const REACH: i32 = 96;
+
+/// A rectangle of 8x8 blocks of the picture. Within a block, samples of one kind are together: `[block][plane][64]`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tile {
+    /// The first pixel; a multiple of [`BLOCK`].
+    pub(crate) x0: usize,
+    pub(crate) y0: usize,
+    pub(crate) blocks_x: usize,
+    pub(crate) blocks_y: usize,
+    /// 1, or 5 with multisampling.
+    pub(crate) planes: usize,
+    pub(crate) nearness: Vec<f32>,
+    pub(crate) id: Vec<u32>,
+    /// The smallest nearness in each block, or less.
+    farthest: Vec<f32>,
+    /// Whether the block was drawn into since `farthest` was taken.
+    stale: Vec<bool>,
+}
+
+impl Tile {
+    /// Moves the tile and empties it.
+    pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
+        [self.x0, self.y0] = origin;
+        [self.blocks_x, self.blocks_y] = blocks;
+        self.planes = planes;
+        let count = blocks[0] * blocks[1];
+        let fill = |v: &mut Vec<f32>, n: usize| {
+            v.clear();
+            v.resize(n, farthest);
+        };
+        fill(&mut self.nearness, count * planes * AREA);
+        fill(&mut self.farthest, count);
+        self.id.clear();
+        self.id.resize(count * planes * AREA, NOTHING);
+        self.stale.clear();
+        self.stale.resize(count, false);
+    }
+
+    /// Takes over the depths of another tile, with nothing in it.
+    pub(crate) fn behind(&mut self, other: &Self) {
+        self.copy(other);
+        self.id.fill(NOTHING);
+    }
+
+    /// Takes over another tile.
+    pub(crate) fn copy(&mut self, other: &Self) {
+        let Self { x0, y0, blocks_x, blocks_y, planes, .. } = *other;
+        (self.x0, self.y0, self.blocks_x, self.blocks_y, self.planes) = (x0, y0, blocks_x, blocks_y, planes);
+        self.nearness.clone_from(&other.nearness);
+        self.id.clone_from(&other.id);
+        self.farthest.clone_from(&other.farthest);
+        self.stale.clone_from(&other.stale);
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity()) + self.stale.capacity()
+    }
+
+    /// The block with the pixel (8 bx, 8 by) of the picture.
+    #[inline(always)]
+    pub(crate) fn block(&self, bx: usize, by: usize) -> usize {
+        (by - self.y0 / BLOCK) * self.blocks_x + bx - self.x0 / BLOCK
+    }
+
+    /// Where the samples of a block and plane begin.
+    #[inline(always)]
+    pub(crate) fn samples(&self, block: usize, plane: usize) -> usize {
+        (block * self.planes + plane) * AREA
+    }
+
+    /// The blocks of a rectangle that are in this tile: x0, y0, x1, y1, the last included.
+    #[inline(always)]
+    pub(crate) fn overlap(&self, rect: [u16; 4]) -> Option<[usize; 4]> {
+        let [x, y] = [self.x0 / BLOCK, self.y0 / BLOCK];
+        let r = rect.map(usize::from);
+        let out = [r[0].max(x), r[1].max(y), r[2].min(x + self.blocks_x - 1), r[3].min(y + self.blocks_y - 1)];
+        (out[0] <= out[2] && out[1] <= out[3]).then_some(out)
+    }
+
+    #[inline(always)]
+    pub(crate) fn touch(&mut self, block: usize) {
+        self.stale[block] = true;
+    }
+
+    /// Whether nothing of this nearness can be seen in a block any more.
+    #[inline(always)]
+    pub(crate) fn hidden(&mut self, block: usize, nearness: f32) -> bool {
+        if nearness <= self.farthest[block] {
+            return true;
+        }
+        if self.stale[block] {
+            let first = self.samples(block, 0);
+            let mut lanes = [f32::MAX; 16];
+            for row in self.nearness[first..first + self.planes * AREA].chunks_exact(16) {
+                for (lane, &x) in lanes.iter_mut().zip(row) {
+                    *lane = if x < *lane { x } else { *lane };
+                }
+            }
+            self.farthest[block] = lanes.iter().copied().fold(f32::MAX, f32::min);
+            self.stale[block] = false;
+        }
+        nearness <= self.farthest[block]
+    }
+}

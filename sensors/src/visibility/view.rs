@@ -1,0 +1,95 @@
+//! A pinhole camera at a place.
+
+use super::RenderError;
+use scene::PoseF32;
+
+/// A pinhole camera at a place, without distortion.
+///
+/// The axes are ROS's optical ones: x to the right of the picture, y down, z forward. The ray of pixel (u, v) goes through
+/// (u + 0.5, v + 0.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal length along x \[pixels\].
+    pub fx: f32,
+    /// Focal length along y \[pixels\].
+    pub fy: f32,
+    /// Principal point, x \[pixels\].
+    pub cx: f32,
+    /// Principal point, y \[pixels\].
+    pub cy: f32,
+    /// Nothing nearer is seen: smallest depth along the optical axis \[m\].
+    pub near: f32,
+    /// Nothing farther is seen: largest depth along the optical axis \[m\].
+    pub far: f32,
+    /// Where the camera is.
+    pub world_from_camera: PoseF32,
+}
+
+impl View {
+    /// The largest side of a picture: edge functions stay exact up to here (see `raster::triangle`).
+    pub const MAX_SIDE: usize = 8192;
+
+    /// A camera at `eye` that looks at `target`, with the vertical field of view `fovy` \[rad\], square pixels and the
+    /// principal point in the middle; it sees depths from 1 cm to 100 m. The picture's upward direction is as near to `up`
+    /// as possible; looking along `up`, it is +y of the world (or +x, where `up` is y).
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::LookAt`] where eye and target coincide, and what [`View::validate`] finds.
+    pub fn look_at(
+        size: [usize; 2],
+        fovy: f32,
+        eye: [f32; 3],
+        target: [f32; 3],
+        up: [f32; 3],
+    ) -> Result<Self, RenderError> {
+        use nalgebra::Vector3;
+        let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let z = (wide(target) - wide(eye)).try_normalize(1e-12).ok_or(RenderError::LookAt)?;
+        let up = wide(up).try_normalize(1e-12).unwrap_or(Vector3::z());
+        let other = if up.y.abs() > 0.9 { Vector3::x() } else { Vector3::y() };
+        let x = [up, other].iter().find_map(|up| z.cross(up).try_normalize(1e-6)).ok_or(RenderError::LookAt)?;
+        let y = z.cross(&x);
+        let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
+        let f = 0.5 * size[1] as f32 / (0.5 * f64::from(fovy)).tan() as f32;
+        let view = Self {
+            width: size[0],
+            height: size[1],
+            fx: f,
+            fy: f,
+            cx: 0.5 * size[0] as f32,
+            cy: 0.5 * size[1] as f32,
+            near: 0.01,
+            far: 100.0,
+            world_from_camera: PoseF32 { rotation, translation: eye },
+        };
+        view.validate().map(|()| view)
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    ///
+    /// The first that is no good.
+    pub fn validate(&self) -> Result<(), RenderError> {
+        let Self { width, height, fx, fy, cx, cy, near, far, world_from_camera } = *self;
+        if width == 0 || height == 0 || width.max(height) > Self::MAX_SIDE {
+            return Err(RenderError::Size { width, height, limit: Self::MAX_SIDE });
+        }
+        let finite = [fx, fy, cx, cy].iter().all(|x| x.is_finite() && x.abs() < 1e7);
+        if !finite || fx < 1e-3 || fy < 1e-3 {
+            return Err(RenderError::Intrinsics { fx, fy, cx, cy });
+        }
+        if !(near > 0.0 && near < far && far.is_finite() && near >= 1e-6) {
+            return Err(RenderError::Range { near, far });
+        }
+        if !world_from_camera.is_rigid() {
+            return Err(RenderError::CameraPose { pose: world_from_camera });
+        }
+        Ok(())
+    }
+}
