@@ -191,7 +191,10 @@ impl Env {
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
-                    self.warnings.add(&raised);
+                    // Nearly always there are none, and then this memory need not come into the cache.
+                    if raised != WarningCounts::default() {
+                        self.warnings.add(&raised);
+                    }
                     self.state.copy_from(&end.state);
                     self.drives.effort.clone_from(&end.efforts);
                     self.steps += 1;

@@ -280,6 +280,7 @@ impl SimulationManager {
         }
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
+        mj::release_freed();
         self.robots = robots;
         self.diagnostics.extend(diagnostics);
         if !self.sensors.is_empty() {

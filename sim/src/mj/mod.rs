@@ -15,6 +15,7 @@ mod arrays;
 mod data;
 mod error;
 mod guard;
+mod memory;
 mod model;
 mod name;
 mod state;
@@ -23,6 +24,7 @@ mod vfs;
 
 pub use data::{Data, Overflow, Warning, WarningCounts};
 pub use error::{CompileError, EngineError};
+pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use state::{Inputs, Motion};
