@@ -1,7 +1,7 @@
 //! `cargo xtask bless`: rewrites the goldens from what the code gives now.
 
 use crate::run::{Cmd, Outcome, Repo};
-use crate::setup::{self, Wanted};
+use crate::setup::{self, Line, Wanted};
 
 /// Tests that compare with a golden rewrite it instead when this is set.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_BLESS";
@@ -14,16 +14,20 @@ pub(crate) struct BlessArgs {
 }
 
 pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> Outcome {
-    let ready = setup::prepare(repo, Wanted::default())?;
-    ready.cargo().env(VARIABLE, "1").args(["test", "--workspace", &args.filter]).run()?;
-    let status = Cmd::new("git").args(["status", "--short", "--", "tests/data"]).current_dir(&repo.root).output()?;
+    // Some goldens belong to one line of MuJoCo.
+    for line in [Line::Debian, Line::Wheel] {
+        let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
+        ready.cargo().env(VARIABLE, "1").args(["test", "--workspace", &args.filter]).run()?;
+    }
+    let status = Cmd::new("git")
+        .args(["status", "--short", "--", "tests/data", "sensors/tests/data"])
+        .current_dir(&repo.root)
+        .output()?;
     let status = String::from_utf8_lossy(&status);
     if status.trim().is_empty() {
-        println!("\nno golden in tests/data changed");
+        println!("\nno golden changed");
     } else {
-        println!(
-            "\nchanged in tests/data; look at each (`git diff -- tests/data`, pictures in a viewer) before you commit:"
-        );
+        println!("\nchanged; look at each (`git diff`, pictures in a viewer) before you commit:");
         print!("{status}");
     }
     Ok(())
