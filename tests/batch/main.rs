@@ -11,5 +11,6 @@ mod growth;
 mod leaks;
 mod quarantine;
 mod sample_models;
+mod sparse;
 mod support;
 mod version;
