@@ -6,6 +6,7 @@
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod pattern;
 pub mod pose;
 pub mod pose_f32;
 pub mod render_scene;
@@ -18,4 +19,4 @@ pub use pose::Pose;
 pub use pose_f32::PoseF32;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
 pub use shape::{RenderMesh, Shape};
-pub use state::SceneState;
+pub use state::{SceneState, VisibleState};

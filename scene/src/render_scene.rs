@@ -94,17 +94,7 @@ impl RenderScene {
         let mut first_ids = vec![0u32];
         let mut next = 0u32;
         for (index, instance) in instances.iter().enumerate() {
-            if instance.mask_id == 0 {
-                return Err(RenderSceneError::ZeroMaskId { instance: index });
-            }
-            if let Some(size) = instance.shape.bad_size() {
-                return Err(RenderSceneError::Size { instance: index, shape: instance.shape.name(), size });
-            }
-            let m = &instance.material;
-            let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
-            if m.rgba.iter().chain(&numbers).any(|x| !x.is_finite()) {
-                return Err(RenderSceneError::Material { instance: index });
-            }
+            instance.validate_as(index)?;
             let ids = instance.mesh().map_or(Self::IDS_OF_PRIMITIVE as usize, |mesh| mesh.triangles().len());
             next = u32::try_from(ids)
                 .ok()
@@ -117,16 +107,22 @@ impl RenderScene {
             let [r, g, b, _] = i.material.rgba;
             [r, g, b].map(crate::material::decode_srgb)
         };
-        Ok(Self {
-            linear_colors: instances.iter().map(linear).collect(),
-            instances,
-            first_ids,
+        let linear_colors = instances.iter().map(linear).collect();
+        Ok(Self { linear_colors, instances, first_ids, ..Self::empty() })
+    }
+
+    /// Nothing but sky.
+    pub fn empty() -> Self {
+        Self {
+            linear_colors: Vec::new(),
+            instances: Vec::new(),
+            first_ids: vec![0],
             lights: vec![Light::default()],
             headlight: Headlight::default(),
             ambient: Hemisphere::default(),
             sky: Sky::default(),
             haze: None,
-        })
+        }
     }
 
     /// The instances; poses come in the same order.
@@ -151,6 +147,30 @@ impl RenderScene {
 }
 
 impl Instance {
+    /// Checks the sizes, the numbers of the material and the mask id.
+    ///
+    /// # Errors
+    ///
+    /// The first that is no good; the instance is called 0 there.
+    pub fn validate(&self) -> Result<(), RenderSceneError> {
+        self.validate_as(0)
+    }
+
+    fn validate_as(&self, instance: usize) -> Result<(), RenderSceneError> {
+        if self.mask_id == 0 {
+            return Err(RenderSceneError::ZeroMaskId { instance });
+        }
+        if let Some(size) = self.shape.bad_size() {
+            return Err(RenderSceneError::Size { instance, shape: self.shape.name(), size });
+        }
+        let m = &self.material;
+        let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
+        if m.rgba.iter().chain(&numbers).any(|x| !x.is_finite()) {
+            return Err(RenderSceneError::Material { instance });
+        }
+        Ok(())
+    }
+
     /// The triangles, for shapes that are made of them.
     pub fn mesh(&self) -> Option<&crate::RenderMesh> {
         match &self.shape {

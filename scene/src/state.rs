@@ -6,6 +6,7 @@
 //! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
 //! and velocities are those of t_(k+1). Both times are given.
 
+use crate::{Light, PoseF32};
 use ndarray::{Array2, Array3};
 
 /// State of all environments after a physics step (or after a reset).
@@ -35,6 +36,18 @@ pub struct SceneState {
     pub contacts: Option<Contacts>,
     /// Values of the physics engine's own sensors, shape \[num_envs, values\].
     pub sensordata: Option<Array2<f64>>,
+    /// Where things are that can be seen.
+    pub visible: Option<VisibleState>,
+}
+
+/// Where everything of a [`RenderScene`](crate::RenderScene) is in all environments.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VisibleState {
+    /// World from instance, in the order of [`RenderScene::instances`](crate::RenderScene::instances), shape
+    /// \[num_envs, instances\]. Single precision: what the renderer works with.
+    pub instance_poses: Array2<PoseF32>,
+    /// The scene's lamps where they are now, shape \[num_envs, lamps\].
+    pub lights: Array2<Light>,
 }
 
 /// Contacts of all environments in one list, environment after environment.

@@ -61,4 +61,33 @@ pub enum SensorError {
         /// What the state has.
         found: usize,
     },
+    /// Nothing is called so.
+    #[error("there is no {what} {name:?}; {}", known(.candidates))]
+    UnknownName {
+        /// What kind of thing was looked for.
+        what: &'static str,
+        /// The name given.
+        name: String,
+        /// Names that exist, nearest first.
+        candidates: Vec<String>,
+    },
+    /// Several things are called so.
+    #[error("{what} {name:?} may be any of {}; give the full name", quoted(.candidates))]
+    AmbiguousName {
+        /// What kind of thing was looked for.
+        what: &'static str,
+        /// The name given.
+        name: String,
+        /// What it may mean.
+        candidates: Vec<String>,
+    },
+}
+
+fn quoted(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|n| format!("{n:?}")).collect();
+    quoted.join(", ")
+}
+
+fn known(candidates: &[String]) -> String {
+    if candidates.is_empty() { "there are none".into() } else { format!("known are {}", quoted(candidates)) }
 }

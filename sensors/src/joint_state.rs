@@ -57,14 +57,14 @@ impl SensorCfg for JointStateCfg {
 
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
         let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
-        let joints = self.joints.clone().unwrap_or_else(|| (0..context.num_joints).collect());
-        check_indices("joint", &joints, context.num_joints)?;
+        let joints = self.joints.clone().unwrap_or_else(|| (0..context.joints.len()).collect());
+        check_indices("joint", &joints, context.joints.len())?;
         let (n, length, width) = (context.num_envs, self.history_length, joints.len());
         let quantity = || Quantity { now: Array2::zeros((n, width)), history: History::new(n, length, width) };
         let stamps = || Stamps { now: Array1::zeros(n), history: History::new(n, length, 1) };
         Ok(JointState {
             joints,
-            num_joints: context.num_joints,
+            num_joints: context.joints.len(),
             phases: schedule.phases(n),
             positions: quantity(),
             velocities: quantity(),
@@ -109,6 +109,19 @@ impl Sensor for JointState {
             self.sample_counts[env] = 0;
         }
         Ok(())
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        let fields = self.fields(state)?;
+        check_indices("environment", env_ids, state.num_envs())?;
+        for &env in env_ids {
+            self.read(env, state, fields);
+        }
+        Ok(())
+    }
+
+    fn due_in(&self) -> u64 {
+        self.phases.due_in()
     }
 }
 
@@ -247,7 +260,10 @@ mod tests {
     use ndarray::array;
 
     const DT: f64 = 0.005;
-    const CONTEXT: SensorContext = SensorContext { num_envs: 2, dt: DT, num_bodies: 0, num_joints: 3 };
+    fn context() -> SensorContext {
+        let joints = ["arm/a", "arm/b", "arm/c"].map(String::from);
+        SensorContext { num_envs: 2, dt: DT, joints: joints.into(), ..SensorContext::default() }
+    }
 
     /// A state whose numbers tell where they come from: position 100 env + 10 joint + step, velocity negative, effort
     /// a thousand more.
@@ -265,7 +281,7 @@ mod tests {
     }
 
     fn built(cfg: JointStateCfg) -> JointState {
-        cfg.build(&CONTEXT).unwrap()
+        cfg.build(&context()).unwrap()
     }
 
     #[test]
@@ -338,10 +354,10 @@ mod tests {
     #[test]
     fn mistakes_are_typed_errors_and_change_nothing() {
         let far = JointStateCfg { joints: Some(vec![0, 3]), ..Default::default() };
-        let error = far.build(&CONTEXT).unwrap_err();
+        let error = far.build(&context()).unwrap_err();
         assert_eq!(error.to_string(), "there is no joint 3: there are 3, counted from 0");
         let period = JointStateCfg { update_period: 0.007, ..Default::default() };
-        assert!(matches!(period.build(&CONTEXT), Err(SensorError::PeriodNotMultiple { .. })));
+        assert!(matches!(period.build(&context()), Err(SensorError::PeriodNotMultiple { .. })));
         let rounded = JointStateCfg { update_period: 0.007, round_period: true, ..Default::default() };
         assert_eq!(built(rounded).schedule().period_steps(), 1);
 

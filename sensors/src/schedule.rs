@@ -92,6 +92,12 @@ impl Phases {
         is_new && (step - phase.start).is_multiple_of(self.schedule.period_steps)
     }
 
+    /// Steps until the next environment is due, at least 1, as far as is known from the last question.
+    pub fn due_in(&self) -> u64 {
+        let period = self.schedule.period_steps;
+        self.envs.iter().map(|phase| period - (phase.seen - phase.start) % period).min().unwrap_or(1)
+    }
+
     /// Starts environment `env` anew: the next measurement falls one period after `step`.
     ///
     /// # Panics
@@ -151,6 +157,23 @@ mod tests {
         let mut phases = Schedule::new(0.1, 0.005, false).unwrap().phases(1);
         let due: Vec<u64> = (1..=1_000_000).filter(|&step| phases.is_due(0, step)).collect();
         assert!(due.iter().copied().eq((1..=50_000).map(|k| 20 * k)));
+    }
+
+    #[test]
+    fn steps_that_cannot_be_due_may_be_left_out() {
+        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(2);
+        phases.reset(1, 3);
+        let (mut step, mut due) = (0, Vec::new());
+        while step < 20 {
+            step += phases.due_in();
+            // Environment 1 came late: it is asked from its own step 3 on.
+            due.extend([0, 1].into_iter().filter(|&env| phases.is_due(env, step)).map(|env| (env, step)));
+        }
+        let expected: Vec<(usize, u64)> = (1..=20)
+            .flat_map(|k| [(0, k), (1, k)])
+            .filter(|&(env, k)| if env == 0 { k % 4 == 0 } else { k > 3 && k % 4 == 3 })
+            .collect();
+        assert_eq!(due, expected);
     }
 
     #[test]

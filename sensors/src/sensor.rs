@@ -1,10 +1,12 @@
 //! The contract of every sensor.
 
 use crate::error::SensorError;
-use scene::SceneState;
+use scene::pattern::{MAX_CANDIDATES, closest};
+use scene::{RenderScene, SceneState};
 use std::any::Any;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
+use std::sync::Arc;
 
 /// What a sensor is, before it exists: plain data with public fields and a `Default`.
 pub trait SensorCfg {
@@ -24,10 +26,11 @@ pub trait SensorCfg {
 
 /// A sensor of all environments.
 ///
-/// The owner calls [`update`](Self::update) after every physics step; the sensor knows when it is due. Measurements are
-/// read through views borrowed from the sensor, so they cannot change while somebody reads. The trait is object safe,
-/// and `&dyn Sensor` converts to `&dyn Any`, from which the owner finds the type back.
-pub trait Sensor: Any + fmt::Debug + Send {
+/// The owner calls [`update`](Self::update) after a physics step at the latest when [`due_in`](Self::due_in) says so; the
+/// sensor knows which environments are due. Measurements are read through views borrowed from the sensor, so they cannot
+/// change while somebody reads. The trait is object safe, and `&dyn Sensor` converts to `&dyn Any`, from which the owner
+/// finds the type back.
+pub trait Sensor: Any + fmt::Debug + Send + Sync {
     /// Measures in the environments that are due at `state`, which holds at least what the configuration requires.
     ///
     /// # Errors
@@ -43,24 +46,82 @@ pub trait Sensor: Any + fmt::Debug + Send {
     ///
     /// As [`update`](Self::update), and [`SensorError::IndexOutOfRange`]; nothing is reset then.
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
+
+    /// Refreshes the current value of the environments `env_ids` after somebody wrote to their state, so that nothing
+    /// stale is ever read. This is not a measurement: history and schedule go on as if nothing had happened.
+    ///
+    /// # Errors
+    ///
+    /// As [`reset`](Self::reset); nothing is refreshed then.
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
+
+    /// Physics steps until the next measurement of any environment, at least 1: the owner may leave out updates before.
+    fn due_in(&self) -> u64 {
+        1
+    }
 }
 
 /// The scene that a sensor is built for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct SensorContext {
     /// Number of environments.
     pub num_envs: usize,
     /// Physics step \[s\].
     pub dt: f64,
-    /// Length of the body axis of [`SceneState`].
-    pub num_bodies: usize,
-    /// Length of the joint axis of [`SceneState`].
-    pub num_joints: usize,
+    /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, or the uid of an object.
+    pub bodies: Arc<[String]>,
+    /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
+    pub joints: Arc<[String]>,
+    /// What can be seen; there for sensors that require [`Requires::VISIBLE`].
+    pub scene: Option<Arc<RenderScene>>,
+    /// How many threads a sensor may use; 0 counts as 1.
+    pub threads: usize,
+}
+
+impl SensorContext {
+    /// Index of a body on the body axis, by its full name (`uid/link`), or by the part behind the first slash where only
+    /// one body is called so.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::UnknownName`] with the nearest names, [`SensorError::AmbiguousName`] with those that it may mean.
+    pub fn body(&self, name: &str) -> Result<usize, SensorError> {
+        if let Some(index) = self.bodies.iter().position(|b| b == name) {
+            return Ok(index);
+        }
+        let matches =
+            || (0..).zip(&*self.bodies).filter(|(_, b)| b.split_once('/').is_some_and(|(_, link)| link == name));
+        match matches().count() {
+            0 => Err(SensorError::UnknownName {
+                what: "body",
+                name: name.into(),
+                candidates: nearest_bodies(name, &self.bodies),
+            }),
+            1 => Ok(matches().next().map_or(0, |(index, _)| index)),
+            _ => Err(SensorError::AmbiguousName {
+                what: "body",
+                name: name.into(),
+                candidates: matches().map(|(_, b)| b.clone()).collect(),
+            }),
+        }
+    }
+}
+
+/// The bodies whose bare or full name is most like `name`, the nearest first.
+fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
+    let bare: Vec<&str> = bodies.iter().map(|b| b.split_once('/').map_or(b.as_str(), |(_, link)| link)).collect();
+    let wanted = if name.contains('/') { bodies.iter().map(String::as_str).collect() } else { bare.clone() };
+    let mut found = Vec::new();
+    for candidate in closest(name, wanted) {
+        found.extend((0..bodies.len()).filter(|&i| bodies[i] == candidate || bare[i] == candidate).map(|i| &bodies[i]));
+    }
+    found.dedup();
+    found.into_iter().take(MAX_CANDIDATES).cloned().collect()
 }
 
 /// What a sensor needs of a [`SceneState`]: a set of fields.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub struct Requires(u8);
+pub struct Requires(u16);
 
 impl Requires {
     /// Nothing.
@@ -79,8 +140,10 @@ impl Requires {
     pub const JOINT_STATE: Self = Self(1 << 5);
     /// [`SceneState::sensordata`].
     pub const SENSORDATA: Self = Self(1 << 6);
+    /// [`SceneState::visible`], and [`SensorContext::scene`].
+    pub const VISIBLE: Self = Self(1 << 7);
 
-    const NAMES: [(Self, &str); 7] = [
+    const NAMES: [(Self, &str); 8] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -88,6 +151,7 @@ impl Requires {
         (Self::JOINT_EFFORTS, "joint_efforts"),
         (Self::JOINT_STATE, "joint_state"),
         (Self::SENSORDATA, "sensordata"),
+        (Self::VISIBLE, "visible"),
     ];
 
     /// Whether all of `other` is in this set.
@@ -120,6 +184,7 @@ impl Requires {
             | has(state.joint_efforts.is_some(), Self::JOINT_EFFORTS)
             | has(state.joint_positions.is_some() && state.joint_velocities.is_some(), Self::JOINT_STATE)
             | has(state.sensordata.is_some(), Self::SENSORDATA)
+            | has(state.visible.is_some(), Self::VISIBLE)
     }
 
     /// The names of the fields in the set.
@@ -182,8 +247,20 @@ mod tests {
     }
 
     #[test]
+    fn bodies_are_found_by_full_and_by_bare_name() {
+        let bodies = ["left/base", "left/tip", "right/base", "cube"].map(String::from);
+        let context = SensorContext { bodies: bodies.into(), ..SensorContext::default() };
+        assert_eq!([context.body("right/base"), context.body("tip"), context.body("cube")], [Ok(2), Ok(1), Ok(3)]);
+        let error = context.body("base").unwrap_err();
+        assert_eq!(error.to_string(), "body \"base\" may be any of \"left/base\", \"right/base\"; give the full name");
+        let error = context.body("tpi").unwrap_err().to_string();
+        assert!(error.starts_with("there is no body \"tpi\"; known are \"left/tip\""), "{error}");
+    }
+
+    #[test]
     fn sensors_live_in_one_list_and_are_found_back() {
-        let context = SensorContext { num_envs: 2, dt: 0.005, num_bodies: 0, num_joints: 3 };
+        let joints = ["arm/a", "arm/b", "arm/c"].map(String::from);
+        let context = SensorContext { num_envs: 2, dt: 0.005, joints: joints.into(), ..SensorContext::default() };
         let mut sensors: Vec<Box<dyn Sensor>> = vec![Box::new(JointStateCfg::default().build(&context).unwrap())];
         let error = sensors[0].update(&SceneState::new(2)).unwrap_err();
         assert_eq!(error.to_string(), "the joint state sensor was given a state without joint_efforts, joint_state");

@@ -3,10 +3,11 @@
 use crate::batch::Batch;
 use crate::compile::Simulation;
 use crate::env::Env;
-use crate::objects::robot::body_pose;
+use crate::objects::robot::{RobotData, body_pose};
 use ndarray::{Array2, Array3};
 use scene::SceneState;
 use sensors::Requires;
+use std::sync::Arc;
 
 /// What [`gather`] can fill so far.
 pub(crate) const AVAILABLE: Requires = Requires::POSES.union(Requires::JOINT_STATE).union(Requires::JOINT_EFFORTS);
@@ -19,6 +20,17 @@ pub(crate) fn body_count(simulation: &Simulation) -> usize {
 /// Number of movable joints of all robots: the joint axis of a [`SceneState`].
 pub(crate) fn joint_count(simulation: &Simulation) -> usize {
     simulation.robots.iter().map(|r| r.joints.len()).sum()
+}
+
+/// Names of the bodies: `uid/link`.
+pub(crate) fn body_names(robots: &[Arc<RobotData>]) -> Arc<[String]> {
+    let links = robots.iter().flat_map(|r| r.description().links.iter().map(|l| format!("{}/{}", r.uid(), l.name)));
+    links.collect()
+}
+
+/// Names of the joints: `uid/joint`.
+pub(crate) fn joint_names(robots: &[Arc<RobotData>]) -> Arc<[String]> {
+    robots.iter().flat_map(|r| r.joint_names().iter().map(|j| format!("{}/{j}", r.uid()))).collect()
 }
 
 /// A state with room for what `requires` names.

@@ -22,11 +22,12 @@ mod manager;
 pub mod mj;
 pub mod mjcf;
 pub mod objects;
-pub mod pattern;
 mod sensor_list;
 pub mod source;
 pub mod urdf;
+pub mod visible;
 
+pub use ::scene::pattern;
 pub use description::RobotDescription;
 pub use diagnostic::{Diagnostic, DiagnosticKind};
 pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};

@@ -316,8 +316,10 @@ impl SimulationManager {
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
-            num_bodies: gather::body_count(&self.simulation),
-            num_joints: gather::joint_count(&self.simulation),
+            bodies: gather::body_names(&self.robots),
+            joints: gather::joint_names(&self.robots),
+            scene: None,
+            threads: self.threads(),
         }
     }
 

@@ -102,6 +102,10 @@ impl Sensor for Height {
     fn reset(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.update(state)
     }
+
+    fn refresh(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.update(state)
+    }
 }
 
 #[test]

@@ -94,6 +94,11 @@ model_arrays! {
     geom_contype: i32, "Contact type bits, (ngeom,).";
     geom_conaffinity: i32, "Contact affinity bits, (ngeom,).";
     geom_size: f64, "Sizes, (ngeom, 3).";
+    geom_dataid: i32, "Mesh or height field of each geom, -1 for none, (ngeom,).";
+    geom_matid: i32, "Material of each geom, -1 for none, (ngeom,).";
+    geom_group: i32, "Group of each geom, (ngeom,).";
+    geom_rgba: f32, "Colours, (ngeom, 4).";
+    cam_fovy: f64, "Vertical fields of view \\[deg\\], (ncam,).";
     actuator_gainprm: f64, "Gain parameters, (nu, mjNGAIN).";
     actuator_biasprm: f64, "Bias parameters, (nu, mjNBIAS).";
     actuator_forcerange: f64, "Force limits, (nu, 2).";
@@ -127,6 +132,10 @@ data_arrays! {
     xipos: f64, "Centres of mass \\[m\\], (nbody, 3).";
     cvel: f64, "Spatial velocities about the subtree's centre of mass, (nbody, 6).";
     subtree_com: f64, "Centres of mass of subtrees \\[m\\], (nbody, 3).";
+    light_xpos: f64, "Light positions \\[m\\], (nlight, 3).";
+    light_xdir: f64, "Light directions, (nlight, 3).";
+    cam_xpos: f64, "Camera positions \\[m\\], (ncam, 3).";
+    cam_xmat: f64, "Camera rotation matrices (x right, y up, looking along -z), row-major, (ncam, 9).";
     geom_xpos: f64, "Geom positions \\[m\\], (ngeom, 3).";
     geom_xmat: f64, "Geom rotation matrices, row-major, (ngeom, 9).";
     efc_type: i32, "Kind of each constraint row, (nefc,).";

@@ -15,6 +15,7 @@ mod arrays;
 mod data;
 mod error;
 mod guard;
+mod look;
 mod memory;
 mod model;
 mod name;
@@ -24,6 +25,9 @@ mod vfs;
 
 pub use data::{Data, Overflow, Warning, WarningCounts};
 pub use error::{CompileError, EngineError};
+pub use look::{
+    HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
+};
 pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
@@ -32,6 +36,7 @@ pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 
 pub use mujoco_sys::{
-    mjCNSTR_FRICTION_DOF, mjCNSTR_FRICTION_TENDON, mjINT_EULER, mjINT_IMPLICIT, mjINT_RK4, mjJNT_BALL, mjJNT_FREE,
-    mjJNT_HINGE, mjJNT_SLIDE,
+    mjCNSTR_FRICTION_DOF, mjCNSTR_FRICTION_TENDON, mjGEOM_BOX, mjGEOM_CAPSULE, mjGEOM_CYLINDER, mjGEOM_ELLIPSOID,
+    mjGEOM_HFIELD, mjGEOM_MESH, mjGEOM_PLANE, mjGEOM_SPHERE, mjINT_EULER, mjINT_IMPLICIT, mjINT_RK4, mjJNT_BALL,
+    mjJNT_FREE, mjJNT_HINGE, mjJNT_SLIDE,
 };

@@ -138,6 +138,11 @@ impl RobotData {
         &self.plans
     }
 
+    /// Names of the movable joints in the order of the merged URDF.
+    pub fn joint_names(&self) -> &[String] {
+        &self.joint_names
+    }
+
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }

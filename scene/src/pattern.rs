@@ -221,7 +221,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 }
 
 /// `candidates: "a", "b"`, or `closest of 240: "a", "b"` when the list was cut.
-pub(crate) fn list(candidates: &[String], total: usize) -> String {
+pub fn list(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {
         0 => "there are none".to_owned(),

@@ -1,0 +1,84 @@
+//! Shapes of MuJoCo's geoms.
+
+use crate::mj::{self, Model};
+use scene::mesh::TriMesh;
+use scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
+use scene::{RenderMesh, Shape};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The shapes of a model's geoms; meshes and height fields are prepared once.
+pub(super) struct Shapes<'a> {
+    model: &'a Model,
+    meshes: HashMap<usize, Arc<RenderMesh>>,
+    fields: HashMap<usize, Option<HeightField>>,
+}
+
+impl<'a> Shapes<'a> {
+    pub(super) fn of(model: &'a Model) -> Self {
+        Self { model, meshes: HashMap::new(), fields: HashMap::new() }
+    }
+
+    /// The shape of a geom; `None` for kinds that are not drawn (signed distance fields), or a mesh without triangles.
+    pub(super) fn get(&mut self, geom: usize) -> Option<Shape> {
+        let size = &self.model.geom_size()[3 * geom..3 * geom + 3];
+        let [x, y, z] = [size[0] as f32, size[1] as f32, size[2] as f32];
+        let data = usize::try_from(self.model.geom_dataid()[geom]).ok();
+        Some(match self.model.geom_type()[geom] as u32 {
+            mj::mjGEOM_PLANE => Plane { half: [x.max(0.0), y.max(0.0)] }.into(),
+            mj::mjGEOM_SPHERE => Sphere { radius: x }.into(),
+            mj::mjGEOM_CAPSULE => Capsule { radius: x, half_length: y }.into(),
+            mj::mjGEOM_ELLIPSOID => Ellipsoid { radii: [x, y, z] }.into(),
+            mj::mjGEOM_CYLINDER => Cylinder { radius: x, half_length: y }.into(),
+            mj::mjGEOM_BOX => Cuboid { half: [x, y, z] }.into(),
+            mj::mjGEOM_MESH => Mesh { mesh: self.mesh(data?)? }.into(),
+            mj::mjGEOM_HFIELD => self.height_field(data?)?.into(),
+            _ => return None,
+        })
+    }
+
+    fn mesh(&mut self, mesh: usize) -> Option<Arc<RenderMesh>> {
+        let model = self.model;
+        let mesh = self.meshes.entry(mesh).or_insert_with(|| Arc::new(render_mesh(model, mesh)));
+        (!mesh.triangles().is_empty()).then(|| Arc::clone(mesh))
+    }
+
+    fn height_field(&mut self, field: usize) -> Option<HeightField> {
+        let model = self.model;
+        self.fields
+            .entry(field)
+            .or_insert_with(|| {
+                let arrays = model.height_field(field);
+                HeightField::new(arrays.size.map(|x| x as f32), arrays.rows, arrays.columns, arrays.elevation)
+            })
+            .clone()
+    }
+}
+
+/// Triangles with a vertex for each combination of position and texture coordinates. Normals are ours, smooth up to a
+/// crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated.
+fn render_mesh(model: &Model, mesh: usize) -> RenderMesh {
+    let arrays = model.mesh(mesh);
+    let mut vertices: HashMap<(i32, i32), u32> = HashMap::new();
+    let mut out = TriMesh { uvs: arrays.texcoords.map(|_| Vec::new()), ..TriMesh::default() };
+    for (face, corners) in arrays.faces.iter().enumerate() {
+        let texture_corners = arrays.face_texcoords.get(face);
+        let triangle = [0, 1, 2].map(|k| {
+            let (position, texcoord) = (corners[k], texture_corners.map_or(-1, |t| t[k]));
+            let texcoord = if out.uvs.is_some() { texcoord } else { -1 };
+            *vertices.entry((position, texcoord)).or_insert_with(|| {
+                out.positions.push(arrays.positions.get(position as usize).copied().unwrap_or_default());
+                if let (Some(uvs), Some(all)) = (&mut out.uvs, arrays.texcoords) {
+                    let [u, v] = all.get(texcoord as usize).copied().unwrap_or_default();
+                    // MuJoCo's v points down the image.
+                    uvs.push([u, 1.0 - v]);
+                }
+                out.positions.len() as u32 - 1
+            })
+        });
+        out.triangles.push(triangle);
+    }
+    let mut mesh = TriMesh::from_triangles(out.positions, out.triangles);
+    mesh.uvs = out.uvs;
+    RenderMesh::new(&mesh, RenderMesh::CREASE)
+}

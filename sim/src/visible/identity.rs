@@ -1,0 +1,112 @@
+//! Mask ids: which number stands for what.
+
+use crate::mj::{Model, ObjectKind};
+use std::sync::Arc;
+
+/// What a number of the mask channel stands for, the same in every environment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MaskId {
+    /// The number, never 0.
+    pub id: i32,
+    /// The robot, rigid object or geom of the world; in a model that was loaded as it is, the first body of the tree.
+    pub object: String,
+    /// The link, for robots.
+    pub link: Option<String>,
+    /// What kind of thing it is: `ground`, `robot`, `object`, or `world` and `body` in a model that was loaded as it is.
+    pub class: &'static str,
+    /// MuJoCo's body.
+    pub body: String,
+    /// MuJoCo's geoms; unnamed ones by number.
+    pub geoms: Vec<String>,
+}
+
+/// Who owns each geom.
+#[derive(Clone, Debug)]
+pub(crate) struct Identities {
+    table: Arc<[MaskId]>,
+    of_geom: Vec<i32>,
+}
+
+impl Identities {
+    /// The mask id of a geom.
+    pub(super) fn id_of(&self, geom: usize) -> i32 {
+        self.of_geom[geom]
+    }
+
+    pub(super) fn table(&self) -> Arc<[MaskId]> {
+        Arc::clone(&self.table)
+    }
+}
+
+/// Name of a geom.
+fn geom_name(model: &Model, geom: usize) -> String {
+    model.name(ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"))
+}
+
+/// Name of a body.
+fn body_name(model: &Model, body: usize) -> String {
+    model.name(ObjectKind::Body, body).unwrap_or_else(|| format!("body {body}"))
+}
+
+/// Each body has a number of its own, and each geom of the world.
+pub(super) fn by_body(model: &Model) -> Identities {
+    let mut table: Vec<MaskId> = Vec::new();
+    let mut of_body = vec![0; model.nbody()];
+    let of_geom = (0..model.ngeom())
+        .map(|geom| {
+            let body = model.geom_bodyid()[geom] as usize;
+            if body > 0 && of_body[body] > 0 {
+                let id: i32 = of_body[body];
+                table[id as usize - 1].geoms.push(geom_name(model, geom));
+                return id;
+            }
+            let id = table.len() as i32 + 1;
+            of_body[body] = id;
+            let (name, root) = (body_name(model, body), body_name(model, model.body_rootid()[body] as usize));
+            let object = if body == 0 { geom_name(model, geom) } else { root };
+            table.push(MaskId {
+                id,
+                object,
+                link: (body > 0).then(|| name.clone()),
+                class: if body == 0 { "world" } else { "body" },
+                body: name,
+                geoms: vec![geom_name(model, geom)],
+            });
+            id
+        })
+        .collect();
+    Identities { table: table.into(), of_geom }
+}
+
+/// Who a geom of a simulation belongs to.
+#[derive(Clone, Debug)]
+pub(crate) struct Owner {
+    pub(crate) id: i32,
+    pub(crate) object: String,
+    pub(crate) link: Option<String>,
+    pub(crate) class: &'static str,
+}
+
+/// Identities of a simulation: `owner` knows every geom.
+pub(crate) fn of_simulation(model: &Model, owner: impl Fn(usize) -> Owner) -> Identities {
+    let mut table: Vec<MaskId> = Vec::new();
+    let of_geom = (0..model.ngeom())
+        .map(|geom| {
+            let Owner { id, object, link, class } = owner(geom);
+            match table.iter_mut().find(|entry| entry.id == id) {
+                Some(entry) => entry.geoms.push(geom_name(model, geom)),
+                None => table.push(MaskId {
+                    id,
+                    object,
+                    link,
+                    class,
+                    body: body_name(model, model.geom_bodyid()[geom] as usize),
+                    geoms: vec![geom_name(model, geom)],
+                }),
+            }
+            id
+        })
+        .collect();
+    table.sort_by_key(|entry| entry.id);
+    Identities { table: table.into(), of_geom }
+}

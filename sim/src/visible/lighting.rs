@@ -1,0 +1,80 @@
+//! Lamps, headlight and sky of MuJoCo models.
+
+use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
+use scene::{Headlight, Light, LightKind, RenderScene, Sky};
+
+/// Sets the lamps, the headlight and the sky of `scene` to the model's.
+pub(super) fn light(model: &Model, scene: &mut RenderScene) {
+    scene.lights = (0..model.nlight())
+        .map(|index| {
+            let light = model.light(index);
+            let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };
+            let kind = match light.kind {
+                LightType::Directional => LightKind::Directional,
+                // OpenGL's spots of 180 degrees shine everywhere.
+                LightType::Spot if light.cutoff_deg > 90.0 => LightKind::Point,
+                LightType::Spot => spot,
+                LightType::Point | LightType::Image => LightKind::Point,
+            };
+            Light {
+                kind,
+                position: [0.0; 3],
+                direction: [0.0, 0.0, -1.0],
+                ambient: light.ambient,
+                diffuse: light.diffuse,
+                specular: light.specular,
+                attenuation: light.attenuation,
+                cast_shadow: light.cast_shadow,
+                // An image around everything is no lamp.
+                active: light.active && light.kind != LightType::Image,
+            }
+        })
+        .collect();
+    let headlight = model.headlight();
+    scene.headlight = Headlight {
+        ambient: headlight.ambient,
+        diffuse: headlight.diffuse,
+        specular: headlight.specular,
+        active: headlight.active,
+    };
+    let skybox = (0..model.ntex()).filter_map(|t| model.texture(t)).find(|t| t.kind == TextureType::Skybox);
+    if let Some(sky) = skybox.and_then(|texture| gradient(&texture)) {
+        scene.sky = sky;
+    }
+}
+
+/// Where the lamps are in `data`.
+pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
+    let (positions, directions) = (data.light_xpos().as_chunks::<3>().0, data.light_xdir().as_chunks::<3>().0);
+    for (index, (to, lamp)) in out.iter_mut().zip(lamps).enumerate() {
+        let position = positions[index].map(|x| x as f32);
+        *to = Light { position, direction: directions[index].map(|x| x as f32), ..*lamp };
+    }
+}
+
+/// The gradient nearest to a skybox: the middle of its upper face, the horizon of its sides, the middle of its lower face.
+/// (The image itself, clouds for instance, is not drawn.)
+fn gradient(texture: &TextureArrays<'_>) -> Option<Sky> {
+    let side = texture.width;
+    // Faces one below the other: right, left, up, down, front, back.
+    if side == 0 || texture.channels < 3 || texture.height < 6 * side {
+        return None;
+    }
+    let mean = |face: usize, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+        let mut sum = [0.0f32; 3];
+        let count = (rows.len() * columns.len()) as f32;
+        for row in rows {
+            for column in columns.clone() {
+                let at = ((face * side + row) * side + column) * texture.channels;
+                for (sum, byte) in sum.iter_mut().zip(&texture.pixels[at..at + 3]) {
+                    *sum += f32::from(*byte) / 255.0;
+                }
+            }
+        }
+        sum.map(|s| s / count)
+    };
+    let middle = side / 2..side / 2 + 1;
+    let horizon = [0, 1, 4, 5].map(|face| mean(face, middle.clone(), 0..side));
+    let horizon = [0, 1, 2].map(|c| horizon.iter().map(|h| h[c]).sum::<f32>() / 4.0);
+    Some(Sky { zenith: mean(2, middle.clone(), middle.clone()), horizon, nadir: mean(3, middle.clone(), middle) })
+}

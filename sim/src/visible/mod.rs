@@ -1,0 +1,114 @@
+//! From MuJoCo's geoms to the scene that cameras draw: `mj::Model -> Visible -> (RenderScene, poses per environment)`.
+//!
+//! Every geom of the model is an instance, whatever file the model came from; geoms that stand for a visual of a URDF
+//! (see `mjcf::robot`) are replaced by its real shape. What does not change is extracted once; [`Visible::read`] copies
+//! the poses of one environment.
+
+mod geom;
+mod identity;
+mod lighting;
+mod surface;
+mod urdf_visual;
+
+pub use identity::MaskId;
+pub(crate) use identity::of_simulation;
+pub(crate) use urdf_visual::{Replacements, VisualCache, replacements};
+
+use crate::mj::{Data, Model};
+use identity::Identities;
+use scene::{Instance, Light, Material, PoseF32, RenderScene, Shape};
+use std::sync::Arc;
+
+/// What can be seen of a model.
+#[derive(Clone, Debug)]
+pub struct Visible {
+    scene: Arc<RenderScene>,
+    /// The geom that each instance moves with.
+    geoms: Vec<usize>,
+    ids: Arc<[MaskId]>,
+    left_out: Vec<String>,
+}
+
+/// One thing that is drawn for a geom.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) shape: Shape,
+    pub(crate) material: Material,
+}
+
+impl Visible {
+    /// What can be seen of `model`, as it is: each body one mask id, each geom of the world its own.
+    pub fn of_model(model: &Model) -> Self {
+        Self::extract(model, &identity::by_body(model), &Replacements::new())
+    }
+
+    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts.
+    pub(crate) fn extract(model: &Model, identities: &Identities, replacements: &Replacements) -> Self {
+        let surfaces = surface::Surfaces::of(model);
+        let mut shapes = geom::Shapes::of(model);
+        let mut left_out = surfaces.left_out().to_vec();
+        let (mut instances, mut geoms) = (Vec::new(), Vec::new());
+        for geom in 0..model.ngeom() {
+            let parts = match replacements.get(&geom) {
+                Some(parts) => parts.clone(),
+                None => shapes
+                    .get(geom)
+                    .map(|shape| vec![Part { shape, material: surfaces.of_geom(geom) }])
+                    .unwrap_or_default(),
+            };
+            for Part { shape, material } in parts {
+                let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
+                let visible = material.rgba[3] > 0.0;
+                let instance = Instance { shape, material, mask_id: identities.id_of(geom), group, visible };
+                if let Err(reason) = instance.validate() {
+                    left_out.push(format!("geom {geom} is not drawn: {reason}"));
+                    continue;
+                }
+                instances.push(instance);
+                geoms.push(geom);
+            }
+        }
+        // Every instance was checked; there may still be too many triangles for 31 bits.
+        let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
+            left_out.push(format!("nothing is drawn: {error}"));
+            geoms.clear();
+            RenderScene::empty()
+        });
+        lighting::light(model, &mut scene);
+        Self { scene: Arc::new(scene), geoms, ids: identities.table(), left_out }
+    }
+
+    /// What the renderer draws, the same for all environments.
+    pub fn scene(&self) -> &Arc<RenderScene> {
+        &self.scene
+    }
+
+    /// What each mask id is.
+    pub fn ids(&self) -> &Arc<[MaskId]> {
+        &self.ids
+    }
+
+    /// What is not drawn, and why: textures or meshes that cannot be read.
+    pub fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+
+    /// Copies where everything is in `data`: a pose for each instance, world from instance, and the lamps.
+    ///
+    /// # Panics
+    /// The slices have other lengths than the scene's instances and lights.
+    #[track_caller]
+    pub fn read(&self, data: &Data, poses: &mut [PoseF32], lights: &mut [Light]) {
+        assert!(poses.len() == self.geoms.len() && lights.len() == self.scene.lights.len(), "slices of another scene");
+        let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
+        for (pose, &geom) in poses.iter_mut().zip(&self.geoms) {
+            let rotation = rotations[geom].map(|x| x as f32);
+            let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotation;
+            *pose = PoseF32 {
+                rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]],
+                translation: positions[geom].map(|x| x as f32),
+            };
+        }
+        lighting::read(data, &self.scene.lights, lights);
+    }
+}

@@ -1,0 +1,80 @@
+//! Materials and textures of MuJoCo models.
+
+use crate::mj::{Model, TextureType};
+use scene::{Material, Texture, TextureKind};
+use std::sync::Arc;
+
+/// The materials of a model.
+pub(super) struct Surfaces<'a> {
+    model: &'a Model,
+    materials: Vec<Material>,
+    left_out: Vec<String>,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(super) fn of(model: &'a Model) -> Self {
+        let mut left_out = Vec::new();
+        let textures: Vec<Option<Arc<Texture>>> = (0..model.ntex())
+            .map(|index| {
+                texture(model, index).unwrap_or_else(|reason| {
+                    left_out.push(format!("texture {index} is not drawn: {reason}"));
+                    None
+                })
+            })
+            .collect();
+        let materials = (0..model.nmat())
+            .map(|index| {
+                let m = model.material(index);
+                Material {
+                    rgba: m.rgba.map(|c| c.clamp(0.0, 1.0)),
+                    texture: m.texture.and_then(|t| textures.get(t).cloned().flatten()),
+                    tex_repeat: m.tex_repeat,
+                    tex_uniform: m.tex_uniform,
+                    emission: m.emission,
+                    specular: m.specular,
+                    shininess: m.shininess,
+                    reflectance: m.reflectance,
+                }
+            })
+            .collect();
+        Self { model, materials, left_out }
+    }
+
+    /// The look of a geom. A colour of the geom's own goes over its material's, as in MuJoCo's viewer.
+    pub(super) fn of_geom(&self, geom: usize) -> Material {
+        /// MuJoCo's grey of geoms that say nothing.
+        const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+        let rgba = &self.model.geom_rgba()[4 * geom..4 * geom + 4];
+        let rgba = [rgba[0], rgba[1], rgba[2], rgba[3]].map(|c| c.clamp(0.0, 1.0));
+        match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
+            None => Material::from_rgba(rgba),
+            Some(material) if rgba == UNSET => material.clone(),
+            Some(material) => Material { rgba, ..material.clone() },
+        }
+    }
+
+    /// What cannot be drawn.
+    pub(super) fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+}
+
+/// A texture of surfaces; `None` for a skybox.
+fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> {
+    let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
+    let kind = match arrays.kind {
+        TextureType::TwoD => TextureKind::TwoD,
+        TextureType::Cube => TextureKind::Cube,
+        TextureType::Skybox => return Ok(None),
+    };
+    let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    // Grey images have one channel, or two with opacity.
+    let colors: Vec<u8> = match arrays.channels {
+        1 | 2 => arrays.pixels.chunks_exact(arrays.channels).flat_map(|p| [p[0]; 3]).collect(),
+        _ => Vec::new(),
+    };
+    let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
+    Texture::new(kind, size(arrays.width), size(arrays.height), size(channels), pixels)
+        .map(|texture| Some(Arc::new(texture)))
+        .map_err(|error| error.to_string())
+}
