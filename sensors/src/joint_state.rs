@@ -120,8 +120,8 @@ impl Sensor for JointState {
         Ok(())
     }
 
-    fn due_in(&self) -> u64 {
-        self.phases.due_in()
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.phases.due_in(step)
     }
 }
 

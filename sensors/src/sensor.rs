@@ -55,8 +55,10 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     /// As [`reset`](Self::reset); nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
-    /// Physics steps until the next measurement of any environment, at least 1: the owner may leave out updates before.
-    fn due_in(&self) -> u64 {
+    /// Physics steps until the next measurement of any environment, at least 1, when the environments are at `step`: the
+    /// owner may leave out updates before.
+    fn due_in(&self, step: &[u64]) -> u64 {
+        let _ = step;
         1
     }
 }

@@ -1,6 +1,7 @@
 //! From robots to a running simulation: document, MuJoCo model, drives, batch.
 
 use crate::batch::Batch;
+use crate::contents::{Contents, GROUND_MASK_ID};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::table::{Drive, DriveTable, Gains, Realization};
 use crate::drive::{DriveModel, implicit};
@@ -11,7 +12,8 @@ use crate::mj::{self, ObjectKind};
 use crate::mjcf::document::Mjcf;
 use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
-use crate::objects::robot::RobotData;
+use crate::objects::rigid_object::RigidObjectData;
+use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use ::scene::Pose;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -21,6 +23,10 @@ use std::sync::Arc;
 pub(crate) struct Simulation {
     pub(crate) batch: Batch,
     pub(crate) robots: Vec<RobotIndex>,
+    pub(crate) objects: Vec<ObjectIndex>,
+    pub(crate) identities: Identities,
+    /// What cameras draw; made when the first sensor asks for it.
+    pub(crate) visible: Option<Arc<Visible>>,
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
     pub(crate) start: Arc<Start>,
@@ -35,6 +41,29 @@ pub(crate) struct RobotIndex {
     pub joints: Vec<JointIndexing>,
     /// Body and frame of each link.
     pub links: Vec<(usize, Pose)>,
+    /// Its geoms.
+    pub geoms: Vec<GeomIndex>,
+}
+
+/// A geom of a robot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GeomIndex {
+    /// Where it is in MuJoCo's arrays.
+    pub geom: usize,
+    /// The link it belongs to.
+    pub link: usize,
+    /// The link's visual that it stands for; `None` for a collision shape.
+    pub visual: Option<usize>,
+}
+
+/// Where a rigid object's numbers are in MuJoCo's arrays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ObjectIndex {
+    pub body: usize,
+    /// First of its seven positions; `None` where it is static.
+    pub qpos: Option<usize>,
+    /// First of its six velocities.
+    pub dof: Option<usize>,
 }
 
 /// Where one joint's numbers are.
@@ -56,22 +85,22 @@ pub(crate) struct Start {
 }
 
 /// Compiles a scene. Self-collision pairs that overlap in the initial pose are excluded and reported.
-pub(crate) fn compile(cfg: &SimulationManagerCfg, robots: &[Arc<RobotData>]) -> Result<Simulation> {
-    let first = build(cfg, robots, &[])?;
-    if !robots.iter().any(|r| r.cfg().self_collision) {
-        return first.into_simulation(cfg, robots, Vec::new());
+pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents) -> Result<Simulation> {
+    let first = build(cfg, contents, &[])?;
+    if !contents.robots.iter().any(|r| r.cfg().self_collision) {
+        return first.into_simulation(cfg, Vec::new());
     }
-    let excluded = overlapping_pairs(&first, robots)?;
+    let excluded = overlapping_pairs(&first, contents)?;
     if excluded.is_empty() {
-        return first.into_simulation(cfg, robots, excluded);
+        return first.into_simulation(cfg, excluded);
     }
-    build(cfg, robots, &excluded)?.into_simulation(cfg, robots, excluded)
+    build(cfg, contents, &excluded)?.into_simulation(cfg, excluded)
 }
 
 /// The document of a scene, for running or for an export.
 pub(crate) fn document(
     cfg: &SimulationManagerCfg,
-    robots: &[Arc<RobotData>],
+    contents: &Contents,
     excluded: &[(String, String)],
     purpose: &Purpose<'_>,
     mut mjcf: Mjcf,
@@ -84,7 +113,7 @@ pub(crate) fn document(
     }
     let mut diagnostics = Vec::new();
     let mut layouts = Vec::new();
-    for (index, data) in robots.iter().enumerate() {
+    for (index, data) in contents.robots.iter().enumerate() {
         let purpose = match purpose {
             Purpose::Run { .. } => Purpose::Run { friction_tendons: data.cfg().drive.model == DriveModel::Implicit },
             export => export.clone(),
@@ -108,6 +137,9 @@ pub(crate) fn document(
         }
         layouts.push(layout);
     }
+    for object in &contents.objects {
+        scene::add_object(&mut mjcf, object);
+    }
     for pair in excluded {
         if !mjcf.excludes.contains(pair) {
             mjcf.excludes.push(pair.clone());
@@ -120,38 +152,78 @@ struct Built {
     model: mj::Model,
     table: Arc<DriveTable>,
     robots: Vec<RobotIndex>,
+    objects: Vec<ObjectIndex>,
+    identities: Identities,
     start: Arc<Start>,
     xml: String,
     diagnostics: Vec<Diagnostic>,
 }
 
-fn build(cfg: &SimulationManagerCfg, robots: &[Arc<RobotData>], excluded: &[(String, String)]) -> Result<Built> {
+fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, String)]) -> Result<Built> {
     let empty = Mjcf::new("kinetoscope", cfg.physics_option());
     let run = Purpose::Run { friction_tendons: true };
-    let (mjcf, layouts, diagnostics) = document(cfg, robots, excluded, &run, empty)?;
+    let (mjcf, layouts, diagnostics) = document(cfg, contents, excluded, &run, empty)?;
     let text = write::write(&mjcf, mj::TARGET);
     let compiled = mj::compile(&text.xml, &[]).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
         other => other.into(),
     })?;
-    let (model, table, indices, start) = set_up_drives(compiled, robots, &layouts)?;
-    Ok(Built { model, table: Arc::new(table), robots: indices, start: Arc::new(start), xml: text.xml, diagnostics })
+    let objects = find_objects(&compiled, contents)?;
+    let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
+    let identities = identify(&model, contents, &robots, &objects);
+    let (table, start) = (Arc::new(table), Arc::new(start));
+    Ok(Built { model, table, robots, objects, identities, start, xml: text.xml, diagnostics })
+}
+
+fn missing(what: &'static str, name: &str) -> Error {
+    Error::UnknownName { what, name: name.into(), candidates: Vec::new() }
+}
+
+/// Finds every rigid object in the compiled model.
+fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<ObjectIndex>> {
+    let find = |object: &RigidObjectData| {
+        let body = compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing("body", object.uid()))?;
+        let free = compiled.joint_address(&format!("{}/free", object.uid()));
+        Ok(ObjectIndex { body, qpos: free.map(|f| f.0), dof: free.map(|f| f.1) })
+    };
+    contents.objects.iter().map(|object| find(object)).collect()
+}
+
+/// Who every geom belongs to.
+fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[ObjectIndex]) -> Identities {
+    let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground" };
+    let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
+    for (data, index) in contents.robots.iter().zip(robots) {
+        for geom in &index.geoms {
+            owners[geom.geom] = Owner {
+                id: data.mask_id(geom.link),
+                object: data.uid().into(),
+                link: Some(data.description().links[geom.link].name.clone()),
+                class: "robot",
+            };
+        }
+    }
+    for (geom, &body) in model.geom_bodyid().iter().enumerate() {
+        if let Some(k) = objects.iter().position(|o| o.body == body as usize) {
+            let object = &contents.objects[k];
+            owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object" };
+        }
+    }
+    visible::of_simulation(model, &owners)
 }
 
 /// Finds every joint and link in the compiled model, and moves implicit drives from actuators to rows.
 fn set_up_drives(
     mut compiled: mj::Compiled,
-    robots: &[Arc<RobotData>],
+    contents: &Contents,
     layouts: &[RobotLayout],
 ) -> Result<(mj::Model, DriveTable, Vec<RobotIndex>, Start)> {
-    let missing =
-        |what: &'static str, name: &str| Error::UnknownName { what, name: name.into(), candidates: Vec::new() };
     let mut table = DriveTable::default();
     let mut indices = Vec::new();
     let mut start = Start::default();
     let mut row_drives: Vec<(usize, usize)> = Vec::new();
     let (mut row_actuators, mut native_actuators) = (Vec::new(), Vec::new());
-    for (data, layout) in robots.iter().zip(layouts) {
+    for (data, layout) in contents.robots.iter().zip(layouts) {
         let implicit = data.cfg().drive.model == DriveModel::Implicit;
         let mut joints = Vec::new();
         for plan in data.plans() {
@@ -187,7 +259,15 @@ fn set_up_drives(
                 Ok((body, frame.body_from_link))
             })
             .collect::<Result<_>>()?;
-        indices.push(RobotIndex { joints, links });
+        let geoms = layout
+            .geoms
+            .iter()
+            .map(|owner| {
+                let geom = compiled.id(ObjectKind::Geom, &owner.geom).ok_or_else(|| missing("geom", &owner.geom))?;
+                Ok(GeomIndex { geom, link: owner.link.0, visual: owner.visual })
+            })
+            .collect::<Result<_>>()?;
+        indices.push(RobotIndex { joints, links, geoms });
     }
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
     implicit::prepare(&mut compiled, &dofs, &row_actuators);
@@ -205,12 +285,7 @@ fn set_up_drives(
 }
 
 impl Built {
-    fn into_simulation(
-        self,
-        cfg: &SimulationManagerCfg,
-        robots: &[Arc<RobotData>],
-        excluded: Vec<(String, String)>,
-    ) -> Result<Simulation> {
+    fn into_simulation(self, cfg: &SimulationManagerCfg, excluded: Vec<(String, String)>) -> Result<Simulation> {
         let mut diagnostics = self.diagnostics;
         for (a, b) in &excluded {
             diagnostics.push(Diagnostic::new(
@@ -222,15 +297,47 @@ impl Built {
         let threads =
             cfg.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get));
         let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads)?;
-        let mut simulation =
-            Simulation { batch, robots: self.robots, xml: self.xml, diagnostics, start: self.start, excluded };
-        debug_assert_eq!(robots.len(), simulation.robots.len());
+        let mut simulation = Simulation {
+            batch,
+            robots: self.robots,
+            objects: self.objects,
+            identities: self.identities,
+            visible: None,
+            xml: self.xml,
+            diagnostics,
+            start: self.start,
+            excluded,
+        };
         simulation.reset(&vec![true; cfg.num_envs]);
         Ok(simulation)
     }
 }
 
 impl Simulation {
+    /// What each number of the mask channel is.
+    pub(crate) fn mask_ids(&self) -> &[MaskId] {
+        self.identities.table()
+    }
+
+    /// Makes what cameras draw, if nobody did before.
+    pub(crate) fn make_visible(&mut self, contents: &Contents, cache: &mut VisualCache) -> Arc<Visible> {
+        if let Some(visible) = &self.visible {
+            return Arc::clone(visible);
+        }
+        let mut replacements = Replacements::new();
+        for (data, index) in contents.robots.iter().zip(&self.robots) {
+            for geom in &index.geoms {
+                let link = &data.description().links[geom.link];
+                if let Some(visual) = geom.visual.and_then(|v| link.visuals.get(v)) {
+                    replacements.insert(geom.geom, cache.parts(&link.name, visual));
+                }
+            }
+        }
+        let visible = Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements));
+        self.visible = Some(Arc::clone(&visible));
+        visible
+    }
+
     /// The control input of a drive.
     pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
         self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
@@ -309,7 +416,7 @@ impl Simulation {
 }
 
 /// Pairs of bodies of one robot that touch in the initial pose.
-fn overlapping_pairs(built: &Built, robots: &[Arc<RobotData>]) -> Result<Vec<(String, String)>> {
+fn overlapping_pairs(built: &Built, contents: &Contents) -> Result<Vec<(String, String)>> {
     // An environment, since its buffers grow until all contacts fit.
     let mut env = Env::new(&with_small_buffers(&built.model), &built.table)?;
     env.write(|data| {
@@ -328,7 +435,7 @@ fn overlapping_pairs(built: &Built, robots: &[Arc<RobotData>]) -> Result<Vec<(St
             })
         };
         let (Some(a), Some(b)) = (body(contact.geom1), body(contact.geom2)) else { continue };
-        let of_one_robot = robots.iter().any(|r| {
+        let of_one_robot = contents.robots.iter().any(|r| {
             let prefix = format!("{}/", r.uid());
             a.starts_with(&prefix) && b.starts_with(&prefix)
         });

@@ -105,11 +105,16 @@ pub enum Error {
         version: String,
     },
     /// A name is used already.
-    #[error("the uid {0:?} is taken; give each robot and each sensor a uid of its own")]
+    #[error(
+        "the uid {0:?} is taken; give each robot, object and sensor a uid of its own (\"world\" and \"ground\" are reserved)"
+    )]
     DuplicateUid(String),
     /// A name that cannot be written to MJCF.
     #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
     InvalidUid(String),
+    /// The object stands fixed.
+    #[error("the object {0:?} is static: it stands where its init_pose says; make it BodyType::Dynamic to move it")]
+    StaticObject(String),
     /// More robots than contact bits.
     #[error("{0} robots are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)")]
     TooManyRobots(usize),
@@ -146,7 +151,7 @@ pub enum Error {
         meaning: &'static str,
     },
     /// A value is NaN or infinite.
-    #[error("{argument}[{row}, {column}] (joint {joint:?}) is {value}; it must be finite")]
+    #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be finite")]
     NotFinite {
         /// The argument.
         argument: &'static str,
@@ -154,8 +159,8 @@ pub enum Error {
         row: usize,
         /// Column of the array.
         column: usize,
-        /// The joint of the column.
-        joint: String,
+        /// Whose value it is: `joint "a"`, `object "cube"`.
+        of: String,
         /// The value.
         value: f64,
     },

@@ -1,6 +1,7 @@
 //! Every stage of the pipeline as files: URDF, description, MJCF for both MuJoCo lines with real meshes.
 
 use crate::compile::{Simulation, document};
+use crate::contents::Contents;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::error::{Error, Result};
@@ -20,11 +21,12 @@ use std::sync::Arc;
 /// Writes everything to `dir`, which is made where it is missing.
 pub(crate) fn dump(
     cfg: &SimulationManagerCfg,
-    robots: &[Arc<RobotData>],
+    contents: &Contents,
     simulation: &Simulation,
     diagnostics: &[Diagnostic],
     dir: &Path,
 ) -> Result<Vec<Diagnostic>> {
+    let robots = &contents.robots[..];
     let meshes = dir.join("meshes");
     std::fs::create_dir_all(&meshes).map_err(at(&meshes))?;
     for robot in robots {
@@ -43,7 +45,7 @@ pub(crate) fn dump(
     write_file(&dir.join("diagnostics.txt"), &text)?;
     for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
         let purpose = Purpose::Export(&assets);
-        let (mut mjcf, _, _) = document(cfg, robots, &simulation.excluded, &purpose, empty.clone())?;
+        let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
         prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
         write_file(&dir.join(file), &write::write(&mjcf, target).xml)?;
     }

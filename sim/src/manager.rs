@@ -1,19 +1,21 @@
-//! `SimulationManager`: robots in N environments, compiled and stepped together.
+//! `SimulationManager`: robots and objects in N environments, compiled and stepped together.
 
 use crate::batch::Batch;
 use crate::compile::{Simulation, compile};
+use crate::contents::Contents;
 use crate::diagnostic::{Diagnostic, count_by_name};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
-use crate::gather;
 use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
+use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::sensor_list::{SensorId, SensorList};
+use crate::visible::{MaskId, Visible, VisualCache};
 use nalgebra::Vector3;
 use ndarray::Array2;
-use sensors::{Sensor, SensorCfg, SensorContext};
+use sensors::{Requires, Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -206,15 +208,23 @@ pub struct RobotId {
     index: usize,
 }
 
+/// Handle of a rigid object; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ObjectId {
+    manager: u64,
+    index: usize,
+}
+
 /// Tells managers of one process apart, so that a handle is not used with another one.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 
-/// Robots in N environments. Environments never touch each other; dropping the manager frees everything.
+/// Robots and objects in N environments. Environments never touch each other; dropping the manager frees everything.
 #[derive(Debug)]
 pub struct SimulationManager {
     serial: u64,
     cfg: SimulationManagerCfg,
-    robots: Vec<Arc<RobotData>>,
+    contents: Contents,
+    visuals: VisualCache,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
     sensors: SensorList,
@@ -232,10 +242,12 @@ impl SimulationManager {
             let version = mj::version_string();
             return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
         }
-        let simulation = compile(&cfg, &[])?;
+        let contents = Contents::default();
+        let simulation = compile(&cfg, &contents)?;
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
-        let sensors = SensorList::default();
-        Ok(Self { serial, cfg, robots: Vec::new(), diagnostics: Vec::new(), simulation, sensors })
+        let sensors = SensorList::new(cfg.substeps);
+        let visuals = VisualCache::default();
+        Ok(Self { serial, cfg, contents, visuals, diagnostics: Vec::new(), simulation, sensors })
     }
 
     /// The configuration.
@@ -259,17 +271,34 @@ impl SimulationManager {
     /// # Errors
     /// Anything wrong with the files, names, drives or meshes of the robot.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
-        if self.robots.iter().any(|r| r.uid() == cfg.uid) {
-            return Err(Error::DuplicateUid(cfg.uid));
-        }
-        if self.robots.len() >= MAX_ROBOTS {
+        self.contents.check_uid(&cfg.uid)?;
+        if self.contents.robots.len() >= MAX_ROBOTS {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }
         let mut diagnostics = Vec::new();
-        let robot = RobotData::load(cfg, &self.cfg, &mut diagnostics)?;
-        let mut robots = self.robots.clone();
-        robots.push(Arc::new(robot));
-        let mut simulation = compile(&self.cfg, &robots)?;
+        let robot = RobotData::load(cfg, &self.cfg, self.contents.next_mask_id(), &mut diagnostics)?;
+        let mut contents = self.contents.clone();
+        contents.robots.push(Arc::new(robot));
+        self.replace_contents(contents, diagnostics)?;
+        Ok(RobotId { manager: self.serial, index: self.contents.robots.len() - 1 })
+    }
+
+    /// Adds a rigid object to every environment, compiled as [`add_robot`](Self::add_robot) does.
+    ///
+    /// # Errors
+    /// The name is taken or a number is out of range.
+    pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
+        self.contents.check_uid(&cfg.uid)?;
+        let object = RigidObjectData::new(cfg, self.contents.next_mask_id())?;
+        let mut contents = self.contents.clone();
+        contents.objects.push(Arc::new(object));
+        self.replace_contents(contents, Vec::new())?;
+        Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
+    }
+
+    /// Compiles `contents` and goes on with them; on an error nothing has changed.
+    fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
+        let mut simulation = compile(&self.cfg, &contents)?;
         // Compiling says again what it said of the robots before.
         let mut known = self.simulation.diagnostics.clone();
         for diagnostic in &simulation.diagnostics {
@@ -281,13 +310,13 @@ impl SimulationManager {
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
         mj::release_freed();
-        self.robots = robots;
+        self.contents = contents;
         self.diagnostics.extend(diagnostics);
         if !self.sensors.is_empty() {
-            let context = self.sensor_context();
-            self.sensors.rebuild(&self.simulation, &context, self.cfg.substeps);
+            let context = self.sensor_context(self.sensors.requires());
+            self.sensors.rebuild(&self.simulation, &context);
         }
-        Ok(RobotId { manager: self.serial, index: self.robots.len() - 1 })
+        Ok(())
     }
 
     /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
@@ -300,8 +329,10 @@ impl SimulationManager {
     where
         C: SensorCfg + Send + 'static,
     {
-        let context = self.sensor_context();
-        self.sensors.add(uid.into(), cfg, &self.simulation, &context, self.cfg.substeps)
+        let uid = uid.into();
+        self.sensors.check(&uid, cfg.requires())?;
+        let context = self.sensor_context(cfg.requires());
+        self.sensors.add(uid, cfg, &self.simulation, &context)
     }
 
     /// A sensor, to read.
@@ -312,15 +343,39 @@ impl SimulationManager {
         self.sensors.get(id)
     }
 
-    fn sensor_context(&self) -> SensorContext {
+    /// A sensor, to change: a camera's pose, for instance.
+    ///
+    /// # Errors
+    /// The sensor failed in an earlier step.
+    pub fn sensor_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
+        self.sensors.get_mut(id)
+    }
+
+    /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
+    fn sensor_context(&mut self, requires: Requires) -> SensorContext {
+        let scene = requires.contains(Requires::VISIBLE).then(|| Arc::clone(self.visible().scene()));
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
-            bodies: gather::body_names(&self.robots),
-            joints: gather::joint_names(&self.robots),
-            scene: None,
+            bodies: self.contents.body_names(),
+            joints: self.contents.joint_names(),
+            scene,
             threads: self.threads(),
         }
+    }
+
+    /// What can be seen: made at the first call, which reads the visual meshes. What cannot be read is left out, with a
+    /// diagnostic.
+    pub fn visible(&mut self) -> Arc<Visible> {
+        let visible = self.simulation.make_visible(&self.contents, &mut self.visuals);
+        self.diagnostics.extend(self.visuals.take_diagnostics());
+        visible
+    }
+
+    /// What each number of the mask channel of cameras stands for, the same in every environment. Numbers stay when more
+    /// is added.
+    pub fn mask_ids(&self) -> &[MaskId] {
+        self.simulation.mask_ids()
     }
 
     /// A robot, to read.
@@ -329,8 +384,8 @@ impl SimulationManager {
     /// The handle is of another manager.
     #[track_caller]
     pub fn robot(&self, id: RobotId) -> Robot<'_> {
-        let index = self.index_of(id);
-        Robot::new(&self.robots[index], &self.simulation, index)
+        let index = self.index_of(id.manager, id.index);
+        Robot::new(&self.contents.robots[index], &self.simulation, index)
     }
 
     /// A robot, to command and to write.
@@ -339,14 +394,34 @@ impl SimulationManager {
     /// The handle is of another manager.
     #[track_caller]
     pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
-        let index = self.index_of(id);
-        RobotMut::new(&self.robots[index], &mut self.simulation, index)
+        let index = self.index_of(id.manager, id.index);
+        RobotMut::new(&self.contents.robots[index], &mut self.simulation, &mut self.sensors, index)
+    }
+
+    /// A rigid object, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object(&self, id: ObjectId) -> RigidObject<'_> {
+        let index = self.index_of(id.manager, id.index);
+        RigidObject::new(&self.contents.objects[index], &self.simulation, index)
+    }
+
+    /// A rigid object, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
     }
 
     #[track_caller]
-    fn index_of(&self, id: RobotId) -> usize {
-        assert!(id.manager == self.serial, "this robot's handle is of another SimulationManager");
-        id.index
+    fn index_of(&self, manager: u64, index: usize) -> usize {
+        assert!(manager == self.serial, "this handle is of another SimulationManager");
+        index
     }
 
     /// The robot called `uid`.
@@ -354,28 +429,43 @@ impl SimulationManager {
     /// # Errors
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        let index = self.robots.iter().position(|r| r.uid() == uid);
+        let index = self.contents.robots.iter().position(|r| r.uid() == uid);
         index.map(|index| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
             what: "robot",
             name: uid.into(),
-            candidates: self.robots.iter().map(|r| r.uid().to_string()).collect(),
+            candidates: self.contents.robots.iter().map(|r| r.uid().to_string()).collect(),
+        })
+    }
+
+    /// The rigid object called `uid`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn rigid_object_id(&self, uid: &str) -> Result<ObjectId> {
+        let index = self.contents.objects.iter().position(|o| o.uid() == uid);
+        index.map(|index| ObjectId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
+            what: "rigid object",
+            name: uid.into(),
+            candidates: self.contents.objects.iter().map(|o| o.uid().to_string()).collect(),
         })
     }
 
     /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
     /// Sensors tick after every step.
     pub fn update(&mut self, steps: u32) {
-        if !self.sensors.is_empty() {
-            for _ in 0..steps {
-                self.simulation.batch.step(self.cfg.substeps);
-                self.sensors.update(&self.simulation, self.cfg.substeps);
+        let mut left = steps;
+        while left > 0 {
+            let mut block = left.min(BLOCK);
+            if !self.sensors.is_empty() {
+                let due_in = self.sensors.due_in(&self.simulation);
+                block = block.min(u32::try_from(due_in).unwrap_or(u32::MAX));
             }
-            return;
+            self.simulation.batch.step(block * self.cfg.substeps);
+            if !self.sensors.is_empty() {
+                self.sensors.update(&self.simulation, u64::from(block));
+            }
+            left -= block;
         }
-        for _ in 0..steps / BLOCK {
-            self.simulation.batch.step(BLOCK * self.cfg.substeps);
-        }
-        self.simulation.batch.step(steps % BLOCK * self.cfg.substeps);
     }
 
     /// Puts environments back to their initial state, all of them where `env_ids` is `None`; revives diverged ones.
@@ -387,7 +477,7 @@ impl SimulationManager {
         self.simulation.reset(&chosen);
         if !self.sensors.is_empty() {
             let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
-            self.sensors.reset(&envs, &self.simulation, self.cfg.substeps);
+            self.sensors.reset(&envs, &self.simulation);
         }
         Ok(())
     }
@@ -487,7 +577,7 @@ impl SimulationManager {
     /// # Errors
     /// A file cannot be written.
     pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<Vec<Diagnostic>> {
-        crate::export::dump(&self.cfg, &self.robots, &self.simulation, &self.diagnostics, dir.as_ref())
+        crate::export::dump(&self.cfg, &self.contents, &self.simulation, &self.diagnostics, dir.as_ref())
     }
 }
 
@@ -502,4 +592,10 @@ pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec
         *mask.get_mut(index).ok_or(Error::UnknownIndex { what: "environment", index, count: num_envs })? = true;
     }
     Ok(mask)
+}
+
+/// Which environments are meant, in the order given; all of them where `None`.
+pub(crate) fn env_list(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
+    env_mask(env_ids, num_envs)?;
+    Ok(env_ids.map_or_else(|| (0..num_envs).collect(), |ids| ids.iter().map(|id| id.0).collect()))
 }

@@ -44,6 +44,8 @@ struct Entry {
 pub(crate) struct SensorList {
     entries: Vec<Entry>,
     state: SceneState,
+    /// MuJoCo steps in a physics step.
+    substeps: u32,
 }
 
 impl std::fmt::Debug for SensorList {
@@ -53,36 +55,51 @@ impl std::fmt::Debug for SensorList {
 }
 
 impl SensorList {
+    /// No sensors yet, in a simulation of `substeps` MuJoCo steps in a physics step.
+    pub(crate) fn new(substeps: u32) -> Self {
+        Self { substeps, ..Self::default() }
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// Builds a sensor and adds it; on an error nothing was added.
+    /// What all sensors together need to see.
+    pub(crate) fn requires(&self) -> Requires {
+        self.entries.iter().fold(Requires::NONE, |sum, e| sum | e.requires)
+    }
+
+    /// Checks that a sensor can be called `uid` and gets what it needs.
+    pub(crate) fn check(&self, uid: &str, requires: Requires) -> Result<()> {
+        if self.entries.iter().any(|e| e.uid == uid) {
+            return Err(Error::DuplicateUid(uid.into()));
+        }
+        let missing = requires.without(gather::AVAILABLE);
+        if missing.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::SensorRequires { sensor: uid.into(), missing: missing.to_string() })
+        }
+    }
+
+    /// Builds a sensor, checked before, and adds it; on an error nothing was added.
     pub(crate) fn add<C>(
         &mut self,
         uid: String,
         cfg: C,
         simulation: &Simulation,
         context: &SensorContext,
-        substeps: u32,
     ) -> Result<SensorId<C::Sensor>>
     where
         C: SensorCfg + Send + 'static,
     {
-        if self.entries.iter().any(|e| e.uid == uid) {
-            return Err(Error::DuplicateUid(uid));
-        }
         let requires = cfg.requires();
-        let missing = requires.without(gather::AVAILABLE);
-        if !missing.is_empty() {
-            return Err(Error::SensorRequires { sensor: uid, missing: missing.to_string() });
-        }
         let build: Builder = Box::new(move |context| Ok(Box::new(cfg.build(context)?) as Box<dyn Sensor>));
         let mut sensor =
             build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
-        let all = self.entries.iter().fold(requires, |sum, e| sum | e.requires);
+        let all = self.requires() | requires;
         let mut state = gather::allocate(simulation, all);
-        gather::gather(simulation, substeps, &mut state);
+        gather::gather(simulation, self.substeps, all, &mut state);
         let envs: Vec<usize> = (0..context.num_envs).collect();
         sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         self.state = state;
@@ -91,10 +108,10 @@ impl SensorList {
     }
 
     /// Builds all sensors anew for a simulation that was compiled again; their histories start again.
-    pub(crate) fn rebuild(&mut self, simulation: &Simulation, context: &SensorContext, substeps: u32) {
-        let all = self.entries.iter().fold(Requires::NONE, |sum, e| sum | e.requires);
+    pub(crate) fn rebuild(&mut self, simulation: &Simulation, context: &SensorContext) {
+        let all = self.requires();
         self.state = gather::allocate(simulation, all);
-        gather::gather(simulation, substeps, &mut self.state);
+        gather::gather(simulation, self.substeps, all, &mut self.state);
         let envs: Vec<usize> = (0..context.num_envs).collect();
         for entry in &mut self.entries {
             entry.fault = match (entry.build)(context) {
@@ -107,20 +124,49 @@ impl SensorList {
         }
     }
 
-    /// After a physics step: every sensor that is due measures.
-    pub(crate) fn update(&mut self, simulation: &Simulation, substeps: u32) {
-        gather::gather(simulation, substeps, &mut self.state);
-        for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
+    /// Physics steps until a sensor is due, at least 1.
+    pub(crate) fn due_in(&mut self, simulation: &Simulation) -> u64 {
+        gather::gather_steps(simulation, self.substeps, &mut self.state);
+        let steps = &self.state.step;
+        let due = self.running().map(|e| e.sensor.due_in(steps).max(1));
+        due.min().unwrap_or(u64::MAX)
+    }
+
+    /// After `steps` physics steps, of which at most the last made sensors due, those that are due measure. `before` are
+    /// the step counts of the environments before.
+    pub(crate) fn update(&mut self, simulation: &Simulation, steps: u64) {
+        // The state still holds the step counts before: `due_in` asked for them.
+        let due: Vec<bool> =
+            self.entries.iter().map(|e| e.fault.is_none() && e.sensor.due_in(&self.state.step) <= steps).collect();
+        let requires =
+            self.entries.iter().zip(&due).filter(|(_, due)| **due).fold(Requires::NONE, |r, (e, _)| r | e.requires);
+        gather::gather(simulation, self.substeps, requires, &mut self.state);
+        for (entry, _) in self.entries.iter_mut().zip(due).filter(|(_, due)| *due) {
             entry.fault = entry.sensor.update(&self.state).err();
         }
     }
 
     /// After a reset of `env_ids`.
-    pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &Simulation, substeps: u32) {
-        gather::gather(simulation, substeps, &mut self.state);
+    pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &Simulation) {
+        gather::gather(simulation, self.substeps, self.requires(), &mut self.state);
         for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
             entry.fault = entry.sensor.reset(env_ids, &self.state).err();
         }
+    }
+
+    /// After somebody wrote to the state of `env_ids`.
+    pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &Simulation) {
+        if self.entries.is_empty() || env_ids.is_empty() {
+            return;
+        }
+        gather::gather(simulation, self.substeps, self.requires(), &mut self.state);
+        for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
+            entry.fault = entry.sensor.refresh(env_ids, &self.state).err();
+        }
+    }
+
+    fn running(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|e| e.fault.is_none())
     }
 
     /// The sensor of a handle.
@@ -135,6 +181,18 @@ impl SensorList {
             what: "sensor of this type called",
             name: entry.uid.clone(),
             candidates: Vec::new(),
+        })
+    }
+
+    /// The sensor of a handle, to change.
+    pub(crate) fn get_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
+        self.get(id)?;
+        let count = self.entries.len();
+        let any: Option<&mut dyn Any> = self.entries.get_mut(id.index).map(|e| e.sensor.as_mut() as &mut dyn Any);
+        any.and_then(|any| any.downcast_mut::<S>()).ok_or(Error::UnknownIndex {
+            what: "sensor",
+            index: id.index,
+            count,
         })
     }
 }

@@ -51,6 +51,7 @@ fn document() -> Mjcf {
             shape: Shape::Sphere(0.1),
             pose: Pose::identity(),
             role: GeomRole::Visual,
+            friction: None,
             rgba: None,
             material: None,
             source: at(23),

@@ -220,6 +220,8 @@ pub struct Geom {
     pub pose: Pose,
     /// What it is for.
     pub role: GeomRole,
+    /// Sliding, torsional and rolling friction; the document's default if unset.
+    pub friction: Option<[f64; 3]>,
     /// Colour; MuJoCo's grey if unset.
     pub rgba: Option<[f64; 4]>,
     /// Name of a material.

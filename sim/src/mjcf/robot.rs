@@ -98,8 +98,21 @@ pub struct RobotLayout {
     pub links: Vec<LinkFrame>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_pairs: Vec<(String, String)>,
+    /// What every named geom is.
+    pub geoms: Vec<GeomOwner>,
     /// Joints whose damping is integrated with the drives: see [`crate::drive::implicit`].
     pub damped: Vec<DampedJoint>,
+}
+
+/// Whose shape a geom is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeomOwner {
+    /// Name of the geom.
+    pub geom: String,
+    /// The link, fused or not.
+    pub link: LinkId,
+    /// Which of the link's visuals; `None` for a collision shape.
+    pub visual: Option<usize>,
 }
 
 /// A joint whose viscous damping was left out of the document; its armature holds the implicit half.
@@ -160,6 +173,7 @@ pub fn add(
         depth: BTreeMap::new(),
         placed: vec![None; description.links.len()],
         masses: BTreeMap::new(),
+        geoms: Vec::new(),
         damped: Vec::new(),
     };
     emitter.bodies()?;
@@ -175,7 +189,7 @@ pub fn add(
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
         .collect();
-    Ok(RobotLayout { links, base_pairs, damped: emitter.damped })
+    Ok(RobotLayout { links, base_pairs, geoms: emitter.geoms, damped: emitter.damped })
 }
 
 struct Emitter<'a, 'm> {
@@ -190,6 +204,7 @@ struct Emitter<'a, 'm> {
     placed: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
     masses: BTreeMap<usize, Vec<LinkId>>,
+    geoms: Vec<GeomOwner>,
     damped: Vec<DampedJoint>,
 }
 
@@ -278,11 +293,13 @@ impl Emitter<'_, '_> {
         for (i, collision) in described.collisions.iter().enumerate() {
             let name = self.name(&format!("{}/collision{i}", described.name));
             let shape = self.collision_shape(&collision.geometry, &collision.source);
+            self.geoms.push(GeomOwner { geom: name.clone(), link, visual: None });
             self.mjcf.bodies[body].geoms.push(Geom {
                 name: Some(name),
                 shape,
                 pose: body_from_link * collision.link_from_shape,
                 role: self.cfg.contact,
+                friction: None,
                 rgba: None,
                 material: None,
                 source: Some(collision.source.clone()),
@@ -293,11 +310,14 @@ impl Emitter<'_, '_> {
             let geoms = self.visual_geoms(&visual.geometry, visual.material.as_ref().and_then(|m| m.rgba));
             let several = geoms.len() > 1;
             for (part, (shape, rgba, material)) in geoms.into_iter().enumerate() {
+                let geom = if several { format!("{name}.{part}") } else { name.clone() };
+                self.geoms.push(GeomOwner { geom: geom.clone(), link, visual: Some(i) });
                 self.mjcf.bodies[body].geoms.push(Geom {
-                    name: Some(if several { format!("{name}.{part}") } else { name.clone() }),
+                    name: Some(geom),
                     shape,
                     pose: body_from_link * visual.link_from_shape,
                     role: GeomRole::Visual,
+                    friction: None,
                     rgba,
                     material,
                     source: Some(visual.source.clone()),

@@ -1,7 +1,8 @@
 //! What is in the world beside robots: the ground, lights.
 
-use super::document::{Geom, GeomRole, Light, Mjcf, Shape};
-use nalgebra::Vector3;
+use super::document::{Body, Geom, GeomRole, Inertial, Joint, JointType, Light, Mjcf, Shape};
+use crate::objects::rigid_object::{BodyType, RigidObjectData};
+use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
 
 /// Contact bit of the ground and of objects.
@@ -29,8 +30,46 @@ pub fn add_ground(mjcf: &mut Mjcf, half_size: f64) {
         shape: Shape::Plane([half_size, half_size]),
         pose: Pose::identity(),
         role: WORLD_CONTACT,
+        friction: None,
         rgba: Some([0.45, 0.47, 0.5, 1.0]),
         material: None,
+        source: None,
+    });
+}
+
+/// Adds a rigid object: a body called by its uid, with the geom `uid/shape` and the joint `uid/free`.
+pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData) {
+    let cfg = object.cfg();
+    let (mass, moments) = object.inertia();
+    let moves = cfg.body_type == BodyType::Dynamic;
+    let free = Joint {
+        name: format!("{}/free", cfg.uid),
+        kind: JointType::Free,
+        axis: Vector3::z(),
+        range: None,
+        damping: 0.0,
+        frictionloss: 0.0,
+        armature: 0.0,
+        source: None,
+    };
+    let inertial = Inertial { mass, com: Vector3::zeros(), axes: UnitQuaternion::identity(), moments, source: None };
+    mjcf.bodies.push(Body {
+        name: cfg.uid.clone(),
+        parent: 0,
+        pose: cfg.init_pose,
+        inertial: moves.then_some(inertial),
+        joints: if moves { vec![free] } else { Vec::new() },
+        geoms: vec![Geom {
+            name: Some(format!("{}/shape", cfg.uid)),
+            shape: cfg.shape.to_mjcf(),
+            pose: Pose::identity(),
+            role: WORLD_CONTACT,
+            friction: cfg.friction,
+            rgba: Some(cfg.rgba),
+            material: None,
+            source: None,
+        }],
+        sites: Vec::new(),
         source: None,
     });
 }

@@ -368,6 +368,9 @@ impl Writer {
                 .attr("group", if seen { 0 } else { 3 }),
             GeomRole::Visual => element.attr("contype", 0).attr("conaffinity", 0).attr("group", 2),
         };
+        if let Some(friction) = &geom.friction {
+            element = element.numbers("friction", friction);
+        }
         element = element.opt("material", geom.material.as_ref());
         if let Some(rgba) = &geom.rgba {
             element = element.numbers("rgba", rgba);

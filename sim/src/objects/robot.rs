@@ -6,11 +6,12 @@ use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::{DriveCfg, DriveModel};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManagerCfg, env_mask};
+use crate::manager::{EnvId, SimulationManagerCfg, env_list};
 use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::pattern;
+use crate::sensor_list::SensorList;
 use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
@@ -71,6 +72,7 @@ pub struct RobotData {
     joint_names: Vec<String>,
     parts: BTreeMap<String, Vec<usize>>,
     hulls: BTreeMap<MeshKey, TriMesh>,
+    first_mask_id: i32,
 }
 
 impl RobotData {
@@ -78,13 +80,9 @@ impl RobotData {
     pub(crate) fn load(
         cfg: RobotCfg,
         manager: &SimulationManagerCfg,
+        first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
-        let usable =
-            (1..=64).contains(&cfg.uid.chars().count()) && !cfg.uid.chars().any(|c| c == '/' || c.is_control());
-        if !usable {
-            return Err(Error::InvalidUid(cfg.uid));
-        }
         check_integrator(&cfg, manager.integrator)?;
         check_pose("init_pose", &cfg.init_pose)?;
         for component in &cfg.urdf.components {
@@ -115,7 +113,7 @@ impl RobotData {
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
-        Ok(Self { cfg, description, plans, joint_names, parts, hulls })
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls, first_mask_id })
     }
 
     /// Name of the robot.
@@ -143,12 +141,17 @@ impl RobotData {
         &self.joint_names
     }
 
+    /// What the mask channel of cameras says of a link.
+    pub(crate) fn mask_id(&self, link: usize) -> i32 {
+        self.first_mask_id + link as i32
+    }
+
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
 }
 
-fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
+pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
     let fail = |expected| Err(Error::Config { field, value: format!("{:?}", to_row(pose)), expected });
     if !to_row(pose).iter().all(|x| x.is_finite()) {
         return fail("every number must be finite");
@@ -388,12 +391,18 @@ pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
 pub struct RobotMut<'a> {
     data: &'a Arc<RobotData>,
     simulation: &'a mut Simulation,
+    sensors: &'a mut SensorList,
     index: usize,
 }
 
 impl<'a> RobotMut<'a> {
-    pub(crate) fn new(data: &'a Arc<RobotData>, simulation: &'a mut Simulation, index: usize) -> Self {
-        Self { data, simulation, index }
+    pub(crate) fn new(
+        data: &'a Arc<RobotData>,
+        simulation: &'a mut Simulation,
+        sensors: &'a mut SensorList,
+        index: usize,
+    ) -> Self {
+        Self { data, simulation, sensors, index }
     }
 
     /// The robot, to read.
@@ -511,6 +520,8 @@ impl<'a> RobotMut<'a> {
                 });
             });
         }
+        let envs: Vec<usize> = write.rows.iter().map(|(env, _)| *env).collect();
+        self.sensors.refresh(&envs, self.simulation);
         Ok(())
     }
 
@@ -534,11 +545,7 @@ impl<'a> RobotMut<'a> {
             }
         };
         let num_envs = self.simulation.batch.num_envs();
-        env_mask(env_ids, num_envs)?;
-        let envs: Vec<usize> = match env_ids {
-            None => (0..num_envs).collect(),
-            Some(ids) => ids.iter().map(|id| id.0).collect(),
-        };
+        let envs = env_list(env_ids, num_envs)?;
         let rows = values.nrows();
         if values.ncols() != joints.len() || (rows != envs.len() && rows != 1) {
             return Err(Error::Shape {
@@ -550,8 +557,8 @@ impl<'a> RobotMut<'a> {
         }
         for ((row, column), &value) in values.indexed_iter() {
             if !value.is_finite() {
-                let joint = self.data.joint_names[joints[column]].clone();
-                return Err(Error::NotFinite { argument, row, column, joint, value });
+                let of = format!("joint {:?}", self.data.joint_names[joints[column]]);
+                return Err(Error::NotFinite { argument, row, column, of, value });
             }
         }
         let rows = envs

@@ -1,6 +1,7 @@
 //! Mask ids: which number stands for what.
 
 use crate::mj::{Model, ObjectKind};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a number of the mask channel stands for, the same in every environment.
@@ -33,7 +34,12 @@ impl Identities {
         self.of_geom[geom]
     }
 
-    pub(super) fn table(&self) -> Arc<[MaskId]> {
+    /// What each mask id is, in order.
+    pub(crate) fn table(&self) -> &[MaskId] {
+        &self.table
+    }
+
+    pub(super) fn shared_table(&self) -> Arc<[MaskId]> {
         Arc::clone(&self.table)
     }
 }
@@ -87,26 +93,19 @@ pub(crate) struct Owner {
     pub(crate) class: &'static str,
 }
 
-/// Identities of a simulation: `owner` knows every geom.
-pub(crate) fn of_simulation(model: &Model, owner: impl Fn(usize) -> Owner) -> Identities {
-    let mut table: Vec<MaskId> = Vec::new();
-    let of_geom = (0..model.ngeom())
-        .map(|geom| {
-            let Owner { id, object, link, class } = owner(geom);
-            match table.iter_mut().find(|entry| entry.id == id) {
-                Some(entry) => entry.geoms.push(geom_name(model, geom)),
-                None => table.push(MaskId {
-                    id,
-                    object,
-                    link,
-                    class,
-                    body: body_name(model, model.geom_bodyid()[geom] as usize),
-                    geoms: vec![geom_name(model, geom)],
-                }),
-            }
-            id
-        })
-        .collect();
-    table.sort_by_key(|entry| entry.id);
-    Identities { table: table.into(), of_geom }
+/// Identities of a simulation, given the owner of every geom.
+pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
+    let mut table: BTreeMap<i32, MaskId> = BTreeMap::new();
+    for (geom, owner) in owners.iter().enumerate() {
+        let entry = table.entry(owner.id).or_insert_with(|| MaskId {
+            id: owner.id,
+            object: owner.object.clone(),
+            link: owner.link.clone(),
+            class: owner.class,
+            body: body_name(model, model.geom_bodyid()[geom] as usize),
+            geoms: Vec::new(),
+        });
+        entry.geoms.push(geom_name(model, geom));
+    }
+    Identities { table: table.into_values().collect(), of_geom: owners.iter().map(|o| o.id).collect() }
 }

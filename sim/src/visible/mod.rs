@@ -7,15 +7,16 @@
 mod geom;
 mod identity;
 mod lighting;
+mod still;
 mod surface;
 mod urdf_visual;
 
 pub use identity::MaskId;
-pub(crate) use identity::of_simulation;
-pub(crate) use urdf_visual::{Replacements, VisualCache, replacements};
+pub use still::{FreeCamera, ModelCamera, Still};
+pub(crate) use identity::{Identities, Owner, of_simulation};
+pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::mj::{Data, Model};
-use identity::Identities;
 use scene::{Instance, Light, Material, PoseF32, RenderScene, Shape};
 use std::sync::Arc;
 
@@ -75,7 +76,7 @@ impl Visible {
             RenderScene::empty()
         });
         lighting::light(model, &mut scene);
-        Self { scene: Arc::new(scene), geoms, ids: identities.table(), left_out }
+        Self { scene: Arc::new(scene), geoms, ids: identities.shared_table(), left_out }
     }
 
     /// What the renderer draws, the same for all environments.

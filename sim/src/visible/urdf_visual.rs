@@ -28,21 +28,14 @@ enum TextureSourceKey {
     Embedded(Vec<u8>),
 }
 
-/// The parts of every proxy: (geom, link's name, visual).
-pub(crate) fn replacements<'v>(
-    proxies: impl Iterator<Item = (usize, &'v str, &'v Visual)>,
-    cache: &mut VisualCache,
-) -> Replacements {
-    proxies.map(|(geom, link, visual)| (geom, cache.parts(link, visual))).collect()
-}
-
 impl VisualCache {
-    /// What could not be read.
-    pub(crate) fn diagnostics(&self) -> &[Diagnostic] {
-        &self.diagnostics
+    /// What could not be read since the last call.
+    pub(crate) fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.diagnostics)
     }
 
-    fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
+    /// What is drawn for a visual.
+    pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
         let own = visual.material.as_ref().map(|m| {
             let texture =
                 m.texture.as_ref().and_then(|path| self.texture(&TextureSource::File(path.clone()), link, visual));

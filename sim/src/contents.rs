@@ -1,0 +1,50 @@
+//! What was added to a simulation, in the order in which it was added.
+
+use crate::error::{Error, Result};
+use crate::objects::rigid_object::RigidObjectData;
+use crate::objects::robot::RobotData;
+use std::sync::Arc;
+
+/// Robots and objects.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Contents {
+    pub(crate) robots: Vec<Arc<RobotData>>,
+    pub(crate) objects: Vec<Arc<RigidObjectData>>,
+}
+
+/// Mask id of the ground; links and objects come after it.
+pub(crate) const GROUND_MASK_ID: i32 = 1;
+
+impl Contents {
+    /// Checks that nothing is called `uid` yet.
+    pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
+        // MuJoCo's world body and our ground have names of their own.
+        let reserved = matches!(uid, "world" | "ground");
+        let mut taken = self.robots.iter().map(|r| r.uid()).chain(self.objects.iter().map(|o| o.uid()));
+        if reserved || taken.any(|other| other == uid) {
+            return Err(Error::DuplicateUid(uid.into()));
+        }
+        let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(|c| c == '/' || c.is_control());
+        if usable { Ok(()) } else { Err(Error::InvalidUid(uid.into())) }
+    }
+
+    /// The first mask id that is not used: ids stay what they are when more is added.
+    pub(crate) fn next_mask_id(&self) -> i32 {
+        let links: usize = self.robots.iter().map(|r| r.description().links.len()).sum();
+        GROUND_MASK_ID + 1 + (links + self.objects.len()) as i32
+    }
+
+    /// Names of the bodies in the order in which sensors see them: links of all robots (`uid/link`), then objects.
+    pub(crate) fn body_names(&self) -> Arc<[String]> {
+        let links = self.robots.iter().flat_map(|r| {
+            let links = r.description().links.iter();
+            links.map(|l| format!("{}/{}", r.uid(), l.name))
+        });
+        links.chain(self.objects.iter().map(|o| o.uid().to_string())).collect()
+    }
+
+    /// Names of the movable joints of all robots, `uid/joint`.
+    pub(crate) fn joint_names(&self) -> Arc<[String]> {
+        self.robots.iter().flat_map(|r| r.joint_names().iter().map(|j| format!("{}/{j}", r.uid()))).collect()
+    }
+}

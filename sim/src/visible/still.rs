@@ -1,0 +1,171 @@
+//! A model at one moment, ready to be drawn without a simulation around it.
+
+use super::{MaskId, Visible};
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManager, env_mask};
+use crate::mj::{self, Data, Model, ObjectKind};
+use crate::pattern;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use scene::{Light, Pose, PoseF32};
+use sensors::camera::Shot;
+use sensors::visibility::View;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A model at one moment: what can be seen, and where it is.
+#[derive(Clone, Debug)]
+pub struct Still {
+    visible: Arc<Visible>,
+    poses: Vec<PoseF32>,
+    lights: Vec<Light>,
+    cameras: Vec<ModelCamera>,
+    free_camera: FreeCamera,
+}
+
+/// A camera that a model file describes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelCamera {
+    /// Its name; empty where the file gives none.
+    pub name: String,
+    /// Where it is, with ROS's optical axes (x right, y down, z forward).
+    pub world_from_camera: Pose,
+    /// Vertical field of view \[rad\].
+    pub fovy: f64,
+}
+
+/// Where MuJoCo's viewers look from when they open a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeCamera {
+    /// Where the camera is \[m\].
+    pub eye: [f64; 3],
+    /// Where it looks \[m\].
+    pub target: [f64; 3],
+    /// Vertical field of view \[rad\].
+    pub fovy: f64,
+    /// Nearest and farthest depth that is seen \[m\].
+    pub clip: [f64; 2],
+}
+
+impl Still {
+    /// The model of an MJCF file, at the positions `qpos` (those of the file where `None`).
+    ///
+    /// # Errors
+    /// MuJoCo refuses the file; `qpos` has not one finite number for each position of the model.
+    pub fn of_mjcf(path: impl AsRef<Path>, qpos: Option<&[f64]>) -> Result<Self> {
+        let path = path.as_ref();
+        if let Err(error) = std::fs::metadata(path) {
+            return Err(Error::File { path: path.into(), error });
+        }
+        let model = mj::compile_file(path)?.into_model();
+        let mut data = Data::new(&model)?;
+        if let Some(qpos) = qpos {
+            if qpos.len() != model.nq() {
+                let (found, expected) = (vec![qpos.len()], vec![model.nq()]);
+                return Err(Error::Shape { argument: "qpos", found, expected, meaning: "positions of the model" });
+            }
+            if let Some(column) = qpos.iter().position(|q| !q.is_finite()) {
+                let (of, value) = (format!("position {column}"), qpos[column]);
+                return Err(Error::NotFinite { argument: "qpos", row: 0, column, of, value });
+            }
+            data.qpos_mut().copy_from_slice(qpos);
+        }
+        data.step1()?;
+        Ok(Self::of_data(&Arc::new(Visible::of_model(&model)), &data))
+    }
+
+    /// One environment of a simulation as it is now.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
+        env_mask(Some(&[env]), sim.num_envs())?;
+        let visible = sim.visible();
+        Ok(sim.batch().read(env.0, |env| Self::of_data(&visible, env.data())))
+    }
+
+    fn of_data(visible: &Arc<Visible>, data: &Data) -> Self {
+        let scene = visible.scene();
+        let mut poses = vec![PoseF32::IDENTITY; scene.instances().len()];
+        let mut lights = scene.lights.clone();
+        visible.read(data, &mut poses, &mut lights);
+        let model = data.model();
+        Self {
+            visible: Arc::clone(visible),
+            poses,
+            lights,
+            cameras: (0..model.ncam()).map(|camera| model_camera(data, camera)).collect(),
+            free_camera: free_camera(model),
+        }
+    }
+
+    /// What can be seen.
+    pub fn visible(&self) -> &Arc<Visible> {
+        &self.visible
+    }
+
+    /// What each mask id is.
+    pub fn mask_ids(&self) -> &[MaskId] {
+        self.visible.ids()
+    }
+
+    /// The cameras of the file.
+    pub fn cameras(&self) -> &[ModelCamera] {
+        &self.cameras
+    }
+
+    /// The camera of the file called `name`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn camera(&self, name: &str) -> Result<&ModelCamera> {
+        self.cameras.iter().find(|c| c.name == name).ok_or_else(|| Error::UnknownName {
+            what: "camera",
+            name: name.into(),
+            candidates: pattern::closest(name, self.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty()))
+                .into_iter()
+                .map(str::to_string)
+                .collect(),
+        })
+    }
+
+    /// Where MuJoCo's viewers look from when they open the model.
+    pub fn free_camera(&self) -> FreeCamera {
+        self.free_camera
+    }
+
+    /// What a rasterizer needs to draw it.
+    pub fn shot<'a>(&'a self, view: &'a View) -> Shot<'a> {
+        Shot { scene: self.visible.scene(), poses: &self.poses, view, lights: Some(&self.lights) }
+    }
+}
+
+fn model_camera(data: &Data, camera: usize) -> ModelCamera {
+    let model = data.model();
+    let position = data.cam_xpos().as_chunks::<3>().0[camera];
+    let m = data.cam_xmat().as_chunks::<9>().0[camera];
+    // MuJoCo's cameras have OpenGL's axes: y up, looking along -z.
+    let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&m) * flip);
+    ModelCamera {
+        name: model.name(ObjectKind::Camera, camera).unwrap_or_default(),
+        world_from_camera: Pose::from_parts(position.into(), UnitQuaternion::from_rotation_matrix(&rotation)),
+        fovy: model.cam_fovy()[camera].to_radians(),
+    }
+}
+
+/// Source: `mjv_defaultFreeCamera` and `mjv_cameraInModel`: 1.5 extents away from the middle, by azimuth and elevation.
+fn free_camera(model: &Model) -> FreeCamera {
+    let [fovy, azimuth, elevation] = model.free_camera().map(f64::to_radians);
+    let (target, distance) = (model.center(), 1.5 * model.extent());
+    let forward = [
+        elevation.cos() * azimuth.cos(),
+        elevation.cos() * azimuth.sin(),
+        elevation.sin(),
+    ];
+    FreeCamera {
+        eye: [0, 1, 2].map(|i| target[i] - distance * forward[i]),
+        target,
+        fovy,
+        clip: model.clip(),
+    }
+}
