@@ -1,5 +1,6 @@
 //! What can be wrong with a sensor.
 
+use crate::camera::CameraError;
 use crate::sensor::Requires;
 
 /// Why a sensor cannot be built or updated.
@@ -81,6 +82,9 @@ pub enum SensorError {
         /// What it may mean.
         candidates: Vec<String>,
     },
+    /// Something is wrong with a camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
 }
 
 fn quoted(names: &[String]) -> String {

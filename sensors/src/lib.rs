@@ -18,6 +18,7 @@ pub mod schedule;
 pub mod sensor;
 pub mod visibility;
 
+pub use camera::{Camera, CameraCfg, CameraError};
 pub use error::SensorError;
 pub use history::History;
 pub use joint_state::{JointState, JointStateCfg};

@@ -1,12 +1,24 @@
-//! Cameras: channels, frames and the rasterizer that fills them.
+//! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+pub mod cfg;
 pub mod channel;
+pub mod error;
+pub mod extrinsics;
+pub mod intrinsics;
 pub mod parallel;
+pub mod point_cloud;
 pub mod rasterizer;
+pub mod sensor;
 
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Channels, Frame, FrameMut};
+pub use cfg::{CameraCfg, DepthMiss};
+pub use channel::{Channel, Channels, Frame, FrameMut, Pictures};
+pub use error::CameraError;
+pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pose};
+pub use intrinsics::{Intrinsics, PixelIntrinsics};
 pub use parallel::ParallelRasterizer;
+pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
+pub use sensor::Camera;

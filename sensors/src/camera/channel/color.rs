@@ -1,6 +1,7 @@
 //! Colour (sRGB, see the tone curve) and opacity (always 255).
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix4;
 
 /// Colour (sRGB, see the tone curve) and opacity (always 255).
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,9 @@ pub struct Color;
 
 impl Channel for Color {
     type Number = u8;
+    type Layout = Ix4;
     const NAME: &'static str = "color";
+    const ALIASES: &'static [&'static str] = &["rgb", "rgba"];
     const COMPONENTS: usize = 4;
     const STAGE: Stage = Stage::Color;
 

@@ -1,6 +1,7 @@
 //! Depth along the optical axis \[m\].
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix3;
 
 /// Depth along the optical axis \[m\].
 #[derive(Clone, Copy, Debug)]
@@ -8,12 +9,18 @@ pub struct Depth;
 
 impl Channel for Depth {
     type Number = f32;
+    type Layout = Ix3;
     const NAME: &'static str = "depth";
+    const ALIASES: &'static [&'static str] = &["distance_to_image_plane"];
     const COMPONENTS: usize = 1;
     const STAGE: Stage = Stage::Geometry;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {
         out[0] = group.depth[lane];
+    }
+
+    fn replace_misses(numbers: &mut [f32], value: f32) {
+        numbers.iter_mut().filter(|x| x.is_infinite()).for_each(|x| *x = value);
     }
 }

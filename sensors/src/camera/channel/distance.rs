@@ -1,6 +1,7 @@
 //! Distance from the camera \[m\].
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix3;
 
 /// Distance from the camera \[m\].
 #[derive(Clone, Copy, Debug)]
@@ -8,12 +9,18 @@ pub struct Distance;
 
 impl Channel for Distance {
     type Number = f32;
+    type Layout = Ix3;
     const NAME: &'static str = "distance";
+    const ALIASES: &'static [&'static str] = &["distance_to_camera"];
     const COMPONENTS: usize = 1;
     const STAGE: Stage = Stage::Geometry;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {
         out[0] = group.distance[lane];
+    }
+
+    fn replace_misses(numbers: &mut [f32], value: f32) {
+        numbers.iter_mut().filter(|x| x.is_infinite()).for_each(|x| *x = value);
     }
 }

@@ -1,6 +1,7 @@
 //! Which instance is seen.
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix3;
 
 /// Which instance is seen.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,9 @@ pub struct Mask;
 
 impl Channel for Mask {
     type Number = i32;
+    type Layout = Ix3;
     const NAME: &'static str = "mask";
+    const ALIASES: &'static [&'static str] = &["segmentation", "semantic_segmentation", "instance_segmentation", "instance_segmentation_fast", "instance_id_segmentation_fast"];
     const COMPONENTS: usize = 1;
     const STAGE: Stage = Stage::Geometry;
 

@@ -1,6 +1,10 @@
 //! What a camera measures: one channel per file, all of them in one list.
 
+use super::sensor::Camera;
+use crate::error::SensorError;
 use crate::visibility::RenderError;
+use ndarray::{Array, ArrayView, Dimension, Ix3, Ix4};
+use scene::pattern::closest;
 
 /// Lanes of a [`PixelGroup`].
 const LANES: usize = 16;
@@ -52,8 +56,12 @@ pub enum Stage {
 pub trait Channel {
     /// The type of its numbers.
     type Number: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
+    /// Axes of its pictures: views, rows, columns, and the numbers of a pixel where there are several.
+    type Layout: Layout;
     /// Its name.
     const NAME: &'static str;
+    /// What others call it.
+    const ALIASES: &'static [&'static str];
     /// Numbers per pixel.
     const COMPONENTS: usize;
     /// When it is known.
@@ -61,7 +69,43 @@ pub trait Channel {
 
     /// The numbers of one pixel.
     fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Number]);
+
+    /// Puts `value` where nothing was hit: see [`DepthMiss`](super::DepthMiss). Only for channels that measure how far
+    /// something is; the others have a value of their own for a miss.
+    fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
 }
+
+/// The axes of a batch of pictures.
+pub trait Layout: Dimension {
+    /// The shape of `views` pictures with `height` rows of `width` pixels.
+    fn of(views: usize, height: usize, width: usize, components: usize) -> Self;
+}
+
+/// One number per pixel: (views, height, width).
+impl Layout for Ix3 {
+    fn of(views: usize, height: usize, width: usize, _components: usize) -> Self {
+        Ix3(views, height, width)
+    }
+}
+
+/// Several numbers per pixel: (views, height, width, components).
+impl Layout for Ix4 {
+    fn of(views: usize, height: usize, width: usize, components: usize) -> Self {
+        Ix4(views, height, width, components)
+    }
+}
+
+/// A channel of the list: [`Pictures`] have a place for it.
+pub trait Listed: Channel {
+    /// Whether it is wanted.
+    fn is_in(channels: Channels) -> bool;
+
+    /// Its pictures, if it is there.
+    fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>>;
+}
+
+/// Pictures of one channel, shape (views, height, width) or (views, height, width, components).
+pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
 
 /// Declares the channels: a module with a type of its own each.
 macro_rules! channels {
@@ -79,6 +123,105 @@ macro_rules! channels {
             pub const ALL: Self = Self { $($field: true,)* };
             /// Their names.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
+
+            /// The channels of these names, which may be aliases (`rgb`, `distance_to_image_plane`, `normals`...).
+            ///
+            /// # Errors
+            ///
+            /// [`SensorError::UnknownName`] with the names most like one that is not known.
+            pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, SensorError> {
+                let mut channels = Self::default();
+                for name in names.iter().map(AsRef::as_ref) {
+                    match name {
+                        $(_ if name == $Name::NAME || $Name::ALIASES.contains(&name) => channels.$field = true,)*
+                        _ => return Err(unknown(name, &[$(($Name::NAME, $Name::ALIASES)),*])),
+                    }
+                }
+                Ok(channels)
+            }
+
+            /// Whether a channel is wanted.
+            pub fn has<C: Listed>(self) -> bool {
+                C::is_in(self)
+            }
+
+            /// The names of those that are wanted.
+            pub fn names(self) -> Vec<&'static str> {
+                [$((self.$field, $Name::NAME)),*].into_iter().filter(|(on, _)| *on).map(|(_, name)| name).collect()
+            }
+
+            /// Memory of a pixel \[bytes\].
+            pub fn bytes_per_pixel(self) -> usize {
+                0 $(+ usize::from(self.$field) * size_of::<<$Name as Channel>::Number>() * $Name::COMPONENTS)*
+            }
+        }
+
+        /// Pictures of many views, one array per channel; the first axis is the view.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Pictures {
+            $($field: Option<Array<<$Name as Channel>::Number, <$Name as Channel>::Layout>>,)*
+        }
+
+        impl Pictures {
+            /// Pictures of `views` views of `width` by `height` pixels, empty.
+            ///
+            /// # Panics
+            ///
+            /// If they do not fit into the address space.
+            #[track_caller]
+            pub fn new(channels: Channels, views: usize, width: usize, height: usize) -> Self {
+                Self {
+                    $($field: channels.$field.then(|| {
+                        let shape = <$Name as Channel>::Layout::of(views, height, width, $Name::COMPONENTS);
+                        Array::from_elem(shape, Default::default())
+                    }),)*
+                }
+            }
+
+            /// Which channels there are.
+            pub fn channels(&self) -> Channels {
+                Channels { $($field: self.$field.is_some(),)* }
+            }
+
+            /// The pictures of one channel, if it is there.
+            pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
+                C::of(self)
+            }
+
+            /// Every view borrowed for drawing, in order.
+            pub fn frames_mut(&mut self, views: usize) -> Vec<FrameMut<'_>> {
+                let mut frames: Vec<_> = (0..views).map(|_| FrameMut::default()).collect();
+                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+                    let each = (numbers.len() / views.max(1)).max(1);
+                    for (frame, numbers) in frames.iter_mut().zip(numbers.chunks_exact_mut(each)) {
+                        frame.$field = Some(numbers);
+                    }
+                })*
+                frames
+            }
+        }
+
+        $(impl Listed for $Name {
+            fn is_in(channels: Channels) -> bool {
+                channels.$field
+            }
+
+            fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>> {
+                pictures.$field.as_ref().map(|array| array.view())
+            }
+        })*
+
+        impl Camera {
+            $($(#[$doc])*
+            ///
+            /// The first axis is the camera's environments. Draws what was captured since the last reading.
+            ///
+            /// # Errors
+            ///
+            /// As [`channel`](Self::channel).
+            pub fn $field(&self) -> Result<PictureView<'_, $Name>, SensorError> {
+                self.channel::<$Name>()
+            })*
         }
 
         /// Pictures of one view, row by row from the top left.
@@ -107,6 +250,13 @@ macro_rules! channels {
         }
 
         impl FrameMut<'_> {
+            /// Puts `value` where nothing was hit, in the channels that measure how far something is.
+            pub fn replace_misses(&mut self, value: f32) {
+                $(if let Some(numbers) = self.$field.as_deref_mut() {
+                    $Name::replace_misses(numbers, value);
+                })*
+            }
+
             /// Which channels there are.
             pub fn channels(&self) -> Channels {
                 Channels { $($field: self.$field.is_some(),)* }
@@ -137,6 +287,13 @@ macro_rules! channels {
             }
         }
     };
+}
+
+/// The error for a name that is no channel, with the names and aliases most like it.
+fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> SensorError {
+    let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
+    let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
+    SensorError::UnknownName { what: "channel", name: name.into(), candidates }
 }
 
 #[inline(always)]

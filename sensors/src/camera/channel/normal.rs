@@ -1,6 +1,7 @@
 //! Normal of the surface itself, turned to the camera.
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix4;
 
 /// Normal of the surface itself, turned to the camera.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,9 @@ pub struct Normal;
 
 impl Channel for Normal {
     type Number = f32;
+    type Layout = Ix4;
     const NAME: &'static str = "normal";
+    const ALIASES: &'static [&'static str] = &["normals"];
     const COMPONENTS: usize = 3;
     const STAGE: Stage = Stage::Geometry;
 

@@ -1,6 +1,7 @@
 //! Where the surface is \[m\].
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix4;
 
 /// Where the surface is \[m\].
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,9 @@ pub struct Position;
 
 impl Channel for Position {
     type Number = f32;
+    type Layout = Ix4;
     const NAME: &'static str = "position";
+    const ALIASES: &'static [&'static str] = &["positions", "position_map"];
     const COMPONENTS: usize = 3;
     const STAGE: Stage = Stage::Geometry;
 

@@ -1,6 +1,7 @@
 //! Normal that light sees: smooth where the surface is meant to be.
 
 use super::{Channel, PixelGroup, Stage};
+use ndarray::Ix4;
 
 /// Normal that light sees: smooth where the surface is meant to be.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,9 @@ pub struct ShadingNormal;
 
 impl Channel for ShadingNormal {
     type Number = f32;
+    type Layout = Ix4;
     const NAME: &'static str = "shading_normal";
+    const ALIASES: &'static [&'static str] = &["shading_normals", "smooth_normals"];
     const COMPONENTS: usize = 3;
     const STAGE: Stage = Stage::Geometry;
 

@@ -8,4 +8,5 @@ mod pictures;
 mod reference;
 mod robots;
 mod scenes;
+
 mod watertight;

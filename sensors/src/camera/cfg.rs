@@ -1,0 +1,172 @@
+//! What a camera is, before it exists.
+
+use super::channel::{Channels, Pictures};
+use super::error::CameraError;
+use super::extrinsics::Extrinsics;
+use super::intrinsics::Intrinsics;
+use super::rasterizer::RasterCfg;
+use super::sensor::{Camera, Lens};
+use crate::error::SensorError;
+use crate::schedule::Schedule;
+use crate::sensor::{Requires, SensorCfg, SensorContext};
+use crate::visibility::RenderError;
+use scene::{Light, PoseF32};
+
+/// The most memory that the pictures of a camera may take \[bytes\].
+const MAX_BYTES: u64 = 64 << 30;
+
+/// What depth and distance say where nothing is hit between the near and the far plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum DepthMiss {
+    /// +inf.
+    #[default]
+    Inf,
+    /// The depth of the far plane; the same number in the distance channel.
+    Far,
+    /// 0.
+    Zero,
+}
+
+/// Configuration of a [`Camera`].
+///
+/// ```
+/// use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+///
+/// let cfg = CameraCfg {
+///     width: 320,
+///     height: 240,
+///     intrinsics: Intrinsics::Fovy { radians: 0.9 },
+///     extrinsics: Extrinsics {
+///         placement: Placement::LookAt { eye: [1.5, 0.0, 1.0], target: [0.0; 3], up: [0.0, 0.0, 1.0] },
+///         ..Extrinsics::default()
+///     },
+///     channels: Channels::from_names(&["rgb", "distance_to_image_plane"])?,
+///     ..CameraCfg::default()
+/// };
+/// assert!(cfg.channels.color && cfg.channels.depth);
+/// # Ok::<(), sensors::SensorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraCfg {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+    /// Nothing nearer is seen: smallest depth along the optical axis \[m\].
+    pub near: f64,
+    /// Nothing farther is seen: largest depth along the optical axis \[m\].
+    pub far: f64,
+    /// Where it is.
+    pub extrinsics: Extrinsics,
+    /// Time between pictures \[s\]; 0 is every physics step.
+    pub update_period: f64,
+    /// Take the nearest whole number of physics steps where the period is none, instead of an error.
+    pub round_period: bool,
+    /// What it measures.
+    pub channels: Channels,
+    /// What depth and distance say where nothing is hit.
+    pub depth_miss: DepthMiss,
+    /// How pictures are drawn.
+    pub raster: RasterCfg,
+    /// The environments that it looks into, in this order; `None` is all of them.
+    pub env_ids: Option<Vec<usize>>,
+    /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
+    /// to see is kept when it is due.
+    pub lazy: bool,
+}
+
+impl Default for CameraCfg {
+    /// EmbodiChain's camera: 640 x 480 pixels, f = 600 pixels, from 5 mm to 100 m, colour only. Geom groups 0, 1 and 2 are
+    /// drawn, as in MuJoCo's own viewers.
+    fn default() -> Self {
+        Self {
+            width: 640,
+            height: 480,
+            intrinsics: Intrinsics::Pixels { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 },
+            near: 0.005,
+            far: 100.0,
+            extrinsics: Extrinsics::default(),
+            update_period: 0.0,
+            round_period: false,
+            channels: Channels { color: true, ..Channels::default() },
+            depth_miss: DepthMiss::Inf,
+            raster: RasterCfg { groups: 0b111, ..RasterCfg::default() },
+            env_ids: None,
+            lazy: true,
+        }
+    }
+}
+
+impl SensorCfg for CameraCfg {
+    type Sensor = Camera;
+
+    /// What can be seen; the poses of bodies only where it hangs on one.
+    fn requires(&self) -> Requires {
+        Camera::requires(self.extrinsics.parent.is_some())
+    }
+
+    /// # Errors
+    ///
+    /// Sizes, lens, depth range or placement that are no good, an unknown parent, environments that do not exist or are
+    /// named twice, a period that is no whole number of steps, pictures that do not fit into memory.
+    fn build(&self, context: &SensorContext) -> Result<Camera, SensorError> {
+        let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
+        let scene = context.scene.clone().ok_or(CameraError::NoScene)?;
+        let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
+        if self.channels == Channels::default() {
+            return Err(CameraError::NoChannels.into());
+        }
+        if !matches!(self.raster.samples, 1 | 4) {
+            return Err(CameraError::View(RenderError::Samples { samples: self.raster.samples }).into());
+        }
+        let lens = Lens::new(self)?;
+        let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
+        lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
+        let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
+        check_env_ids(&env_ids, context.num_envs)?;
+        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len())?;
+        let mount = self.extrinsics.parent_from_camera()?;
+        let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
+        Ok(Camera::new(self, context, scene, schedule, parent, (lens, pixels, mount), env_ids, pictures))
+    }
+}
+
+impl CameraCfg {
+    /// Refuses what would end the process: an allocation that fails.
+    fn check_memory(&self, views: usize, instances: usize, lamps: usize) -> Result<(), CameraError> {
+        let bytes_per_pixel = self.channels.bytes_per_pixel();
+        let capture = instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
+        let bytes = self
+            .width
+            .checked_mul(self.height)
+            .and_then(|pixels| pixels.checked_mul(bytes_per_pixel))
+            .and_then(|bytes| bytes.checked_add(capture))
+            .and_then(|bytes| bytes.checked_mul(views))
+            .filter(|&bytes| bytes as u64 <= MAX_BYTES);
+        // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
+        let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
+        if granted {
+            return Ok(());
+        }
+        let (width, height) = (self.width, self.height);
+        Err(CameraError::Memory { views, width, height, bytes_per_pixel, limit: MAX_BYTES })
+    }
+}
+
+fn check_env_ids(env_ids: &[usize], count: usize) -> Result<(), SensorError> {
+    if env_ids.is_empty() {
+        return Err(CameraError::NoEnvironments.into());
+    }
+    let mut seen = vec![false; count];
+    for &env in env_ids {
+        let Some(seen) = seen.get_mut(env) else {
+            return Err(SensorError::IndexOutOfRange { what: "environment", index: env, count });
+        };
+        if std::mem::replace(seen, true) {
+            return Err(CameraError::DuplicateEnvironment { env }.into());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! What can be wrong with a camera.
+
+use crate::visibility::RenderError;
+
+/// Why a camera cannot be built, placed or read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// Size, intrinsics, depth range or number of samples are no good.
+    #[error("the camera cannot see: {0}")]
+    View(RenderError),
+    /// An environment could not be drawn; it is tried again when it was captured anew.
+    #[error("environment {env} cannot be drawn: {error}")]
+    Draw {
+        /// The environment.
+        env: usize,
+        /// Why.
+        error: RenderError,
+    },
+    /// The lens has numbers that no lens has.
+    #[error("{what} of the lens is {value}; it must be {allowed}")]
+    Lens {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What is possible.
+        allowed: &'static str,
+    },
+    /// A matrix that is not that of a pinhole camera.
+    #[error("an intrinsic matrix is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; row {row}, column {column} is {value}")]
+    IntrinsicMatrix {
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+        /// What is there.
+        value: f64,
+    },
+    /// A pose with a number that is not finite (or too large for the renderer), or without a rotation.
+    #[error("pose {row} is not a rigid transform [x, y, z, qw, qx, qy, qz]: {pose:?}")]
+    Pose {
+        /// Which of those given.
+        row: usize,
+        /// The pose, as a row.
+        pose: [f64; 7],
+    },
+    /// Rows of poses that have not seven numbers.
+    #[error("a pose is a row of 7 numbers [x, y, z, qw, qx, qy, qz], not {columns}")]
+    PoseColumns {
+        /// Numbers in a row.
+        columns: usize,
+    },
+    /// The eye is where the target is, or a number is not finite.
+    #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite and apart")]
+    LookAt {
+        /// Where the camera is \[m\].
+        eye: [f64; 3],
+        /// What it looks at \[m\].
+        target: [f64; 3],
+    },
+    /// Too few or too many values for the environments.
+    #[error("{found} {what} for {expected} environments; give one for each, or one for all")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// How many environments are meant.
+        expected: usize,
+        /// How many values were given.
+        found: usize,
+    },
+    /// The camera would see no environment.
+    #[error("a camera needs at least one environment")]
+    NoEnvironments,
+    /// An environment is named twice.
+    #[error("environment {env} is named twice")]
+    DuplicateEnvironment {
+        /// The environment.
+        env: usize,
+    },
+    /// The camera does not look into this environment.
+    #[error("the camera does not see environment {env}; it sees {}", some(.seen))]
+    NotSeen {
+        /// The environment.
+        env: usize,
+        /// The environments of the camera.
+        seen: Vec<usize>,
+    },
+    /// The camera would measure nothing.
+    #[error("the camera has no channels; name at least one")]
+    NoChannels,
+    /// A channel that the camera was not asked to measure.
+    #[error("the camera does not measure {channel}; it measures {}", .enabled.join(", "))]
+    ChannelOff {
+        /// The channel.
+        channel: &'static str,
+        /// Those it measures.
+        enabled: Vec<&'static str>,
+    },
+    /// The pictures of all environments do not fit into memory.
+    #[error(
+        "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \
+         (at most {limit} bytes)"
+    )]
+    Memory {
+        /// How many environments.
+        views: usize,
+        /// Pixels per row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Memory of a pixel.
+        bytes_per_pixel: usize,
+        /// The most that is allowed.
+        limit: u64,
+    },
+    /// There is no scene to look at.
+    #[error("the camera was built without a scene to look at")]
+    NoScene,
+    /// Nothing was captured yet.
+    #[error("the camera has not seen environment {env} yet; it does after the first reset or update")]
+    NothingCaptured {
+        /// The environment.
+        env: usize,
+    },
+}
+
+/// The first few of a list.
+fn some(ids: &[usize]) -> String {
+    let first: Vec<String> = ids.iter().take(8).map(usize::to_string).collect();
+    let more = if ids.len() > 8 { format!(" and {} more", ids.len() - 8) } else { String::new() };
+    first.join(", ") + &more
+}
