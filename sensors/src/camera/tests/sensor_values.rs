@@ -159,7 +159,9 @@ fn an_attached_camera_is_a_free_one_that_moves() {
                 attached.refresh(&[0, 1], &state(&steps)).unwrap();
                 free.refresh(&[0, 1], &state(&steps)).unwrap();
                 let mounted = convention.to_optical(&local);
-                let composed: Vec<Pose> = (0..2).map(|env| tip(env, steps[env]) * mounted).collect();
+                // As the state has it: in a row, from which it is normalised.
+                let link = |env: usize| scene::pose::from_row(&to_row(&tip(env, steps[env])));
+                let composed = [link(0) * mounted, link(1) * mounted];
                 free.set_local_pose(&composed, None, CameraConvention::Ros).unwrap();
                 assert_eq!(bits(&attached, 0..2), bits(&free, 0..2), "{convention:?}, {steps:?}");
                 assert_eq!(attached.pose_w(CameraConvention::Ros), free.pose_w(CameraConvention::Ros));
