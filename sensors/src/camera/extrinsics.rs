@@ -180,8 +180,8 @@ fn rigid(row: usize, pose: &Pose) -> Result<Pose, CameraError> {
 fn rigid_row(row: usize, numbers: [f64; 7]) -> Result<Pose, CameraError> {
     let [x, y, z, qw, qx, qy, qz] = numbers;
     let q = Quaternion::new(qw, qx, qy, qz);
-    // A rotation that is one already keeps its bits.
-    let unit = (q.norm_squared() - 1.0).abs() < 4.0 * f64::EPSILON;
+    // A rotation that is one already, up to the rounding of a few products, keeps its bits.
+    let unit = (q.norm_squared() - 1.0).abs() < 1e-13;
     let rotation = if unit { Some(UnitQuaternion::new_unchecked(q)) } else { UnitQuaternion::try_new(q, 1e-12) };
     rotation
         .map(|rotation| Pose::from_parts(Translation3::new(x, y, z), rotation))

@@ -8,5 +8,8 @@ mod pictures;
 mod reference;
 mod robots;
 mod scenes;
-
+mod sensor;
+mod sensor_mistakes;
+mod sensor_values;
+mod stage;
 mod watertight;
