@@ -9,11 +9,9 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::pose::from_xyz_rpy;
-use launcher::{Launcher, Progress};
+use launcher::arm::ArmWithHand;
+use launcher::{Launcher, Progress, Renderer};
 use serde_json::{Value, json};
-use std::f64::consts::FRAC_PI_2;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Drives an arm with a hand through the phases arm position 1, arm position 2, close hand, open hand.
@@ -22,18 +20,8 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// URDF of the arm
-    #[arg(long, alias = "arm_urdf", default_value = "sr5/SR5.urdf")]
-    arm_urdf: PathBuf,
-    /// URDF of the hand
-    #[arg(long, alias = "hand_urdf", default_value = "revo1_left/revo1_left.urdf")]
-    hand_urdf: PathBuf,
-    /// Joints of the arm, a pattern that matches whole names
-    #[arg(long, alias = "arm_joints", default_value = "JOINT[1-6]")]
-    arm_joints: String,
-    /// Joints of the hand, a pattern that matches whole names
-    #[arg(long, alias = "hand_joints", default_value = "LEFT_.*")]
-    hand_joints: String,
+    #[command(flatten)]
+    robot: ArmWithHand,
     /// Close the hand by its upper limits and open it by the lower ones, for hands that bend that way
     #[arg(long, alias = "swap_hand")]
     swap_hand: bool,
@@ -49,6 +37,9 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
+    if args.launcher.renderer != Renderer::Auto || args.launcher.out.is_some() {
+        println!("This example draws no images: --renderer and --out have no effect (create_sensor draws).");
+    }
     println!("Creating simulation...");
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
@@ -57,7 +48,7 @@ fn run(args: &Args) -> launcher::Result {
     })?;
 
     println!("Loading robot...");
-    let robot = sim.add_robot(robot_cfg(args)?)?;
+    let robot = sim.add_robot(args.robot.cfg()?)?;
     let dof = sim.robot(robot).dof();
     println!("Robot created successfully with {dof} joints");
     for diagnostic in sim.diagnostics() {
@@ -114,30 +105,6 @@ fn run(args: &Args) -> launcher::Result {
     drop(sim);
     println!("Cleaning up...");
     Ok(())
-}
-
-fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
-    let hand = ComponentCfg {
-        transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
-        ..ComponentCfg::new("hand", launcher::user_or_asset(&args.hand_urdf)?)
-    };
-    Ok(RobotCfg {
-        uid: "sr5".into(),
-        urdf: UrdfCfg {
-            components: vec![ComponentCfg::new("arm", launcher::user_or_asset(&args.arm_urdf)?), hand],
-            ..Default::default()
-        },
-        control_parts: vec![
-            ("arm".into(), vec![args.arm_joints.clone()]),
-            ("hand".into(), vec![args.hand_joints.clone()]),
-        ],
-        drive: DriveCfg {
-            stiffness: [(&*args.arm_joints, 1e4), (&*args.hand_joints, 1e3)].into(),
-            damping: [(&*args.arm_joints, 1e3), (&*args.hand_joints, 1e2)].into(),
-            ..Default::default()
-        },
-        ..Default::default()
-    })
 }
 
 /// One quarter of the cycle: which joints go where.

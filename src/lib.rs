@@ -12,8 +12,13 @@ pub use sim;
 pub mod prelude {
     pub use crate::assets;
     pub use scene::Pose;
+    pub use sensors::camera::{
+        Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
+    };
+    pub use sensors::{JointState, JointStateCfg};
     pub use sim::{
-        ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex, NameCase,
-        NameCaseCfg, PerJoint, Result, RobotCfg, RobotId, SimulationManager, SimulationManagerCfg, UrdfCfg,
+        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,
+        MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId,
+        SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
     };
 }

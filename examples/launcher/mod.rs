@@ -1,4 +1,8 @@
-//! What every example shares: flags, Ctrl+C, the progress bar, the report.
+//! What every example shares: flags, Ctrl+C, the progress bar, the report, pictures.
+
+pub(crate) mod arm;
+pub(crate) mod panel;
+pub(crate) mod picture;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -60,7 +64,7 @@ pub(crate) enum Device {
     Cuda,
 }
 
-/// How images are drawn. Nothing is drawn yet; the names are accepted so that scripts run.
+/// How images are drawn; examples that draw none accept the names so that scripts run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renderer {
     /// The default
@@ -88,9 +92,6 @@ impl Launcher {
         }
         if !self.headless {
             println!("There is no window yet: going on headless.");
-        }
-        if !matches!(self.renderer, Renderer::Auto) || self.out.is_some() {
-            println!("This example draws no images yet: --renderer and --out have no effect.");
         }
         Ok(SimulationManagerCfg {
             num_envs: self.num_envs,

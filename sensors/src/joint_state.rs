@@ -121,7 +121,7 @@ impl Sensor for JointState {
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        self.phases.due_in(step)
+        self.phases.due_in(step.iter().copied())
     }
 }
 

@@ -92,11 +92,11 @@ impl Phases {
         is_new && (step - phase.start).is_multiple_of(self.schedule.period_steps)
     }
 
-    /// Steps until the next environment is due, at least 1, when they are at `step`.
-    pub fn due_in(&self, step: &[u64]) -> u64 {
+    /// Steps until the next environment is due, at least 1, when they are at `steps`.
+    pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
         let period = self.schedule.period_steps;
-        let wait = |(phase, step): (&Phase, &u64)| period - step.saturating_sub(phase.start) % period;
-        self.envs.iter().zip(step).map(wait).min().unwrap_or(1)
+        let wait = |(phase, step): (&Phase, u64)| period - step.saturating_sub(phase.start) % period;
+        self.envs.iter().zip(steps).map(wait).min().unwrap_or(1)
     }
 
     /// Starts environment `env` anew: the next measurement falls one period after `step`.
@@ -166,7 +166,7 @@ mod tests {
         phases.reset(1, 3);
         let (mut step, mut due) = (0, Vec::new());
         while step < 20 {
-            step += phases.due_in(&[step, step.max(3)]);
+            step += phases.due_in([step, step.max(3)]);
             // Environment 1 came late: it is asked from its own step 3 on.
             due.extend([0, 1].into_iter().filter(|&env| phases.is_due(env, step)).map(|env| (env, step)));
         }

@@ -106,7 +106,7 @@ pub(crate) fn document(
     mut mjcf: Mjcf,
 ) -> Result<(Mjcf, Vec<RobotLayout>, Vec<Diagnostic>)> {
     if let Some(ground) = &cfg.ground {
-        scene::add_ground(&mut mjcf, ground.half_size);
+        scene::add_ground(&mut mjcf, ground.half_size, ground.color);
     }
     for (i, light) in cfg.lights.iter().enumerate() {
         scene::add_light(&mut mjcf, &format!("light{i}"), light.direction, light.color);
@@ -320,11 +320,20 @@ impl Simulation {
     }
 
     /// Makes what cameras draw, if nobody did before.
-    pub(crate) fn make_visible(&mut self, contents: &Contents, cache: &mut VisualCache) -> Arc<Visible> {
+    pub(crate) fn make_visible(
+        &mut self,
+        cfg: &SimulationManagerCfg,
+        contents: &Contents,
+        cache: &mut VisualCache,
+    ) -> Arc<Visible> {
         if let Some(visible) = &self.visible {
             return Arc::clone(visible);
         }
         let mut replacements = Replacements::new();
+        let ground = self.batch.model().id(ObjectKind::Geom, "ground");
+        if let (Some(geom), Some(cfg)) = (ground, &cfg.ground) {
+            replacements.insert(geom, vec![visible::ground(cfg)]);
+        }
         for (data, index) in contents.robots.iter().zip(&self.robots) {
             for geom in &index.geoms {
                 let link = &data.description().links[geom.link];
@@ -333,7 +342,8 @@ impl Simulation {
                 }
             }
         }
-        let visible = Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements));
+        let visible =
+            Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements).with_own_headlight());
         self.visible = Some(Arc::clone(&visible));
         visible
     }

@@ -18,10 +18,8 @@ pub(crate) const GROUND_MASK_ID: i32 = 1;
 impl Contents {
     /// Checks that nothing is called `uid` yet.
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
-        // MuJoCo's world body and our ground have names of their own.
-        let reserved = matches!(uid, "world" | "ground");
         let mut taken = self.robots.iter().map(|r| r.uid()).chain(self.objects.iter().map(|o| o.uid()));
-        if reserved || taken.any(|other| other == uid) {
+        if taken.any(|other| other == uid) {
             return Err(Error::DuplicateUid(uid.into()));
         }
         let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(|c| c == '/' || c.is_control());

@@ -106,7 +106,7 @@ pub enum Error {
     },
     /// A name is used already.
     #[error(
-        "the uid {0:?} is taken; give each robot, object and sensor a uid of its own (\"world\" and \"ground\" are reserved)"
+        "the uid {0:?} is taken; give each robot, object and sensor a uid of its own (for objects, \"world\" and \"ground\" are taken)"
     )]
     DuplicateUid(String),
     /// A name that cannot be written to MJCF.

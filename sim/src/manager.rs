@@ -58,11 +58,15 @@ pub struct SimulationManagerCfg {
 pub struct GroundCfg {
     /// Half of the side that is drawn \[m\]; the plane itself is infinite.
     pub half_size: f64,
+    /// Colour, 0..=1.
+    pub color: [f64; 3],
+    /// Whether cameras see squares of half a metre, a little lighter and darker than the colour.
+    pub checker: bool,
 }
 
 impl Default for GroundCfg {
     fn default() -> Self {
-        Self { half_size: 50.0 }
+        Self { half_size: 50.0, color: [0.45, 0.47, 0.5], checker: true }
     }
 }
 
@@ -165,6 +169,11 @@ impl SimulationManagerCfg {
             && !positive(ground.half_size)
         {
             return fail("ground.half_size", &ground.half_size, "it must be above 0 metres");
+        }
+        if let Some(ground) = &self.ground
+            && !ground.color.iter().all(|c| (0.0..=1.0).contains(c))
+        {
+            return fail("ground.color", &format!("{:?}", ground.color), "each component must be 0 to 1");
         }
         for light in &self.lights {
             if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
@@ -289,6 +298,10 @@ impl SimulationManager {
     /// The name is taken or a number is out of range.
     pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
         self.contents.check_uid(&cfg.uid)?;
+        // MuJoCo's world body and our ground are called so.
+        if matches!(cfg.uid.as_str(), "world" | "ground") {
+            return Err(Error::DuplicateUid(cfg.uid));
+        }
         let object = RigidObjectData::new(cfg, self.contents.next_mask_id())?;
         let mut contents = self.contents.clone();
         contents.objects.push(Arc::new(object));
@@ -367,7 +380,7 @@ impl SimulationManager {
     /// What can be seen: made at the first call, which reads the visual meshes. What cannot be read is left out, with a
     /// diagnostic.
     pub fn visible(&mut self) -> Arc<Visible> {
-        let visible = self.simulation.make_visible(&self.contents, &mut self.visuals);
+        let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);
         self.diagnostics.extend(self.visuals.take_diagnostics());
         visible
     }

@@ -2,6 +2,7 @@
 
 pub mod cfg;
 pub mod channel;
+pub mod colormap;
 pub mod error;
 pub mod extrinsics;
 pub mod intrinsics;

@@ -150,8 +150,8 @@ impl Sensor for Camera {
         Ok(())
     }
 
-    fn due_in(&self) -> u64 {
-        self.phases.due_in()
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.phases.due_in(self.env_ids.iter().map(|&env| step[env]))
     }
 }
 
@@ -183,7 +183,7 @@ impl Camera {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
-        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads.min(rows));
+        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads);
         Self {
             lens,
             scene,

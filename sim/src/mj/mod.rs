@@ -19,6 +19,7 @@ mod look;
 mod memory;
 mod model;
 mod name;
+mod ray;
 mod state;
 mod version;
 mod vfs;
@@ -31,6 +32,7 @@ pub use look::{
 pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
+pub use ray::RayHit;
 pub use state::{Inputs, Motion};
 pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};

@@ -24,14 +24,14 @@ pub fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
 }
 
 /// Adds a ground plane at z = 0 \[m\].
-pub fn add_ground(mjcf: &mut Mjcf, half_size: f64) {
+pub fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
     mjcf.bodies[0].geoms.push(Geom {
         name: Some("ground".into()),
         shape: Shape::Plane([half_size, half_size]),
         pose: Pose::identity(),
         role: WORLD_CONTACT,
         friction: None,
-        rgba: Some([0.45, 0.47, 0.5, 1.0]),
+        rgba: Some([r, g, b, 1.0]),
         material: None,
         source: None,
     });

@@ -1,6 +1,7 @@
 //! Lamps, headlight and sky of MuJoCo models.
 
 use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
+use scene::material::decode_srgb;
 use scene::{Headlight, Light, LightKind, RenderScene, Sky};
 
 /// Sets the lamps, the headlight and the sky of `scene` to the model's.
@@ -20,9 +21,9 @@ pub(super) fn light(model: &Model, scene: &mut RenderScene) {
                 kind,
                 position: [0.0; 3],
                 direction: [0.0, 0.0, -1.0],
-                ambient: light.ambient,
-                diffuse: light.diffuse,
-                specular: light.specular,
+                ambient: linear(light.ambient),
+                diffuse: linear(light.diffuse),
+                specular: linear(light.specular),
                 attenuation: light.attenuation,
                 cast_shadow: light.cast_shadow,
                 // An image around everything is no lamp.
@@ -32,15 +33,21 @@ pub(super) fn light(model: &Model, scene: &mut RenderScene) {
         .collect();
     let headlight = model.headlight();
     scene.headlight = Headlight {
-        ambient: headlight.ambient,
-        diffuse: headlight.diffuse,
-        specular: headlight.specular,
+        ambient: linear(headlight.ambient),
+        diffuse: linear(headlight.diffuse),
+        specular: linear(headlight.specular),
         active: headlight.active,
     };
     let skybox = (0..model.ntex()).filter_map(|t| model.texture(t)).find(|t| t.kind == TextureType::Skybox);
     if let Some(sky) = skybox.and_then(|texture| gradient(&texture)) {
         scene.sky = sky;
     }
+}
+
+/// MuJoCo multiplies colours as they are on the screen; ours are multiplied in linear light. For one light the result is
+/// the same up to the small linear part of sRGB: (c l)^2.2 = c^2.2 l^2.2.
+fn linear(color: [f32; 3]) -> [f32; 3] {
+    color.map(decode_srgb)
 }
 
 /// Where the lamps are in `data`.
@@ -57,14 +64,17 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
 fn gradient(texture: &TextureArrays<'_>) -> Option<Sky> {
     let side = texture.width;
     // Faces one below the other: right, left, up, down, front, back.
-    if side == 0 || texture.channels < 3 || texture.height < 6 * side {
+    if side == 0 || texture.channels < 3 || texture.height < side {
         return None;
     }
+    // A square is the same on all faces.
+    let one = texture.height < 6 * side;
     let mean = |face: usize, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
         let mut sum = [0.0f32; 3];
         let count = (rows.len() * columns.len()) as f32;
         for row in rows {
             for column in columns.clone() {
+                let face = if one { 0 } else { face };
                 let at = ((face * side + row) * side + column) * texture.channels;
                 for (sum, byte) in sum.iter_mut().zip(&texture.pixels[at..at + 3]) {
                     *sum += f32::from(*byte) / 255.0;

@@ -12,12 +12,14 @@ mod surface;
 mod urdf_visual;
 
 pub use identity::MaskId;
-pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use identity::{Identities, Owner, of_simulation};
+pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
+use crate::manager::GroundCfg;
 use crate::mj::{Data, Model};
-use scene::{Instance, Light, Material, PoseF32, RenderScene, Shape};
+use scene::shape::Plane;
+use scene::{Headlight, Instance, Light, Material, PoseF32, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
 /// What can be seen of a model.
@@ -35,6 +37,21 @@ pub struct Visible {
 pub(crate) struct Part {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
+}
+
+/// The ground of a simulation.
+pub(crate) fn ground(cfg: &GroundCfg) -> Part {
+    let [r, g, b] = cfg.color.map(|c| c as f32);
+    let material = Material { specular: 0.05, shininess: 0.1, ..Material::from_rgba([r, g, b, 1.0]) };
+    let half = cfg.half_size as f32;
+    let shape = Plane { half: [half, half] }.into();
+    if !cfg.checker {
+        return Part { shape, material };
+    }
+    let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
+    // Two by two squares of half a metre repeat once per metre. The texture brings the colour.
+    let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
+    Part { shape, material: Material { rgba: [1.0; 4], texture, tex_uniform: true, ..material } }
 }
 
 impl Visible {
@@ -77,6 +94,12 @@ impl Visible {
         });
         lighting::light(model, &mut scene);
         Self { scene: Arc::new(scene), geoms, ids: identities.shared_table(), left_out }
+    }
+
+    /// The headlight that goes with our ambient light, instead of the one MuJoCo gives to models that ask for none.
+    pub(crate) fn with_own_headlight(mut self) -> Self {
+        Arc::make_mut(&mut self.scene).headlight = Headlight::default();
+        self
     }
 
     /// What the renderer draws, the same for all environments.

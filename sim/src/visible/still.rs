@@ -157,15 +157,6 @@ fn model_camera(data: &Data, camera: usize) -> ModelCamera {
 fn free_camera(model: &Model) -> FreeCamera {
     let [fovy, azimuth, elevation] = model.free_camera().map(f64::to_radians);
     let (target, distance) = (model.center(), 1.5 * model.extent());
-    let forward = [
-        elevation.cos() * azimuth.cos(),
-        elevation.cos() * azimuth.sin(),
-        elevation.sin(),
-    ];
-    FreeCamera {
-        eye: [0, 1, 2].map(|i| target[i] - distance * forward[i]),
-        target,
-        fovy,
-        clip: model.clip(),
-    }
+    let forward = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
+    FreeCamera { eye: [0, 1, 2].map(|i| target[i] - distance * forward[i]), target, fovy, clip: model.clip() }
 }

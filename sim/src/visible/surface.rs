@@ -74,6 +74,13 @@ fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> 
         _ => Vec::new(),
     };
     let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
+    // A square is the same on all faces of the cube.
+    if kind == TextureKind::Cube && arrays.height == arrays.width {
+        let pixels = pixels.repeat(6);
+        return Texture::new(kind, size(arrays.width), size(6 * arrays.height), size(channels), &pixels)
+            .map(|texture| Some(Arc::new(texture)))
+            .map_err(|error| error.to_string());
+    }
     Texture::new(kind, size(arrays.width), size(arrays.height), size(channels), pixels)
         .map(|texture| Some(Arc::new(texture)))
         .map_err(|error| error.to_string())

@@ -1,0 +1,69 @@
+//! The robot of the tutorials: an arm and a hand from two URDF files.
+#![allow(dead_code, reason = "each example uses its part")]
+
+use super::{Result, user_or_asset};
+use clap::Args;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sim::Robot;
+use std::f64::consts::FRAC_PI_2;
+use std::path::PathBuf;
+
+/// Which arm and which hand.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ArmWithHand {
+    /// URDF of the arm
+    #[arg(long, alias = "arm_urdf", default_value = "sr5/SR5.urdf")]
+    arm_urdf: PathBuf,
+    /// URDF of the hand
+    #[arg(long, alias = "hand_urdf", default_value = "revo1_left/revo1_left.urdf")]
+    hand_urdf: PathBuf,
+    /// Joints of the arm, a pattern that matches whole names
+    #[arg(long, alias = "arm_joints", default_value = "JOINT[1-6]")]
+    arm_joints: String,
+    /// Joints of the hand, a pattern that matches whole names
+    #[arg(long, alias = "hand_joints", default_value = "LEFT_.*")]
+    hand_joints: String,
+}
+
+impl ArmWithHand {
+    /// The two merged, the hand turned and moved onto the flange, with the tutorial's gains.
+    ///
+    /// # Errors
+    /// A file is neither there nor an asset.
+    pub(crate) fn cfg(&self) -> Result<RobotCfg> {
+        let hand = ComponentCfg {
+            transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
+            ..ComponentCfg::new("hand", user_or_asset(&self.hand_urdf)?)
+        };
+        Ok(RobotCfg {
+            uid: "sr5".into(),
+            urdf: UrdfCfg {
+                components: vec![ComponentCfg::new("arm", user_or_asset(&self.arm_urdf)?), hand],
+                ..Default::default()
+            },
+            control_parts: vec![
+                ("arm".into(), vec![self.arm_joints.clone()]),
+                ("hand".into(), vec![self.hand_joints.clone()]),
+            ],
+            drive: DriveCfg {
+                stiffness: [(&*self.arm_joints, 1e4), (&*self.hand_joints, 1e3)].into(),
+                damping: [(&*self.arm_joints, 1e3), (&*self.hand_joints, 1e2)].into(),
+                ..Default::default()
+            },
+            ..Default::default()
+        })
+    }
+}
+
+/// The link that the hand hangs on, as `uid/link`.
+pub(crate) fn tip(robot: Robot<'_>) -> String {
+    let description = robot.description();
+    let joins = |parent: &str, child: &str| parent == "arm" && child == "hand";
+    let joint = description
+        .joints
+        .iter()
+        .find(|j| joins(&description.link(j.parent).component, &description.link(j.child).component));
+    let link = joint.map_or(description.root, |j| j.parent);
+    format!("{}/{}", robot.uid(), description.link(link).name)
+}

@@ -1,0 +1,148 @@
+//! Four channels of a camera side by side, with titles and a scale for the depth.
+#![allow(dead_code, reason = "each example uses its part")]
+
+use super::picture;
+use embedded_graphics::mono_font::MonoTextStyle;
+use embedded_graphics::mono_font::ascii::{FONT_8X13, FONT_10X20};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use image::{Rgb, RgbImage};
+use kinetoscope::ndarray::{ArrayView, Axis, RemoveAxis};
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::colormap::depth_color;
+use std::convert::Infallible;
+
+/// Height of a title \[pixels\].
+const TITLE: u32 = 28;
+/// Space around pictures \[pixels\].
+const GAP: u32 = 8;
+/// Height of the depth scale \[pixels\].
+const SCALE: u32 = 24;
+
+/// The channels of one environment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Views<'a> {
+    /// Pixels per row, rows.
+    pub(crate) size: [usize; 2],
+    /// Four bytes per pixel.
+    pub(crate) color: &'a [u8],
+    /// Metres.
+    pub(crate) depth: &'a [f32],
+    /// Ids.
+    pub(crate) mask: &'a [i32],
+    /// Three numbers per pixel.
+    pub(crate) normal: &'a [f32],
+}
+
+impl<'a> Views<'a> {
+    /// What a camera sees in its environment number `row`.
+    ///
+    /// # Errors
+    /// One of the four channels is not enabled, or cannot be drawn.
+    pub(crate) fn of(camera: &'a Camera, row: usize) -> super::Result<Self> {
+        let (height, width) = camera.image_shape();
+        Ok(Self {
+            size: [width, height],
+            color: slice(camera.color()?, row)?,
+            depth: slice(camera.depth()?, row)?,
+            mask: slice(camera.mask()?, row)?,
+            normal: slice(camera.normal()?, row)?,
+        })
+    }
+}
+
+/// One environment of a channel.
+fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::Result<&[T]> {
+    channel.index_axis_move(Axis(0), row).to_slice().ok_or_else(|| "pictures are not in C order".into())
+}
+
+/// Color, Depth, Mask, Normals in a grid of 2 x 2.
+pub(crate) fn grid(views: &Views<'_>) -> RgbImage {
+    let size = views.size;
+    let range = picture::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
+    let pictures = [
+        ("Color", picture::color_picture(size, views.color)),
+        ("Depth", picture::depth_picture(size, views.depth, range)),
+        ("Mask", picture::mask_picture(size, views.mask)),
+        ("Normals", picture::normal_picture(size, views.normal)),
+    ];
+    let (width, height) = (size[0] as u32, size[1] as u32);
+    let cell = [width + 2 * GAP, height + TITLE + SCALE];
+    let mut out = Canvas(RgbImage::from_pixel(2 * cell[0], 2 * cell[1], Rgb([250, 250, 250])));
+    for (k, (title, picture)) in (0u32..).zip(&pictures) {
+        let (x, y) = (k % 2 * cell[0] + GAP, k / 2 * cell[1] + TITLE);
+        image::imageops::replace(&mut out.0, picture, i64::from(x), i64::from(y));
+        out.title(title, [x + width / 2, y - TITLE / 2]);
+        if *title == "Depth" {
+            out.depth_scale([x, y + height + 3], width, range);
+        }
+    }
+    out.0
+}
+
+/// Pictures of the same size in a grid as square as can be, row by row.
+pub(crate) fn tile(pictures: &[RgbImage]) -> RgbImage {
+    let Some(first) = pictures.first() else { return RgbImage::default() };
+    let columns = (1..).find(|c| c * c >= pictures.len()).unwrap_or(1);
+    let rows = pictures.len().div_ceil(columns);
+    let (width, height) = first.dimensions();
+    let mut out = RgbImage::from_pixel(columns as u32 * width, rows as u32 * height, Rgb([250, 250, 250]));
+    for (k, picture) in pictures.iter().enumerate() {
+        let at = [(k % columns) as i64 * i64::from(width), (k / columns) as i64 * i64::from(height)];
+        image::imageops::replace(&mut out, picture, at[0], at[1]);
+    }
+    out
+}
+
+struct Canvas(RgbImage);
+
+impl Canvas {
+    fn title(&mut self, text: &str, [x, y]: [u32; 2]) {
+        let style = MonoTextStyle::new(&FONT_10X20, Rgb888::new(30, 30, 30));
+        let place = TextStyleBuilder::new().alignment(Alignment::Center).baseline(Baseline::Middle).build();
+        let Ok(_) = Text::with_text_style(text, Point::new(x as i32, y as i32), style, place).draw(self);
+    }
+
+    /// A bar of the colours between the ends of `range` \[m\], with both written beside it.
+    fn depth_scale(&mut self, [x, y]: [u32; 2], width: u32, range: [f32; 2]) {
+        let [near, far] = range.map(|d| format!("{d:.2} m"));
+        let style = MonoTextStyle::new(&FONT_8X13, Rgb888::new(30, 30, 30));
+        let room = 8 * near.len().max(far.len()) as u32 + 6;
+        let middle = (y + 7) as i32;
+        for (text, x, alignment) in [(&near, x, Alignment::Left), (&far, x + width, Alignment::Right)] {
+            let place = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Middle).build();
+            let Ok(_) = Text::with_text_style(text, Point::new(x as i32, middle), style, place).draw(self);
+        }
+        let bar = width.saturating_sub(2 * room);
+        for k in 0..bar {
+            let depth = range[0] + (range[1] - range[0]) * k as f32 / bar as f32;
+            for row in 0..14 {
+                self.0.put_pixel(x + room + k, y + row, Rgb(depth_color(depth, range)));
+            }
+        }
+    }
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        Size::new(self.0.width(), self.0.height())
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(at, color) in pixels {
+            if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
+                && x < self.0.width()
+                && y < self.0.height()
+            {
+                self.0.put_pixel(x, y, Rgb([color.r(), color.g(), color.b()]));
+            }
+        }
+        Ok(())
+    }
+}

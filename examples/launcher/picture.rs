@@ -1,0 +1,59 @@
+//! Channels of cameras as files.
+#![allow(dead_code, reason = "each example uses its part")]
+
+use super::Result;
+use image::{Rgb, RgbImage};
+use kinetoscope::ndarray::{ArrayBase, Data, Dimension};
+use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
+use ndarray_npy::{WritableElement, WriteNpyExt};
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// Writes an array for NumPy.
+pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
+where
+    S: Data,
+    S::Elem: WritableElement,
+    D: Dimension,
+{
+    let file = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    array.write_npy(BufWriter::new(file)).map_err(|e| format!("{}: {e}", path.display()).into())
+}
+
+/// Writes a picture as PNG.
+pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result {
+    picture.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
+}
+
+/// Colours without their opacity.
+pub(crate) fn color_picture(size: [usize; 2], color: &[u8]) -> RgbImage {
+    picture(size, |k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]])
+}
+
+/// Depths by colour between the ends of `range`.
+pub(crate) fn depth_picture(size: [usize; 2], depth: &[f32], range: [f32; 2]) -> RgbImage {
+    picture(size, |k| depth_color(depth[k], range))
+}
+
+/// Mask ids, each in its own colour.
+pub(crate) fn mask_picture(size: [usize; 2], mask: &[i32]) -> RgbImage {
+    picture(size, |k| mask_color(mask[k]))
+}
+
+/// Normals as colours.
+pub(crate) fn normal_picture(size: [usize; 2], normal: &[f32]) -> RgbImage {
+    picture(size, |k| normal_color([normal[3 * k], normal[3 * k + 1], normal[3 * k + 2]]))
+}
+
+fn picture([width, height]: [usize; 2], color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
+    RgbImage::from_fn(width as u32, height as u32, |x, y| Rgb(color(y as usize * width + x as usize)))
+}
+
+/// Smallest and largest finite value; `None` where there is none.
+pub(crate) fn finite_range(depth: impl IntoIterator<Item = f32>) -> Option<[f32; 2]> {
+    depth
+        .into_iter()
+        .filter(|d| d.is_finite())
+        .fold(None, |range, d| Some(range.map_or([d, d], |[low, high]: [f32; 2]| [low.min(d), high.max(d)])))
+}

@@ -1,0 +1,213 @@
+//! One image of any MJCF or URDF, in four channels.
+//!
+//! ```text
+//! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid.xml --out pictures
+//! ```
+
+mod launcher;
+
+use clap::{Parser, ValueEnum};
+use kinetoscope::ndarray::{Array2, ArrayView2, ArrayView3};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::PoseF32;
+use kinetoscope::scene::pose::to_row;
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::visibility::View;
+use launcher::picture;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Draws color, depth, mask and normals of a model at its initial state.
+#[derive(Debug, Parser)]
+#[command(name = "render_model")]
+struct Args {
+    /// MJCF or URDF file
+    #[arg(value_name = "FILE.xml|FILE.urdf")]
+    file: PathBuf,
+    /// Positions of all joints in MuJoCo's order (MJCF) or in the order of the URDF, separated by commas
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    qpos: Option<Vec<f64>>,
+    /// A camera of the file
+    #[arg(long, conflicts_with_all = ["eye", "target"])]
+    camera: Option<String>,
+    /// Where the camera is, x,y,z in metres
+    #[arg(long, requires = "target", value_parser = point, allow_hyphen_values = true)]
+    eye: Option<Point>,
+    /// Where it looks, x,y,z in metres
+    #[arg(long, requires = "eye", value_parser = point, allow_hyphen_values = true)]
+    target: Option<Point>,
+    /// Vertical field of view in degrees; 45 where neither the flag nor a camera of the file says otherwise
+    #[arg(long)]
+    fovy: Option<f64>,
+    /// Pixels per row
+    #[arg(long, default_value_t = 640)]
+    width: usize,
+    /// Rows
+    #[arg(long, default_value_t = 480)]
+    height: usize,
+    /// Whether lamps cast shadows
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    shadows: Switch,
+    /// Samples per pixel of the color: 1 or 4
+    #[arg(long, default_value_t = 4)]
+    msaa: u8,
+    /// Geom groups that are drawn, as in MuJoCo's viewers
+    #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
+    groups: Vec<u8>,
+    /// Threads that draw; every core by default
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Draw again and again for so many seconds and report images per second
+    #[arg(long)]
+    bench: Option<f64>,
+    /// Folder for color.png, depth.png, mask.png, normal.png and meta.json
+    #[arg(long, default_value = ".")]
+    out: PathBuf,
+    /// Also write color.npy, depth.npy, mask.npy and normal.npy
+    #[arg(long)]
+    raw: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Point([f64; 3]);
+
+fn point(text: &str) -> std::result::Result<Point, String> {
+    let numbers: Vec<f64> = text.split(',').map(|n| n.trim().parse().unwrap_or(f64::NAN)).collect();
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(Point([x, y, z])),
+        _ => Err("expected three numbers separated by commas, such as 1.5,-2,1".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    launcher::run("render_model", || run(&Args::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result {
+    let still = load(args)?;
+    for left_out in still.visible().left_out() {
+        eprintln!("warning: {left_out}");
+    }
+    let (view, pose, fovy) = view(args, &still)?;
+    let cfg = RasterCfg {
+        samples: args.msaa,
+        shadows: args.shadows == Switch::On,
+        groups: args.groups.iter().fold(0, |bits, group| bits | 1u32.checked_shl(u32::from(*group)).unwrap_or(0)),
+        ..RasterCfg::default()
+    };
+    let threads = match args.threads {
+        Some(threads @ 1..=1024) => threads,
+        Some(threads) => return Err(format!("--threads {threads}: it must be 1 to 1024").into()),
+        None => std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get),
+    };
+    let mut rasterizer = ParallelRasterizer::new(cfg, threads);
+    let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
+    let mut frame = Frame::new(view.width, view.height, channels);
+    let seconds = Duration::try_from_secs_f64(args.bench.unwrap_or(0.0)).map_err(|e| format!("--bench: {e}"))?;
+    let (start, mut images) = (Instant::now(), 0u32);
+    while images == 0 || start.elapsed() < seconds {
+        let mut job = [(still.shot(&view), frame.as_mut())];
+        rasterizer.render(&mut job).map_err(|(_, error)| error)?;
+        images += 1;
+    }
+    let rate = f64::from(images) / start.elapsed().as_secs_f64();
+
+    std::fs::create_dir_all(&args.out).map_err(|e| format!("--out {}: {e}", args.out.display()))?;
+    write_pictures(args, &view, &frame)?;
+    let meta = json!({
+        "width": view.width,
+        "height": view.height,
+        "fx": view.fx,
+        "fy": view.fy,
+        "cx": view.cx,
+        "cy": view.cy,
+        "fovy_deg": fovy.to_degrees(),
+        "pose": {
+            "ros": to_row(&pose),
+            "opengl": to_row(&CameraConvention::OpenGl.of_optical(&pose)),
+            "world": to_row(&CameraConvention::World.of_optical(&pose)),
+        },
+        "ids": still.mask_ids().iter().map(|id| json!({
+            "id": id.id, "object": id.object, "link": id.link, "class": id.class, "body": id.body, "geoms": id.geoms,
+        })).collect::<Vec<_>>(),
+        "triangles": still.visible().scene().triangle_count(),
+        "images_per_second": rate,
+        "threads": threads,
+    });
+    let path = args.out.join("meta.json");
+    std::fs::write(&path, serde_json::to_string_pretty(&meta)? + "\n")
+        .map_err(|e| format!("{}: {e}", path.display()))?;
+    println!("{images} images, {rate:.1} per second; written to {}", args.out.display());
+    Ok(())
+}
+
+/// A URDF goes through the whole pipeline, anything else is for MuJoCo to read.
+fn load(args: &Args) -> launcher::Result<Still> {
+    let is_urdf = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"));
+    if !is_urdf {
+        return Ok(Still::of_mjcf(&args.file, args.qpos.as_deref())?);
+    }
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
+    let urdf = UrdfCfg::single(launcher::user_or_asset(&args.file)?);
+    let robot = sim.add_robot(RobotCfg { urdf, ..Default::default() })?;
+    if let Some(qpos) = &args.qpos {
+        let row = Array2::from_shape_vec((1, qpos.len()), qpos.clone())?;
+        sim.robot_mut(robot).write_qpos(&row, None, None)?;
+    }
+    let still = Still::of_env(&mut sim, EnvId(0))?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    Ok(still)
+}
+
+/// The view, the pose of its optical frame, and its vertical field of view \[rad\].
+fn view(args: &Args, still: &Still) -> launcher::Result<(View, Pose, f64)> {
+    let free = still.free_camera();
+    let (pose, own_fovy) = match (&args.camera, args.eye, args.target) {
+        (Some(name), ..) => {
+            let camera = still.camera(name)?;
+            (camera.world_from_camera, camera.fovy)
+        }
+        (None, Some(eye), Some(target)) => (look_at_pose(eye.0, target.0, [0.0, 0.0, 1.0])?, 45f64.to_radians()),
+        _ => (look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0])?, free.fovy),
+    };
+    let radians = args.fovy.map_or(own_fovy, f64::to_radians);
+    let pixels = Intrinsics::Fovy { radians }.to_pixels(args.width, args.height)?;
+    let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
+    let [near, far] = free.clip.map(|x| x as f32);
+    let (width, height, world_from_camera) = (args.width, args.height, PoseF32::from(&pose));
+    let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera };
+    view.validate()?;
+    Ok((view, pose, radians))
+}
+
+fn write_pictures(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
+    let (Some(color), Some(depth), Some(mask), Some(normal)) = (&frame.color, &frame.depth, &frame.mask, &frame.normal)
+    else {
+        return Err("a channel was not drawn".into());
+    };
+    let size = [view.width, view.height];
+    let range = picture::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
+    let file = |name: &str| args.out.join(name);
+    picture::write_png(&file("color.png"), &picture::color_picture(size, color))?;
+    picture::write_png(&file("depth.png"), &picture::depth_picture(size, depth, range))?;
+    picture::write_png(&file("mask.png"), &picture::mask_picture(size, mask))?;
+    picture::write_png(&file("normal.png"), &picture::normal_picture(size, normal))?;
+    if args.raw {
+        let (w, h) = (view.width, view.height);
+        picture::write_npy(&file("color.npy"), &ArrayView3::from_shape((h, w, 4), color)?)?;
+        picture::write_npy(&file("depth.npy"), &ArrayView2::from_shape((h, w), depth)?)?;
+        picture::write_npy(&file("mask.npy"), &ArrayView2::from_shape((h, w), mask)?)?;
+        picture::write_npy(&file("normal.npy"), &ArrayView3::from_shape((h, w, 3), normal)?)?;
+    }
+    Ok(())
+}
