@@ -112,7 +112,7 @@ fn run(args: &Args) -> launcher::Result {
             if step % every == 0 {
                 progress.say(message);
                 let target = position(wrist);
-                sim.robot_mut(robot).set_qpos(&ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
+                sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
                 album.add(sim.sensor(camera)?, step)?;
             }
         }

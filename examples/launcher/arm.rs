@@ -1,5 +1,4 @@
 //! The robot of the tutorials: an arm and a hand from two URDF files.
-#![allow(dead_code, reason = "each example uses its part")]
 
 use super::{Result, user_or_asset};
 use clap::Args;

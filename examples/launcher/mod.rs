@@ -1,4 +1,5 @@
 //! What every example shares: flags, Ctrl+C, the progress bar, the report, pictures.
+#![allow(dead_code, reason = "each example uses its part")]
 
 pub(crate) mod arm;
 pub(crate) mod panel;

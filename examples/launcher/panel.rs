@@ -1,5 +1,4 @@
 //! Four channels of a camera side by side, with titles and a scale for the depth.
-#![allow(dead_code, reason = "each example uses its part")]
 
 use super::picture;
 use embedded_graphics::mono_font::MonoTextStyle;

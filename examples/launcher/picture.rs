@@ -1,5 +1,4 @@
 //! Channels of cameras as files.
-#![allow(dead_code, reason = "each example uses its part")]
 
 use super::Result;
 use image::{Rgb, RgbImage};

@@ -175,6 +175,11 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     Ok(Built { model, table, robots, objects, identities, start, xml: text.xml, diagnostics })
 }
 
+/// Threads for those who do not say how many.
+pub(crate) fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
+}
+
 fn missing(what: &'static str, name: &str) -> Error {
     Error::UnknownName { what, name: name.into(), candidates: Vec::new() }
 }
@@ -294,8 +299,7 @@ impl Built {
                 format!("{a:?} and {b:?} overlap in the initial pose and never collide with each other"),
             ));
         }
-        let threads =
-            cfg.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get));
+        let threads = cfg.threads.unwrap_or_else(all_cores);
         let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads)?;
         let mut simulation = Simulation {
             batch,

@@ -373,7 +373,7 @@ impl SimulationManager {
             bodies: self.contents.body_names(),
             joints: self.contents.joint_names(),
             scene,
-            threads: self.threads(),
+            threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
         }
     }
 

@@ -209,12 +209,12 @@ fn sample_models_agree_with_mujocos_rays() {
 /// A height field and a mesh from text: triangles of both, and the field's walls.
 #[test]
 fn height_fields_and_meshes_agree_with_mujocos_rays() {
-    let rows = 17;
+    let rows = 17i32;
     let elevation: Vec<f32> = (0..rows * rows)
         .map(|k| (((k % rows) as f32 * 0.7).sin() * ((k / rows) as f32 * 0.5).cos() + 1.0) / 2.0)
         .collect();
     // MuJoCo's binary format of height fields: rows, columns, then elevations.
-    let mut bytes: Vec<u8> = [rows as i32; 2].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let mut bytes: Vec<u8> = [rows; 2].iter().flat_map(|n| n.to_le_bytes()).collect();
     bytes.extend(elevation.iter().flat_map(|e| e.to_le_bytes()));
     let xml = "<mujoco><asset><hfield name='h' file='terrain.bin' size='1 1 .4 .1'/>
         <mesh name='m' vertex='0 0 0  .5 0 0  0 .5 0  0 0 .5  .3 .3 .4' face='0 2 1  0 1 3  0 3 2  1 2 4  2 3 4  3 1 4'/></asset>

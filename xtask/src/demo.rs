@@ -4,25 +4,28 @@ use crate::run::{Outcome, Repo};
 use crate::setup::{self, Wanted};
 
 /// What runs when nothing else is asked for; a flag of the user's replaces the one here.
-const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("4000"))];
+const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("2004"))];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct DemoArgs {
-    /// Flags of the example `create_robot`; they replace the demo's own
+    /// Flags of the example `create_sensor`; they replace the demo's own
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) args: Vec<String>,
 }
 
 pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
     let ready = setup::prepare(repo, Wanted::default())?;
+    let pictures = repo.target.join("demo").to_string_lossy().into_owned();
+    let mut defaults = DEFAULTS.to_vec();
+    defaults.push(("--out", Some(&pictures)));
     ready
         .cargo()
         // Paths among the arguments are relative to where the user is, not to the repository.
         .current_dir(".")
         .args(["run", "--release", "--manifest-path"])
         .arg(repo.root.join("Cargo.toml"))
-        .args(["--package", "kinetoscope", "--example", "create_robot", "--"])
-        .args(merged(DEFAULTS, &args.args))
+        .args(["--package", "kinetoscope", "--example", "create_sensor", "--"])
+        .args(merged(&defaults, &args.args))
         .inherit_stdin()
         .run()
 }
@@ -56,13 +59,13 @@ mod tests {
 
     #[test]
     fn defaults_stand_without_flags_of_the_user() {
-        assert_eq!(merged(DEFAULTS, &[]), words("--headless --num-envs 4 --steps 4000"));
+        assert_eq!(merged(DEFAULTS, &[]), words("--headless --num-envs 4 --steps 2004"));
     }
 
     #[test]
     fn a_flag_of_the_user_replaces_the_default_in_either_spelling() {
-        assert_eq!(merged(DEFAULTS, &words("--num_envs 9")), words("--headless --steps 4000 --num_envs 9"));
+        assert_eq!(merged(DEFAULTS, &words("--num_envs 9")), words("--headless --steps 2004 --num_envs 9"));
         assert_eq!(merged(DEFAULTS, &words("--steps=1")), words("--headless --num-envs 4 --steps=1"));
-        assert_eq!(merged(DEFAULTS, &words("--seed 3")), words("--headless --num-envs 4 --steps 4000 --seed 3"));
+        assert_eq!(merged(DEFAULTS, &words("--seed 3")), words("--headless --num-envs 4 --steps 2004 --seed 3"));
     }
 }

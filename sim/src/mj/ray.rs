@@ -30,7 +30,7 @@ impl Data {
         // SAFETY: model and data are alive and belong together; the arrays have the lengths that mj_ray reads (3, 3,
         // mjNGROUP); the normal may be null. It does not write to the data.
         let distance = guarded(|| unsafe {
-            mj::mj_ray(model, data, origin, direction, groups, 1, -1, &raw mut geom, std::ptr::null_mut())
+            mj::mj_ray(model, data, origin, direction, groups, true, -1, &raw mut geom, std::ptr::null_mut())
         })?;
         #[cfg(not(mj4))]
         // SAFETY: as above.

@@ -46,7 +46,7 @@ fn pictures_show_the_instant_of_capture_however_late_they_are_read() {
     assert_eq!(eager.draws(), 2);
     let mut due = Vec::new();
     for step in 1..=11 {
-        due.push(lazy.due_in());
+        due.push(lazy.due_in(&[step - 1, step - 1]));
         lazy.update(&state(&[step, step])).unwrap();
         eager.update(&state(&[step, step])).unwrap();
     }
