@@ -93,7 +93,8 @@ impl Plan {
     /// The parts of the shadow maps; all must be drawn before the picture.
     pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         self.shadows.iter_mut().take(self.maps).flat_map(|map| {
-            let rows = BAND / (map.side().max(1) * BLOCK);
+            // Small maps in quarters, so that the scratch memory is smaller than the map.
+            let rows = (BAND / (map.side().max(1) * BLOCK)).min(map.side() / BLOCK / 4);
             map.bands(rows.max(1))
         })
     }
