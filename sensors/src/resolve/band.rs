@@ -53,9 +53,9 @@ impl Brush {
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
-            self.colors.clear();
-            if frame.wants(Stage::Color) {
-                self.colors.resize(size[0] * size[1] * 4, [[0.0; LANES]; 3]);
+            let groups = size[0] * size[1] * (BLOCK / 2);
+            if frame.wants(Stage::Color) && self.colors.len() < groups {
+                self.colors.resize(groups, [[0.0; LANES]; 3]);
             }
             at_level!(level, s => self.band(s, plan, shot, projection, frame, top));
         }
@@ -100,10 +100,8 @@ impl Brush {
             } else {
                 resolve(s, &context, ids, [&u, &v], wants_geometry.then_some(&mut pixels), color);
             }
-            s.vectorize(
-                #[inline(always)]
-                || write(frame, Stage::Geometry, &pixels, [x, y], size, top),
-            );
+            // Without the instruction set: with it, normals become scattered writes, which are slower.
+            write(frame, Stage::Geometry, &pixels, [x, y], size, top);
         }
         if !wants_color {
             return;
@@ -138,9 +136,12 @@ impl Brush {
                 || {
                     let [r, g, b] = &colors[block * 4 + row];
                     let byte = |x: &[f32; LANES]| encode(s, load(s, x)).to_int();
-                    let rgba = byte(r) | byte(g) * (1 << 8) | byte(b) * (1 << 16) | splat_i(s, i32::MIN >> 7);
+                    let (r, g, b) = (byte(r), byte(g) * (1 << 8), byte(b) * (1 << 16));
+                    let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
                     let rgba: [i32; LANES] = rgba.array();
-                    pixels.color = rgba.map(i32::to_le_bytes);
+                    for (to, from) in pixels.color.iter_mut().zip(rgba) {
+                        *to = from.to_le_bytes();
+                    }
                     write(frame, Stage::Color, &pixels, at, size, top);
                 },
             );

@@ -103,9 +103,9 @@ impl Plan {
     pub(crate) fn rows(&self) -> usize {
         let Some(projection) = &self.projection else { return 1 };
         let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
-        // Small pictures in halves, so that the scratch memory is smaller than the picture.
-        let few = BAND / (self.planes * blocks[0] * BLOCK * BLOCK);
-        few.clamp(1, blocks[1].div_ceil(2))
+        // Small pictures with many samples in halves, so that the scratch memory is not much larger than the picture.
+        let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
+        (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
 
     /// What all pixels need.

@@ -126,13 +126,13 @@ pub(crate) fn shade<S: Simd>(
     let headlight = &scene.headlight;
     if headlight.active {
         let facing = max(-n.dot(view), zero);
-        for k in 0..3 {
-            diffuse[k] += facing * headlight.diffuse[k] + headlight.ambient[k];
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
         }
         if glossy(headlight.specular) {
             let shine = power(s, facing, exponent) * material.specular;
-            for k in 0..3 {
-                gloss[k] += shine * headlight.specular[k];
+            for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
+                *gloss += shine * specular;
             }
         }
     }
@@ -162,15 +162,15 @@ pub(crate) fn shade<S: Simd>(
                 lit = lit * map.light(s, at.position, at.normal, matters);
             }
         }
-        for k in 0..3 {
-            diffuse[k] += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
         }
         if glossy(light.specular) {
             let half = to.sub(view).unit(s);
             let shine = power(s, max(n.dot(half), zero), exponent) * material.specular;
             let shine = select(facing.simd_gt(zero), shine, zero);
-            for k in 0..3 {
-                gloss[k] += shine * lit * light.specular[k];
+            for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
+                *gloss += shine * lit * specular;
             }
         }
     }

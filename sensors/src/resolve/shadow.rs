@@ -177,23 +177,27 @@ impl ShadowMap {
         let (x, y, q): ([f32; LANES], [f32; LANES], [f32; LANES]) = (x.array(), y.array(), nearness.array());
         let mut lit = [1.0f32; LANES];
         for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
-            lit[lane] = self.taps(x[lane], y[lane], q[lane]);
+            let (column, row) = (columns[lane], rows[lane]);
+            lit[lane] =
+                self.taps([column as usize, row as usize], x[lane] - column as f32, y[lane] - row as f32, q[lane]);
         }
         load(s, &lit)
     }
 
     /// Sixteen texels around a point.
     #[inline(always)]
-    fn taps(&self, x: f32, y: f32, q: f32) -> f32 {
-        let (ix, iy) = (x as usize, y as usize);
-        let (fx, fy) = (x - ix as f32, y - iy as f32);
+    fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let (wx, wy) = ([1.0 - fx, 1.0, 1.0, fx], [1.0 - fy, 1.0, 1.0, fy]);
         let mut sum = 0.0;
-        for (row, wy) in wy.iter().enumerate() {
-            let first = (iy + row - 1) * self.side + ix - 1;
-            let Some(seen) = self.nearness[first..].first_chunk::<4>() else { continue };
-            let part = [0, 1, 2, 3].map(|k| if seen[k] > q { 0.0 } else { wx[k] });
-            sum += (part[0] + part[1] + part[2] + part[3]) * wy;
+        for (k, wy) in wy.iter().enumerate() {
+            let first = (row + k - 1) * self.side + column - 1;
+            let Some(&[a, b, c, d]) = self.nearness[first..].first_chunk::<4>() else { continue };
+            // Spelled out: `map` of an array stays a call.
+            let a = if a > q { 0.0 } else { wx[0] };
+            let b = if b > q { 0.0 } else { wx[1] };
+            let c = if c > q { 0.0 } else { wx[2] };
+            let d = if d > q { 0.0 } else { wx[3] };
+            sum += (a + b + c + d) * wy;
         }
         sum * (1.0 / 9.0)
     }
@@ -229,8 +233,11 @@ fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2
             for two in block.chunks_exact(LANES) {
                 (low, high) = (min(load(s, two), low), max(load(s, two), high));
             }
-            let fold = |x: [f32; LANES], f: fn(f32, f32) -> f32| x.into_iter().fold(x[0], f);
-            *range = [fold(low.array(), f32::min), fold(high.array(), f32::max)];
+            let (lows, highs): ([f32; LANES], [f32; LANES]) = (low.array(), high.array());
+            *range = [lows[0], highs[0]];
+            for (&l, &h) in lows.iter().zip(&highs) {
+                *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
+            }
             for (row, from) in block.chunks_exact(BLOCK).enumerate() {
                 lines[row * side + bx * BLOCK..][..BLOCK].copy_from_slice(from);
             }
