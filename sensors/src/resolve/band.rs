@@ -135,8 +135,10 @@ impl Brush {
                 #[inline(always)]
                 || {
                     let [r, g, b] = &colors[block * 4 + row];
-                    let byte = |x: &[f32; LANES]| encode(s, load(s, x)).to_int();
-                    let (r, g, b) = (byte(r), byte(g) * (1 << 8), byte(b) * (1 << 16));
+                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    let r = encode(s, load(s, r)).to_int();
+                    let g = encode(s, load(s, g)).to_int() * (1 << 8);
+                    let b = encode(s, load(s, b)).to_int() * (1 << 16);
                     let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
                     let rgba: [i32; LANES] = rgba.array();
                     for (to, from) in pixels.color.iter_mut().zip(rgba) {
@@ -163,7 +165,6 @@ fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usi
 
 /// Writes a group into a frame whose first row is `top` of the picture.
 #[inline(always)]
-#[expect(clippy::if_same_then_else, reason = "in the first, the compiler knows how many pixels there are")]
 fn write(
     frame: &mut FrameMut<'_>,
     stage: Stage,
@@ -172,10 +173,5 @@ fn write(
     [width, height]: [usize; 2],
     top: usize,
 ) {
-    let (at, size) = ([x, y - top], [width, height - top]);
-    if size[0] - at[0] >= BLOCK && size[1] - at[1] >= 2 {
-        frame.write(stage, pixels, at, size);
-    } else {
-        frame.write(stage, pixels, at, size);
-    }
+    frame.write(stage, pixels, [x, y - top], [width, height - top]);
 }

@@ -122,10 +122,10 @@ impl Plan {
     }
 }
 
-/// Texels along the side of a shadow map: about three for two pixels.
+/// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.
 fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     match cfg.shadow_size {
-        0 => (3 * view.width.max(view.height) / 2).next_power_of_two().clamp(128, 1024),
+        0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
         n => n.clamp(64, 8192).next_multiple_of(BLOCK),
     }
 }
