@@ -1,21 +1,35 @@
 //! Draws many frames on several threads.
 
-use super::channel::FrameMut;
+use super::channel::{Channel, Color, Depth, Distance, FrameMut, Mask, Normal, Position, ShadingNormal};
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
+use crate::resolve::plan::{Plan, estimate};
 use crate::visibility::RenderError;
-use std::sync::Mutex;
+use crate::visibility::raster::tile::BLOCK;
+use std::sync::{Mutex, PoisonError};
+
+/// Less work than this is drawn on the calling thread: starting another takes some 0.05 ms \[ns\].
+const WORTH_A_THREAD: usize = 1_000_000;
+/// Parts that each thread gets, about: the last ones decide how long the others wait.
+const PARTS: usize = 8;
+
+/// A shot and where its pictures go.
+type Job<'a> = (Shot<'a>, FrameMut<'a>);
 
 /// Draws batches of frames on several threads; keeps the scratch memory of each. The bits do not depend on the number of
 /// threads.
+///
+/// Where there are many shots, each is drawn by one thread. The last ones, that would leave threads without work, are
+/// drawn together: first what is drawn where, then their shadow maps in parts, then bands of the pictures.
 #[derive(Clone, Debug)]
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
+    plans: Vec<Plan>,
 }
 
 impl ParallelRasterizer {
     /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1.
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        Self { rasterizers: vec![Rasterizer::new(cfg); threads.max(1)] }
+        Self { rasterizers: vec![Rasterizer::new(cfg); threads.max(1)], plans: Vec::new() }
     }
 
     /// Number of threads, the calling one included.
@@ -32,7 +46,8 @@ impl ParallelRasterizer {
 
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
-        self.rasterizers.iter().map(Rasterizer::scratch_bytes).sum()
+        let own: usize = self.rasterizers.iter().map(Rasterizer::scratch_bytes).sum();
+        own + self.plans.iter().map(Plan::bytes).sum::<usize>()
     }
 
     /// Draws every shot into its frame.
@@ -40,36 +55,155 @@ impl ParallelRasterizer {
     /// # Errors
     ///
     /// Of the first shot that cannot be drawn, with its index; the others are drawn nevertheless.
-    pub fn render(&mut self, jobs: &mut [(Shot<'_>, FrameMut<'_>)]) -> Result<(), (usize, RenderError)> {
-        let threads = self.rasterizers.len().min(jobs.len());
-        let work = Mutex::new(jobs.iter_mut().enumerate());
-        let failure = Mutex::new(None);
-        let lock = |mutex: &Mutex<Option<(usize, RenderError)>>, index, error| {
-            let mut first = mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
+        let Self { rasterizers, plans } = self;
+        let Some(cfg) = rasterizers.first().map(|r| r.cfg) else { return Ok(()) };
+        let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
+        let threads = rasterizers.len().min(cost / (WORTH_A_THREAD / 2)).max(1);
+        let rasterizers = &mut rasterizers[..threads];
+        let failure = Failure::default();
+        let count = jobs.len();
+        let together = match threads {
+            1 => 0,
+            _ if count < 2 * threads => count,
+            // As many as one thread would draw while the others wait.
+            _ if count < 8 * threads => count % threads,
+            _ => 0,
+        };
+        let (alone, together) = jobs.split_at_mut(count - together);
+        let first = alone.len();
+        share(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
+            failure.note(index, rasterizer.render_shot(shot, frame));
+        });
+        if !together.is_empty() {
+            plans.resize_with(plans.len().max(together.len()), Plan::default);
+            draw_together(rasterizers, &mut plans[..together.len()], together, |index, result| {
+                failure.note(first + index, result);
+            });
+        }
+        failure.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+}
+
+/// The first shot that could not be drawn.
+#[derive(Debug, Default)]
+struct Failure(Mutex<Option<(usize, RenderError)>>);
+
+impl Failure {
+    fn note(&self, index: usize, result: Result<(), RenderError>) {
+        if let Err(error) = result {
+            let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             if first.as_ref().is_none_or(|(other, _)| index < *other) {
                 *first = Some((index, error));
             }
-        };
-        let draw = |rasterizer: &mut Rasterizer| {
-            loop {
-                let next = work.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
-                let Some((index, (shot, frame))) = next else { break };
-                if let Err(error) = rasterizer.render_shot(shot, frame) {
-                    lock(&failure, index, error);
-                }
-            }
-        };
-        let Some((mine, others)) = self.rasterizers.split_first_mut() else { return Ok(()) };
-        if threads <= 1 {
-            draw(mine);
-        } else {
-            std::thread::scope(|scope| {
-                for rasterizer in &mut others[..threads - 1] {
-                    scope.spawn(|| draw(rasterizer));
-                }
-                draw(mine);
-            });
         }
-        failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+}
+
+/// Does all the work, on as many threads as there are rasterizers, each taking the next thing when it is done with one.
+fn share<I>(rasterizers: &mut [Rasterizer], work: I, act: impl Fn(&mut Rasterizer, I::Item) + Sync)
+where
+    I: Iterator + Send,
+{
+    let Some((mine, others)) = rasterizers.split_first_mut() else { return };
+    // No more threads than things to do, where their number is known.
+    let count = match work.size_hint() {
+        (least, Some(most)) if least == most => most.saturating_sub(1).min(others.len()),
+        _ => others.len(),
+    };
+    let others = &mut others[..count];
+    if others.is_empty() {
+        return work.for_each(|item| act(mine, item));
+    }
+    let work = Mutex::new(work);
+    let run = |rasterizer: &mut Rasterizer| {
+        loop {
+            let next = work.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some(item) = next else { break };
+            act(rasterizer, item);
+        }
+    };
+    std::thread::scope(|scope| {
+        for rasterizer in others {
+            scope.spawn(|| run(rasterizer));
+        }
+        run(mine);
+    });
+}
+
+/// Draws a few shots, each by all threads.
+fn draw_together(
+    rasterizers: &mut [Rasterizer],
+    plans: &mut [Plan],
+    jobs: &mut [Job<'_>],
+    note: impl Fn(usize, Result<(), RenderError>) + Sync,
+) {
+    let parts = (PARTS * rasterizers.len()).div_ceil(jobs.len());
+    share(rasterizers, plans.iter_mut().zip(&*jobs).enumerate(), |rasterizer, (index, (plan, (shot, frame)))| {
+        note(index, plan.prepare(rasterizer.cfg, shot, frame));
+    });
+    if plans.iter().any(Plan::has_shadows) {
+        let maps = plans.iter_mut().zip(&*jobs);
+        let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
+        share(rasterizers, bands, |rasterizer, (scene, band)| rasterizer.brush.shadow(rasterizer.level, scene, band));
+    }
+    let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
+        let (shot, frame) = (job.0, &mut job.1);
+        let bands = bands(plan, &shot, frame, parts);
+        bands.map(move |band| (plan, shot, band))
+    });
+    share(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
+        rasterizer.brush.paint(rasterizer.level, plan, &shot, &mut frame, first..first + rows);
+    });
+}
+
+/// Bands of a frame, about `parts` of them: the first row of blocks, their number, and that part of the frame. None where
+/// the shot cannot be drawn.
+fn bands<'a>(
+    plan: &Plan,
+    shot: &Shot<'_>,
+    frame: &'a mut FrameMut<'_>,
+    parts: usize,
+) -> impl Iterator<Item = (usize, usize, FrameMut<'a>)> + use<'a> {
+    let (width, height) = (shot.view.width, shot.view.height);
+    let blocks = if plan.projection.is_some() { height.div_ceil(BLOCK) } else { 0 };
+    let rows = blocks.div_ceil(parts).clamp(1, plan.rows());
+    let mut rest = whole(frame);
+    (0..blocks).step_by(rows).map(move |first| {
+        let rows = rows.min(blocks - first);
+        let pixels = width * (rows * BLOCK).min(height - first * BLOCK);
+        (first, rows, cut_off(&mut rest, pixels))
+    })
+}
+
+/// All of a frame, borrowed.
+fn whole<'a>(frame: &'a mut FrameMut<'_>) -> FrameMut<'a> {
+    FrameMut {
+        color: frame.color.as_deref_mut(),
+        depth: frame.depth.as_deref_mut(),
+        distance: frame.distance.as_deref_mut(),
+        mask: frame.mask.as_deref_mut(),
+        normal: frame.normal.as_deref_mut(),
+        shading_normal: frame.shading_normal.as_deref_mut(),
+        position: frame.position.as_deref_mut(),
+    }
+}
+
+/// Takes the first pixels of all channels, or as many as there are.
+fn cut_off<'a>(frame: &mut FrameMut<'a>, pixels: usize) -> FrameMut<'a> {
+    fn cut<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
+        let all = buffer.take()?;
+        let (cut, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));
+        *buffer = Some(rest);
+        Some(cut)
+    }
+    FrameMut {
+        color: cut::<Color>(&mut frame.color, pixels),
+        depth: cut::<Depth>(&mut frame.depth, pixels),
+        distance: cut::<Distance>(&mut frame.distance, pixels),
+        mask: cut::<Mask>(&mut frame.mask, pixels),
+        normal: cut::<Normal>(&mut frame.normal, pixels),
+        shading_normal: cut::<ShadingNormal>(&mut frame.shading_normal, pixels),
+        position: cut::<Position>(&mut frame.position, pixels),
     }
 }

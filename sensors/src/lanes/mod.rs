@@ -82,7 +82,7 @@ pub(crate) const LANES: usize = 16;
 
 /// The first sixteen of a slice.
 #[inline(always)]
-fn first<T>(x: &[T]) -> &[T; LANES] {
+pub(crate) fn first<T>(x: &[T]) -> &[T; LANES] {
     match x.first_chunk() {
         Some(x) => x,
         None => panic!("fewer than sixteen"),

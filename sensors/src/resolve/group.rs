@@ -4,7 +4,7 @@ use super::shade::{Lighting, shade, sky};
 use super::shadow::ShadowMap;
 use super::surface::{Source, surface};
 use crate::camera::channel::PixelGroup;
-use crate::lanes::{F, LANES, M, Simd, U, V3, load, load_u, select, splat, splat_u, store};
+use crate::lanes::{F, LANES, M, Simd, U, V3, load, load_u, select, select_i, splat, splat_i, splat_u, store};
 use crate::visibility::Projection;
 use crate::visibility::raster::Placed;
 use crate::visibility::raster::tile::NOTHING;
@@ -80,7 +80,7 @@ fn resolve_lanes<S: Simd>(
     let projection = context.projection;
     let direction = projection.world_directions(s, u, v);
     let length = direction.dot(direction).sqrt();
-    let view = direction.scale(1.0 / length);
+    let view = if colors.is_some() { direction.scale(1.0 / length) } else { direction };
     let zero = splat(s, 0.0);
     let nothing = splat_u(s, NOTHING);
     let missed = ids.simd_eq(nothing);
@@ -88,7 +88,7 @@ fn resolve_lanes<S: Simd>(
     let none = V3::splat(s, [0.0; 3]);
     let (mut normal, mut shading, mut position) = (none, none, none);
     let mut color = none;
-    let mut mask = [0i32; LANES];
+    let mut mask = splat_i(s, 0);
     if colors.is_some() && missed.any_true() {
         color = sky(s, context.lighting, view);
     }
@@ -103,16 +103,13 @@ fn resolve_lanes<S: Simd>(
         let here: M<S> = ids.simd_ge(splat_u(s, source.first_id)) & ids.simd_lt(splat_u(s, end));
         let bits = here.to_bitmask();
         left &= !bits;
-        let at = surface(s, projection, &source, ids, here, u, v);
+        let at = surface(s, projection, &source, ids, here, [u, v], direction);
         if pixels.is_some() {
             depth = select(here, at.depth, depth);
             normal = V3::select(here, at.normal, normal);
             shading = V3::select(here, at.shading, shading);
             position = V3::select(here, at.position, position);
-            let id = source.instance.mask_id;
-            for (lane, mask) in mask.iter_mut().enumerate() {
-                *mask = if bits >> lane & 1 == 1 { id } else { *mask };
-            }
+            mask = select_i(here, splat_i(s, source.instance.mask_id), mask);
         }
         if colors.is_some() {
             let Context { scene, lighting, shadows, pixel, .. } = *context;
@@ -124,7 +121,7 @@ fn resolve_lanes<S: Simd>(
     if let Some(pixels) = &mut pixels {
         store(depth, &mut pixels.depth);
         store(depth * length, &mut pixels.distance);
-        pixels.mask = mask;
+        pixels.mask = mask.array();
         for (to, v) in [(&mut pixels.normal, normal), (&mut pixels.shading_normal, shading)] {
             store(v.x, &mut to[0]);
             store(v.y, &mut to[1]);

@@ -2,8 +2,10 @@
 //!
 //! Colour is computed in linear light; `tone` says how it reaches the screen.
 
+pub(crate) mod band;
 pub(crate) mod group;
 pub(crate) mod multisample;
+pub(crate) mod plan;
 pub(crate) mod shade;
 pub(crate) mod shadow;
 pub(crate) mod surface;

@@ -122,13 +122,18 @@ pub(crate) fn shade<S: Simd>(
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     let mut gloss = [zero, zero, zero];
     let exponent = ((material.shininess * 128.0 + 0.5) as u32).clamp(1, 128);
+    let glossy = |specular: [f32; 3]| material.specular != 0.0 && specular.iter().any(|&x| x != 0.0);
     let headlight = &scene.headlight;
     if headlight.active {
         let facing = max(-n.dot(view), zero);
-        let shine = power(s, facing, exponent) * material.specular;
-        for k in 0..3 {
-            diffuse[k] += facing * headlight.diffuse[k] + headlight.ambient[k];
-            gloss[k] += shine * headlight.specular[k];
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
+        }
+        if glossy(headlight.specular) {
+            let shine = power(s, facing, exponent) * material.specular;
+            for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
+                *gloss += shine * specular;
+            }
         }
     }
     for lamp in &lighting.lamps {
@@ -157,12 +162,16 @@ pub(crate) fn shade<S: Simd>(
                 lit = lit * map.light(s, at.position, at.normal, matters);
             }
         }
-        let half = to.sub(view).unit(s);
-        let shine = power(s, max(n.dot(half), zero), exponent) * material.specular;
-        let shine = select(facing.simd_gt(zero), shine, zero);
-        for k in 0..3 {
-            diffuse[k] += facing * lit * light.diffuse[k] + strength * light.ambient[k];
-            gloss[k] += shine * lit * light.specular[k];
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+        }
+        if glossy(light.specular) {
+            let half = to.sub(view).unit(s);
+            let shine = power(s, max(n.dot(half), zero), exponent) * material.specular;
+            let shine = select(facing.simd_gt(zero), shine, zero);
+            for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
+                *gloss += shine * lit * specular;
+            }
         }
     }
     let mut color =

@@ -1,19 +1,37 @@
 //! Shadow maps: what a lamp sees.
 
 use crate::lanes::{F, Level};
-use crate::lanes::{LANES, M, Simd, V3, at_level, load, select, splat};
+use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{AREA, BLOCK, Tile};
 use crate::visibility::raster::{DrawList, Layer, Painter};
-use scene::{Light, LightKind, PoseF32, RenderScene};
+use scene::{Instance, Light, LightKind, PoseF32, RenderScene};
 
 /// Depths from a lamp.
 #[derive(Clone, Debug)]
 pub(crate) struct ShadowMap {
     projection: Projection,
-    tile: Tile,
+    /// What the lamp sees.
+    list: DrawList,
+    /// Texels along a side.
+    side: usize,
     /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
     texel: f32,
+    /// Nearness of what the lamp sees at each texel, row by row: the taps of a point are together in four rows.
+    nearness: Vec<f32>,
+    /// The smallest and the largest nearness in each block of texels: most points are lit, or not, by all of their texels.
+    range: Vec<[f32; 2]>,
+}
+
+/// Rows of a map that are drawn together, and what is needed for that.
+#[derive(Debug)]
+pub(crate) struct ShadowBand<'a> {
+    projection: &'a Projection,
+    list: &'a DrawList,
+    /// Which row of blocks is the first.
+    first: usize,
+    nearness: &'a mut [f32],
+    range: &'a mut [[f32; 2]],
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -46,35 +64,30 @@ impl ShadowMap {
             far: 1.0,
             world_from_camera: PoseF32::IDENTITY,
         };
-        Self { projection, tile: Tile::default(), texel: 1.0 }
+        Self { projection, list: DrawList::default(), side: 0, texel: 1.0, nearness: Vec::new(), range: Vec::new() }
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.tile.bytes()
+        self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
     }
 
-    /// Draws what the lamp sees, on `side` by `side` texels. `false` where it casts no shadow.
-    #[expect(clippy::too_many_arguments, reason = "scratch memory comes from outside")]
-    pub(crate) fn draw(
+    /// Finds what the lamp sees, on `side` by `side` texels, without drawing it. `false` where it casts no shadow.
+    pub(crate) fn prepare(
         &mut self,
-        level: Level,
         light: &Light,
         scene: &RenderScene,
         poses: &[PoseF32],
         groups: u32,
         side: usize,
-        list: &mut DrawList,
-        painter: &mut Painter,
     ) -> bool {
-        let casts = |k: usize| {
-            let instance = &scene.instances()[k];
+        let solid = |instance: &Instance| {
             let solid = matches!(Layer::of(instance, groups), Layer::Opaque | Layer::Veil);
             solid && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
         let along = super::shade::unit(light.direction);
         let rotation = frame_along(along);
         let Some(projection) = (match light.kind {
-            LightKind::Directional => fit(scene, poses, rotation, side, casts),
+            LightKind::Directional => fit(scene, poses, rotation, side, solid),
             LightKind::Spot { cutoff_deg, .. } => spot(light, rotation, cutoff_deg, side),
             LightKind::Point => None,
         }) else {
@@ -82,21 +95,31 @@ impl ShadowMap {
         };
         self.texel = 1.0 / projection.fx;
         self.projection = projection;
-        list.build(&projection, scene, poses, |instance| {
-            let finite = instance.shape.aabb()[1].iter().all(|x| x.is_finite());
-            match Layer::of(instance, groups) {
-                Layer::Opaque | Layer::Veil if finite => Layer::Opaque,
-                _ => Layer::Hidden,
-            }
-        });
-        self.tile.clear([0, 0], [side / BLOCK; 2], 1, projection.farthest());
-        let tile = &mut self.tile;
-        at_level!(level, s => {
-            for item in &list.opaque {
-                painter.draw(s, tile, &projection, scene, &list.placed, item);
-            }
-        });
+        self.side = side;
+        self.list.build(&projection, scene, poses, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        // All of it is written when it is drawn.
+        self.nearness.resize(side * side, 0.0);
+        self.range.resize((side / BLOCK) * (side / BLOCK), [0.0; 2]);
         true
+    }
+
+    /// Texels along a side.
+    pub(crate) fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The map in parts that can be drawn one by one, each of `rows` rows of blocks.
+    pub(crate) fn bands(&mut self, rows: usize) -> impl Iterator<Item = ShadowBand<'_>> {
+        let Self { projection, list, side, nearness, range, .. } = self;
+        let (projection, list) = (&*projection, &*list);
+        let parts = nearness.chunks_mut(rows * BLOCK * *side).zip(range.chunks_mut(rows * (*side / BLOCK)));
+        parts.enumerate().map(move |(k, (nearness, range))| ShadowBand {
+            projection,
+            list,
+            first: k * rows,
+            nearness,
+            range,
+        })
     }
 
     /// How much of the lamp's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
@@ -113,43 +136,112 @@ impl ShadowMap {
         let (x, y) = if p.parallel { (c.x * p.fx, c.y * p.fy) } else { (c.x * p.fx / c.z, c.y * p.fy / c.z) };
         let (x, y) = (x + (p.cx - 0.5), y + (p.cy - 0.5));
         let nearness = p.nearness_lanes(c.z - width * 0.3);
-        let side = (self.tile.blocks_x * BLOCK) as f32;
+        let side = self.side as f32;
         let inside = x.simd_gt(splat(s, 2.0))
             & y.simd_gt(splat(s, 2.0))
             & x.simd_lt(splat(s, side - 3.0))
             & y.simd_lt(splat(s, side - 3.0))
             & c.z.simd_gt(splat(s, p.near));
-        let wanted = (inside & lanes).to_bitmask();
-        if wanted == 0 {
+        let wanted = inside & lanes;
+        let bits = wanted.to_bitmask();
+        if bits == 0 {
             return splat(s, 1.0);
+        }
+        // Lanes that are not wanted look where one that is does.
+        let some = bits.trailing_zeros() as usize % LANES;
+        let x = select(wanted, x, splat(s, x.array()[some]));
+        let y = select(wanted, y, splat(s, y.array()[some]));
+        let (columns, rows): ([i32; LANES], [i32; LANES]) = (x.to_int().array(), y.to_int().array());
+        let (mut lo, mut hi) = ([i32::MAX; 2], [0i32; 2]);
+        for (&x, &y) in columns.iter().zip(&rows) {
+            (lo, hi) = ([lo[0].min(x), lo[1].min(y)], [hi[0].max(x), hi[1].max(y)]);
+        }
+        let [x0, y0] = lo.map(|i| (i as usize - 1) / BLOCK);
+        let [x1, y1] = hi.map(|i| (i as usize + 2) / BLOCK);
+        // Pixels far apart on the map would look at too many blocks.
+        if (x1 + 1 - x0) * (y1 + 1 - y0) <= 12 {
+            let (mut low, mut high) = (f32::MAX, f32::MIN);
+            for row in y0..=y1 {
+                let first = row * (self.side / BLOCK);
+                for &[l, h] in &self.range[first + x0..=first + x1] {
+                    (low, high) = (if l < low { l } else { low }, if h > high { h } else { high });
+                }
+            }
+            if !(wanted & nearness.simd_lt(splat(s, high))).any_true() {
+                return splat(s, 1.0);
+            }
+            if !(wanted & nearness.simd_ge(splat(s, low))).any_true() {
+                return select(wanted, splat(s, 0.0), splat(s, 1.0));
+            }
         }
         let (x, y, q): ([f32; LANES], [f32; LANES], [f32; LANES]) = (x.array(), y.array(), nearness.array());
         let mut lit = [1.0f32; LANES];
-        for lane in (0..LANES).filter(|lane| wanted >> lane & 1 == 1) {
-            lit[lane] = self.taps(x[lane], y[lane], q[lane]);
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let (column, row) = (columns[lane], rows[lane]);
+            lit[lane] =
+                self.taps([column as usize, row as usize], x[lane] - column as f32, y[lane] - row as f32, q[lane]);
         }
-        select(lanes, load(s, &lit), splat(s, 1.0))
+        load(s, &lit)
     }
 
     /// Sixteen texels around a point.
     #[inline(always)]
-    fn taps(&self, x: f32, y: f32, q: f32) -> f32 {
-        let (ix, iy) = (x as usize, y as usize);
-        let (fx, fy) = (x - ix as f32, y - iy as f32);
+    fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let (wx, wy) = ([1.0 - fx, 1.0, 1.0, fx], [1.0 - fy, 1.0, 1.0, fy]);
         let mut sum = 0.0;
-        for (row, wy) in wy.iter().enumerate() {
-            let ty = iy + row - 1;
-            let line = (ty / BLOCK) * self.tile.blocks_x * AREA + (ty % BLOCK) * BLOCK;
-            let mut part = 0.0;
-            for (column, wx) in wx.iter().enumerate() {
-                let tx = ix + column - 1;
-                let seen = self.tile.nearness[line + (tx / BLOCK) * AREA + tx % BLOCK];
-                part += if seen > q { 0.0 } else { *wx };
-            }
-            sum += part * wy;
+        for (k, wy) in wy.iter().enumerate() {
+            let first = (row + k - 1) * self.side + column - 1;
+            let Some(&[a, b, c, d]) = self.nearness[first..].first_chunk::<4>() else { continue };
+            // Spelled out: `map` of an array stays a call.
+            let a = if a > q { 0.0 } else { wx[0] };
+            let b = if b > q { 0.0 } else { wx[1] };
+            let c = if c > q { 0.0 } else { wx[2] };
+            let d = if d > q { 0.0 } else { wx[3] };
+            sum += (a + b + c + d) * wy;
         }
         sum * (1.0 / 9.0)
+    }
+}
+
+impl ShadowBand<'_> {
+    /// Draws the band, by way of a tile that stays in the cache.
+    pub(crate) fn draw(self, level: Level, scene: &RenderScene, tile: &mut Tile, painter: &mut Painter) {
+        let Self { projection, list, first, nearness, range } = self;
+        let wide = projection.width / BLOCK;
+        let rows = range.len() / wide;
+        tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
+        at_level!(level, s => {
+            for item in &list.opaque {
+                painter.draw(s, tile, projection, scene, &list.placed, item);
+            }
+            s.vectorize(
+                #[inline(always)]
+                || unfold(s, tile, nearness, range),
+            );
+        });
+    }
+}
+
+/// Blocks into rows.
+#[inline(always)]
+fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
+    let side = tile.blocks_x * BLOCK;
+    let lines = nearness.chunks_exact_mut(BLOCK * side).zip(range.chunks_exact_mut(tile.blocks_x));
+    for ((lines, range), blocks) in lines.zip(tile.nearness.chunks_exact(AREA * tile.blocks_x)) {
+        for (bx, (block, range)) in blocks.chunks_exact(AREA).zip(range).enumerate() {
+            let (mut low, mut high) = (load(s, block), load(s, block));
+            for two in block.chunks_exact(LANES) {
+                (low, high) = (min(load(s, two), low), max(load(s, two), high));
+            }
+            let (lows, highs): ([f32; LANES], [f32; LANES]) = (low.array(), high.array());
+            *range = [lows[0], highs[0]];
+            for (&l, &h) in lows.iter().zip(&highs) {
+                *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
+            }
+            for (row, from) in block.chunks_exact(BLOCK).enumerate() {
+                lines[row * side + bx * BLOCK..][..BLOCK].copy_from_slice(from);
+            }
+        }
     }
 }
 
@@ -159,10 +251,10 @@ fn fit(
     poses: &[PoseF32],
     rotation: [[f32; 3]; 3],
     side: usize,
-    casts: impl Fn(usize) -> bool,
+    casts: impl Fn(&Instance) -> bool,
 ) -> Option<Projection> {
     let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
-    for (_, (instance, pose)) in scene.instances().iter().zip(poses).enumerate().filter(|(k, _)| casts(*k)) {
+    for (instance, pose) in scene.instances().iter().zip(poses).filter(|(instance, _)| casts(instance)) {
         let [a, b] = instance.shape.aabb();
         let middle = pose.apply([0, 1, 2].map(|k| 0.5 * (a[k] + b[k])));
         for k in 0..3 {

@@ -35,7 +35,7 @@ pub(crate) struct Source<'a> {
 }
 
 /// The surface at the points (u, v) of the picture where `lanes` says that this instance is seen, with the ids that the
-/// visibility buffer has.
+/// visibility buffer has; `direction` is that of the rays in the world frame.
 #[inline(always)]
 pub(crate) fn surface<S: Simd>(
     s: S,
@@ -43,8 +43,8 @@ pub(crate) fn surface<S: Simd>(
     source: &Source<'_>,
     ids: U<S>,
     lanes: M<S>,
-    u: F<S>,
-    v: F<S>,
+    [u, v]: [F<S>; 2],
+    direction: V3<S>,
 ) -> Surface<S> {
     let (o, d) = projection.rays(s, &source.placed.local, u, v);
     let zero = splat(s, 0.0);
@@ -70,11 +70,7 @@ pub(crate) fn surface<S: Simd>(
     let world = source.world_from_instance;
     let local = o.add(d.scale(depth));
     // From the camera outward, as the depth says: agrees with the depth to the last digits.
-    let along = if projection.parallel { None } else { Some(projection.world_directions(s, u, v)) };
-    let position = match along {
-        Some(along) => along.scale(depth).add(V3::splat(s, projection.world_from_camera.translation)),
-        None => local.rotate(&world.rotation).add(V3::splat(s, world.translation)),
-    };
+    let position = direction.scale(depth).add(V3::splat(s, projection.world_from_camera.translation));
     Surface {
         depth,
         normal: normal.scale(flip).rotate(&world.rotation),

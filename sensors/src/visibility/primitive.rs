@@ -52,8 +52,11 @@ fn ball<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     let middle = -(o.dot(d) / dd);
     let p = o.add(d.scale(middle));
     let rest = splat(s, radius * radius) - p.dot(p);
-    let half = (max(rest, splat(s, 0.0)) / dd).sqrt();
     let hit = rest.simd_ge(splat(s, 0.0));
+    if !hit.any_true() {
+        return Interval { enter: splat(s, EMPTY), leave: splat(s, -EMPTY) };
+    }
+    let half = (max(rest, splat(s, 0.0)) / dd).sqrt();
     Interval { enter: select(hit, middle - half, splat(s, EMPTY)), leave: select(hit, middle + half, splat(s, -EMPTY)) }
 }
 
@@ -66,8 +69,11 @@ fn tube<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     let middle = select(along, splat(s, 0.0), -((o.x * d.x + o.y * d.y) / dd));
     let (x, y) = (o.x + d.x * middle, o.y + d.y * middle);
     let rest = splat(s, radius * radius) - (x * x + y * y);
-    let half = select(along, splat(s, EMPTY), (max(rest, splat(s, 0.0)) / dd).sqrt());
     let hit = rest.simd_ge(splat(s, 0.0));
+    if !hit.any_true() {
+        return Interval { enter: splat(s, EMPTY), leave: splat(s, -EMPTY) };
+    }
+    let half = select(along, splat(s, EMPTY), (max(rest, splat(s, 0.0)) / dd).sqrt());
     Interval { enter: select(hit, middle - half, splat(s, EMPTY)), leave: select(hit, middle + half, splat(s, -EMPTY)) }
 }
 
@@ -118,7 +124,13 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
         }
         Shape::Capsule(capsule) => {
             let (r, h) = (capsule.radius, capsule.half_length);
-            let (side, caps) = (tube(s, o, d, r), slab(s, o.z, d.z, h));
+            let side = tube(s, o, d, r);
+            // The balls at the ends are inside of the tube.
+            let near_axis = side.enter.simd_le(side.leave);
+            if !near_axis.any_true() {
+                return none();
+            }
+            let caps = slab(s, o.z, d.z, h);
             let mut all = Interval { enter: max(side.enter, caps.enter), leave: min(side.leave, caps.leave) };
             let empty = all.enter.simd_gt(all.leave);
             all.enter = select(empty, splat(s, EMPTY), all.enter);
@@ -130,10 +142,14 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             let (hit, t, _) = first(s, all, near);
             let p = o.add(d.scale(t));
             let z = p.z - max(min(p.z, splat(s, h)), splat(s, -h));
-            PrimitiveHit { hit, t, normal: V3 { x: p.x, y: p.y, z }, face: splat_u(s, 0) }
+            PrimitiveHit { hit: hit & near_axis, t, normal: V3 { x: p.x, y: p.y, z }, face: splat_u(s, 0) }
         }
         Shape::Cylinder(cylinder) => {
-            let (side, caps) = (tube(s, o, d, cylinder.radius), slab(s, o.z, d.z, cylinder.half_length));
+            let side = tube(s, o, d, cylinder.radius);
+            if !side.enter.simd_le(side.leave).any_true() {
+                return none();
+            }
+            let caps = slab(s, o.z, d.z, cylinder.half_length);
             let all = Interval { enter: max(side.enter, caps.enter), leave: min(side.leave, caps.leave) };
             let (hit, t, outside) = first(s, all, near);
             let p = o.add(d.scale(t));

@@ -74,10 +74,10 @@ impl Projection {
         }
     }
 
-    /// Directions of the rays in the world frame.
+    /// Directions of the rays in the world frame, such that the parameter is the depth. Not for parallel rays.
     #[inline(always)]
     pub(crate) fn world_directions<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
-        let c = V3 { x: (u - self.cx) / splat(s, self.fx), y: (v - self.cy) / splat(s, self.fy), z: splat(s, 1.0) };
+        let c = V3 { x: (u - self.cx) * (1.0 / self.fx), y: (v - self.cy) * (1.0 / self.fy), z: splat(s, 1.0) };
         c.rotate(&self.world_from_camera.rotation)
     }
 }

@@ -1,6 +1,6 @@
 //! The same picture, bit for bit, with every instruction set and on every thread.
 
-use super::super::{Channels, Frame, RasterCfg, Rasterizer};
+use super::super::{Channels, Frame, FrameMut, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
 use super::scenes::{Random, figure, random};
 use crate::lanes::levels;
 use crate::visibility::View;
@@ -92,4 +92,70 @@ fn bands_and_channels_do_not_change_a_picture() {
     assert!(all.mask == one.mask && all.normal == one.normal);
     assert!(all.color != one.color);
     assert!(draw(Channels { color: true, ..Channels::default() }, 4).color == all.color);
+}
+
+/// A scene with everything, and things that are not quite opaque; larger than what is worth a thread.
+fn large(seed: u64, size: [usize; 2]) -> (RenderScene, Vec<PoseF32>, View) {
+    let (scene, poses, view) = rich(seed);
+    let mut instances = scene.instances().to_vec();
+    (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
+    let mut veiled = RenderScene::new(instances).unwrap();
+    (veiled.lights, veiled.haze) = (scene.lights.clone(), scene.haze);
+    let view = View { width: size[0], height: size[1], fx: view.fx * 3.0, fy: view.fy * 3.0, ..view };
+    (veiled, poses, View { cx: 0.5 * size[0] as f32, cy: 0.5 * size[1] as f32, ..view })
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_pictures() {
+    let sizes = [[333, 251], [64, 64], [97, 401], [8, 8], [401, 97], [203, 300], [1, 1], [120, 90], [130, 17]];
+    let shots: Vec<_> = sizes.into_iter().zip(1..).map(|(size, seed)| large(seed, size)).collect();
+    for samples in [1, 4] {
+        let cfg = RasterCfg { samples, ..RasterCfg::default() };
+        let mut alone = Rasterizer::new(cfg);
+        let expected: Vec<Vec<u32>> = shots
+            .iter()
+            .map(|(scene, poses, view)| {
+                let mut frame = Frame::new(view.width, view.height, Channels::ALL);
+                alone.render(scene, poses, view, &mut frame).unwrap();
+                bits(&frame)
+            })
+            .collect();
+        for threads in [1, 2, 3, 8] {
+            let mut parallel = ParallelRasterizer::new(cfg, threads);
+            for count in [1, 2, 3, 5, 9] {
+                let mut frames: Vec<_> =
+                    shots[..count].iter().map(|(_, _, v)| Frame::new(v.width, v.height, Channels::ALL)).collect();
+                let mut jobs: Vec<_> = shots[..count]
+                    .iter()
+                    .zip(&mut frames)
+                    .map(|((scene, poses, view), frame)| (Shot { scene, poses, view, lights: None }, frame.as_mut()))
+                    .collect();
+                parallel.render(&mut jobs).unwrap();
+                for (k, frame) in frames.iter().enumerate() {
+                    assert!(bits(frame) == expected[k], "{threads} threads, shot {k} of {count}, {samples} samples");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn shots_that_cannot_be_drawn_do_not_stop_the_others() {
+    let (scene, poses, view) = large(1, [333, 251]);
+    for (threads, count) in [(1, 3), (2, 3), (4, 3), (2, 5), (2, 9)] {
+        let mut frames = vec![Frame::new(333, 251, Channels { mask: true, ..Channels::default() }); count];
+        let mut jobs: Vec<(Shot<'_>, FrameMut<'_>)> = frames
+            .iter_mut()
+            .map(|frame| (Shot { scene: &scene, poses: &poses, view: &view, lights: None }, frame.as_mut()))
+            .collect();
+        for k in [1, count - 1] {
+            jobs[k].0.poses = &[];
+        }
+        let (index, _) = ParallelRasterizer::new(RasterCfg::default(), threads).render(&mut jobs).unwrap_err();
+        assert_eq!(index, 1);
+        for (k, frame) in frames.iter().enumerate() {
+            let drawn = frame.mask.iter().flatten().any(|&m| m != 0);
+            assert_eq!(drawn, k != 1 && k != count - 1, "shot {k} of {count}, {threads} threads");
+        }
+    }
 }

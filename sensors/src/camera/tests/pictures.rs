@@ -1,6 +1,6 @@
 //! Pictures as files, for people.
 
-use super::super::{Channels, Frame, RasterCfg, Rasterizer};
+use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
 use super::scenes::figure;
 use crate::visibility::View;
 use scene::{PoseF32, RenderScene};
@@ -85,6 +85,34 @@ pub(super) fn report(name: &str, scene: &RenderScene, poses: &[PoseF32], view: &
     }
 }
 
+/// Milliseconds that pass per picture with a number of threads, for one picture at a time and for many: the best of many.
+fn passed(threads: usize, scene: &RenderScene, poses: &[PoseF32], view: &View) -> [f64; 2] {
+    [1, 16].map(|count| {
+        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), threads);
+        let mut frames = vec![Frame::new(view.width, view.height, FOUR); count];
+        let mut best = f64::MAX;
+        for _ in 0..40 / count.min(4) {
+            let shot = Shot { scene, poses, view, lights: None };
+            let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
+            let start = Instant::now();
+            rasterizer.render(&mut jobs).unwrap();
+            best = best.min(start.elapsed().as_secs_f64() * 1e3 / count as f64);
+        }
+        best
+    })
+}
+
+pub(super) fn report_threads(name: &str, scene: &RenderScene, poses: &[PoseF32], view: &View) {
+    if folder().is_none() {
+        return;
+    }
+    let all = [1, 2].map(|threads| passed(threads, scene, poses, view));
+    for (k, what) in ["one picture", "16 pictures"].into_iter().enumerate() {
+        let (one, two) = (all[0][k], all[1][k]);
+        println!("{name}, {what}: {one:.2} ms each, with two threads {two:.2} ms, {:.2} times as fast", one / two);
+    }
+}
+
 #[test]
 fn a_figure_stands_on_the_ground() {
     let (scene, poses) = figure();
@@ -94,6 +122,7 @@ fn a_figure_stands_on_the_ground() {
     assert!((1..scene.instances().len() as i32).all(|id| mask.contains(&id)), "everything is seen");
     assert!(mask.contains(&100) && mask.contains(&0), "ground and sky");
     report("figure", &scene, &poses, &view);
+    report_threads("figure", &scene, &poses, &view);
     for side in [64, 128, 256] {
         let view = View::look_at([side; 2], 0.8, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
         report("figure", &scene, &poses, &view);

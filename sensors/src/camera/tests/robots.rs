@@ -1,6 +1,6 @@
 //! The vendors' robots, where they are present.
 
-use super::pictures::{report, save};
+use super::pictures::{report, report_threads, save};
 use super::scenes::checker_plane;
 use crate::visibility::View;
 use scene::mesh::load;
@@ -58,6 +58,7 @@ fn sr5_is_drawn_from_its_own_meshes() {
     let mask = frame.mask.unwrap();
     assert!((1..=7).all(|id| mask.contains(&id)), "every link is seen");
     report("SR5", &scene, &poses, &view);
+    report_threads("SR5", &scene, &poses, &view);
 }
 
 /// The meshes of ANYmal's base, each with its JPEG texture.

@@ -17,6 +17,7 @@ pub(crate) struct Vertices {
     camera: [[f32; MAX_VERTICES]; 3],
     screen: [[f32; MAX_VERTICES]; 2],
     snapped: [[i32; MAX_VERTICES]; 2],
+    nearness: [f32; MAX_VERTICES],
     /// 1 where the vertex must be clipped.
     clip: [f32; MAX_VERTICES],
 }
@@ -27,6 +28,7 @@ impl Default for Vertices {
             camera: [[0.0; MAX_VERTICES]; 3],
             screen: [[0.0; MAX_VERTICES]; 2],
             snapped: [[0; MAX_VERTICES]; 2],
+            nearness: [0.0; MAX_VERTICES],
             clip: [0.0; MAX_VERTICES],
         }
     }
@@ -52,14 +54,14 @@ pub(crate) fn draw<S: Simd>(
     cluster: &Cluster,
     pass: &Pass<'_>,
 ) {
-    transform(s, v, mesh, cluster, pass);
+    let all_good = transform(s, v, mesh, cluster, pass);
     let nearest = pass.projection.nearest();
     let first = cluster.first as usize;
     for k in first..first + cluster.count as usize {
         let [a, b, c] = mesh.corners()[k];
         let corners = [usize::from(a), usize::from(b), usize::from(c)];
         let id = pass.first_id + k as u32;
-        if corners.iter().any(|&i| v.clip[i] != 0.0) {
+        if !all_good && corners.iter().any(|&i| v.clip[i] != 0.0) {
             clipped(s, tile, v, corners, pass, id);
             continue;
         }
@@ -75,32 +77,37 @@ pub(crate) fn draw<S: Simd>(
         if area < 0 {
             p.swap(1, 2);
         }
-        let seen = |i: usize| [v.camera[0][i], v.camera[1][i], v.camera[2][i]];
-        let camera = [seen(corners[0]), seen(corners[1]), seen(corners[2])];
-        let at = [v.screen[0][corners[0]], v.screen[1][corners[0]]];
-        let g = gradient(pass.projection, camera, at, &camera);
-        triangle::draw(s, tile, p, &g, nearest, id);
+        let plane = || {
+            let seen = |i: usize| [v.camera[0][i], v.camera[1][i], v.camera[2][i]];
+            let camera = [seen(corners[0]), seen(corners[1]), seen(corners[2])];
+            let at = [v.screen[0][corners[0]], v.screen[1][corners[0]]];
+            gradient(pass.projection, camera, at, corners.map(|i| v.nearness[i]).as_slice())
+        };
+        triangle::draw(s, tile, p, plane, nearest, id);
     }
 }
 
+/// Whether no vertex must be clipped.
 #[inline(always)]
-fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Cluster, pass: &Pass<'_>) {
+fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Cluster, pass: &Pass<'_>) -> bool {
     let (projection, pose) = (pass.projection, pass.camera_from_instance);
     let (r, t) = (&pose.rotation, pose.translation);
     let too_near = splat(s, 0.5 * projection.near);
     let (guard, zero) = (splat(s, GUARD), splat(s, 0.0));
+    let mut all_good = true;
     for i in (0..cluster.lane_count as usize).step_by(LANES) {
         let from = cluster.first_lane as usize + i;
         let [x, y, z] = mesh.lanes();
         let (x, y, z) = (load(s, &x[from..]), load(s, &y[from..]), load(s, &z[from..]));
         let row = |k: usize| x * r[k][0] + y * r[k][1] + z * r[k][2] + t[k];
         let c = [row(0), row(1), row(2)];
+        let nearness = projection.nearness_lanes(c[2]);
         let (sx, sy) = if projection.parallel {
             (c[0] * projection.fx + projection.cx, c[1] * projection.fy + projection.cy)
         } else {
-            let inverse = 1.0 / c[2];
-            (c[0] * inverse * projection.fx + projection.cx, c[1] * inverse * projection.fy + projection.cy)
+            (c[0] * nearness * projection.fx + projection.cx, c[1] * nearness * projection.fy + projection.cy)
         };
+        store(nearness, &mut v.nearness[i..]);
         let good = abs(sx).simd_le(guard) & abs(sy).simd_le(guard) & c[2].simd_ge(too_near);
         for (to, value) in v.camera.iter_mut().zip(c) {
             store(value, &mut to[i..]);
@@ -112,7 +119,9 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
             store_i(snapped.to_int(), &mut v.snapped[k][i..]);
         }
         store(select(good, zero, splat(s, 1.0)), &mut v.clip[i..]);
+        all_good &= good.all_true();
     }
+    all_good
 }
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
@@ -120,9 +129,10 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 /// The plane of a triangle, from its unsnapped corners. A ray (x, y, 1) meets the plane n·p = d at the nearness
-/// 1/z = n·(x, y, 1) / d, which is linear in the pixels.
+/// 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is where the first corner is in the picture, `polygon` the
+/// nearness of the corners that are drawn, that one first.
 #[inline(always)]
-fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[[f32; 3]]) -> Gradient {
+fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[f32]) -> Gradient {
     let (u, v) = (sub(p[1], p[0]), sub(p[2], p[0]));
     let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     let (d, scale) = if projection.parallel {
@@ -133,12 +143,11 @@ fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[
     let k = if d == 0.0 { 0.0 } else { scale / d };
     let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
     let (mut low, mut high) = (f32::MAX, f32::MIN);
-    for c in polygon {
-        let q = projection.nearness(c[2]);
+    for &q in polygon {
         (low, high) = (low.min(q), high.max(q));
     }
     let step = [finite(n[0] * k / projection.fx), finite(n[1] * k / projection.fy)];
-    Gradient { at: [at[0], at[1], projection.nearness(polygon[0][2])], step, low, high }
+    Gradient { at: [at[0], at[1], polygon[0]], step, low, high }
 }
 
 /// A triangle that leaves the guard band or comes too near: clipped to a polygon of at most eight corners, drawn as a fan.
@@ -161,7 +170,11 @@ fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pa
         ]
     };
     let snap = |p: [f32; 2]| p.map(|x| ((x * SUB + ROUND) - ROUND) as i32);
-    let g = gradient(projection, original, screen(polygon[0]), polygon);
+    let mut nearness = [0.0; 9];
+    for (to, corner) in nearness.iter_mut().zip(polygon) {
+        *to = projection.nearness(corner[2]);
+    }
+    let g = gradient(projection, original, screen(polygon[0]), &nearness[..count]);
     for k in 2..count {
         let mut p = [0, k - 1, k].map(|i| snap(screen(polygon[i])));
         let edge = |k: usize| [i64::from(p[k][0] - p[0][0]), i64::from(p[k][1] - p[0][1])];
@@ -181,7 +194,7 @@ fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pa
 fn rarely<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, nearest: f32, id: u32) {
     s.vectorize(
         #[inline(always)]
-        || triangle::draw(s, tile, p, g, nearest, id),
+        || triangle::draw(s, tile, p, || *g, nearest, id),
     );
 }
 

@@ -8,7 +8,7 @@
 //! and steps by the edge's differences: within a block it changes by less than 14 * 2^23 < 2^27. The value at a block's
 //! corner is cut to ±2^30, which keeps every sign in the block, and the rest is done in `i32`.
 
-use super::tile::{AREA, BLOCK, REACH, SAMPLES, Tile};
+use super::tile::{BLOCK, REACH, SAMPLES, Tile};
 use crate::lanes::{COLUMN, F, I, ROW, Simd, load, load_i, load_u, max, min, select, select_i, select_u};
 use crate::lanes::{splat, splat_i, splat_u, store, store_u};
 
@@ -28,9 +28,17 @@ pub(crate) struct Gradient {
     pub(crate) high: f32,
 }
 
-/// Draws a triangle given by its snapped corners.
+/// Draws a triangle given by its snapped corners. The gradient costs several divisions: most triangles of dense meshes lie
+/// between the samples, and end before it is asked for.
 #[inline(always)]
-pub(crate) fn draw<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, nearest: f32, id: u32) {
+pub(crate) fn draw<S: Simd>(
+    s: S,
+    tile: &mut Tile,
+    p: [[i32; 2]; 3],
+    gradient: impl FnOnce() -> Gradient,
+    nearest: f32,
+    id: u32,
+) {
     let min3 = |k: usize| p[0][k].min(p[1][k]).min(p[2][k]);
     let max3 = |k: usize| p[0][k].max(p[1][k]).max(p[2][k]);
     let reach = if tile.planes > 1 { REACH } else { 0 };
@@ -42,6 +50,7 @@ pub(crate) fn draw<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradien
     if x0 > x1 || y0 > y1 {
         return;
     }
+    let g = &gradient();
     let (mut a, mut b, mut c) = ([0i32; 3], [0i32; 3], [0i64; 3]);
     for k in 0..3 {
         let (from, to) = (p[k], p[(k + 1) % 3]);
@@ -51,7 +60,7 @@ pub(crate) fn draw<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradien
         c[k] =
             i64::from(dx) * i64::from(128 - from[1]) - i64::from(dy) * i64::from(128 - from[0]) - i64::from(!owns_edge);
     }
-    if tile.planes == 1 && (x1 - x0 + 1) * (y1 - y0 + 1) <= 4 {
+    if (x1 - x0 + 1) * (y1 - y0 + 1) <= 4 {
         return few_pixels(tile, [x0, y0, x1, y1], a, b, c, g, nearest, id);
     }
     let one_block = x0 >> 3 == x1 >> 3 && y0 >> 3 == y1 >> 3;
@@ -123,27 +132,33 @@ fn few_pixels(
     nearest: f32,
     id: u32,
 ) {
-    for y in y0..=y1 {
-        for x in x0..=x1 {
-            let inside =
-                (0..3).all(|k| (c[k] >> 8) + i64::from(a[k]) * i64::from(x) + i64::from(b[k]) * i64::from(y) >= 0);
-            if !inside {
-                continue;
-            }
-            // In the order of additions of the wide path: corner of the block, row pair, lane.
-            let (bx, by) = (x & !7, y & !7);
-            let corner = g.at[2] + g.step[0] * (bx as f32 + 0.5 - g.at[0]) + g.step[1] * (by as f32 + 0.5 - g.at[1]);
-            let (column, row) = (x - bx, y - by);
-            let lane = column as f32 * g.step[0] + (row & 1) as f32 * g.step[1];
-            let q = lane + (corner + g.step[1] * (row & !1) as f32);
-            let q = if q > g.low { q } else { g.low };
-            let q = if q < g.high { q } else { g.high };
-            let block = tile.block(bx as usize / BLOCK, by as usize / BLOCK);
-            let here = block * AREA + (row * 8 + column) as usize;
-            if q > tile.nearness[here] && q <= nearest {
-                tile.nearness[here] = q;
-                tile.id[here] = id;
-                tile.touch(block);
+    for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+        let start: [i64; 3] = std::array::from_fn(|k| {
+            (c[k] + i64::from(a[k]) * i64::from(offset[0]) + i64::from(b[k]) * i64::from(offset[1])) >> 8
+        });
+        let shift = g.step[0] * (offset[0] as f32 * (1.0 / SUB)) + g.step[1] * (offset[1] as f32 * (1.0 / SUB));
+        for y in y0..=y1 {
+            for x in x0..=x1 {
+                let at = |k: usize| start[k] + i64::from(a[k]) * i64::from(x) + i64::from(b[k]) * i64::from(y);
+                if (at(0) | at(1) | at(2)) < 0 {
+                    continue;
+                }
+                // In the order of additions of the wide path: corner of the block, sample, row pair, lane.
+                let (bx, by) = (x & !7, y & !7);
+                let corner =
+                    g.at[2] + g.step[0] * (bx as f32 + 0.5 - g.at[0]) + g.step[1] * (by as f32 + 0.5 - g.at[1]);
+                let (column, row) = (x - bx, y - by);
+                let lane = column as f32 * g.step[0] + (row & 1) as f32 * g.step[1];
+                let q = lane + ((corner + shift) + g.step[1] * (row & !1) as f32);
+                let q = if q > g.low { q } else { g.low };
+                let q = if q < g.high { q } else { g.high };
+                let block = tile.block(bx as usize / BLOCK, by as usize / BLOCK);
+                let here = tile.samples(block, plane) + (row * 8 + column) as usize;
+                if q > tile.nearness[here] && q <= nearest {
+                    tile.nearness[here] = q;
+                    tile.id[here] = id;
+                    tile.touch(block);
+                }
             }
         }
     }

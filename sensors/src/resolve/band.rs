@@ -1,0 +1,177 @@
+//! A band of a picture: from what is drawn where to the pixels of all channels.
+
+use super::group::{Colors, resolve};
+use super::multisample::{blend, smooth};
+use super::plan::Plan;
+use super::shadow::ShadowBand;
+use super::tone::encode;
+use crate::camera::channel::{FrameMut, PixelGroup, Stage};
+use crate::camera::rasterizer::Shot;
+use crate::lanes::{COLUMN, LANES, Level, ROW, Simd, at_level, first, load, splat_i};
+use crate::visibility::Projection;
+use crate::visibility::raster::tile::{BLOCK, Tile};
+use crate::visibility::raster::{Layer, Painter};
+use scene::RenderScene;
+use std::ops::Range;
+
+/// What a thread needs to draw; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Brush {
+    tile: Tile,
+    layer: Tile,
+    veiled: Tile,
+    painter: Painter,
+    colors: Vec<Colors>,
+}
+
+impl Brush {
+    pub(crate) fn bytes(&self) -> usize {
+        self.tile.bytes()
+            + self.layer.bytes()
+            + self.veiled.bytes()
+            + size_of::<Painter>()
+            + self.colors.capacity() * size_of::<Colors>()
+    }
+
+    /// Draws a part of a shadow map.
+    pub(crate) fn shadow(&mut self, level: Level, scene: &RenderScene, band: ShadowBand<'_>) {
+        band.draw(level, scene, &mut self.tile, &mut self.painter);
+    }
+
+    /// Draws rows of blocks of a prepared shot, a band at a time. `frame` begins with the first of them.
+    pub(crate) fn paint(
+        &mut self,
+        level: Level,
+        plan: &Plan,
+        shot: &Shot<'_>,
+        frame: &mut FrameMut<'_>,
+        rows: Range<usize>,
+    ) {
+        let Some(projection) = &plan.projection else { return };
+        let wide = projection.width.div_ceil(BLOCK);
+        let (step, top) = (plan.rows(), rows.start * BLOCK);
+        for first in rows.clone().step_by(step) {
+            let size = [wide, step.min(rows.end - first)];
+            self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
+            let groups = size[0] * size[1] * (BLOCK / 2);
+            if frame.wants(Stage::Color) && self.colors.len() < groups {
+                self.colors.resize(groups, [[0.0; LANES]; 3]);
+            }
+            at_level!(level, s => self.band(s, plan, shot, projection, frame, top));
+        }
+    }
+
+    /// Draws a band of the picture, where the tile is.
+    #[inline(always)]
+    fn band<S: Simd>(
+        &mut self,
+        s: S,
+        plan: &Plan,
+        shot: &Shot<'_>,
+        projection: &Projection,
+        frame: &mut FrameMut<'_>,
+        top: usize,
+    ) {
+        let Self { tile, layer, veiled, painter, colors } = self;
+        let list = &plan.list;
+        for item in &list.opaque {
+            painter.draw(s, tile, projection, shot.scene, &list.placed, item);
+        }
+        let context = plan.context(shot, projection);
+        let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
+        if veils {
+            veiled.copy(tile);
+            for (_, item) in list.blended.iter().filter(|(layer, _)| *layer == Layer::Veil) {
+                painter.draw(s, veiled, projection, shot.scene, &list.placed, item);
+            }
+        }
+        let size = [projection.width, projection.height];
+        let wants_color = frame.wants(Stage::Color);
+        let wants_geometry = frame.wants(Stage::Geometry);
+        let mut pixels = PixelGroup::default();
+        for (block, row, [x, y]) in groups(tile, size) {
+            let at = tile.samples(block, 0) + row * LANES;
+            let (u, v) = (COLUMN.map(|c| c + (x as f32 + 0.5)), ROW.map(|r| r + (y as f32 + 0.5)));
+            let ids = first(&tile.id[at..]);
+            let color = if wants_color { Some(&mut colors[block * 4 + row]) } else { None };
+            if veils && wants_geometry {
+                resolve(s, &context, first(&veiled.id[at..]), [&u, &v], Some(&mut pixels), None);
+                resolve(s, &context, ids, [&u, &v], None, color);
+            } else {
+                resolve(s, &context, ids, [&u, &v], wants_geometry.then_some(&mut pixels), color);
+            }
+            // Without the instruction set: with it, normals become scattered writes, which are slower.
+            write(frame, Stage::Geometry, &pixels, [x, y], size, top);
+        }
+        if !wants_color {
+            return;
+        }
+        if tile.planes > 1 {
+            for (block, row, [x, y]) in groups(tile, size) {
+                let corner = [x as f32, (y - 2 * row) as f32];
+                s.vectorize(
+                    #[inline(always)]
+                    || smooth(s, &context, tile, block, row, corner, &mut colors[block * 4 + row]),
+                );
+            }
+        }
+        for items in list.blended.chunk_by(|(_, a), (_, b)| a.instance == b.instance) {
+            layer.behind(tile);
+            for (_, item) in items {
+                painter.draw(s, layer, projection, shot.scene, &list.placed, item);
+            }
+            let Some((_, item)) = items.first() else { continue };
+            let alpha = shot.scene.instances()[item.instance as usize].material.rgba[3];
+            for (block, row, [x, y]) in groups(tile, size) {
+                let corner = [x as f32, (y - 2 * row) as f32];
+                s.vectorize(
+                    #[inline(always)]
+                    || blend(s, &context, layer, block, row, corner, alpha, &mut colors[block * 4 + row]),
+                );
+            }
+        }
+        for (block, row, at) in groups(tile, size) {
+            s.vectorize(
+                #[inline(always)]
+                || {
+                    let [r, g, b] = &colors[block * 4 + row];
+                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    let r = encode(s, load(s, r)).to_int();
+                    let g = encode(s, load(s, g)).to_int() * (1 << 8);
+                    let b = encode(s, load(s, b)).to_int() * (1 << 16);
+                    let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
+                    let rgba: [i32; LANES] = rgba.array();
+                    for (to, from) in pixels.color.iter_mut().zip(rgba) {
+                        *to = from.to_le_bytes();
+                    }
+                    write(frame, Stage::Color, &pixels, at, size, top);
+                },
+            );
+        }
+    }
+}
+
+/// Groups of 8 x 2 pixels of a tile that are inside of the picture: block, pair of rows, first pixel.
+#[inline(always)]
+fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usize, usize, [usize; 2])> + use<> {
+    let (blocks_x, count) = (tile.blocks_x, tile.blocks_x * tile.blocks_y);
+    let [x0, y0] = [tile.x0, tile.y0];
+    let all = (0..count).flat_map(move |block| {
+        let (x, y) = (x0 + block % blocks_x * BLOCK, y0 + block / blocks_x * BLOCK);
+        (0..BLOCK / 2).map(move |row| (block, row, [x, y + 2 * row]))
+    });
+    all.filter(move |(_, _, [x, y])| *x < width && *y < height)
+}
+
+/// Writes a group into a frame whose first row is `top` of the picture.
+#[inline(always)]
+fn write(
+    frame: &mut FrameMut<'_>,
+    stage: Stage,
+    pixels: &PixelGroup,
+    [x, y]: [usize; 2],
+    [width, height]: [usize; 2],
+    top: usize,
+) {
+    frame.write(stage, pixels, [x, y - top], [width, height - top]);
+}

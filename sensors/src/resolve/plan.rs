@@ -1,0 +1,145 @@
+//! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
+
+use super::group::Context;
+use super::shade::{Lighting, MAX_LIGHTS};
+use super::shadow::{ShadowBand, ShadowMap};
+use crate::camera::RasterCfg;
+use crate::camera::channel::{FrameMut, Stage};
+use crate::camera::rasterizer::Shot;
+use crate::visibility::raster::tile::{BLOCK, SAMPLES};
+use crate::visibility::raster::{DrawList, Layer};
+use crate::visibility::{Projection, RenderError, View};
+
+/// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
+const BAND: usize = 128 * 1024;
+/// Lamps with a shadow, at most.
+const MAX_SHADOWS: usize = 4;
+
+/// A shot that is ready to be drawn, band by band; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Plan {
+    pub(crate) list: DrawList,
+    lighting: Lighting,
+    shadows: Vec<ShadowMap>,
+    /// How many of the maps are in use.
+    maps: usize,
+    /// Kinds of samples: 1, or 5 with multisampling.
+    pub(crate) planes: usize,
+    /// The picture, while there is one.
+    pub(crate) projection: Option<Projection>,
+}
+
+impl Plan {
+    pub(crate) fn bytes(&self) -> usize {
+        self.list.bytes() + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
+    }
+
+    /// Checks a shot and finds what is drawn where. Shadows are not drawn yet, see [`Plan::shadow_bands`].
+    pub(crate) fn prepare(&mut self, cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> Result<(), RenderError> {
+        self.projection = None;
+        self.maps = 0;
+        let Shot { scene, poses, view, .. } = *shot;
+        view.validate()?;
+        if !matches!(cfg.samples, 1 | 4) {
+            return Err(RenderError::Samples { samples: cfg.samples });
+        }
+        if poses.len() != scene.instances().len() {
+            return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
+        }
+        if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, p)| !p.is_rigid()) {
+            return Err(RenderError::InstancePose { instance, pose: *pose });
+        }
+        frame.validate(view.width * view.height)?;
+        let projection = Projection::from(view);
+        let wants_color = frame.wants(Stage::Color);
+        if wants_color {
+            self.light(cfg, shot);
+        }
+        self.planes = if wants_color && cfg.samples == 4 { SAMPLES.len() } else { 1 };
+        self.list.build(&projection, scene, poses, |instance| Layer::of(instance, cfg.groups));
+        self.projection = Some(projection);
+        Ok(())
+    }
+
+    /// Prepares lamps and their shadows.
+    fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
+        let Shot { scene, poses, view, lights } = *shot;
+        let lights = lights.unwrap_or(&scene.lights);
+        let mut maps = [None; 256];
+        if cfg.shadows {
+            let side = shadow_side(cfg, view);
+            let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
+            for (k, light) in lamps.filter(|(k, l)| l.cast_shadow && *k < 256) {
+                if self.maps == MAX_SHADOWS {
+                    break;
+                }
+                if self.shadows.len() == self.maps {
+                    self.shadows.push(ShadowMap::empty());
+                }
+                if self.shadows[self.maps].prepare(light, scene, poses, cfg.groups, side) {
+                    maps[k] = Some(self.maps);
+                    self.maps += 1;
+                }
+            }
+        }
+        self.lighting.prepare(scene, lights, |k| maps.get(k).copied().flatten());
+    }
+
+    /// Whether there are shadow maps to draw.
+    pub(crate) fn has_shadows(&self) -> bool {
+        self.maps > 0
+    }
+
+    /// The parts of the shadow maps; all must be drawn before the picture.
+    pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
+        self.shadows.iter_mut().take(self.maps).flat_map(|map| {
+            // Small maps in quarters, so that the scratch memory is smaller than the map.
+            let rows = (BAND / (map.side().max(1) * BLOCK)).min(map.side() / BLOCK / 4);
+            map.bands(rows.max(1))
+        })
+    }
+
+    /// Rows of blocks that are drawn together.
+    pub(crate) fn rows(&self) -> usize {
+        let Some(projection) = &self.projection else { return 1 };
+        let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
+        // Small pictures with many samples in halves, so that the scratch memory is not much larger than the picture.
+        let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
+        (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
+    }
+
+    /// What all pixels need.
+    pub(crate) fn context<'a>(&'a self, shot: &Shot<'a>, projection: &'a Projection) -> Context<'a> {
+        Context {
+            projection,
+            scene: shot.scene,
+            poses: shot.poses,
+            placed: &self.list.placed,
+            lighting: &self.lighting,
+            shadows: &self.shadows[..self.maps],
+            pixel: 1.0 / projection.fx.min(projection.fy),
+        }
+    }
+}
+
+/// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.
+fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
+    match cfg.shadow_size {
+        0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
+        n => n.clamp(64, 8192).next_multiple_of(BLOCK),
+    }
+}
+
+/// How long a shot takes, about \[ns\]: to tell whether another thread is worth its start.
+pub(crate) fn estimate(cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> usize {
+    let Shot { scene, view, .. } = *shot;
+    let wants_color = frame.wants(Stage::Color);
+    let (pixels, triangles) = (view.width.saturating_mul(view.height), scene.triangle_count());
+    let shadows = if wants_color && cfg.shadows {
+        let texels = shadow_side(cfg, view).pow(2);
+        scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels
+    } else {
+        0
+    };
+    pixels.saturating_mul(if wants_color { 15 } else { 8 }) + 20 * triangles + shadows
+}

@@ -1,0 +1,81 @@
+//! After the first frame, drawing allocates nothing, and keeps little.
+
+use scene::mesh::TriMesh;
+use scene::shape::{Capsule, Mesh, Plane, Sphere};
+use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
+use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
+use sensors::visibility::View;
+use std::sync::Arc;
+
+/// Capsules, a mesh and a plane under two lamps.
+fn scene() -> (RenderScene, Vec<PoseF32>) {
+    let ball: TriMesh = Shape::from(Sphere { radius: 0.3 }).tessellate(96);
+    let mesh = Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE));
+    let mut instances = vec![
+        Instance::new(Plane::INFINITE, Material::default(), 1),
+        Instance::new(Mesh { mesh }, Material::default(), 2),
+    ];
+    let mut poses = vec![PoseF32::from_translation([0., 0., -0.5]), PoseF32::IDENTITY];
+    for k in 0..12 {
+        instances.push(Instance::new(Capsule { radius: 0.05, half_length: 0.2 }, Material::default(), 3 + k));
+        poses.push(PoseF32::from_translation([0.2 * k as f32 - 1.1, 0.3, 0.1]));
+    }
+    let mut scene = RenderScene::new(instances).expect("a good scene");
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 4.0 };
+    scene.lights.push(Light { kind: spot, position: [1., 1., 3.], direction: [-1., -1., -3.], ..Light::default() });
+    (scene, poses)
+}
+
+const FOUR: Channels = Channels {
+    color: true,
+    depth: true,
+    mask: true,
+    normal: true,
+    distance: false,
+    shading_normal: false,
+    position: false,
+};
+
+fn view(size: [usize; 2]) -> View {
+    View::look_at(size, 0.9, [2.2, -1.4, 1.2], [0., 0., 0.], [0., 0., 1.]).expect("a good view")
+}
+
+#[test]
+fn frames_allocate_nothing_and_scratch_memory_is_three_pictures_at_most() {
+    let (scene, poses) = scene();
+    for size in [[64, 64], [200, 120], [640, 480]] {
+        for (samples, shadows) in [(1, false), (4, false), (1, true), (4, true)] {
+            let view = view(size);
+            let mut frame = Frame::new(view.width, view.height, FOUR);
+            let mut rasterizer = Rasterizer::new(RasterCfg { samples, shadows, ..RasterCfg::default() });
+            let mut draw = || rasterizer.render(&scene, &poses, &view, &mut frame).expect("a good frame");
+            draw();
+            let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
+            assert_eq!(allocations, 0, "{size:?}, {samples} samples, shadows {shadows}");
+            let (scratch, picture) = (rasterizer.scratch_bytes(), 24 * size[0] * size[1]);
+            println!("{size:?}, {samples} samples, shadows {shadows}: {scratch} bytes, picture {picture}");
+            assert!(
+                scratch <= 3 * picture,
+                "{size:?}, {samples} samples, shadows {shadows}: {scratch} > 3 x {picture}"
+            );
+        }
+    }
+}
+
+#[test]
+fn batches_allocate_for_threads_and_not_for_frames() {
+    let (scene, poses) = scene();
+    let view = view([160, 120]);
+    let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2);
+    let mut count = |frames: usize| {
+        let mut frames = vec![Frame::new(view.width, view.height, FOUR); frames];
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None };
+        let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
+        let mut draw = || rasterizer.render(&mut jobs).expect("good frames");
+        (0..3).for_each(|_| draw());
+        allocation_counter::measure(draw).count_total
+    };
+    let (few, many) = (count(4), count(64));
+    println!("{few} allocations for 4 frames, {many} for 64");
+    assert!(many <= few + 8, "{few} allocations for 4 frames, {many} for 64");
+}
