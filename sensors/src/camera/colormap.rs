@@ -1,6 +1,6 @@
 //! Numbers of channels as colours that a person can read.
 
-/// The colour of a depth \[m\] between `near` (dark blue) and `far` (dark red): Google's Turbo. Nearer and farther ones get
+/// The colour of a depth \[m\] between `near` (dark, then blue) and `far` (dark red): Google's Turbo. Nearer and farther ones get
 /// the colours of the ends, `inf` (nothing was hit) black.
 ///
 /// Source: Mikhailov's polynomial approximation of Turbo (2019).
@@ -54,8 +54,8 @@ mod tests {
     #[test]
     fn depth_goes_from_blue_to_red() {
         let range = [1.0, 3.0];
-        let [near, middle, far] = [1.0, 2.0, 3.0].map(|d| depth_color(d, range));
-        assert!(near[2] > near[0] && far[0] > far[2] && middle[1] > 200, "{near:?} {middle:?} {far:?}");
+        let [near, quarter, middle, far] = [1.0, 1.4, 2.0, 3.0].map(|d| depth_color(d, range));
+        assert!(quarter[2] > 200 && far[0] > far[2] && middle[1] > 200, "{quarter:?} {middle:?} {far:?}");
         assert_eq!([depth_color(0.1, range), depth_color(9.0, range)], [near, far]);
         assert_eq!(depth_color(f32::INFINITY, range), [0, 0, 0]);
         assert_eq!(depth_color(2.0, [2.0, 2.0]), near, "an empty range is no reason to fail");

@@ -1,6 +1,6 @@
 //! Draws many frames on several threads.
 
-use super::channel::{Channel, Color, Depth, Distance, FrameMut, Mask, Normal, Position, ShadingNormal};
+use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
 use crate::resolve::plan::{Plan, estimate};
 use crate::visibility::RenderError;
@@ -168,42 +168,10 @@ fn bands<'a>(
     let (width, height) = (shot.view.width, shot.view.height);
     let blocks = if plan.projection.is_some() { height.div_ceil(BLOCK) } else { 0 };
     let rows = blocks.div_ceil(parts).clamp(1, plan.rows());
-    let mut rest = whole(frame);
+    let mut rest = frame.reborrow();
     (0..blocks).step_by(rows).map(move |first| {
         let rows = rows.min(blocks - first);
         let pixels = width * (rows * BLOCK).min(height - first * BLOCK);
-        (first, rows, cut_off(&mut rest, pixels))
+        (first, rows, rest.split_off_first(pixels))
     })
-}
-
-/// All of a frame, borrowed.
-fn whole<'a>(frame: &'a mut FrameMut<'_>) -> FrameMut<'a> {
-    FrameMut {
-        color: frame.color.as_deref_mut(),
-        depth: frame.depth.as_deref_mut(),
-        distance: frame.distance.as_deref_mut(),
-        mask: frame.mask.as_deref_mut(),
-        normal: frame.normal.as_deref_mut(),
-        shading_normal: frame.shading_normal.as_deref_mut(),
-        position: frame.position.as_deref_mut(),
-    }
-}
-
-/// Takes the first pixels of all channels, or as many as there are.
-fn cut_off<'a>(frame: &mut FrameMut<'a>, pixels: usize) -> FrameMut<'a> {
-    fn cut<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
-        let all = buffer.take()?;
-        let (cut, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));
-        *buffer = Some(rest);
-        Some(cut)
-    }
-    FrameMut {
-        color: cut::<Color>(&mut frame.color, pixels),
-        depth: cut::<Depth>(&mut frame.depth, pixels),
-        distance: cut::<Distance>(&mut frame.distance, pixels),
-        mask: cut::<Mask>(&mut frame.mask, pixels),
-        normal: cut::<Normal>(&mut frame.normal, pixels),
-        shading_normal: cut::<ShadingNormal>(&mut frame.shading_normal, pixels),
-        position: cut::<Position>(&mut frame.position, pixels),
-    }
 }

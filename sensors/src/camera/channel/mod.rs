@@ -249,6 +249,18 @@ macro_rules! channels {
             }
         }
 
+        impl<'a> FrameMut<'a> {
+            /// The same frame for a shorter time.
+            pub(crate) fn reborrow(&mut self) -> FrameMut<'_> {
+                FrameMut { $($field: self.$field.as_deref_mut(),)* }
+            }
+
+            /// Takes the first pixels of all channels, or as many as there are.
+            pub(crate) fn split_off_first(&mut self, pixels: usize) -> FrameMut<'a> {
+                FrameMut { $($field: split_off::<$Name>(&mut self.$field, pixels),)* }
+            }
+        }
+
         impl FrameMut<'_> {
             /// Puts `value` where nothing was hit, in the channels that measure how far something is.
             pub fn replace_misses(&mut self, value: f32) {
@@ -294,6 +306,14 @@ fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> SensorError
     let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
     let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
     SensorError::UnknownName { what: "channel", name: name.into(), candidates }
+}
+
+/// The first pixels of one channel.
+fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
+    let all = buffer.take()?;
+    let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));
+    *buffer = Some(rest);
+    Some(first)
 }
 
 #[inline(always)]
