@@ -23,8 +23,6 @@ class Job:
             self.__dict__.update(json.load(file))
         self.width, self.height = self.size
         self.mj_model = mujoco.MjModel.from_xml_path(self.model)
-        # As in ours: an environment that diverges would start again at a place that the others have left.
-        self.mj_model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.camera = self.mj_model.camera("bench").id
 
     def datas(self):

@@ -1,7 +1,8 @@
 """MuJoCo's own renderer on OSMesa (Mesa's software renderer): colour, depth and segmentation of every image.
 
 The looks: `plain` (shadows, reflections, fog and multisampling off, one pass for colour and one for depth and
-segmentation together, buffers of the image's size), `full` (the same with shadows and four samples per pixel),
+segmentation together, buffers of the image's size), `full` (the same with shadows and four samples per pixel;
+`shadow_size` replaces the size of the shadow map),
 `defaults` (`mujoco.Renderer` as its documentation shows it, three passes). See camera_job.py for the commands.
 """
 
@@ -47,7 +48,9 @@ class Tuned:
         model = job.mj_model
         model.vis.global_.offwidth, model.vis.global_.offheight = job.width, job.height
         model.vis.quality.offsamples = 4 if full else 0
-        self.job, self.model, self.option = job, model, option(job)
+        if job.shadow_size:
+            model.vis.quality.shadowsize = job.shadow_size
+        self.job, self.option = job, option(job)
         self.renderer = mujoco.Renderer(model, job.height, job.width)
         scene = self.renderer.scene
         for flag in (Flag.mjRND_REFLECTION, Flag.mjRND_SKYBOX, Flag.mjRND_FOG, Flag.mjRND_HAZE):
