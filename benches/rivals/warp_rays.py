@@ -14,6 +14,10 @@ import mujoco_warp as mjw
 import warp as wp
 
 
+# It gives depths in this unit, at most 1 [m].
+FAR = 100.0
+
+
 def main():
     job = camera_job.Job(sys.argv[1])
     datas = job.datas()
@@ -48,7 +52,7 @@ def main():
             mjw.refit_bvh(model, data, context)
             mjw.render(model, data, context)
             mjw.get_rgb(context, 0, color)
-            mjw.get_depth(context, 0, 1.0, depth)
+            mjw.get_depth(context, 0, FAR, depth)
             mjw.get_segmentation(context, 0, segmentation)
 
         # Compiles the kernels; a captured graph then starts them with the least overhead there can be.
@@ -62,7 +66,7 @@ def main():
             print(f"warp_rays.py: no graph, {error}", file=sys.stderr)
             step = draw
         with contextlib.redirect_stdout(answers):
-            camera_job.serve(job, lambda: None, step, lambda: depth.numpy()[0])
+            camera_job.serve(job, lambda: None, step, lambda: FAR * depth.numpy()[0])
 
 
 if __name__ == "__main__":

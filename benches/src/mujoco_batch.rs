@@ -1,6 +1,7 @@
-//! Batched stepping against `mujoco.batch` from Python: the same model, states and threads, in turns.
+//! Batched stepping against `mujoco.batch` from Python: the same model, states and threads, in turns. The two processes
+//! are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
-use crate::interleave::{Plan, Side, measure};
+use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{Case, STEPS};
 use crate::rival::{self, Process};
 use crate::row::Row;
@@ -19,19 +20,20 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
-            let mut ours = Ours::new(&case, envs, threads)?;
-            let mut plan = Plan { seconds: settings.seconds, restart_after: STEPS };
+            let plan = |share| Plan { seconds: share * settings.seconds, restart_after: STEPS };
+            let ours = || Ours::new(&case, envs, threads);
             let row =
                 |rate| Row::new("mujoco-batch", format!("{}, {envs} envs", case.name), "env-steps/s", threads, rate);
             let Some(python) = &python else {
-                plan.seconds *= 0.25;
-                let times = measure(plan, &mut [&mut ours])?;
+                let times = measure(plan(0.25), &mut [&mut ours()?])?;
                 rows.push(row(envs as f64 / times.per_step(0)).without("mujoco.batch"));
                 continue;
             };
-            let mut rival = Rival::start(python, &case, envs, threads)?;
-            let times = measure(plan, &mut [&mut ours, &mut rival])?;
-            let rate = |side: usize| envs as f64 / times.per_step(side);
+            let times = in_both_orders(|order| {
+                let (mut ours, mut rival) = order.create(ours, || Rival::start(python, &case, envs, threads))?;
+                measure(plan(0.5), &mut [&mut ours, &mut rival])
+            })?;
+            let rate = |side: usize| times.rate(side, envs);
             rows.push(row(rate(0)).against("mujoco.batch", rate(1), times.ratio(0, 1)));
         }
     }
@@ -45,7 +47,10 @@ impl Rival {
     fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         let job = job(case, envs, threads, folder.path())?;
-        Process::start(python, "mujoco_batch.py", &job, folder).map(Self)
+        let mut rival = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
+        // When it answers, its memory is allocated.
+        rival.restart()?;
+        Ok(rival)
     }
 }
 

@@ -129,7 +129,9 @@ impl Need {
             Self::Models => "the models that come with MuJoCo (humanoid.xml)",
             Self::Pip => "python3 with pip (MuJoCo 4 is downloaded with it)",
             Self::Venv => "python3 with venv (rivals in Python are installed with it)",
-            Self::OsMesa => "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)",
+            Self::OsMesa => {
+                "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
+            }
         }
     }
 }
