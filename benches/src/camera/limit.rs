@@ -10,7 +10,7 @@ pub(super) struct Copying(Vec<(Vec<u64>, Vec<u64>)>);
 
 impl Copying {
     /// Bytes written in a step.
-    pub(super) const BYTES: usize = 256 << 20;
+    pub(super) const BYTES: usize = 64 << 20;
 
     pub(super) fn new(threads: usize) -> Self {
         let share = Self::BYTES / threads / size_of::<u64>();
