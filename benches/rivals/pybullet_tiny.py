@@ -8,16 +8,10 @@ import os
 import sys
 import tempfile
 
-# PyBullet tells its build time on standard output; that belongs to the answers here.
-stdout = os.dup(1)
-os.dup2(2, 1)
-import pybullet
-
-os.dup2(stdout, 1)
-
 import camera_job
 import mujoco
 import numpy as np
+import pybullet
 
 Geom = mujoco.mjtGeom
 

@@ -35,18 +35,26 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let rivals = Rivals::new();
     let scenes = Scenes::new()?;
     let mut rows = Vec::new();
-    if let Some(humanoid) = &scenes.humanoid {
-        rows.extend(large(settings, &rivals, humanoid, [10.0, 50.0])?);
-    }
-    if let Some(vendor) = &scenes.vendor {
-        rows.extend(large(settings, &rivals, vendor, [10.0, 20.0])?);
-    }
-    rows.extend(stepping(settings, &rivals, &scenes.bundled)?);
+    // All of this takes minutes: show results as they come.
+    let mut add = |new: Vec<Row>| {
+        for row in &new {
+            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.rival_name));
+            eprintln!("    {}: {:.1} {}{ratio}", row.case, row.ours, row.unit);
+        }
+        rows.extend(new);
+    };
     if let Some(humanoid) = &scenes.humanoid {
         for side in [64, 128] {
-            rows.extend(per_core(settings, &rivals, humanoid, [side, side], BATCH)?);
+            add(per_core(settings, &rivals, humanoid, [side, side], BATCH)?);
         }
-        rows.extend(scaling(settings, humanoid)?);
+        add(large(settings, &rivals, humanoid, [10.0, 50.0])?);
+    }
+    if let Some(vendor) = &scenes.vendor {
+        add(large(settings, &rivals, vendor, [10.0, 20.0])?);
+    }
+    add(stepping(settings, &rivals, &scenes.bundled)?);
+    if let Some(humanoid) = &scenes.humanoid {
+        add(scaling(settings, humanoid)?);
     }
     Ok(rows)
 }
