@@ -9,10 +9,13 @@ import sys
 # Warp tells on standard output what it compiles; that belongs to the answers here.
 answers, sys.stdout = sys.stdout, sys.stderr
 
-import camera_job
-import mujoco_warp as mjw
 import warp as wp
 
+# Before the import of mujoco_warp, which starts it.
+wp.config.log_level = wp.LOG_ERROR
+
+import camera_job
+import mujoco_warp as mjw
 
 # It gives depths in this unit, at most 1 [m].
 FAR = 100.0

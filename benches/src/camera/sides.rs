@@ -206,7 +206,7 @@ impl Rival {
     pub(super) fn must_see(&mut self, ours: &[f32], size: [usize; 2]) -> Outcome<()> {
         let bytes = self.process.bytes("depth")?;
         let theirs: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect();
-        let share = agreement(ours, &theirs);
+        let share = agreement(ours, &theirs, size);
         if theirs.len() == size[0] * size[1] && share > SAME {
             return Ok(());
         }
@@ -214,17 +214,27 @@ impl Rival {
     }
 }
 
-/// Share of the pixels that must agree: edges may be a pixel off.
-const SAME: f64 = 0.95;
+/// Share of the pixels that must agree.
+const SAME: f64 = 0.97;
 /// What is farther is background, whatever a renderer calls that \[m\].
 const FAR: f32 = 20.0;
 
-/// Share of pixels with depths within 2 %, or with background in both.
-fn agreement(a: &[f32], b: &[f32]) -> f64 {
+/// Share of pixels whose depth is, within 2 %, between the depths around that pixel in the other picture: where pixels
+/// have their centres is not the same everywhere.
+fn agreement(ours: &[f32], theirs: &[f32], [width, height]: [usize; 2]) -> f64 {
     // Ray casters have 0 where rays hit nothing.
     let far = |x: f32| if x > 0.0 && x < FAR { x } else { FAR };
-    let same = |(&x, &y): (&f32, &f32)| (far(x) - far(y)).abs() <= 0.02 * far(x);
-    a.iter().zip(b).filter(|pair| same(*pair)).count() as f64 / a.len().max(1) as f64
+    let around = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
+    let agrees = |(index, &depth): (usize, &f32)| {
+        let (x, y) = (index % width, index / width);
+        let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
+        for neighbor in around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x)) {
+            let depth = far(ours.get(neighbor).copied().unwrap_or(0.0));
+            (least, most) = (least.min(depth), most.max(depth));
+        }
+        (0.98 * least..=1.02 * most).contains(&far(depth))
+    };
+    theirs.iter().enumerate().filter(|pixel| agrees(*pixel)).count() as f64 / (width * height) as f64
 }
 
 impl Side for Rival {
@@ -246,7 +256,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn background_agrees_however_it_is_written() {
-        assert_eq!(agreement(&[1.0, 2.0, f32::INFINITY, 0.0], &[1.01, 3.0, 0.0, 99.0]), 0.75);
+    fn pictures_agree_up_to_a_pixel_and_to_how_background_is_written() {
+        let ours = [1.0, 1.0, 2.0, 2.0, 3.0, f32::INFINITY];
+        assert_eq!(agreement(&ours, &[1.01, 1.0, 1.0, 3.0, 0.0, 99.0], [6, 1]), 1.0);
+        assert_eq!(agreement(&ours, &[2.0, 1.0, 2.0, 1.0, 1.0, 99.0], [6, 1]), 0.5);
     }
 }
