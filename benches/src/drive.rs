@@ -1,7 +1,8 @@
 //! What drives cost: the arm and hand on their way between two poses, against the same model stepped from the same states
-//! without the drives' writes.
+//! without the drives' writes. The sides are created in both orders, half the time each: the ratio is the geometric mean
+//! of the two, times are those of mean rates.
 
-use crate::interleave::{Plan, Side, measure};
+use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{State, drive_sr5, sr5};
 use crate::row::Row;
 use crate::{Outcome, Settings};
@@ -94,21 +95,25 @@ fn read_back(batch: &Batch, qpos: &mut [f64], qvel: &mut [f64]) {
 }
 
 pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
-    let (mut sim, robot) = sr5(ENVS, 1)?;
-    drive_sr5(&mut sim, robot, false)?;
-    let model = sim.batch().model().clone();
-    let states = States::default();
+    let model = sr5(1, 1)?.0.batch().model().clone();
     let (qpos, qvel) = (vec![0.0; ENVS * model.nq()], vec![0.0; ENVS * model.nv()]);
-    let mut undriven = Undriven {
-        batch: Batch::new(&model, &Arc::new(DriveTable::default()), ENVS, 1)?,
-        states: Rc::clone(&states),
-        qpos: qpos.clone(),
-        qvel: qvel.clone(),
-    };
-    let mut driven = Driven { sim, robot, states, steps: 0, closed: false, qpos, qvel };
-    let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
-    let times = measure(plan, &mut [&mut driven, &mut undriven])?;
-    let micros = |side: usize| 1e6 * times.per_step(side) / ENVS as f64;
+    let times = in_both_orders(|order| {
+        let states = States::default();
+        let driven = || {
+            let (mut sim, robot) = sr5(ENVS, 1)?;
+            drive_sr5(&mut sim, robot, false)?;
+            let (states, qpos, qvel) = (Rc::clone(&states), qpos.clone(), qvel.clone());
+            Ok(Driven { sim, robot, states, steps: 0, closed: false, qpos, qvel })
+        };
+        let undriven = || {
+            let batch = Batch::new(&model, &Arc::new(DriveTable::default()), ENVS, 1)?;
+            Ok(Undriven { batch, states: Rc::clone(&states), qpos: qpos.clone(), qvel: qvel.clone() })
+        };
+        let (mut driven, mut undriven) = order.create(driven, undriven)?;
+        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: STEPS };
+        measure(plan, &mut [&mut driven, &mut undriven])
+    })?;
+    let micros = |side: usize| 1e6 / times.rate(side, ENVS);
     Ok(vec![
         Row::new("drive", format!("SR5 + hand, {ENVS} envs"), "us/env-step", 1, micros(0))
             .against("same model, no drives", micros(1), times.ratio(0, 1))

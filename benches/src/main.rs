@@ -2,12 +2,14 @@
 //!
 //! `cargo xtask bench` runs this on both lines of MuJoCo. A table goes to standard error, the rows as JSON to a file.
 
+mod camera;
 mod drive;
 mod foreign;
 mod interleave;
 mod memory;
 mod models;
 mod mujoco_batch;
+mod rival;
 mod row;
 mod startup;
 mod step;
@@ -22,6 +24,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("step", step::run),
     ("drive", drive::run),
     ("mujoco-batch", mujoco_batch::run),
+    ("camera", camera::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -40,7 +43,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

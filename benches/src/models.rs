@@ -144,6 +144,16 @@ fn trajectory(model: &Model) -> Outcome<Vec<State>> {
 
 /// The bundled arm and hand as in the example `create_robot`.
 pub(crate) fn sr5(envs: usize, threads: usize) -> Outcome<(SimulationManager, RobotId)> {
+    arm_with_hand(&assets::path("sr5/SR5.urdf")?, "JOINT[1-6]", envs, threads)
+}
+
+/// An arm from a file, with these joints, and the bundled hand.
+pub(crate) fn arm_with_hand(
+    arm: &Path,
+    joints: &str,
+    envs: usize,
+    threads: usize,
+) -> Outcome<(SimulationManager, RobotId)> {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         num_envs: envs,
         threads: Some(threads),
@@ -155,11 +165,8 @@ pub(crate) fn sr5(envs: usize, threads: usize) -> Outcome<(SimulationManager, Ro
     };
     let robot = sim.add_robot(RobotCfg {
         uid: "sr5".into(),
-        urdf: UrdfCfg {
-            components: vec![ComponentCfg::new("arm", assets::path("sr5/SR5.urdf")?), hand],
-            ..UrdfCfg::default()
-        },
-        control_parts: vec![("arm".into(), vec!["JOINT[1-6]".into()]), ("hand".into(), vec!["LEFT_HAND_.*".into()])],
+        urdf: UrdfCfg { components: vec![ComponentCfg::new("arm", arm), hand], ..UrdfCfg::default() },
+        control_parts: vec![("arm".into(), vec![joints.into()]), ("hand".into(), vec!["LEFT_HAND_.*".into()])],
         drive: DriveCfg {
             stiffness: [("arm", 1e4), ("hand", 1e3)].into(),
             damping: [("arm", 1e3), ("hand", 1e2)].into(),

@@ -79,7 +79,7 @@ fn root() -> PathBuf {
 }
 
 /// The vendors' robots: `KINETOSCOPE_ROBOTS`, or `shared/robots` in a folder above the project.
-fn robots() -> Option<PathBuf> {
+pub(crate) fn robots() -> Option<PathBuf> {
     let named = std::env::var_os("KINETOSCOPE_ROBOTS").map(PathBuf::from);
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|dir| dir.join("shared/robots"));
     named.into_iter().chain(above).find(|dir| dir.is_dir())

@@ -1,8 +1,9 @@
 //! Batched stepping with all positions and velocities read back, against bare loops of MuJoCo calls on as many threads.
 //!
-//! Both sides start from the same states and do the same physics; that is checked, bit by bit, after every round.
+//! Both sides start from the same states and do the same physics; that is checked, bit by bit, after every round. They
+//! are created in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
-use crate::interleave::{Plan, Side, measure};
+use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
 use crate::row::Row;
 use crate::{Outcome, Settings};
@@ -126,15 +127,16 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
         for envs in ENVS {
             let name = format!("{}, {envs} envs", case.name);
             eprintln!("  {name}");
-            // Half the time in each comparison with one and with two threads.
-            let plan = Plan { seconds: 2.0 * settings.seconds, restart_after: STEPS };
-            let mut ours = [Ours::new(&case, envs, 1)?, Ours::new(&case, envs, 2)?];
-            let mut bare = [Bare::new(&case, envs, 1)?, Bare::new(&case, envs, 2)?];
-            let [ours1, ours2] = &mut ours;
-            let [bare1, bare2] = &mut bare;
-            let times = measure(plan, &mut [ours1, bare1, ours2, bare2])?;
+            // Half the time in each comparison with one and with two threads, and half of that in each order.
+            let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
+            let times = in_both_orders(|order| {
+                let pair =
+                    |threads| order.create(|| Ours::new(&case, envs, threads), || Bare::new(&case, envs, threads));
+                let ((mut ours1, mut bare1), (mut ours2, mut bare2)) = (pair(1)?, pair(2)?);
+                measure(plan, &mut [&mut ours1, &mut bare1, &mut ours2, &mut bare2])
+            })?;
             for (threads, side) in [(1, 0), (2, 2)] {
-                let rate = |side: usize| envs as f64 / times.per_step(side);
+                let rate = |side: usize| times.rate(side, envs);
                 rows.push(
                     Row::new("step", &name, "env-steps/s", threads, rate(side))
                         .against("bare loop", rate(side + 1), times.ratio(side, side + 1))
@@ -142,11 +144,11 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
                 );
             }
             scaling.push(
-                Row::new("scaling", &name, "speed-up", 2, times.median_of(|t| t[0] / t[2]))
+                Row::new("scaling", &name, "speed-up", 2, times.mean_of(|t| t[0] / t[2]))
                     .against(
                         "bare loop",
-                        times.median_of(|t| t[1] / t[3]),
-                        times.median_of(|t| (t[0] / t[2]) / (t[1] / t[3])),
+                        times.mean_of(|t| t[1] / t[3]),
+                        times.mean_of(|t| (t[0] / t[2]) / (t[1] / t[3])),
                     )
                     .wanted(WANTED),
             );

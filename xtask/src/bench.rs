@@ -12,6 +12,13 @@ const RESULTS: &str = "benches/RESULTS.md";
 /// Names a python that can `import mujoco` of the wheel's version; its loops are among the rivals.
 const PYTHON: &str = "KINETOSCOPE_PYTHON4";
 
+/// Rivals of the cameras in the same environment: what to import, and what to install for it. No other versions were tried.
+const CAMERAS: &[(&str, &[&str])] = &[
+    ("OpenGL", &["PyOpenGL==3.1.10"]),
+    ("mujoco_warp", &["mujoco-warp==4.0.0", "warp-lang==1.19.0"]),
+    ("pybullet", &["pybullet==3.2.7"]),
+];
+
 const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
 
 #[derive(Debug, clap::Args)]
@@ -28,6 +35,12 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
     let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
     let python = python_with_mujoco(repo);
+    if args.name.as_deref().is_none_or(|name| name == "camera") {
+        setup::try_to_have(Need::OsMesa);
+        if let Some(python) = &python {
+            install_cameras(python);
+        }
+    }
     for ready in both {
         let file = repo.target.join("bench-rows.json");
         if file.exists() {
@@ -82,17 +95,38 @@ fn python_with_mujoco(repo: &Repo) -> Option<PathBuf> {
     if is_ready() {
         return Some(python);
     }
-    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run().and_then(|()| {
-        Cmd::new(&python)
-            .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet"])
-            .arg(format!("mujoco=={}", wheel::VERSION))
-            .run()
-    });
+    let made = Cmd::new("python3")
+        .args(["-m", "venv", "--clear"])
+        .arg(&venv)
+        .run()
+        .and_then(|()| pip_install(&python, &[&format!("mujoco=={}", wheel::VERSION)]));
     if made.is_ok() && is_ready() {
         return Some(python);
     }
     eprintln!("note: no python with mujoco {} could be made: rivals in Python are left out", wheel::VERSION);
     None
+}
+
+/// Installs the rivals of the cameras that are not there yet; says which are not to be had.
+fn install_cameras(python: &Path) {
+    for (module, packages) in CAMERAS {
+        let has = || {
+            // Does not run the module: some talk, or compile, when they are imported.
+            let check = format!("import importlib.util as u, sys; sys.exit(u.find_spec('{module}') is None)");
+            Cmd::new(python).args(["-c", &check]).quiet().succeeds()
+        };
+        if !has() && (pip_install(python, packages).is_err() || !has()) {
+            eprintln!("note: {} could not be installed: that rival is left out", packages.join(" "));
+        }
+    }
+}
+
+/// Wheels only: to build PyBullet takes a compiler and half an hour.
+fn pip_install(python: &Path, packages: &[&str]) -> Outcome {
+    Cmd::new(python)
+        .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--only-binary=:all:"])
+        .args(packages)
+        .run()
 }
 
 /// One table per benchmark, in the order the rows came.

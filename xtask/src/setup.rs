@@ -86,6 +86,13 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     Ok(Ready { root: repo.root.clone(), choice })
 }
 
+/// Installs what newer distributions no longer have; says so where it is not to be had.
+pub(crate) fn try_to_have(need: Need) {
+    if let Err(failure) = install(&Machine::this(), &[need]) {
+        eprintln!("note: {}", failure.message);
+    }
+}
+
 /// Something the machine must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
@@ -95,6 +102,7 @@ pub(crate) enum Need {
     Models,
     Pip,
     Venv,
+    OsMesa,
 }
 
 impl Need {
@@ -106,6 +114,7 @@ impl Need {
             Self::Models => &["libmujoco-samples"],
             Self::Pip => &["python3-pip"],
             Self::Venv => &["python3-venv"],
+            Self::OsMesa => &["libosmesa6"],
         }
     }
 
@@ -120,6 +129,9 @@ impl Need {
             Self::Models => "the models that come with MuJoCo (humanoid.xml)",
             Self::Pip => "python3 with pip (MuJoCo 4 is downloaded with it)",
             Self::Venv => "python3 with venv (rivals in Python are installed with it)",
+            Self::OsMesa => {
+                "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
+            }
         }
     }
 }
@@ -158,6 +170,9 @@ impl Machine {
             }
             Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Need::Pip | Need::Venv => (self.python_has)(need),
+            Need::OsMesa => {
+                self.library_folders().iter().flat_map(|dir| entries(dir)).any(|file| is_osmesa(&file_name(&file)))
+            }
         }
     }
 
@@ -199,6 +214,11 @@ fn is_libclang(name: &str) -> bool {
     let Some(rest) = name.strip_prefix("libclang") else { return false };
     let version = rest.strip_prefix('-').unwrap_or(rest).trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
     rest.starts_with(".so") || rest.starts_with('-') && version.starts_with("so")
+}
+
+/// `libOSMesa.so.8`, `libOSMesa.so`.
+fn is_osmesa(name: &str) -> bool {
+    name.starts_with("libOSMesa.so")
 }
 
 fn entries(dir: &Path) -> Vec<PathBuf> {
@@ -350,6 +370,14 @@ mod tests {
         for name in ["libclang-cpp.so.14", "libclangAST.a", "libclang.a", "libmujoco.so"] {
             assert!(!is_libclang(name), "{name}");
         }
+    }
+
+    #[test]
+    fn osmesa_is_looked_for_where_libraries_are() {
+        assert!(!machine(&["usr/lib/libGL.so.1"]).1.has(Need::OsMesa));
+        let library = format!("usr/lib/{}-linux-gnu/libOSMesa.so.8", env::consts::ARCH);
+        assert!(machine(&[&library]).1.has(Need::OsMesa));
+        assert_eq!(packages(&[Need::OsMesa]), ["libosmesa6"]);
     }
 
     #[test]

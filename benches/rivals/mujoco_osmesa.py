@@ -1,0 +1,110 @@
+"""MuJoCo's own renderer on OSMesa (Mesa's software renderer): colour, depth and segmentation of every image.
+
+The looks: `plain` (shadows, reflections, fog and multisampling off, one pass for colour and one for depth and
+segmentation together, buffers of the image's size), `full` (the same with shadows and four samples per pixel;
+`shadow_size` replaces the size of the shadow map),
+`defaults` (`mujoco.Renderer` as its documentation shows it, three passes). See camera_job.py for the commands.
+"""
+
+import os
+import sys
+
+os.environ["MUJOCO_GL"] = "osmesa"
+
+import camera_job
+import mujoco
+import numpy as np
+
+Flag = mujoco.mjtRndFlag
+
+
+class Defaults:
+    """`mujoco.Renderer` with the model's own quality."""
+
+    def __init__(self, job):
+        model = job.mj_model
+        model.vis.global_.offwidth = max(model.vis.global_.offwidth, job.width)
+        model.vis.global_.offheight = max(model.vis.global_.offheight, job.height)
+        self.job = job
+        self.renderer = mujoco.Renderer(model, job.height, job.width)
+        self.option = option(job)
+
+    def draw(self, data):
+        renderer = self.renderer
+        renderer.update_scene(data, self.job.camera, self.option)
+        color = renderer.render()
+        renderer.enable_depth_rendering()
+        depth = renderer.render()
+        renderer.enable_segmentation_rendering()
+        segmentation = renderer.render()
+        renderer.disable_segmentation_rendering()
+        return color, depth, segmentation
+
+
+class Tuned:
+    """The same library with as few passes as there can be; `full` keeps shadows and multisampling on."""
+
+    def __init__(self, job, full):
+        model = job.mj_model
+        model.vis.global_.offwidth, model.vis.global_.offheight = job.width, job.height
+        model.vis.quality.offsamples = 4 if full else 0
+        if job.shadow_size:
+            model.vis.quality.shadowsize = job.shadow_size
+        self.job, self.option = job, option(job)
+        self.renderer = mujoco.Renderer(model, job.height, job.width)
+        scene = self.renderer.scene
+        for flag in (Flag.mjRND_REFLECTION, Flag.mjRND_SKYBOX, Flag.mjRND_FOG, Flag.mjRND_HAZE):
+            scene.flags[flag] = False
+        scene.flags[Flag.mjRND_SHADOW] = full
+        self.rect = mujoco.MjrRect(0, 0, job.width, job.height)
+        self.color = np.empty((job.height, job.width, 3), np.uint8)
+        self.ids = np.empty((job.height, job.width, 3), np.uint8)
+        self.depth = np.empty((job.height, job.width), np.float32)
+        near, far = (np.float32(z * model.stat.extent) for z in (model.vis.map.znear, model.vis.map.zfar))
+        # As in mujoco.Renderer: with a reversed depth buffer, distance = d / (buffer + c).
+        self.c = np.float32(0.5) * (far + near) / (far - near) - np.float32(0.5)
+        self.d = far * near / (far - near)
+
+    def draw(self, data):
+        renderer, scene = self.renderer, self.renderer.scene
+        context = renderer._mjr_context
+        renderer.update_scene(data, self.job.camera, self.option)
+        mujoco.mjr_render(self.rect, scene, context)
+        mujoco.mjr_readPixels(self.color, None, self.rect, context)
+        scene.flags[Flag.mjRND_SEGMENT] = scene.flags[Flag.mjRND_IDCOLOR] = True
+        mujoco.mjr_render(self.rect, scene, context)
+        mujoco.mjr_readPixels(self.ids, self.depth, self.rect, context)
+        scene.flags[Flag.mjRND_SEGMENT] = scene.flags[Flag.mjRND_IDCOLOR] = False
+        # All scenes here have fewer than 65535 geoms.
+        numbers = self.ids[:, :, 0].astype(np.uint16) | (self.ids[:, :, 1].astype(np.uint16) << 8)
+        # The bottom row is the first: a view costs nothing.
+        return self.color[::-1], (self.d / (self.depth + self.c))[::-1], numbers[::-1]
+
+
+def option(job):
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = [group in job.groups for group in range(len(option.geomgroup))]
+    option.sitegroup[:] = 0
+    return option
+
+
+def main():
+    job = camera_job.Job(sys.argv[1])
+    drawer = Defaults(job) if job.look == "defaults" else Tuned(job, job.look == "full")
+    datas = job.datas()
+    turn = 0
+
+    def step():
+        nonlocal turn
+        for _ in range(job.images):
+            data = datas[turn % job.envs]
+            turn += 1
+            for _ in range(job.physics):
+                mujoco.mj_step(job.mj_model, data)
+            drawer.draw(data)
+
+    camera_job.serve(job, lambda: job.restart(datas), step, lambda: drawer.draw(datas[0])[1])
+
+
+if __name__ == "__main__":
+    main()

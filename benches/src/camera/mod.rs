@@ -1,0 +1,263 @@
+//! Cameras on the CPU: our rasterizer against MuJoCo's own renderer on OSMesa, PyBullet's TinyRenderer and MuJoCo Warp's ray
+//! caster, all drawing the same geoms from the same camera. That is checked: every rival's depth image must be ours.
+//!
+//! Ours fills colour, depth, mask and normals; rivals fill colour, depth and segmentation (none has normals). Rivals that
+//! draw one image after the other draw a few environments per turn, in turn: rates are images per second of each side.
+//! OSMesa uses all cores, and is compared with ours on two threads; the others use one, and are compared with one thread.
+//!
+//! `plain` is without shadows and with one sample per pixel; of OSMesa it is the fastest that we could make it (see
+//! `rivals/mujoco_osmesa.py`). `full` is with shadows and four samples. Shadow maps are as large as each side makes them by
+//! default, 4096 texels wide in MuJoCo and at most 1024 in ours, so there is also a row with MuJoCo's made as small as ours.
+
+mod limit;
+mod scene;
+mod sides;
+
+use crate::interleave::{Plan, Side, Times, measure};
+use crate::rival::{can_run, python};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use limit::{Compute, Copying};
+use scene::{Scene, Scenes};
+use sides::{Look, Ours, Renderer, Rival, Work};
+use std::ffi::OsString;
+
+/// Steps between restarts: the scenes hardly move.
+const STEPS: u32 = 1_000_000;
+/// Environments of the batches, and of pictures that are large.
+const BATCH: usize = 64;
+const FEW: usize = 8;
+/// Physics steps per image, where there are any: a camera with 50 Hz and steps of 5 ms.
+const PHYSICS: u32 = 4;
+const VGA: [usize; 2] = [640, 480];
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let rivals = Rivals::new();
+    let scenes = Scenes::new()?;
+    let mut rows = Vec::new();
+    // All of this takes minutes: show results as they come.
+    let mut add = |new: Vec<Row>| {
+        for row in &new {
+            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.rival_name));
+            eprintln!("    {}: {:.1} {}{ratio}", row.case, row.ours, row.unit);
+        }
+        rows.extend(new);
+    };
+    if let Some(humanoid) = &scenes.humanoid {
+        for side in [64, 128] {
+            add(per_core(settings, &rivals, humanoid, [side, side], BATCH)?);
+        }
+        add(large(settings, &rivals, humanoid, [10.0, 50.0])?);
+    }
+    if let Some(vendor) = &scenes.vendor {
+        add(large(settings, &rivals, vendor, [10.0, 20.0])?);
+    }
+    add(stepping(settings, &rivals, &scenes.bundled)?);
+    if let Some(humanoid) = &scenes.humanoid {
+        add(scaling(settings, humanoid)?);
+    }
+    Ok(rows)
+}
+
+/// The rivals on this machine.
+struct Rivals {
+    python: Option<OsString>,
+    missing: Vec<Renderer>,
+}
+
+impl Rivals {
+    fn new() -> Self {
+        let python = python("rivals of the cameras");
+        let all = [Renderer::OsMesa, Renderer::Tiny, Renderer::Warp];
+        let missing =
+            python.iter().flat_map(|python| all.into_iter().filter(|r| !can_run(python, r.probe()))).collect();
+        for renderer in &missing {
+            let renderer: &Renderer = renderer;
+            eprintln!("  without {}: `{}` fails", renderer.name(), renderer.probe());
+        }
+        Self { python, missing }
+    }
+
+    fn start(&self, renderer: Renderer, scene: &Scene, work: &Work) -> Outcome<Option<Rival>> {
+        match &self.python {
+            Some(python) if !self.missing.contains(&renderer) => Rival::start(python, renderer, scene, work).map(Some),
+            _ => Ok(None),
+        }
+    }
+}
+
+/// Sides that take turns, and how many images each draws in a step.
+#[derive(Default)]
+struct Contest<'s> {
+    sides: Vec<(f64, Box<dyn Side + 's>)>,
+}
+
+impl<'s> Contest<'s> {
+    fn ours(&mut self, scene: &'s Scene, work: &Work, threads: usize) -> Outcome<usize> {
+        let ours = Ours::new(scene, work, threads)?;
+        self.sides.push((work.envs as f64, Box::new(ours)));
+        Ok(self.sides.len() - 1)
+    }
+
+    /// The rival, where it is on the machine; it must see what ours sees.
+    fn rival(&mut self, rivals: &Rivals, renderer: Renderer, scene: &'s Scene, work: &Work) -> Outcome<Option<usize>> {
+        let Some(mut rival) = rivals.start(renderer, scene, work)? else { return Ok(None) };
+        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1)?;
+        rival.must_see(&ours.depth()?, work.size)?;
+        let (ours, theirs) = (scene.triangles(), rival.triangles()?);
+        if ours != theirs {
+            return Err(format!("{} draws {theirs} triangles, ours {ours}", renderer.name()).into());
+        }
+        self.sides.push((renderer.images(work) as f64, Box::new(rival)));
+        Ok(Some(self.sides.len() - 1))
+    }
+
+    fn run(mut self, seconds: f64) -> Outcome<Rates> {
+        let mut sides: Vec<&mut dyn Side> = Vec::new();
+        for (_, side) in &mut self.sides {
+            sides.push(&mut **side);
+        }
+        let times = measure(Plan { seconds, restart_after: STEPS }, &mut sides)?;
+        Ok(Rates { times, images: self.sides.iter().map(|(images, _)| *images).collect() })
+    }
+}
+
+/// Results of a contest.
+struct Rates {
+    times: Times,
+    images: Vec<f64>,
+}
+
+impl Rates {
+    /// Images per second.
+    fn rate(&self, side: usize) -> f64 {
+        self.images[side] / self.times.per_step(side)
+    }
+
+    fn row(&self, case: String, threads: usize, ours: usize, rival: (Renderer, Option<usize>)) -> Row {
+        let row = Row::new("camera", case, "images/s", threads, self.rate(ours));
+        match rival {
+            (renderer, None) => row.without(renderer.name()),
+            (renderer, Some(rival)) => {
+                let ratio = self.times.ratio(ours, rival) * self.images[ours] / self.images[rival];
+                row.against(renderer.name(), self.rate(rival), ratio)
+            }
+        }
+    }
+}
+
+/// Large pictures: both looks, on two threads against OSMesa, on one against the others.
+fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) -> Outcome<Vec<Row>> {
+    let [width, height] = VGA;
+    let name = |look: &str| format!("{}, {width}x{height}, {look}", scene.name);
+    eprintln!("  {}, {width}x{height}: {} triangles", scene.name, scene.triangles());
+    let plain = Work { size: VGA, envs: FEW, physics: 0, look: Look::Plain, shadow_size: None };
+    let full = Work { look: Look::Full, ..plain };
+    let mut contest = Contest::default();
+    let ours = contest.ours(scene, &plain, 2)?;
+    let ours_full = contest.ours(scene, &full, 2)?;
+    let osmesa = contest.rival(rivals, Renderer::OsMesa, scene, &plain)?;
+    let osmesa_full = contest.rival(rivals, Renderer::OsMesa, scene, &full)?;
+    let shadows_as_ours = Work { shadow_size: Some(1024), ..full };
+    let osmesa_small = contest.rival(rivals, Renderer::OsMesa, scene, &shadows_as_ours)?;
+    let copying = contest.sides.len();
+    contest.sides.push((1.0, Box::new(Copying::new(2))));
+    let rates = contest.run(3.0 * settings.seconds)?;
+    let against = |look: &str, ours, rival| rates.row(name(look), 2, ours, (Renderer::OsMesa, rival));
+    let mut rows = vec![
+        against("plain", ours, osmesa).wanted(wanted[0]),
+        against("full", ours_full, osmesa_full).wanted(wanted[1]),
+        against("full, shadow maps of 1024", ours_full, osmesa_small),
+    ];
+    for (look, side) in [("plain", ours), ("full", ours_full)] {
+        // Colour, depth and mask have 4 bytes each, a normal 12.
+        let seconds = (width * height * 24) as f64 * rates.times.per_step(copying) / Copying::BYTES as f64;
+        let distance = rates.times.median_of(|t| t[side] / rates.images[side]) / seconds;
+        rows.push(Row::new("camera", name(look), "x of bandwidth limit", 2, distance).against(
+            "copy loop",
+            1.0,
+            1.0 / distance,
+        ));
+    }
+    rows.extend(per_core(settings, rivals, scene, VGA, FEW)?);
+    Ok(rows)
+}
+
+/// Environments that are stepped and drawn, with the whole machine.
+fn stepping(settings: &Settings, rivals: &Rivals, scene: &Scene) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for side in [64, 128, 256] {
+        let name = |look: &str| format!("{}, {BATCH} envs, {PHYSICS} steps + {side}x{side}, {look}", scene.name);
+        eprintln!("  {}", name("plain and full"));
+        let plain = Work { size: [side, side], envs: BATCH, physics: PHYSICS, look: Look::Plain, shadow_size: None };
+        let full = Work { look: Look::Full, ..plain };
+        let mut contest = Contest::default();
+        let ours = contest.ours(scene, &plain, 2)?;
+        let ours_full = contest.ours(scene, &full, 2)?;
+        if side != 128 {
+            let rates = contest.run(0.5 * settings.seconds)?;
+            for (look, ours) in [("plain", ours), ("full", ours_full)] {
+                rows.push(Row::new("camera", name(look), "images/s", 2, rates.rate(ours)));
+            }
+            continue;
+        }
+        let osmesa = contest.rival(rivals, Renderer::OsMesa, scene, &plain)?;
+        let osmesa_defaults =
+            contest.rival(rivals, Renderer::OsMesa, scene, &Work { look: Look::Defaults, ..plain })?;
+        let rates = contest.run(2.0 * settings.seconds)?;
+        rows.push(rates.row(name("plain"), 2, ours, (Renderer::OsMesa, osmesa)).wanted(10.0));
+        let defaults =
+            rates.row(name("full, rival at its defaults"), 2, ours_full, (Renderer::OsMesa, osmesa_defaults));
+        rows.push(defaults.wanted(50.0));
+    }
+    Ok(rows)
+}
+
+/// One thread against the rivals that have one.
+fn per_core(settings: &Settings, rivals: &Rivals, scene: &Scene, size: [usize; 2], envs: usize) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for look in [Look::Plain, Look::Full] {
+        let name = format!("{}, {envs} x {}x{}, {}", scene.name, size[0], size[1], look.name());
+        eprintln!("  {name}, one core");
+        let work = Work { size, envs, physics: 0, look, shadow_size: None };
+        let mut contest = Contest::default();
+        let ours = contest.ours(scene, &work, 1)?;
+        let warp = contest.rival(rivals, Renderer::Warp, scene, &work)?;
+        // It has no multisampling.
+        let has_tiny = look == Look::Plain;
+        let tiny = if has_tiny { contest.rival(rivals, Renderer::Tiny, scene, &work)? } else { None };
+        let rates = contest.run(settings.seconds)?;
+        let row = rates.row(name.clone(), 1, ours, (Renderer::Warp, warp));
+        // What we want to reach is about batches of small pictures.
+        rows.push(if has_tiny && envs == BATCH { row.wanted(5.0) } else { row });
+        if has_tiny {
+            rows.push(rates.row(name, 1, ours, (Renderer::Tiny, tiny)));
+        }
+    }
+    Ok(rows)
+}
+
+/// Two threads against one, and how a loop that only computes does on this machine.
+fn scaling(settings: &Settings, scene: &Scene) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for (size, envs) in [(VGA, FEW), ([128, 128], BATCH)] {
+        for look in [Look::Plain, Look::Full] {
+            let work = Work { size, envs, physics: 0, look, shadow_size: None };
+            let mut contest = Contest::default();
+            contest.ours(scene, &work, 1)?;
+            contest.ours(scene, &work, 2)?;
+            for threads in [1, 2] {
+                contest.sides.push((1.0, Box::new(Compute::new(threads))));
+            }
+            let times = contest.run(settings.seconds)?.times;
+            let name = format!("{}, {envs} x {}x{}, {}", scene.name, size[0], size[1], look.name());
+            let [ours, bare] = [times.median_of(|t| t[0] / t[1]), times.median_of(|t| t[2] / t[3])];
+            let ratio = times.median_of(|t| (t[0] / t[1]) / (t[2] / t[3]));
+            // 1.8 times as fast where computing alone is 1.9 times as fast.
+            rows.push(
+                Row::new("camera", name, "speed-up", 2, ours).against("compute loop", bare, ratio).wanted(1.8 / 1.9),
+            );
+        }
+    }
+    Ok(rows)
+}

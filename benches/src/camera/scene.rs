@@ -1,0 +1,142 @@
+//! What is drawn: MuJoCo's humanoid, the vendor's arm with its 160 000 triangles, and the bundled arm, each as an MJCF file
+//! that ours and the rivals compile.
+
+use crate::Outcome;
+use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
+use crate::startup::robots;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Shape;
+use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::mj::{self, Model, TARGET, Target};
+use kinetoscope::sim::visible::Visible;
+use std::path::{Path, PathBuf};
+
+/// Geom groups that are drawn: not those of collision shapes.
+pub(super) const GROUPS: [u8; 3] = [0, 1, 2];
+/// Vertical field of view \[deg\].
+const FOVY: f32 = 45.0;
+/// States to draw that differ from each other.
+const STATES: usize = 64;
+
+/// A model, what can be seen of it, and a camera.
+pub(super) struct Scene {
+    /// Name in the results.
+    pub(super) name: &'static str,
+    /// The MJCF with the camera `bench`.
+    pub(super) file: PathBuf,
+    pub(super) model: Model,
+    pub(super) visible: Visible,
+    /// Joint positions to draw; environment `i` has one of them.
+    states: Vec<Vec<f64>>,
+    eye: [f32; 3],
+    target: [f32; 3],
+    /// Where the file is.
+    _folder: tempfile::TempDir,
+}
+
+/// Those that the machine has files for.
+pub(super) struct Scenes {
+    pub(super) humanoid: Option<Scene>,
+    pub(super) vendor: Option<Scene>,
+    pub(super) bundled: Scene,
+}
+
+impl Scenes {
+    pub(super) fn new() -> Outcome<Self> {
+        let humanoid = match Case::humanoid()? {
+            None => None,
+            Some(case) => {
+                let states = (0..STATES).map(|i| case.state(i).qpos.clone()).collect();
+                let text = std::fs::read_to_string(HUMANOID)?;
+                Some(Scene::new("humanoid", &text, tempfile::tempdir()?, states, [2.5, -2.5, 1.8], [0.0, 0.0, 0.9])?)
+            }
+        };
+        let vendor = robots().map(|dir| dir.join("rokae_description/urdf/SR5.urdf")).filter(|file| file.exists());
+        if vendor.is_none() {
+            eprintln!("  skipped: no vendor robots; set KINETOSCOPE_ROBOTS to their folder");
+        }
+        let vendor = match vendor {
+            None => None,
+            Some(file) => Some(Scene::exported("vendor SR5", &arm_with_hand(&file, "joint[1-6]", 1, 1)?.0)?),
+        };
+        Ok(Self { humanoid, vendor, bundled: Scene::exported("SR5 + hand", &sr5(1, 1)?.0)? })
+    }
+}
+
+impl Scene {
+    fn new(
+        name: &'static str,
+        mjcf: &str,
+        folder: tempfile::TempDir,
+        states: Vec<Vec<f64>>,
+        eye: [f32; 3],
+        target: [f32; 3],
+    ) -> Outcome<Self> {
+        let view = View::look_at([1, 1], FOVY.to_radians(), eye, target, [0.0, 0.0, 1.0])?;
+        let file = folder.path().join("scene.xml");
+        std::fs::write(&file, with_camera(mjcf, &view)?)?;
+        let model = compile(&file)?;
+        let visible = Visible::of_model(&model);
+        for left_out in visible.left_out() {
+            eprintln!("  {name}: {left_out}");
+        }
+        Ok(Self { name, file, model, visible, states, eye, target, _folder: folder })
+    }
+
+    /// A robot as it is exported for other programs, its arm bent, a little differently in every state.
+    fn exported(name: &'static str, sim: &SimulationManager) -> Outcome<Self> {
+        let folder = tempfile::tempdir()?;
+        sim.dump(folder.path())?;
+        let file = match TARGET {
+            Target::V4 => "robot.mjcf4.xml",
+            Target::V2 => "robot.mjcf2.xml",
+        };
+        let mjcf = std::fs::read_to_string(folder.path().join(file))?;
+        let (bent, nq) = ([0.0, 0.5, 1.5, 0.3, 0.5, 0.0], sim.batch().model().nq());
+        let state = |i: usize| {
+            let sway = |k: usize| 0.15 * (1.3 * k as f64 + 0.7 * i as f64).sin();
+            (0..nq).map(|k| bent.get(k).map_or(0.0, |q| q + sway(k))).collect()
+        };
+        Self::new(name, &mjcf, folder, (0..STATES).map(state).collect(), [1.5, -1.1, 1.1], [0.1, 0.0, 0.5])
+    }
+
+    /// The joint positions of environment `index`.
+    pub(super) fn state(&self, index: usize) -> &[f64] {
+        &self.states[index % self.states.len()]
+    }
+
+    /// The camera with pictures of this size.
+    pub(super) fn view(&self, size: [usize; 2]) -> Outcome<View> {
+        Ok(View::look_at(size, FOVY.to_radians(), self.eye, self.target, [0.0, 0.0, 1.0])?)
+    }
+
+    /// Triangles of the meshes that are drawn.
+    pub(super) fn triangles(&self) -> usize {
+        let drawn = self.visible.scene().instances().iter().filter(|i| i.visible && GROUPS.contains(&i.group));
+        drawn
+            .filter_map(|i| if let Shape::Mesh(shape) = &i.shape { Some(shape.mesh.triangles().len()) } else { None })
+            .sum()
+    }
+}
+
+fn compile(file: &Path) -> Outcome<Model> {
+    let mut compiled = mj::compile_file(file)?;
+    compiled.prepare_for_stepping(false);
+    Ok(compiled.into_model())
+}
+
+/// The MJCF with the camera in its world.
+fn with_camera(mjcf: &str, view: &View) -> Outcome<String> {
+    let end = mjcf.rfind("</worldbody>").ok_or("an MJCF without a world")?;
+    let pose = &view.world_from_camera;
+    // MuJoCo's cameras look along -z, with y up.
+    let column = |j: usize, sign: f32| pose.rotation.map(|row| sign * row[j]);
+    let words = |numbers: &[f32]| numbers.iter().map(f32::to_string).collect::<Vec<_>>().join(" ");
+    Ok(format!(
+        "{}<camera name=\"bench\" pos=\"{}\" xyaxes=\"{}\" fovy=\"{FOVY}\"/>\n{}",
+        &mjcf[..end],
+        words(&pose.translation),
+        words(&[column(0, 1.0), column(1, -1.0)].concat()),
+        &mjcf[end..],
+    ))
+}

@@ -1,0 +1,264 @@
+//! Those that draw: our rasterizer in this process, rivals in others.
+
+use super::scene::{GROUPS, Scene};
+use crate::Outcome;
+use crate::interleave::Side;
+use crate::rival::Process;
+use kinetoscope::scene::{Light, PoseF32};
+use kinetoscope::sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
+use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::drive::table::DriveTable;
+use serde_json::json;
+use std::ffi::OsString;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How things look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// No shadows, one sample per pixel.
+    Plain,
+    /// Shadows, four samples per pixel.
+    Full,
+    /// As the rival draws when nobody tells it how; as `Full` in ours.
+    Defaults,
+}
+
+impl Look {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Full => "full",
+            Self::Defaults => "defaults",
+        }
+    }
+}
+
+/// What every side does in a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work {
+    pub(super) size: [usize; 2],
+    pub(super) envs: usize,
+    /// Physics steps before an image.
+    pub(super) physics: u32,
+    pub(super) look: Look,
+    /// Side of the rival's shadow maps [texels]; `None` is its own choice.
+    pub(super) shadow_size: Option<u32>,
+}
+
+/// Ours: environments, and a frame for each.
+pub(super) struct Ours<'s> {
+    scene: &'s Scene,
+    batch: Batch,
+    rasterizer: ParallelRasterizer,
+    view: View,
+    physics: u32,
+    poses: Vec<PoseF32>,
+    lights: Vec<Light>,
+    frames: Vec<Frame>,
+}
+
+impl<'s> Ours<'s> {
+    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize) -> Outcome<Self> {
+        let full = work.look != Look::Plain;
+        let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
+        let cfg = RasterCfg { samples: if full { 4 } else { 1 }, shadows: full, shadow_size: 0, groups };
+        let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
+        let [width, height] = work.size;
+        let seen = scene.visible.scene();
+        let mut ours = Self {
+            scene,
+            batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads)?,
+            rasterizer: ParallelRasterizer::new(cfg, threads),
+            view: scene.view(work.size)?,
+            physics: work.physics,
+            poses: vec![PoseF32::IDENTITY; work.envs * seen.instances().len()],
+            lights: (0..work.envs).flat_map(|_| seen.lights.clone()).collect(),
+            frames: vec![Frame::new(width, height, channels); work.envs],
+        };
+        ours.restart()?;
+        Ok(ours)
+    }
+
+    fn draw(&mut self) -> Outcome<()> {
+        let Self { scene, batch, rasterizer, view, poses, lights, frames, .. } = self;
+        let seen = scene.visible.scene();
+        let (things, lamps) = (seen.instances().len(), seen.lights.len());
+        batch.for_each(|i, env| {
+            let lights = &mut lights[i * lamps..(i + 1) * lamps];
+            scene.visible.read(env.data(), &mut poses[i * things..(i + 1) * things], lights);
+        });
+        let shot = |i: usize| Shot {
+            scene: seen,
+            poses: &poses[i * things..(i + 1) * things],
+            view,
+            lights: Some(&lights[i * lamps..(i + 1) * lamps]),
+        };
+        let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
+        rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())
+    }
+
+    /// The depth image of the first environment at its start.
+    pub(super) fn depth(&mut self) -> Outcome<Vec<f32>> {
+        self.restart()?;
+        self.draw()?;
+        self.frames.first().and_then(|frame| frame.depth.clone()).ok_or_else(|| "no depth image".into())
+    }
+}
+
+impl Side for Ours<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        for i in 0..self.batch.num_envs() {
+            let state = self.scene.state(i);
+            self.batch.write(i, |env| env.reset(|data, _| data.qpos_mut().copy_from_slice(state)));
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            if self.physics > 0 {
+                self.batch.step(self.physics);
+            }
+            self.draw()?;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+/// Who else draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Renderer {
+    OsMesa,
+    Tiny,
+    Warp,
+}
+
+impl Renderer {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::OsMesa => "MuJoCo on OSMesa",
+            Self::Tiny => "PyBullet TinyRenderer",
+            Self::Warp => "MuJoCo Warp on the CPU",
+        }
+    }
+
+    fn script(self) -> &'static str {
+        match self {
+            Self::OsMesa => "mujoco_osmesa.py",
+            Self::Tiny => "pybullet_tiny.py",
+            Self::Warp => "warp_rays.py",
+        }
+    }
+
+    /// What python must be able to run.
+    pub(super) fn probe(self) -> &'static str {
+        match self {
+            Self::OsMesa => "import os; os.environ['MUJOCO_GL'] = 'osmesa'; import mujoco; mujoco.GLContext(8, 8)",
+            Self::Tiny => "import mujoco, pybullet",
+            Self::Warp => "import mujoco_warp",
+        }
+    }
+
+    /// Images that it draws in a step: a whole batch, or as many as take a fraction of a second.
+    pub(super) fn images(self, work: &Work) -> usize {
+        match self {
+            Self::Warp => work.envs,
+            Self::OsMesa if work.look != Look::Plain => 1,
+            Self::OsMesa => 4.min(work.envs),
+            Self::Tiny => work.envs.min(4_000_000_usize.div_ceil(work.size[0] * work.size[1] * 8)),
+        }
+    }
+}
+
+/// A rival's process.
+pub(super) struct Rival {
+    name: &'static str,
+    process: Process,
+}
+
+impl Rival {
+    pub(super) fn start(python: &OsString, renderer: Renderer, scene: &Scene, work: &Work) -> Outcome<Self> {
+        let starts: Vec<&[f64]> = (0..work.envs).map(|i| scene.state(i)).collect();
+        let job = json!({
+            "model": scene.file,
+            "size": work.size,
+            "groups": GROUPS,
+            "envs": work.envs,
+            "starts": starts,
+            "images": renderer.images(work),
+            "physics": work.physics,
+            "look": work.look.name(),
+            "shadow_size": work.shadow_size,
+        });
+        let process = Process::start(python, renderer.script(), &job, tempfile::tempdir()?)?;
+        Ok(Self { name: renderer.name(), process })
+    }
+
+    /// Triangles of the meshes that it draws.
+    pub(super) fn triangles(&mut self) -> Outcome<usize> {
+        Ok(self.process.ask("triangles")?.parse()?)
+    }
+
+    /// Its depth image must be this one: the same camera, the same things in the same places.
+    pub(super) fn must_see(&mut self, ours: &[f32], size: [usize; 2]) -> Outcome<()> {
+        let bytes = self.process.bytes("depth")?;
+        let theirs: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect();
+        let share = agreement(ours, &theirs, size);
+        if theirs.len() == size[0] * size[1] && share > SAME {
+            return Ok(());
+        }
+        Err(format!("{} sees something else: {:.1} % of the depths agree", self.name, 100.0 * share).into())
+    }
+}
+
+/// Share of the pixels that must agree.
+const SAME: f64 = 0.97;
+/// What is farther is background, whatever a renderer calls that \[m\].
+const FAR: f32 = 20.0;
+
+/// Share of pixels whose depth is, within 2 %, between the depths around that pixel in the other picture: where pixels
+/// have their centres is not the same everywhere.
+fn agreement(ours: &[f32], theirs: &[f32], [width, height]: [usize; 2]) -> f64 {
+    // Ray casters have 0 where rays hit nothing.
+    let far = |x: f32| if x > 0.0 && x < FAR { x } else { FAR };
+    let around = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
+    let agrees = |(index, &depth): (usize, &f32)| {
+        let (x, y) = (index % width, index / width);
+        let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
+        for neighbor in around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x)) {
+            let depth = far(ours.get(neighbor).copied().unwrap_or(0.0));
+            (least, most) = (least.min(depth), most.max(depth));
+        }
+        (0.98 * least..=1.02 * most).contains(&far(depth))
+    };
+    theirs.iter().enumerate().filter(|pixel| agrees(*pixel)).count() as f64 / (width * height) as f64
+}
+
+impl Side for Rival {
+    fn restart(&mut self) -> Outcome<()> {
+        self.process.ask("restart").map(drop)
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        self.process.block(steps)
+    }
+
+    fn process(&self) -> Option<u32> {
+        Some(self.process.id())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_agree_up_to_a_pixel_and_to_how_background_is_written() {
+        let ours = [1.0, 1.0, 2.0, 2.0, 3.0, f32::INFINITY];
+        assert_eq!(agreement(&ours, &[1.01, 1.0, 1.0, 3.0, 0.0, 99.0], [6, 1]), 1.0);
+        assert_eq!(agreement(&ours, &[2.0, 1.0, 2.0, 1.0, 1.0, 99.0], [6, 1]), 0.5);
+    }
+}

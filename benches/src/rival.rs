@@ -1,0 +1,98 @@
+//! A rival in Python: a process that is told what to do over pipes (see `rivals/*.py`), one line each way.
+
+use crate::Outcome;
+use kinetoscope::sim::mj::{TARGET, Target};
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Duration;
+
+/// Names a python that can import mujoco 4; `cargo xtask bench` sets it.
+const PYTHON: &str = "KINETOSCOPE_PYTHON4";
+
+/// The python that runs rivals; `None`, with a message, where there is none or where this build is for another MuJoCo than
+/// theirs.
+pub(crate) fn python(rivals: &str) -> Option<OsString> {
+    if TARGET != Target::V4 {
+        eprintln!("  without {rivals}: the rivals have MuJoCo 4, and this build is for 2.2.2");
+        return None;
+    }
+    let python = std::env::var_os(PYTHON);
+    if python.is_none() {
+        eprintln!("  without {rivals}: {PYTHON} does not name a python that can import mujoco 4");
+    }
+    python
+}
+
+/// Whether `python` runs this line.
+pub(crate) fn can_run(python: &OsString, line: &str) -> bool {
+    let mut command = Command::new(python);
+    command.args(["-c", line]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+/// A script that runs until it is dropped.
+#[derive(Debug)]
+pub(crate) struct Process {
+    script: &'static str,
+    process: Child,
+    /// Open until the process is to end.
+    commands: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+    _job: tempfile::TempDir,
+}
+
+impl Process {
+    /// Starts a script of `rivals/` with a job, which may name files in `folder`.
+    pub(crate) fn start(
+        python: &OsString,
+        script: &'static str,
+        job: &serde_json::Value,
+        folder: tempfile::TempDir,
+    ) -> Outcome<Self> {
+        let file = folder.path().join("job.json");
+        std::fs::write(&file, job.to_string())?;
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("rivals").join(script);
+        let mut process =
+            Command::new(python).arg(path).arg(file).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let commands = process.stdin.take();
+        let answers = BufReader::new(process.stdout.take().ok_or("the rival has no standard output")?);
+        Ok(Self { script, process, commands, answers, _job: folder })
+    }
+
+    /// Sends a line and waits for the answer.
+    pub(crate) fn ask(&mut self, command: &str) -> Outcome<String> {
+        let commands = self.commands.as_mut().ok_or("the rival has ended")?;
+        writeln!(commands, "{command}")?;
+        commands.flush()?;
+        let mut line = String::new();
+        self.answers.read_line(&mut line)?;
+        if line.is_empty() { Err(format!("{} ended early", self.script).into()) } else { Ok(line.trim().into()) }
+    }
+
+    /// The command `block`: the time that these steps took.
+    pub(crate) fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        Ok(Duration::from_secs_f64(self.ask(&format!("block {steps}"))?.parse()?))
+    }
+
+    /// A command that is answered with bytes.
+    pub(crate) fn bytes(&mut self, command: &str) -> Outcome<Vec<u8>> {
+        let hex = self.ask(command)?;
+        let byte = |i: usize| u8::from_str_radix(hex.get(i..i + 2).unwrap_or(""), 16);
+        Ok((0..hex.len()).step_by(2).map(byte).collect::<Result<_, _>>()?)
+    }
+
+    /// Number of the process.
+    pub(crate) fn id(&self) -> u32 {
+        self.process.id()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // The end of its input ends the process.
+        self.commands = None;
+        let _ = self.process.wait();
+    }
+}
