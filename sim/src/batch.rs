@@ -4,7 +4,7 @@
 //! mostly stays in the cache of one core, and then helps with what is left of the other shares. Which thread steps an
 //! environment decides nothing, since environments share only the immutable model.
 
-use crate::drive::table::DriveTable;
+use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
 use crate::mj::{EngineError, Model};
 use std::ops::Range;
@@ -117,10 +117,13 @@ impl Batch {
         // Several chunks per thread even out environments that take longer. Threads wait for the last chunk of a step: more
         // than 4 environments in one gain nothing.
         let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
+        let drives = DriveState::new(drives, model);
         let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
         for first in (0..num_envs).step_by(chunk_size) {
             let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
-                .map(|index| Env::new(model, drives).map_err(|error| BatchError::Environment { index, error }))
+                .map(|index| {
+                    Env::with_drives(model, drives.clone()).map_err(|error| BatchError::Environment { index, error })
+                })
                 .collect();
             chunks.push(Mutex::new(Chunk { envs: chunk?, read: Vec::new() }));
         }
@@ -189,18 +192,31 @@ impl Batch {
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
         }
-        let job: Job = Arc::new(move |_, chunk: &mut Chunk| {
-            chunk.read.clear();
-            for env in &mut chunk.envs {
-                env.step(count);
-                for (values, width) in read(env).into_iter().zip(widths) {
-                    assert!(
-                        values.len() == width,
-                        "{} numbers from one environment, {width} from another",
-                        values.len()
-                    );
-                    chunk.read.extend_from_slice(values);
+        let step = move |env: &mut Env, take: &mut dyn FnMut(usize, &[f64])| {
+            env.step(count);
+            for (k, (values, width)) in read(env).into_iter().zip(widths).enumerate() {
+                assert!(values.len() == width, "{} numbers from one environment, {width} from another", values.len());
+                take(k, values);
+            }
+        };
+        if self.workers.is_empty() {
+            // No other thread: straight to where the numbers go.
+            let mut index = 0;
+            for chunk in &self.shared.chunks {
+                for env in &mut lock(chunk).envs {
+                    step(env, &mut |k, values| {
+                        outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
+                    });
+                    index += 1;
                 }
+            }
+            return;
+        }
+        let job: Job = Arc::new(move |_, chunk: &mut Chunk| {
+            let Chunk { envs, read } = chunk;
+            read.clear();
+            for env in envs {
+                step(env, &mut |_, values| read.extend_from_slice(values));
             }
         });
         self.run_chunks(&job);

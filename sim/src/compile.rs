@@ -411,7 +411,7 @@ impl Simulation {
                     env.drives.copy_from(&targets, from, to);
                 }
                 for &(from, to) in &dofs {
-                    env.drives.applied[to] = targets.applied[from];
+                    env.drives.copy_applied_from(&targets, from, to);
                 }
                 env.write(|data| {
                     for &(from, to) in &qpos {

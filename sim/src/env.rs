@@ -5,9 +5,13 @@
 //! done again, from the state before it, with doubled buffers: the result is what large buffers would have given from the
 //! beginning. A step that ends in a state that is not finite is undone, and the environment stands still until it is
 //! reset.
+//!
+//! When its turn comes, an environment is no longer in the core's own cache: every line of memory that a step touches
+//! beside MuJoCo's is waited for. What a step needs for itself is therefore in memory of the thread, and what it seldom
+//! needs is apart from what it always needs.
 
 use crate::drive::table::{DriveState, DriveTable};
-use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, Warning, WarningCounts};
+use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts};
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -55,13 +59,19 @@ pub struct Env {
     data: Data,
     /// Targets, gains and efforts of the drives.
     pub drives: DriveState,
-    status: EnvStatus,
     steps: u64,
+    /// Why the environment stands still, while it does.
+    diverged: Option<Box<EnvStatus>>,
+    /// The rest of the present state is in `data`.
+    raw_quats: RawQuats,
+    seldom: Box<Seldom>,
+}
+
+/// What a good step does not touch.
+#[derive(Debug, Default)]
+struct Seldom {
     warnings: WarningCounts,
     growths: u32,
-    /// The present state as it was before its forward pass, to go back to. The pass of 2.2.2 normalises quaternions in
-    /// place, and a second one would change their last bits.
-    state: Motion,
     /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
     inputs: Inputs,
 }
@@ -72,20 +82,21 @@ impl Env {
     /// # Errors
     /// MuJoCo cannot allocate it.
     pub fn new(model: &Model, drives: &Arc<DriveTable>) -> Result<Self, EngineError> {
-        let data = Data::new(model)?;
-        let drives = DriveState::new(drives, model);
+        Self::with_drives(model, DriveState::new(drives, model))
+    }
+
+    /// As [`new`](Self::new), with drives that share with others what no environment has changed.
+    pub(crate) fn with_drives(model: &Model, drives: DriveState) -> Result<Self, EngineError> {
         let mut env = Self {
-            data,
+            data: Data::new(model)?,
             drives,
-            status: EnvStatus::Running,
             steps: 0,
-            warnings: WarningCounts::default(),
-            growths: 0,
-            state: Motion::default(),
-            inputs: Inputs::default(),
+            diverged: None,
+            raw_quats: RawQuats::new(model),
+            seldom: Box::default(),
         };
         let initial = env.saved();
-        env.refresh(initial);
+        env.refresh(&initial);
         Ok(env)
     }
 
@@ -98,52 +109,71 @@ impl Env {
     /// is not finite is not kept: the environment diverges, in the state before the write. `qfrc_applied` and the
     /// controls of drives are not inputs here: [`DriveState`] sets them in every step.
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
-        self.state.restore(&mut self.data);
+        // To be normalised once, not twice, where `change` leaves them alone.
+        self.raw_quats.restore(&mut self.data);
         let good = self.saved();
         change(&mut self.data);
-        self.refresh(good);
+        self.refresh(&good);
     }
 
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.data.reset();
         self.data.take_warnings();
-        let table = Arc::clone(self.drives.table());
-        let gains = std::mem::take(&mut self.drives.gains);
-        self.drives = DriveState::new(&table, self.data.model());
-        self.drives.gains = gains;
-        self.status = EnvStatus::Running;
+        self.drives.reset();
+        self.diverged = None;
         self.steps = 0;
         let initial = self.saved();
         change(&mut self.data, &mut self.drives);
-        self.refresh(initial);
+        self.refresh(&initial);
     }
 
+    /// The state that is in `data`.
     fn saved(&self) -> Motion {
         let mut motion = Motion::default();
         motion.save(&self.data);
         motion
     }
 
+    /// The present state as it was before its forward pass, to go back to.
+    fn save_present(&self, state: &mut Motion) {
+        state.save(&self.data);
+        state.undo_normalization(&self.raw_quats);
+    }
+
+    /// Goes to a state; its forward pass is left to do.
+    fn go_to(&mut self, state: &Motion) {
+        self.seldom.inputs.restore(&mut self.data);
+        state.restore(&mut self.data);
+        self.raw_quats.save(&self.data);
+    }
+
     /// Takes over what happened to `other`, whose state this one was given: steps, warnings, divergence.
     pub(crate) fn take_history(&mut self, other: &History) {
         self.steps = other.steps;
-        self.warnings.add(&other.warnings);
-        self.growths += other.growths;
-        if self.status == EnvStatus::Running {
-            self.status = other.status.clone();
+        self.seldom.warnings.add(&other.warnings);
+        self.seldom.growths += other.growths;
+        if self.diverged.is_none() {
+            self.diverged.clone_from(&other.diverged);
         }
     }
 
     /// What happened since the environment was made.
     pub(crate) fn history(&self) -> History {
-        History { status: self.status.clone(), steps: self.steps, warnings: self.warnings, growths: self.growths }
+        History {
+            diverged: self.diverged.clone(),
+            steps: self.steps,
+            warnings: self.seldom.warnings,
+            growths: self.seldom.growths,
+        }
     }
 
     /// Positions, velocities and warm start, to carry over to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
+        let mut state = Motion::default();
+        self.save_present(&mut state);
         SavedArrays {
-            qpos: self.state.qpos(self.data.model()).to_vec(),
+            qpos: state.qpos(self.data.model()).to_vec(),
             qvel: self.data.qvel().to_vec(),
             warmstart: self.data.qacc_warmstart().to_vec(),
         }
@@ -151,7 +181,7 @@ impl Env {
 
     /// Running or diverged.
     pub fn status(&self) -> &EnvStatus {
-        &self.status
+        self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
     }
 
     /// Steps done since the last reset.
@@ -161,18 +191,18 @@ impl Env {
 
     /// MuJoCo's warnings since the environment was made; an overflow that was redone is not among them.
     pub fn warnings(&self) -> &WarningCounts {
-        &self.warnings
+        &self.seldom.warnings
     }
 
     /// How often the buffers were doubled.
     pub fn growths(&self) -> u32 {
-        self.growths
+        self.seldom.growths
     }
 
     /// Does `count` steps; a diverged environment stands still.
     pub fn step(&mut self, count: u32) {
         for _ in 0..count {
-            if self.status != EnvStatus::Running {
+            if self.diverged.is_some() {
                 return;
             }
             self.step_once();
@@ -180,40 +210,41 @@ impl Env {
     }
 
     fn step_once(&mut self) {
-        let mut end = END.take();
-        self.step_to(&mut end);
-        END.set(end);
+        let mut scratch = SCRATCH.take();
+        self.step_with(&mut scratch);
+        SCRATCH.set(scratch);
     }
 
-    fn step_to(&mut self, end: &mut End) {
+    fn step_with(&mut self, scratch: &mut Scratch) {
+        let Scratch { before, efforts } = scratch;
+        self.save_present(before);
         loop {
-            let done = self.attempt(end);
+            let done = self.attempt(efforts);
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
-                    // Nearly always there are none, and then this memory need not come into the cache.
                     if raised != WarningCounts::default() {
-                        self.warnings.add(&raised);
+                        self.seldom.warnings.add(&raised);
                     }
-                    self.state.copy_from(&end.state);
-                    self.drives.effort.clone_from(&end.efforts);
+                    self.drives.effort.copy_from_slice(efforts);
                     self.steps += 1;
                     return;
                 }
                 Verdict::NeedsRoom(what) => {
-                    if let Err(reason) = self.grow(what) {
-                        return self.quarantine(reason);
+                    if let Err(reason) = self.grow(what, before) {
+                        return self.quarantine(reason, before);
                     }
                 }
                 Verdict::Bad(reason) => {
-                    self.warnings.add(&raised);
-                    return self.quarantine(reason);
+                    self.seldom.warnings.add(&raised);
+                    return self.quarantine(reason, before);
                 }
             }
         }
     }
 
-    fn attempt(&mut self, end: &mut End) -> Result<(), EngineError> {
+    /// One step, with the efforts the drives gave in it.
+    fn attempt(&mut self, efforts: &mut Vec<f64>) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
         if self.data.model().integrator() == mj::mjINT_RK4 {
             // mj_step2 would integrate with Euler, whatever the model says.
@@ -222,42 +253,41 @@ impl Env {
             self.data.step2()?;
         }
         // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
-        self.drives.read_efforts(&self.data, &mut end.efforts);
-        end.state.save(&self.data);
+        self.drives.read_efforts(&self.data, efforts);
+        self.raw_quats.save(&self.data);
         self.data.step1()
     }
 
     /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
-    fn refresh(&mut self, good: Motion) {
-        self.state.save(&self.data);
-        self.inputs.save(&self.data);
+    fn refresh(&mut self, good: &Motion) {
+        let state = self.saved();
+        self.raw_quats.save(&self.data);
+        self.seldom.inputs.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
-                    self.warnings.add(&raised);
+                    self.seldom.warnings.add(&raised);
                     return;
                 }
                 Verdict::NeedsRoom(what) => {
-                    if let Err(reason) = self.enlarge(what) {
-                        self.state = good;
-                        return self.quarantine(reason);
+                    if let Err(reason) = self.enlarge(what, &state) {
+                        return self.quarantine(reason, good);
                     }
                 }
                 Verdict::Bad(reason) => {
-                    self.warnings.add(&raised);
-                    self.state = good;
-                    return self.quarantine(reason);
+                    self.seldom.warnings.add(&raised);
+                    return self.quarantine(reason, good);
                 }
             }
         }
     }
 
     /// Goes back to the state before the step, with larger buffers and a forward pass done.
-    fn grow(&mut self, mut what: Overflow) -> Result<(), Divergence> {
+    fn grow(&mut self, mut what: Overflow, before: &Motion) -> Result<(), Divergence> {
         loop {
-            self.enlarge(what)?;
+            self.enlarge(what, before)?;
             let done = self.data.step1();
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
@@ -268,26 +298,24 @@ impl Env {
         }
     }
 
-    /// Replaces the data by one with twice as much of `what`, in the state before the step.
-    fn enlarge(&mut self, what: Overflow) -> Result<(), Divergence> {
+    /// Replaces the data by one with twice as much of `what`, in `state`.
+    fn enlarge(&mut self, what: Overflow, state: &Motion) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > LARGEST_ENVIRONMENT {
             return Err(Divergence::BuffersExhausted(buffers));
         }
         let model = self.data.model().with_buffers(buffers);
-        let mut larger = Data::new(&model).map_err(Divergence::Engine)?;
-        self.inputs.restore(&mut larger);
-        self.state.restore(&mut larger);
-        self.data = larger;
-        self.growths += 1;
+        self.data = Data::new(&model).map_err(Divergence::Engine)?;
+        self.go_to(state);
+        self.seldom.growths += 1;
         Ok(())
     }
 
-    fn quarantine(&mut self, reason: Divergence) {
-        self.status = EnvStatus::Diverged { step: self.steps, reason };
+    /// Stands still in `good`, the last good state, from now on.
+    fn quarantine(&mut self, reason: Divergence, good: &Motion) {
+        self.diverged = Some(Box::new(EnvStatus::Diverged { step: self.steps, reason }));
         self.data.reset();
-        self.inputs.restore(&mut self.data);
-        self.state.restore(&mut self.data);
+        self.go_to(good);
         // The last good state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
@@ -305,24 +333,24 @@ pub(crate) struct SavedArrays {
 /// What happened to an environment.
 #[derive(Clone, Debug)]
 pub(crate) struct History {
-    status: EnvStatus,
+    diverged: Option<Box<EnvStatus>>,
     steps: u64,
     warnings: WarningCounts,
     growths: u32,
 }
 
-/// What a step leads to, kept only where the step is good.
+/// What a step keeps for itself.
 #[derive(Default)]
-struct End {
-    /// The new state before its forward pass.
-    state: Motion,
-    /// Efforts of the drives in the step.
+struct Scratch {
+    /// The state before the step.
+    before: Motion,
+    /// Efforts of the drives in the step, kept only where it is good.
     efforts: Vec<f64>,
 }
 
 thread_local! {
     /// One per thread, not per environment: a thousand of them would not stay in the cache.
-    static END: Cell<End> = const { Cell::new(End { state: Motion::EMPTY, efforts: Vec::new() }) };
+    static SCRATCH: Cell<Scratch> = const { Cell::new(Scratch { before: Motion::EMPTY, efforts: Vec::new() }) };
 }
 
 enum Verdict {
@@ -346,4 +374,90 @@ fn judge(done: Result<(), EngineError>, raised: &WarningCounts) -> Verdict {
 /// The model with buffers for [`Env`] to start with: small, they grow on demand.
 pub fn with_small_buffers(model: &mj::Model) -> mj::Model {
     model.with_buffers(model.small_buffers())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Free and ball joints above the ground, so that contacts come one after the other.
+    fn falling() -> Model {
+        let mut bodies = String::new();
+        for i in 0..9 {
+            let (x, z) = (0.5 * f64::from(i), 0.2 + 0.03 * f64::from(i));
+            bodies += &format!(
+                r#"<body pos="{x} 0 {z}"><freejoint/><geom type="box" size="0.1 0.05 0.03"/>
+                   <body pos="0.15 0 0"><joint type="ball"/><geom type="capsule" fromto="0 0 0 0.1 0 0" size="0.02"/></body>
+                   </body>"#
+            );
+        }
+        let xml = format!(
+            r#"<mujoco><option timestep="0.004"/><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>"#
+        );
+        mj::compile(&xml, &[]).expect("compiles").into_model()
+    }
+
+    /// An environment whose quaternions are far from unit length.
+    fn tumbling(model: &Model, buffers: Buffers) -> Env {
+        let mut env = Env::new(&model.with_buffers(buffers), &Arc::default()).expect("small");
+        env.reset(|data, _| {
+            for (body, qpos) in data.qpos_mut().chunks_exact_mut(11).enumerate() {
+                for (k, q) in qpos[3..].iter_mut().enumerate() {
+                    *q = 1.3 * *q + 0.11 * ((body + 1) as f64) - 0.07 * k as f64;
+                }
+            }
+            data.qvel_mut().iter_mut().enumerate().for_each(|(i, v)| *v = (1.7 * i as f64).sin());
+        });
+        env
+    }
+
+    fn bits(env: &Env) -> Vec<u64> {
+        let data = env.data();
+        let saved = env.saved_arrays();
+        let raw = [&[data.time()], &saved.qpos[..], &saved.qvel, &saved.warmstart];
+        raw.into_iter().chain([data.qpos(), data.xquat()]).flatten().map(|x| x.to_bits()).collect()
+    }
+
+    const TINY: Buffers = Buffers { contacts: 1, constraints: 1, arena_bytes: 1 << 14 };
+    const HUGE: Buffers = Buffers { contacts: 500, constraints: 2000, arena_bytes: 64 << 20 };
+
+    #[test]
+    fn steps_done_again_keep_every_bit_of_raw_quaternions() {
+        let model = falling();
+        let (mut tiny, mut huge) = (tumbling(&model, TINY), tumbling(&model, HUGE));
+        let at_first = tiny.growths();
+        for step in 0..150 {
+            assert!(bits(&tiny) == bits(&huge), "before step {step}");
+            tiny.step(1);
+            huge.step(1);
+            if step % 40 == 20 {
+                // A write leaves alone what it does not mean, too.
+                tiny.write(|data| data.xfrc_applied_mut()[6] = 0.1);
+                huge.write(|data| data.xfrc_applied_mut()[6] = 0.1);
+            }
+        }
+        assert!(bits(&tiny) == bits(&huge));
+        assert!(tiny.growths() > at_first && huge.growths() == 0);
+        assert_eq!((tiny.status(), huge.status()), (&EnvStatus::Running, &EnvStatus::Running));
+    }
+
+    #[test]
+    fn a_step_that_fails_is_undone_to_the_last_bit() {
+        let mut env = tumbling(&falling(), HUGE);
+        for steps in [0, 30] {
+            env.step(steps);
+            let mut other = tumbling(&falling(), HUGE);
+            other.step(steps);
+            other.write(|data| data.xfrc_applied_mut()[6] = 1e300);
+            assert_eq!(bits(&other), bits(&env), "a write of a force changes no state");
+            other.step(1);
+            assert!(matches!(other.status(), EnvStatus::Diverged { step, .. } if *step == u64::from(steps)));
+            assert_eq!(bits(&other), bits(&env));
+            assert_eq!(other.data().xfrc_applied()[6], 1e300, "inputs are those of the write");
+            // A state that is refused is undone as well.
+            env.write(|data| data.qpos_mut()[0] = f64::NAN);
+            assert_eq!(bits(&other), bits(&env));
+            env = tumbling(&falling(), HUGE);
+        }
+    }
 }

@@ -28,7 +28,7 @@ fn export(cfg: RobotCfg) -> Export {
     let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
     let start = numbers(between(&xml, "<key name=\"start\" qpos=\"", "\""));
     let ctrl = numbers(between(&xml, "\" ctrl=\"", "\""));
-    let targets = world.sim.batch().read(0, |env| env.drives.position.clone());
+    let targets = world.sim.batch().read(0, |env| env.drives.position.to_vec());
     assert_eq!(ctrl, targets, "the keyframe commands the start");
     Export { _folder: folder, path, xml, start, targets }
 }

@@ -53,7 +53,7 @@ fn cycle(mut world: World) {
             world.step(1);
             let (q, v, tau, target) = (world.q(), world.v(), world.effort(), world.target());
             let drivers = (0..q.len()).filter(|&i| !followers[i]);
-            for (i, gains) in drivers.zip(&gains) {
+            for (i, gains) in drivers.zip(gains.iter()) {
                 assert!(tau[i].abs() <= effort_limits[i], "joint {i}: {}", tau[i]);
                 let asked =
                     (gains.kp * (target[i] - q[i]) - gains.kd * v[i]).clamp(-effort_limits[i], effort_limits[i]);
@@ -63,7 +63,7 @@ fn cycle(mut world: World) {
         world.assert_well();
         let (q, tau, target, load) = (world.q(), world.effort(), world.target(), world.load_by_gravity(&EARTH));
         let drivers = (0..q.len()).filter(|&i| !followers[i]);
-        for (i, gains) in drivers.zip(&gains) {
+        for (i, gains) in drivers.zip(gains.iter()) {
             assert!(tau[i].abs() < effort_limits[i], "joint {i} rests below its limit");
             let hangs = load[i] / gains.kp;
             sag = sag.max(hangs.abs());

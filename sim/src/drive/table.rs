@@ -2,6 +2,7 @@
 
 use super::{actuator, implicit};
 use crate::mj;
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 /// How one drive acts in MuJoCo.
@@ -51,56 +52,113 @@ pub struct DriveTable {
     pub damped: Vec<(usize, f64)>,
 }
 
+/// A list that environments share until one writes to its own. Nobody sets most of what a drive can be told, and memory
+/// of which there is one for all stays in the cache.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shared<T>(Arc<[T]>);
+
+impl<T> Deref for Shared<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T: Clone> DerefMut for Shared<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+impl<T: Copy + PartialEq> Shared<T> {
+    /// Writes where that changes something.
+    fn put(&mut self, index: usize, value: T) {
+        if self[index] != value {
+            self[index] = value;
+        }
+    }
+}
+
+/// What environments start with.
+#[derive(Debug, PartialEq)]
+struct Initial {
+    table: Arc<DriveTable>,
+    position: Box<[f64]>,
+    /// One zero per drive.
+    no_targets: Shared<f64>,
+    /// One zero per degree of freedom.
+    no_forces: Shared<f64>,
+}
+
 /// Targets and gains of the drives in one environment, and the effort they last gave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveState {
-    table: Arc<DriveTable>,
+    initial: Arc<Initial>,
     /// Gains, one per drive.
-    pub gains: Vec<Gains>,
+    pub gains: Shared<Gains>,
     /// Position targets \[rad or m\].
-    pub position: Vec<f64>,
+    pub position: Box<[f64]>,
     /// Velocity targets \[rad/s or m/s\].
-    pub velocity: Vec<f64>,
+    pub velocity: Shared<f64>,
     /// Feed-forward efforts \[N m or N\]; they stay until changed.
-    pub feedforward: Vec<f64>,
+    pub feedforward: Shared<f64>,
     /// Effort each drive gave in the last step \[N m or N\].
-    pub effort: Vec<f64>,
+    pub effort: Box<[f64]>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
-    pub applied: Vec<f64>,
+    pub applied: Shared<f64>,
 }
 
 impl DriveState {
-    /// Drives at rest at the model's initial positions.
+    /// Drives at rest at the model's initial positions. Clones share what none of them has changed.
     pub fn new(table: &Arc<DriveTable>, model: &mj::Model) -> Self {
         let n = table.drives.len();
+        let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
+        let no_targets = Shared(vec![0.0; n].into());
+        let no_forces = Shared(vec![0.0; model.nv()].into());
         Self {
-            table: Arc::clone(table),
-            gains: table.drives.iter().map(|d| d.initial).collect(),
-            position: table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect(),
-            velocity: vec![0.0; n],
-            feedforward: vec![0.0; n],
-            effort: vec![0.0; n],
-            applied: vec![0.0; model.nv()],
+            gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
+            position: position.clone(),
+            velocity: no_targets.clone(),
+            feedforward: no_targets.clone(),
+            effort: vec![0.0; n].into(),
+            applied: no_forces.clone(),
+            initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
         }
+    }
+
+    /// Back to rest at the model's initial positions; gains stay.
+    pub(crate) fn reset(&mut self) {
+        let initial = &*self.initial;
+        self.position.copy_from_slice(&initial.position);
+        self.velocity.clone_from(&initial.no_targets);
+        self.feedforward.clone_from(&initial.no_targets);
+        self.effort.fill(0.0);
+        self.applied.clone_from(&initial.no_forces);
     }
 
     /// Takes gains, targets and effort of drive `from` of `other` for drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
-        self.gains[to] = other.gains[from];
+        self.gains.put(to, other.gains[from]);
         self.position[to] = other.position[from];
-        self.velocity[to] = other.velocity[from];
-        self.feedforward[to] = other.feedforward[from];
+        self.velocity.put(to, other.velocity[from]);
+        self.feedforward.put(to, other.feedforward[from]);
         self.effort[to] = other.effort[from];
+    }
+
+    /// Takes the force applied to degree of freedom `from` of `other` for degree of freedom `to`.
+    pub(crate) fn copy_applied_from(&mut self, other: &Self, from: usize, to: usize) {
+        self.applied.put(to, other.applied[from]);
     }
 
     /// The model's drives.
     pub fn table(&self) -> &Arc<DriveTable> {
-        &self.table
+        &self.initial.table
     }
 
     /// Between `mj_step1` and `mj_step2`: makes every drive act on this step.
     pub fn apply(&self, data: &mut mj::Data) {
-        let table = &*self.table;
+        let table = &*self.initial.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, data);
         for (i, drive) in table.drives.iter().enumerate() {
@@ -116,7 +174,7 @@ impl DriveState {
     /// After `mj_step2`: the effort every drive gave.
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
-        efforts.extend(self.table.drives.iter().enumerate().map(|(i, drive)| match drive.realization {
+        efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
             Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
             Realization::Actuator => data.actuator_force()[drive.ctrl],
         }));
@@ -132,4 +190,50 @@ pub struct Target {
     pub velocity: f64,
     /// Feed-forward effort \[N m or N\].
     pub feedforward: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_one_environment_is_told_the_others_do_not_hear() {
+        let model = mj::compile(
+            r#"<mujoco><worldbody><body><joint type="hinge" ref="0.5"/><geom size="0.1"/></body></worldbody></mujoco>"#,
+            &[],
+        )
+        .expect("compiles")
+        .into_model();
+        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY };
+        let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization: Realization::Actuator, initial };
+        let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], damped: Vec::new() }), &model);
+        let (mut told, other) = (fresh.clone(), fresh.clone());
+        assert!(std::ptr::eq(&*told.velocity, &*other.velocity));
+        told.position[0] = 0.1;
+        told.velocity[0] = 0.2;
+        told.feedforward[0] = 0.3;
+        told.applied[0] = 0.4;
+        told.effort[0] = 0.5;
+        assert_eq!(other, fresh);
+        let mut copy = other.clone();
+        copy.copy_from(&told, 0, 0);
+        copy.copy_applied_from(&told, 0, 0);
+        assert_eq!(copy, told);
+        told.gains[0].kp = 7.0;
+        told.reset();
+        assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");
+        told.gains[0] = initial;
+        assert_eq!(told, fresh);
+        assert!(std::ptr::eq(&*told.velocity, &*other.velocity), "shared again");
+    }
+
+    #[test]
+    fn taking_over_what_is_the_same_shares_it_still() {
+        let mut list = Shared(Arc::from([1.0, 2.0]));
+        let same = list.clone();
+        list.put(1, 2.0);
+        assert!(std::ptr::eq(&*list, &*same));
+        list.put(1, 3.0);
+        assert_eq!((&*list, &*same), (&[1.0, 3.0][..], &[1.0, 2.0][..]));
+    }
 }

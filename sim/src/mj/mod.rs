@@ -33,7 +33,7 @@ pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use ray::RayHit;
-pub use state::{Inputs, Motion};
+pub use state::{Inputs, Motion, RawQuats};
 pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 
