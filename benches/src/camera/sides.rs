@@ -43,7 +43,7 @@ pub(super) struct Work {
     /// Physics steps before an image.
     pub(super) physics: u32,
     pub(super) look: Look,
-    /// Side of the rival's shadow maps [texels]; `None` is its own choice.
+    /// Side of the rival's shadow maps \[texels\]; `None` is its own choice.
     pub(super) shadow_size: Option<u32>,
 }
 
