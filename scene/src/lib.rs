@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod light;
+pub mod marker;
 pub mod material;
 pub mod mesh;
 pub mod pattern;
@@ -14,6 +15,7 @@ pub mod shape;
 pub mod state;
 
 pub use light::{Haze, Headlight, Hemisphere, Light, LightKind, Sky};
+pub use marker::{Marker, MarkerKind};
 pub use material::{Material, Texture, TextureKind};
 pub use pose::Pose;
 pub use pose_f32::PoseF32;

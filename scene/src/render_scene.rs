@@ -111,6 +111,16 @@ impl RenderScene {
         Ok(Self { linear_colors, instances, first_ids, ..Self::empty() })
     }
 
+    /// Other things in the same light.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
+        let Self { headlight, ambient, sky, haze, .. } = *self;
+        Ok(Self { lights: self.lights.clone(), headlight, ambient, sky, haze, ..Self::new(instances)? })
+    }
+
     /// Nothing but sky.
     pub fn empty() -> Self {
         Self {

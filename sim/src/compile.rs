@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub(crate) struct Simulation {
     pub(crate) batch: Batch,
     pub(crate) robots: Vec<RobotIndex>,
-    pub(crate) objects: Vec<ObjectIndex>,
+    pub(crate) objects: Vec<FreeIndex>,
     pub(crate) identities: Identities,
     /// What cameras draw; made when the first sensor asks for it.
     pub(crate) visible: Option<Arc<Visible>>,
@@ -41,6 +41,8 @@ pub(crate) struct RobotIndex {
     pub joints: Vec<JointIndexing>,
     /// Body and frame of each link.
     pub links: Vec<(usize, Pose)>,
+    /// The body of its root link.
+    pub root: FreeIndex,
     /// Its geoms.
     pub geoms: Vec<GeomIndex>,
 }
@@ -56,14 +58,12 @@ pub(crate) struct GeomIndex {
     pub visual: Option<usize>,
 }
 
-/// Where a rigid object's numbers are in MuJoCo's arrays.
+/// Where the numbers of a body that may be free are in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ObjectIndex {
+pub(crate) struct FreeIndex {
     pub body: usize,
-    /// First of its seven positions; `None` where it is static.
-    pub qpos: Option<usize>,
-    /// First of its six velocities.
-    pub dof: Option<usize>,
+    /// First of its seven positions and first of its six velocities; `None` where it is fixed.
+    pub joint: Option<(usize, usize)>,
 }
 
 /// Where one joint's numbers are.
@@ -152,7 +152,7 @@ struct Built {
     model: mj::Model,
     table: Arc<DriveTable>,
     robots: Vec<RobotIndex>,
-    objects: Vec<ObjectIndex>,
+    objects: Vec<FreeIndex>,
     identities: Identities,
     start: Arc<Start>,
     xml: String,
@@ -185,17 +185,16 @@ fn missing(what: &'static str, name: &str) -> Error {
 }
 
 /// Finds every rigid object in the compiled model.
-fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<ObjectIndex>> {
+fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<FreeIndex>> {
     let find = |object: &RigidObjectData| {
         let body = compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing("body", object.uid()))?;
-        let free = compiled.joint_address(&format!("{}/free", object.uid()));
-        Ok(ObjectIndex { body, qpos: free.map(|f| f.0), dof: free.map(|f| f.1) })
+        Ok(FreeIndex { body, joint: compiled.joint_address(&format!("{}/free", object.uid())) })
     };
     contents.objects.iter().map(|object| find(object)).collect()
 }
 
 /// Who every geom belongs to.
-fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[ObjectIndex]) -> Identities {
+fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[FreeIndex]) -> Identities {
     let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground" };
     let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
     for (data, index) in contents.robots.iter().zip(robots) {
@@ -263,7 +262,7 @@ fn set_up_drives(
                 let body = compiled.id(ObjectKind::Body, &frame.body).ok_or_else(|| missing("body", &frame.body))?;
                 Ok((body, frame.body_from_link))
             })
-            .collect::<Result<_>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let geoms = layout
             .geoms
             .iter()
@@ -272,7 +271,11 @@ fn set_up_drives(
                 Ok(GeomIndex { geom, link: owner.link.0, visual: owner.visual })
             })
             .collect::<Result<_>>()?;
-        indices.push(RobotIndex { joints, links, geoms });
+        let root = FreeIndex {
+            body: links[data.description().root.0].0,
+            joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
+        };
+        indices.push(RobotIndex { joints, links, root, geoms });
     }
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
     implicit::prepare(&mut compiled, &dofs, &row_actuators);

@@ -112,9 +112,15 @@ pub enum Error {
     /// A name that cannot be written to MJCF.
     #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
     InvalidUid(String),
-    /// The object stands fixed.
-    #[error("the object {0:?} is static: it stands where its init_pose says; make it BodyType::Dynamic to move it")]
-    StaticObject(String),
+    /// The environments together are too much to draw.
+    #[error("the overview cannot be drawn: {0}; choose fewer environments")]
+    Overview(String),
+    /// The object or the base of the robot stands fixed.
+    #[error(
+        "{0:?} is fixed where its init_pose says; make an object BodyType::Dynamic, give a robot fix_base: false, to \
+         move it"
+    )]
+    FixedBody(String),
     /// More robots than contact bits.
     #[error("{0} robots are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)")]
     TooManyRobots(usize),

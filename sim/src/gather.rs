@@ -3,7 +3,7 @@
 use crate::batch::Batch;
 use crate::compile::Simulation;
 use crate::env::Env;
-use crate::objects::robot::body_pose;
+use crate::objects::free_body::body_pose;
 use ndarray::{Array2, Array3};
 use scene::{Light, PoseF32, SceneState, VisibleState};
 use sensors::Requires;

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod models;
+mod mujoco_renderer;
 mod objects;
+mod overview;
 mod placement;
 mod rays;
 mod schedule;

@@ -1,22 +1,19 @@
 //! `cargo xtask bench`: ours and the rivals on both lines of MuJoCo, and the page with the results.
 
-use crate::run::{Cmd, Failure, Outcome, Repo};
+use crate::python::{self, Module};
+use crate::run::{Failure, Outcome, Repo};
 use crate::setup::{self, Line, Need, Wanted};
-use crate::wheel;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{fs, thread};
 
 const RESULTS: &str = "benches/RESULTS.md";
-/// Names a python that can `import mujoco` of the wheel's version; its loops are among the rivals.
-const PYTHON: &str = "KINETOSCOPE_PYTHON4";
-
-/// Rivals of the cameras in the same environment: what to import, and what to install for it. No other versions were tried.
-const CAMERAS: &[(&str, &[&str])] = &[
-    ("OpenGL", &["PyOpenGL==3.1.10"]),
-    ("mujoco_warp", &["mujoco-warp==4.0.0", "warp-lang==1.19.0"]),
-    ("pybullet", &["pybullet==3.2.7"]),
+/// Rivals of the cameras. No other versions were tried.
+const CAMERAS: &[Module] = &[
+    python::OPENGL,
+    Module { name: "mujoco_warp", packages: &["mujoco-warp==4.0.0", "warp-lang==1.19.0"] },
+    Module { name: "pybullet", packages: &["pybullet==3.2.7"] },
 ];
 
 const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
@@ -34,11 +31,16 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     let mut rows = Vec::new();
     let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
     let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
-    let python = python_with_mujoco(repo);
+    let python = python::with_mujoco(repo);
+    if python.is_none() {
+        eprintln!("note: rivals in Python are left out");
+    }
     if args.name.as_deref().is_none_or(|name| name == "camera") {
         setup::try_to_have(Need::OsMesa);
-        if let Some(python) = &python {
-            install_cameras(python);
+        for module in CAMERAS {
+            if python.as_ref().is_some_and(|python| !module.install(python)) {
+                eprintln!("note: that rival is left out");
+            }
         }
     }
     for ready in both {
@@ -48,7 +50,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
         }
         let mut cmd = ready.cargo();
         if let Some(python) = &python {
-            cmd = cmd.env(PYTHON, python);
+            cmd = cmd.env(python::VARIABLE, python);
         }
         cmd.args(["run", "--release", "--package", "kinetoscope-benches", "--"])
             .args(&args.name)
@@ -82,51 +84,6 @@ fn read_rows(file: &Path) -> Outcome<Vec<Value>> {
         Ok(_) => Err(Failure::new(format!("{}: not an array of rows", file.display()))),
         Err(e) => Err(Failure::new(format!("{}: {e}", file.display()))),
     }
-}
-
-/// A virtual environment below the target folder, made at the first call. Without one the rivals in Python are left out.
-fn python_with_mujoco(repo: &Repo) -> Option<PathBuf> {
-    let venv = repo.target.join("bench-venv");
-    let python = venv.join("bin/python");
-    let is_ready = || {
-        let check = format!("import mujoco; assert mujoco.__version__ == '{}'", wheel::VERSION);
-        Cmd::new(&python).args(["-c", &check]).quiet().succeeds()
-    };
-    if is_ready() {
-        return Some(python);
-    }
-    let made = Cmd::new("python3")
-        .args(["-m", "venv", "--clear"])
-        .arg(&venv)
-        .run()
-        .and_then(|()| pip_install(&python, &[&format!("mujoco=={}", wheel::VERSION)]));
-    if made.is_ok() && is_ready() {
-        return Some(python);
-    }
-    eprintln!("note: no python with mujoco {} could be made: rivals in Python are left out", wheel::VERSION);
-    None
-}
-
-/// Installs the rivals of the cameras that are not there yet; says which are not to be had.
-fn install_cameras(python: &Path) {
-    for (module, packages) in CAMERAS {
-        let has = || {
-            // Does not run the module: some talk, or compile, when they are imported.
-            let check = format!("import importlib.util as u, sys; sys.exit(u.find_spec('{module}') is None)");
-            Cmd::new(python).args(["-c", &check]).quiet().succeeds()
-        };
-        if !has() && (pip_install(python, packages).is_err() || !has()) {
-            eprintln!("note: {} could not be installed: that rival is left out", packages.join(" "));
-        }
-    }
-}
-
-/// Wheels only: to build PyBullet takes a compiler and half an hour.
-fn pip_install(python: &Path, packages: &[&str]) -> Outcome {
-    Cmd::new(python)
-        .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--only-binary=:all:"])
-        .args(packages)
-        .run()
 }
 
 /// One table per benchmark, in the order the rows came.

@@ -11,6 +11,7 @@ mod ci;
 mod demo;
 mod docs_check;
 mod examples;
+mod python;
 mod run;
 mod setup;
 mod source_check;

@@ -1,7 +1,8 @@
 //! `cargo xtask test`: every test of the workspace, doctests included, against one MuJoCo.
 
-use crate::run::{Outcome, Repo};
-use crate::setup::{self, Line, Wanted};
+use crate::python;
+use crate::run::{Failure, Outcome, Repo, in_ci};
+use crate::setup::{self, Line, Need, Wanted};
 
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TestArgs {
@@ -19,9 +20,20 @@ pub(crate) struct TestArgs {
 }
 
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
-    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: &[] })?;
+    // MuJoCo's own renderer is a judge of our pictures where both have the same MuJoCo.
+    let judged = args.mujoco == Some(Line::Wheel);
+    let extras: &[Need] = if judged { &[Need::Pip, Need::Venv, Need::OsMesa] } else { &[] };
+    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras })?;
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
-    ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args)).run()
+    let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args));
+    if judged {
+        match python::with_mujoco(repo).filter(|python| python::OPENGL.install(python)) {
+            Some(python) => cargo = cargo.env(python::VARIABLE, python),
+            None if in_ci() => return Err(Failure::new("MuJoCo's renderer, a judge of our pictures, is not there")),
+            None => eprintln!("note: pictures are not compared with those of MuJoCo's renderer"),
+        }
+    }
+    cargo.run()
 }
 
 fn cargo_args(args: &TestArgs) -> Vec<String> {

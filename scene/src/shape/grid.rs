@@ -3,7 +3,7 @@
 use crate::mesh::TriMesh;
 
 /// Revolves a profile of (radius, z), from the bottom to the top, about z. A radius of zero is a pole.
-pub(super) fn revolve(profile: &[[f64; 2]], segments: usize) -> TriMesh {
+pub(crate) fn revolve(profile: &[[f64; 2]], segments: usize) -> TriMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     let mut rings: Vec<Vec<u32>> = Vec::new();
     for &[radius, z] in profile {

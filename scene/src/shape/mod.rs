@@ -7,6 +7,7 @@ mod grid;
 pub mod render_mesh;
 
 use crate::mesh::TriMesh;
+pub(crate) use grid::revolve;
 pub use render_mesh::{Cluster, RenderMesh};
 
 /// What a shape must be able to do.

@@ -326,14 +326,7 @@ impl Camera {
         env_ids: Option<&[usize]>,
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
-        let poses = poses.to_poses()?;
-        let rows = self.chosen_rows(env_ids)?;
-        let each = one_each("poses", &poses, rows.len())?;
-        for (&row, pose) in rows.iter().zip(each) {
-            self.mounts[row].parent_from_camera = convention.to_optical(pose);
-        }
-        self.outdate(&rows);
-        Ok(())
+        self.place(&poses.to_poses()?, env_ids, |_, _, pose| Ok(convention.to_optical(pose)))
     }
 
     /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local
@@ -349,21 +342,30 @@ impl Camera {
         env_ids: Option<&[usize]>,
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
-        let poses = poses.to_poses()?;
-        let rows = self.chosen_rows(env_ids)?;
-        let each = one_each("poses", &poses, rows.len())?;
-        let mut local = Vec::with_capacity(rows.len());
-        for (&row, pose) in rows.iter().zip(each) {
+        self.place(&poses.to_poses()?, env_ids, |camera, row, pose| {
             let optical = convention.to_optical(pose);
-            local.push(match (self.parent, self.captures.world_from_parent[row]) {
-                (None, _) => optical,
-                (Some(_), Some(world_from_parent)) => world_from_parent.inverse() * optical,
-                (Some(_), None) => return Err(CameraError::NothingCaptured { env: self.env_ids[row] }.into()),
-            });
-        }
-        // The parent's own pose may be no good.
-        let local = local.to_poses()?;
-        for (&row, pose) in rows.iter().zip(local) {
+            match (camera.parent, camera.captures.world_from_parent[row]) {
+                (None, _) => Ok(optical),
+                (Some(_), Some(world_from_parent)) => Ok(world_from_parent.inverse() * optical),
+                (Some(_), None) => Err(CameraError::NothingCaptured { env: camera.env_ids[row] }),
+            }
+        })
+    }
+
+    /// Gives the cameras of `env_ids` the local poses that `local` makes of `poses`, one each or one for all; on an error
+    /// nothing has changed.
+    fn place(
+        &mut self,
+        poses: &[Pose],
+        env_ids: Option<&[usize]>,
+        local: impl Fn(&Self, usize, &Pose) -> Result<Pose, CameraError>,
+    ) -> Result<(), SensorError> {
+        let rows = self.chosen_rows(env_ids)?;
+        let each = one_each("poses", poses, rows.len())?;
+        let placed: Vec<Pose> =
+            rows.iter().zip(each).map(|(&row, pose)| local(self, row, pose)).collect::<Result<_, _>>()?;
+        // The pose of a parent may be no good.
+        for (&row, pose) in rows.iter().zip(placed.to_poses()?) {
             self.mounts[row].parent_from_camera = pose;
         }
         self.outdate(&rows);

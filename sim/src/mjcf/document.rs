@@ -196,6 +196,22 @@ pub struct Joint {
     pub source: Option<Source>,
 }
 
+impl Joint {
+    /// A joint that leaves a child of the world free.
+    pub fn free(name: impl Into<String>, source: Option<Source>) -> Self {
+        Self {
+            name: name.into(),
+            kind: JointType::Free,
+            axis: Vector3::z(),
+            range: None,
+            damping: 0.0,
+            frictionloss: 0.0,
+            armature: 0.0,
+            source,
+        }
+    }
+}
+
 /// Kinds of joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JointType {

@@ -96,6 +96,8 @@ pub struct RobotCfg<'a> {
 pub struct RobotLayout {
     /// For every link (fused ones included): the body it is part of, and its frame there.
     pub links: Vec<LinkFrame>,
+    /// The joint that leaves the root link free; `None` where it is fixed.
+    pub free_joint: Option<String>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_pairs: Vec<(String, String)>,
     /// What every named geom is.
@@ -170,6 +172,7 @@ pub fn add(
         mjcf,
         diagnostics,
         plan_of: cfg.plans.iter().map(|p| (p.joint, p)).collect(),
+        free_joint: None,
         depth: BTreeMap::new(),
         placed: vec![None; description.links.len()],
         masses: BTreeMap::new(),
@@ -189,7 +192,8 @@ pub fn add(
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
         .collect();
-    Ok(RobotLayout { links, base_pairs, geoms: emitter.geoms, damped: emitter.damped })
+    let Emitter { free_joint, geoms, damped, .. } = emitter;
+    Ok(RobotLayout { links, free_joint, base_pairs, geoms, damped })
 }
 
 struct Emitter<'a, 'm> {
@@ -198,6 +202,8 @@ struct Emitter<'a, 'm> {
     mjcf: &'m mut Mjcf,
     diagnostics: &'m mut Vec<Diagnostic>,
     plan_of: BTreeMap<JointId, &'a JointPlan>,
+    /// The joint that leaves the root link free.
+    free_joint: Option<String>,
     /// Number of bodies above each body of this robot.
     depth: BTreeMap<usize, usize>,
     /// Body and frame of each link.
@@ -225,8 +231,8 @@ impl Emitter<'_, '_> {
     /// Links depth first from the root, a body for each that moves.
     fn bodies(&mut self) -> Result<(), EmitError> {
         let root = self.description.root;
-        let root_joints =
-            if self.cfg.fix_base { Vec::new() } else { vec![self.free_joint(&self.unused("base"), None)] };
+        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![Joint::free(self.unused("base"), None)] };
+        self.free_joint = root_joints.first().map(|joint| joint.name.clone());
         let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
         self.place(root, body, Pose::identity());
         let mut stack: Vec<JointId> = self.description.link(root).child_joints.iter().rev().copied().collect();
@@ -381,19 +387,6 @@ impl Emitter<'_, '_> {
         }
     }
 
-    fn free_joint(&self, name: &str, source: Option<Source>) -> Joint {
-        Joint {
-            name: name.into(),
-            kind: JointType::Free,
-            axis: Vector3::z(),
-            range: None,
-            damping: 0.0,
-            frictionloss: 0.0,
-            armature: 0.0,
-            source,
-        }
-    }
-
     /// The MuJoCo joints of one URDF joint.
     fn joints(&self, id: JointId, parent: usize) -> Vec<Joint> {
         let joint = self.description.joint(id);
@@ -410,7 +403,7 @@ impl Emitter<'_, '_> {
         };
         match joint.kind {
             JointKind::Fixed => Vec::new(),
-            JointKind::Floating if parent == 0 => vec![self.free_joint(&name, Some(joint.source.clone()))],
+            JointKind::Floating if parent == 0 => vec![Joint::free(name, Some(joint.source.clone()))],
             // Below a moving part the six degrees of freedom are three slides and a ball.
             JointKind::Floating => vec![
                 plain(".x", JointType::Slide, Vector3::x()),

@@ -1,6 +1,6 @@
 //! What is in the world beside robots: the ground, lights.
 
-use super::document::{Body, Geom, GeomRole, Inertial, Joint, JointType, Light, Mjcf, Shape};
+use super::document::{Body, Geom, GeomRole, Inertial, Joint, Light, Mjcf, Shape};
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
 use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
@@ -42,16 +42,7 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData) {
     let cfg = object.cfg();
     let (mass, moments) = object.inertia();
     let moves = cfg.body_type == BodyType::Dynamic;
-    let free = Joint {
-        name: format!("{}/free", cfg.uid),
-        kind: JointType::Free,
-        axis: Vector3::z(),
-        range: None,
-        damping: 0.0,
-        frictionloss: 0.0,
-        armature: 0.0,
-        source: None,
-    };
+    let free = Joint::free(format!("{}/free", cfg.uid), None);
     let inertial = Inertial { mass, com: Vector3::zeros(), axes: UnitQuaternion::identity(), moments, source: None };
     mjcf.bodies.push(Body {
         name: cfg.uid.clone(),

@@ -1,15 +1,15 @@
 //! Rigid objects: props that robots see, push and hold.
 
 use super::shape::ObjectShape;
-use crate::compile::{ObjectIndex, Simulation};
+use crate::compile::Simulation;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
-use crate::objects::robot::{body_pose, check_pose};
+use crate::manager::EnvId;
+use crate::objects::free_body::{FreeBody, FreeBodyMut};
+use crate::objects::robot::check_pose;
 use crate::sensor_list::SensorList;
 use ::scene::Pose;
-use ::scene::pose::{from_row, to_row};
 use nalgebra::Vector3;
-use ndarray::{Array2, ArrayView2, AsArray, Ix2};
+use ndarray::{Array2, AsArray, Ix2};
 use std::sync::Arc;
 
 /// Whether an object moves.
@@ -80,8 +80,7 @@ impl RigidObjectData {
         if !(cfg.density.is_finite() && cfg.density > 0.0) {
             return fail("density", &cfg.density, "it must be above 0 kg/m³, such as 1000 for water");
         }
-        let mass = cfg.mass.unwrap_or(cfg.density * cfg.shape.volume());
-        let moments = mass * cfg.shape.unit_moments();
+        let (mass, moments) = inertia(&cfg);
         if cfg.body_type == BodyType::Dynamic && !(mass.is_finite() && mass > 1e-12 && moments.min() > 1e-14) {
             return fail(
                 "mass",
@@ -118,9 +117,13 @@ impl RigidObjectData {
 
     /// Mass \[kg\] and principal moments along x, y, z \[kg m²\].
     pub(crate) fn inertia(&self) -> (f64, Vector3<f64>) {
-        let mass = self.cfg.mass.unwrap_or(self.cfg.density * self.cfg.shape.volume());
-        (mass, mass * self.cfg.shape.unit_moments())
+        inertia(&self.cfg)
     }
+}
+
+fn inertia(cfg: &RigidObjectCfg) -> (f64, Vector3<f64>) {
+    let mass = cfg.mass.unwrap_or(cfg.density * cfg.shape.volume());
+    (mass, mass * cfg.shape.unit_moments())
 }
 
 /// A rigid object, to read. Arrays have one row per environment.
@@ -136,8 +139,8 @@ impl<'a> RigidObject<'a> {
         Self { data, simulation, index }
     }
 
-    fn indexing(&self) -> ObjectIndex {
-        self.simulation.objects[self.index]
+    fn body(&self) -> FreeBody<'a> {
+        FreeBody { simulation: self.simulation, index: self.simulation.objects[self.index] }
     }
 
     /// Name of the object.
@@ -162,28 +165,12 @@ impl<'a> RigidObject<'a> {
 
     /// Pose of its frame in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn get_pose(&self) -> Array2<f64> {
-        let body = self.indexing().body;
-        self.rows(|env| to_row(&body_pose(env.data(), body)))
+        self.body().poses()
     }
 
-    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6).
+    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where it is static.
     pub fn get_velocity(&self) -> Array2<f64> {
-        let index = self.indexing();
-        self.rows(|env| {
-            let Some(dof) = index.dof else { return [0.0; 6] };
-            let v = &env.data().qvel()[dof..dof + 6];
-            // MuJoCo gives the angular velocity of a free joint in the body's axes.
-            let angular = body_pose(env.data(), index.body).rotation * Vector3::new(v[3], v[4], v[5]);
-            [v[0], v[1], v[2], angular.x, angular.y, angular.z]
-        })
-    }
-
-    fn rows<const K: usize>(&self, read: impl Fn(&crate::env::Env) -> [f64; K]) -> Array2<f64> {
-        let n = self.simulation.batch.num_envs();
-        let mut values = Vec::with_capacity(n * K);
-        self.simulation.batch.for_each(|_, env| values.extend(read(env)));
-        // K values for each environment were pushed.
-        Array2::from_shape_vec((n, K), values).unwrap_or_default()
+        self.body().velocities()
     }
 }
 
@@ -212,31 +199,15 @@ impl<'a> RigidObjectMut<'a> {
     }
 
     /// Puts the object somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] for `env_ids` (all where `None`;
-    /// a single row is for all of them). Quaternions are normalised; velocities stay. A forward pass follows, so that
-    /// everything that is read afterwards belongs to the new state.
+    /// a single row is for all of them). Quaternions are normalised; velocities, which are in world axes, stay. A forward
+    /// pass follows, so that everything that is read afterwards belongs to the new state.
     ///
     /// # Errors
     /// The object is static; wrong shape, unknown environment, a value that is not finite, a quaternion of length zero;
     /// then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        let rows = self.checked::<7>("write_pose", poses.into(), env_ids, "environments, x y z qw qx qy qz")?;
-        if let Some((row, _)) = rows.iter().enumerate().find(|(_, (_, r))| r[3..].iter().all(|q| q.abs() < 1e-9)) {
-            return Err(Error::Config {
-                field: "write_pose",
-                value: format!("{:?} in row {row}", &rows[row].1[3..]),
-                expected: "the last four numbers must be a quaternion w, x, y, z other than zero",
-            });
-        }
-        let qpos = self.free()?.0;
-        for (env, row) in &rows {
-            let row = to_row(&from_row(row));
-            self.simulation
-                .batch
-                .write(*env, |env| env.write(|data| data.qpos_mut()[qpos..qpos + 7].copy_from_slice(&row)));
-        }
-        self.refresh(&rows);
-        Ok(())
+        self.body().write_poses("write_pose", poses.into(), env_ids)
     }
 
     /// Sets the velocity of the object's frame and its angular velocity, in world axes: rows of 6 \[m/s, rad/s\], as in
@@ -250,58 +221,11 @@ impl<'a> RigidObjectMut<'a> {
         velocities: impl AsArray<'t, f64, Ix2>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let rows =
-            self.checked::<6>("write_velocity", velocities.into(), env_ids, "environments, vx vy vz wx wy wz")?;
-        let (dof, body) = (self.free()?.1, self.simulation.objects[self.index].body);
-        for (env, v) in &rows {
-            self.simulation.batch.write(*env, |env| {
-                env.write(|data| {
-                    let rotation = body_pose(data, body).rotation;
-                    let angular = rotation.inverse() * Vector3::new(v[3], v[4], v[5]);
-                    data.qvel_mut()[dof..dof + 6].copy_from_slice(&[v[0], v[1], v[2], angular.x, angular.y, angular.z]);
-                });
-            });
-        }
-        self.refresh(&rows);
-        Ok(())
+        self.body().write_velocities("write_velocity", velocities.into(), env_ids)
     }
 
-    /// Addresses of its position and velocity.
-    fn free(&self) -> Result<(usize, usize)> {
+    fn body(&mut self) -> FreeBodyMut<'_> {
         let index = self.simulation.objects[self.index];
-        index.qpos.zip(index.dof).ok_or_else(|| Error::StaticObject(self.data.uid().into()))
-    }
-
-    fn refresh<const K: usize>(&mut self, rows: &[(usize, [f64; K])]) {
-        let envs: Vec<usize> = rows.iter().map(|(env, _)| *env).collect();
-        self.sensors.refresh(&envs, self.simulation);
-    }
-
-    /// Checks an argument of a writer before anything is written; gives environments and their rows.
-    fn checked<const K: usize>(
-        &self,
-        argument: &'static str,
-        values: ArrayView2<'_, f64>,
-        env_ids: Option<&[EnvId]>,
-        meaning: &'static str,
-    ) -> Result<Vec<(usize, [f64; K])>> {
-        self.free()?;
-        let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
-        let rows = values.nrows();
-        if values.ncols() != K || (rows != envs.len() && rows != 1) {
-            let (found, expected) = (values.shape().to_vec(), vec![envs.len(), K]);
-            return Err(Error::Shape { argument, found, expected, meaning });
-        }
-        if let Some(((row, column), value)) = values.indexed_iter().find(|(_, v)| !v.is_finite()) {
-            return Err(Error::NotFinite {
-                argument,
-                row,
-                column,
-                of: format!("object {:?}", self.data.uid()),
-                value: *value,
-            });
-        }
-        let row = |i: usize| std::array::from_fn(|k| values[(if rows == 1 { 0 } else { i }, k)]);
-        Ok(envs.into_iter().enumerate().map(|(i, env)| (env, row(i))).collect())
+        FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
     }
 }

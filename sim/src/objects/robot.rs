@@ -1,22 +1,24 @@
 //! Robots: configuration, the loaded robot, and its views of a running simulation.
 
-use crate::compile::{RobotIndex, Simulation};
+use crate::compile::{JointIndexing, RobotIndex, Simulation};
 use crate::description::{JointKind, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::{DriveCfg, DriveModel};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManagerCfg, env_list};
+use crate::manager::{EnvId, SimulationManagerCfg};
 use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
+use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
+use crate::objects::rows::{Rows, Table};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ::scene::pose::to_row;
-use ndarray::{Array2, Array3, AsArray, Ix2};
+use ndarray::{Array2, Array3, ArrayView2, AsArray, Ix2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -350,6 +352,34 @@ impl<'a> Robot<'a> {
         self.data.description.total_mass()
     }
 
+    /// Joint positions at the start, which [`reset`](crate::SimulationManager::reset) goes back to \[rad or m\], shape
+    /// (N, dof).
+    pub fn get_default_qpos(&self) -> Array2<f64> {
+        let n = self.simulation.batch.num_envs();
+        Array2::from_shape_fn((n, self.dof()), |(_, joint)| self.data.plans[joint].initial)
+    }
+
+    /// Pose of the root link at the start: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
+    pub fn get_default_root_pose(&self) -> Array2<f64> {
+        let row = to_row(&self.data.cfg.init_pose);
+        Array2::from_shape_fn((self.simulation.batch.num_envs(), 7), |(_, k)| row[k])
+    }
+
+    /// Pose of the root link in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    pub fn get_root_pose(&self) -> Array2<f64> {
+        self.root().poses()
+    }
+
+    /// Velocity of the root link's frame, then its angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where
+    /// the base is fixed.
+    pub fn get_root_velocity(&self) -> Array2<f64> {
+        self.root().velocities()
+    }
+
+    fn root(&self) -> FreeBody<'a> {
+        FreeBody { simulation: self.simulation, index: self.indexing().root }
+    }
+
     /// Pose of a link, fused ones included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
     ///
     /// # Errors
@@ -371,19 +401,13 @@ impl<'a> Robot<'a> {
         Ok(poses)
     }
 
-    fn gather(&self, read: impl Fn(&crate::env::Env, &crate::compile::JointIndexing) -> f64) -> Array2<f64> {
+    fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {
         let joints = &self.indexing().joints;
         let mut values = Vec::with_capacity(self.simulation.batch.num_envs() * joints.len());
         self.simulation.batch.for_each(|_, env| values.extend(joints.iter().map(|joint| read(env, joint))));
         // One value for each environment and joint was pushed.
         Array2::from_shape_vec((self.simulation.batch.num_envs(), joints.len()), values).unwrap_or_default()
     }
-}
-
-/// Pose of a MuJoCo body in the environment.
-pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
-    let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
-    ::scene::pose::from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
 }
 
 /// A robot, to command and to write.
@@ -425,8 +449,8 @@ impl<'a> RobotMut<'a> {
     ) -> Result<()> {
         let write = self.checked("set_qpos", targets.into(), joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
-        for (env, row) in &write.rows {
-            self.simulation.batch.write(*env, |env| {
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
                     if let Some(drive) = robot.joints[joint].drive {
                         let [low, high] = self.data.plans[joint].usable;
@@ -452,8 +476,8 @@ impl<'a> RobotMut<'a> {
     ) -> Result<()> {
         let write = self.checked("set_qvel", velocities.into(), joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
-        for (env, row) in &write.rows {
-            self.simulation.batch.write(*env, |env| {
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
                     if let Some(drive) = robot.joints[joint].drive {
                         env.drives.velocity[drive] = value;
@@ -480,8 +504,8 @@ impl<'a> RobotMut<'a> {
     ) -> Result<()> {
         let write = self.checked("set_qf", efforts.into(), joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
-        for (env, row) in &write.rows {
-            self.simulation.batch.write(*env, |env| {
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
                     let (indexing, plan) = (robot.joints[joint], &self.data.plans[joint]);
                     if let Some(drive) = indexing.drive {
@@ -509,71 +533,105 @@ impl<'a> RobotMut<'a> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let write = self.checked("write_qpos", positions.into(), joint_ids, env_ids)?;
-        let robot = &self.simulation.robots[self.index];
-        for (env, row) in &write.rows {
-            self.simulation.batch.write(*env, |env| {
-                env.write(|data| {
-                    for (&joint, &value) in write.joints.iter().zip(row) {
-                        let [low, high] = self.data.plans[joint].limit.unwrap_or([f64::MIN, f64::MAX]);
-                        data.qpos_mut()[robot.joints[joint].qpos] = value.clamp(low, high);
-                    }
-                });
-            });
-        }
-        let envs: Vec<usize> = write.rows.iter().map(|(env, _)| *env).collect();
-        self.sensors.refresh(&envs, self.simulation);
+        let limits: Vec<[f64; 2]> =
+            self.data.plans.iter().map(|plan| plan.limit.unwrap_or([f64::MIN, f64::MAX])).collect();
+        let addresses = self.addresses(|joint| joint.qpos);
+        self.write_joints(&write, |data, joint, value| {
+            let [low, high] = limits[joint];
+            data.qpos_mut()[addresses[joint]] = value.clamp(low, high);
+        });
         Ok(())
     }
 
-    /// Checks an argument of a writer before anything is written.
-    fn checked(
-        &self,
-        argument: &'static str,
-        values: ndarray::ArrayView2<'_, f64>,
+    /// Writes joint velocities \[rad/s or m/s\] into the state; targets stay. Rows and columns as in
+    /// [`write_qpos`](Self::write_qpos).
+    ///
+    /// # Errors
+    /// As [`write_qpos`](Self::write_qpos).
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_qvel<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Write> {
-        let count = self.data.plans.len();
-        let joints: Vec<usize> = match joint_ids {
-            None => (0..count).collect(),
-            Some(ids) => {
-                ids.iter()
-                    .map(|&JointIndex(index)| {
-                        if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) }
-                    })
-                    .collect::<Result<_>>()?
-            }
-        };
-        let num_envs = self.simulation.batch.num_envs();
-        let envs = env_list(env_ids, num_envs)?;
-        let rows = values.nrows();
-        if values.ncols() != joints.len() || (rows != envs.len() && rows != 1) {
-            return Err(Error::Shape {
-                argument,
-                found: values.shape().to_vec(),
-                expected: vec![envs.len(), joints.len()],
-                meaning: "environments, joints",
+    ) -> Result<()> {
+        let write = self.checked("write_qvel", velocities.into(), joint_ids, env_ids)?;
+        let addresses = self.addresses(|joint| joint.dof);
+        self.write_joints(&write, |data, joint, value| data.qvel_mut()[addresses[joint]] = value);
+        Ok(())
+    }
+
+    fn addresses(&self, of: impl Fn(&JointIndexing) -> usize) -> Vec<usize> {
+        self.simulation.robots[self.index].joints.iter().map(of).collect()
+    }
+
+    /// Puts the root link of a robot without a fixed base somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment
+    /// \[m\] for `env_ids` (all where `None`; a single row is for all of them). Quaternions are normalised; velocities,
+    /// which are in world axes, stay. A forward pass follows.
+    ///
+    /// # Errors
+    /// The base is fixed; wrong shape, unknown environment, a value that is not finite, a quaternion of length zero; then
+    /// nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_root_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.root().write_poses("write_root_pose", poses.into(), env_ids)
+    }
+
+    /// Sets the velocity of the root link's frame and its angular velocity, in world axes: rows of 6 \[m/s, rad/s\], as in
+    /// [`write_root_pose`](Self::write_root_pose).
+    ///
+    /// # Errors
+    /// As [`write_root_pose`](Self::write_root_pose).
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_root_velocity<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.root().write_velocities("write_root_velocity", velocities.into(), env_ids)
+    }
+
+    fn root(&mut self) -> FreeBodyMut<'_> {
+        let index = self.simulation.robots[self.index].root;
+        FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
+    }
+
+    /// Changes the state of each environment that `write` is for, joint by joint; one forward pass each.
+    fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| write.joints.iter().zip(row).for_each(|(&joint, &value)| change(data, joint, value)));
             });
         }
-        for ((row, column), &value) in values.indexed_iter() {
-            if !value.is_finite() {
-                let of = format!("joint {:?}", self.data.joint_names[joints[column]]);
-                return Err(Error::NotFinite { argument, row, column, of, value });
-            }
-        }
-        let rows = envs
-            .into_iter()
-            .enumerate()
-            .map(|(i, env)| (env, values.row(if rows == 1 { 0 } else { i }).to_vec()))
-            .collect();
-        Ok(Write { joints, rows })
+        self.sensors.refresh(write.rows.envs(), self.simulation);
+    }
+
+    /// Checks an argument of a writer before anything is written.
+    fn checked<'v>(
+        &self,
+        argument: &'static str,
+        values: ArrayView2<'v, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<JointRows<'v>> {
+        let count = self.data.plans.len();
+        let exists =
+            |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) };
+        let joints: Vec<usize> = match joint_ids {
+            None => (0..count).collect(),
+            Some(ids) => ids.iter().map(|&JointIndex(index)| exists(index)).collect::<Result<_>>()?,
+        };
+        let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
+        let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
+        let rows = Rows::check(table, values, env_ids, self.simulation.batch.num_envs())?;
+        Ok(JointRows { joints, rows })
     }
 }
 
 /// A checked argument: columns, and one row of values per environment.
-struct Write {
+struct JointRows<'v> {
     joints: Vec<usize>,
-    rows: Vec<(usize, Vec<f64>)>,
+    rows: Rows<'v>,
 }
 
 impl RobotData {

@@ -7,6 +7,7 @@
 mod geom;
 mod identity;
 mod lighting;
+mod overview;
 mod still;
 mod surface;
 mod urdf_visual;
@@ -94,6 +95,12 @@ impl Visible {
         });
         lighting::light(model, &mut scene);
         Self { scene: Arc::new(scene), geoms, ids: identities.shared_table(), left_out }
+    }
+
+    /// This, with other instances in the place of its own, each moving with no geom. The lamps stay.
+    fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, scene::RenderSceneError> {
+        let scene = Arc::new(self.scene.with_instances(instances)?);
+        Ok(Self { scene, geoms: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
     }
 
     /// The headlight that goes with our ambient light, instead of the one MuJoCo gives to models that ask for none.

@@ -1,12 +1,12 @@
 //! A model at one moment, ready to be drawn without a simulation around it.
 
-use super::{MaskId, Visible};
+use super::{MaskId, Visible, overview};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager, env_mask};
+use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use crate::mj::{self, Data, Model, ObjectKind};
 use crate::pattern;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use scene::{Light, Pose, PoseF32};
+use scene::{Light, Marker, Pose, PoseF32};
 use sensors::camera::Shot;
 use sensors::visibility::View;
 use std::path::Path;
@@ -81,6 +81,26 @@ impl Still {
         env_mask(Some(&[env]), sim.num_envs())?;
         let visible = sim.visible();
         Ok(sim.batch().read(env.0, |env| Self::of_data(&visible, env.data())))
+    }
+
+    /// Several environments side by side, as [`SimulationManager::env_origins`] places them (all of them where `envs` is
+    /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0.
+    ///
+    /// # Errors
+    /// An environment does not exist, or there are more triangles than can be drawn.
+    pub fn overview(sim: &mut SimulationManager, envs: Option<&[EnvId]>, markers: &[(EnvId, Marker)]) -> Result<Self> {
+        let envs = env_list(envs, sim.num_envs())?;
+        env_list(Some(&markers.iter().map(|(env, _)| *env).collect::<Vec<_>>()), sim.num_envs())?;
+        let (visible, origins) = (sim.visible(), sim.env_origins());
+        let stills: Vec<(usize, Self)> =
+            envs.iter().map(|&env| (env, sim.batch().read(env, |env| Self::of_data(&visible, env.data())))).collect();
+        let places = stills.iter().map(|(env, still)| {
+            let markers = markers.iter().filter(|(of, _)| of.0 == *env).map(|(_, marker)| *marker).collect();
+            let origin = [0, 1, 2].map(|k| origins[(*env, k)] as f32);
+            overview::Place { origin, poses: &still.poses, markers }
+        });
+        let (visible, poses) = overview::side_by_side(&visible, &places.collect::<Vec<_>>())?;
+        Ok(Self { visible: Arc::new(visible), poses, ..Self::of_env(sim, EnvId(0))? })
     }
 
     fn of_data(visible: &Arc<Visible>, data: &Data) -> Self {

@@ -1,0 +1,142 @@
+//! Bodies that stand or move freely in the world: pose and velocity of objects and of the root links of robots.
+
+use crate::compile::FreeIndex;
+use crate::compile::Simulation;
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::manager::EnvId;
+use crate::mj;
+use crate::objects::rows::{Rows, Table};
+use crate::sensor_list::SensorList;
+use ::scene::Pose;
+use ::scene::pose::{from_row, to_row};
+use nalgebra::Vector3;
+use ndarray::{Array2, ArrayView2};
+
+/// Pose of a MuJoCo body in the environment.
+pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
+    let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
+    from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
+}
+
+/// One body in all environments, to read.
+#[derive(Clone, Copy)]
+pub(super) struct FreeBody<'a> {
+    pub(super) simulation: &'a Simulation,
+    pub(super) index: FreeIndex,
+}
+
+impl FreeBody<'_> {
+    /// Poses, (N, 7).
+    pub(super) fn poses(&self) -> Array2<f64> {
+        self.rows(|env| to_row(&body_pose(env.data(), self.index.body)))
+    }
+
+    /// Velocities of the frame, then angular velocities, in world axes, (N, 6); 0 where the body is fixed.
+    pub(super) fn velocities(&self) -> Array2<f64> {
+        self.rows(|env| {
+            let Some((_, dof)) = self.index.joint else { return [0.0; 6] };
+            let v = &env.data().qvel()[dof..dof + 6];
+            // MuJoCo gives the angular velocity of a free joint in the body's axes.
+            let angular = body_pose(env.data(), self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
+            [v[0], v[1], v[2], angular.x, angular.y, angular.z]
+        })
+    }
+
+    fn rows<const K: usize>(&self, read: impl Fn(&Env) -> [f64; K]) -> Array2<f64> {
+        let n = self.simulation.batch.num_envs();
+        let mut values = Vec::with_capacity(n * K);
+        self.simulation.batch.for_each(|_, env| values.extend(read(env)));
+        // K values for each environment were pushed.
+        Array2::from_shape_vec((n, K), values).unwrap_or_default()
+    }
+}
+
+/// One body in all environments, to write.
+pub(super) struct FreeBodyMut<'a> {
+    pub(super) simulation: &'a mut Simulation,
+    pub(super) sensors: &'a mut SensorList,
+    pub(super) index: FreeIndex,
+    /// Whose body it is, as errors say it.
+    pub(super) owner: &'a str,
+}
+
+impl FreeBodyMut<'_> {
+    /// Writes poses, rows `[x, y, z, qw, qx, qy, qz]`; quaternions are normalised, velocities in world axes stay.
+    pub(super) fn write_poses(
+        &mut self,
+        argument: &'static str,
+        poses: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (qpos, dof) = self.joint()?;
+        let rows = self.check(argument, 7, "environments, x y z qw qx qy qz", poses, env_ids)?;
+        for (row, (_, pose)) in rows.arrays::<7>().enumerate() {
+            if pose[3..].iter().all(|q| q.abs() < 1e-9) {
+                return Err(Error::Config {
+                    field: argument,
+                    value: format!("{:?} in row {row}", &pose[3..]),
+                    expected: "the last four numbers must be a quaternion w, x, y, z other than zero",
+                });
+            }
+        }
+        for (env, pose) in rows.arrays::<7>() {
+            let row = to_row(&from_row(&pose));
+            let body = self.index.body;
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| {
+                    // The angular velocity is kept in the world, as it is read; MuJoCo keeps it in the body.
+                    let before = body_pose(data, body).rotation;
+                    let turned = from_row(&row).rotation.inverse() * before;
+                    let v = &mut data.qvel_mut()[dof + 3..dof + 6];
+                    let angular = turned * Vector3::new(v[0], v[1], v[2]);
+                    if before.coords != from_row(&row).rotation.coords {
+                        v.copy_from_slice(angular.as_slice());
+                    }
+                    data.qpos_mut()[qpos..qpos + 7].copy_from_slice(&row);
+                });
+            });
+        }
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
+    /// Writes velocities of the frame, then angular velocities, in world axes.
+    pub(super) fn write_velocities(
+        &mut self,
+        argument: &'static str,
+        velocities: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (_, dof) = self.joint()?;
+        let rows = self.check(argument, 6, "environments, vx vy vz wx wy wz", velocities, env_ids)?;
+        for (env, v) in rows.arrays::<6>() {
+            let body = self.index.body;
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| {
+                    let rotation = body_pose(data, body).rotation;
+                    let angular = rotation.inverse() * Vector3::new(v[3], v[4], v[5]);
+                    data.qvel_mut()[dof..dof + 6].copy_from_slice(&[v[0], v[1], v[2], angular.x, angular.y, angular.z]);
+                });
+            });
+        }
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
+    fn joint(&self) -> Result<(usize, usize)> {
+        self.index.joint.ok_or_else(|| Error::FixedBody(self.owner.into()))
+    }
+
+    fn check<'v>(
+        &self,
+        argument: &'static str,
+        columns: usize,
+        meaning: &'static str,
+        values: ArrayView2<'v, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rows<'v>> {
+        let of = |_| format!("{:?}", self.owner);
+        Rows::check(Table { argument, meaning, columns, of: &of }, values, env_ids, self.simulation.batch.num_envs())
+    }
+}
