@@ -66,12 +66,9 @@ pub struct Texture {
 /// One size of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// Pixels per row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Colours (sRGB) from the top left, four bytes each; the fourth is not used.
-    pub pixels: Vec<[u8; 4]>,
+    width: u32,
+    height: u32,
+    bytes: Vec<u8>,
 }
 
 /// Why pixels do not make a texture.
@@ -115,8 +112,8 @@ impl Texture {
         if kind == TextureKind::Cube && u64::from(height) != 6 * u64::from(width) {
             return Err(TextureError::NotSixSquares { width, height });
         }
-        let pixels = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
-        let mut levels = vec![Level { width, height, pixels }];
+        let pixels: Vec<_> = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
+        let mut levels = vec![Level::new(width, height, &pixels)];
         // The faces of a cube must not mix: halve only while a face has an even side.
         let shrinks = |l: &Level| match kind {
             TextureKind::TwoD => l.width > 1 || l.height > 1,
@@ -134,8 +131,8 @@ impl Texture {
         let size = size.clamp(2, 4096) & !1;
         let pick = |k: u32| if (k % size < size / 2) == (k / size < size / 2) { a } else { b };
         let data: Vec<u8> = (0..size * size).flat_map(pick).collect();
-        let pixels = data.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]).collect();
-        let mut levels = vec![Level { width: size, height: size, pixels }];
+        let pixels: Vec<_> = data.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]).collect();
+        let mut levels = vec![Level::new(size, size, &pixels)];
         while let Some(last) = levels.last().filter(|l| l.width > 1) {
             let next = last.half();
             levels.push(next);
@@ -155,18 +152,53 @@ impl Texture {
 }
 
 impl Level {
+    fn new(width: u32, height: u32, pixels: &[[u8; 4]]) -> Self {
+        let rows = pixels.chunks_exact(width as usize);
+        let bytes = rows.clone().chain(rows.take(1)).flat_map(|row| row.iter().chain(&row[..1]).flatten().copied());
+        Self { width, height, bytes: bytes.collect() }
+    }
+
+    /// Pixels per row.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Colours (sRGB) from the top left, four bytes each, of which the fourth is not used. A row has
+    /// [`width`](Self::width) + 1 pixels, and there is a row more than [`height`](Self::height): the last column and the
+    /// last row repeat the first, so that the four pixels around a point are two pairs in memory wherever it lies.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The colour of a pixel inside of the image.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such pixel.
+    #[track_caller]
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
+        assert!(x < self.width && y < self.height, "pixel ({x}, {y}) of {} x {}", self.width, self.height);
+        let at = 4 * (y as usize * (self.width as usize + 1) + x as usize);
+        [0, 1, 2, 3].map(|k| self.bytes[at + k])
+    }
+
     /// Half the size, each pixel the mean of four in linear light.
     fn half(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let table = srgb_to_linear();
-        let at = |x: u32, y: u32| self.pixels[(y.min(self.height - 1) * self.width + x.min(self.width - 1)) as usize];
+        let at = |x: u32, y: u32| self.pixel(x.min(self.width - 1), y.min(self.height - 1));
         let pixel = |k: u32| {
             let (x, y) = (2 * (k % width), 2 * (k / width));
             let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
             let mean = |c: usize| four.iter().map(|p| table[p[c] as usize]).sum::<f32>() / 4.0;
             [linear_to_srgb8(mean(0)), linear_to_srgb8(mean(1)), linear_to_srgb8(mean(2)), 255]
         };
-        Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+        Self::new(width, height, &(0..width * height).map(pixel).collect::<Vec<_>>())
     }
 }
 

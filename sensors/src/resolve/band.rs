@@ -1,13 +1,13 @@
 //! A band of a picture: from what is drawn where to the pixels of all channels.
 
-use super::group::{Colors, resolve};
+use super::group::{At, Colors, resolve};
 use super::multisample::{blend, smooth};
 use super::plan::Plan;
 use super::shadow::ShadowBand;
 use super::tone::encode;
 use crate::camera::channel::{FrameMut, PixelGroup, Stage};
 use crate::camera::rasterizer::Shot;
-use crate::lanes::{COLUMN, LANES, Level, ROW, Simd, at_level, first, load, splat_i};
+use crate::lanes::{LANES, Level, Simd, at_level, first, load, splat_i};
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{BLOCK, Tile};
 use crate::visibility::raster::{Layer, Painter};
@@ -91,14 +91,13 @@ impl Brush {
         let mut pixels = PixelGroup::default();
         for (block, row, [x, y]) in groups(tile, size) {
             let at = tile.samples(block, 0) + row * LANES;
-            let (u, v) = (COLUMN.map(|c| c + (x as f32 + 0.5)), ROW.map(|r| r + (y as f32 + 0.5)));
-            let ids = first(&tile.id[at..]);
+            let (ids, points) = (first(&tile.id[at..]), At::Pixels([x, y]));
             let color = if wants_color { Some(&mut colors[block * 4 + row]) } else { None };
             if veils && wants_geometry {
-                resolve(s, &context, first(&veiled.id[at..]), [&u, &v], Some(&mut pixels), None);
-                resolve(s, &context, ids, [&u, &v], None, color);
+                resolve(s, &context, first(&veiled.id[at..]), points, Some(&mut pixels), None);
+                resolve(s, &context, ids, points, None, color);
             } else {
-                resolve(s, &context, ids, [&u, &v], wants_geometry.then_some(&mut pixels), color);
+                resolve(s, &context, ids, points, wants_geometry.then_some(&mut pixels), color);
             }
             // Without the instruction set: with it, normals become scattered writes, which are slower.
             write(frame, Stage::Geometry, &pixels, [x, y], size, top);

@@ -4,7 +4,9 @@ use super::shade::{Lighting, shade, sky};
 use super::shadow::ShadowMap;
 use super::surface::{Source, surface};
 use crate::camera::channel::PixelGroup;
-use crate::lanes::{F, LANES, M, Simd, U, V3, load, load_u, select, select_i, splat, splat_i, splat_u, store};
+use crate::lanes::{
+    COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, select, select_i, splat, splat_i, splat_u, store,
+};
 use crate::visibility::Projection;
 use crate::visibility::raster::Placed;
 use crate::visibility::raster::tile::NOTHING;
@@ -49,7 +51,27 @@ impl<'a> Context<'a> {
 /// Linear colours of sixteen samples.
 pub(crate) type Colors = [[f32; LANES]; 3];
 
-/// Resolves sixteen samples at (u, v): geometry into `pixels`, colour into `colors`, each only if wanted.
+/// Where sixteen samples are in the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum At<'a> {
+    /// In the middle of 8 x 2 pixels, of which this is the first.
+    Pixels([usize; 2]),
+    /// At these u and v.
+    Points([&'a [f32; LANES]; 2]),
+}
+
+impl At<'_> {
+    #[inline(always)]
+    fn uv<S: Simd>(self, s: S) -> [F<S>; 2] {
+        match self {
+            // Not from memory: numbers that were just written one by one are waited for.
+            Self::Pixels([x, y]) => [load(s, &COLUMN) + (x as f32 + 0.5), load(s, &ROW) + (y as f32 + 0.5)],
+            Self::Points([u, v]) => [load(s, u), load(s, v)],
+        }
+    }
+}
+
+/// Resolves sixteen samples: geometry into `pixels`, colour into `colors`, each only if wanted.
 ///
 /// One copy per instruction set, so its arguments are in memory.
 #[inline(never)]
@@ -57,13 +79,13 @@ pub(crate) fn resolve<S: Simd>(
     s: S,
     context: &Context<'_>,
     ids: &[u32; LANES],
-    at: [&[f32; LANES]; 2],
+    at: At<'_>,
     pixels: Option<&mut PixelGroup>,
     colors: Option<&mut Colors>,
 ) {
     s.vectorize(
         #[inline(always)]
-        || resolve_lanes(s, context, load_u(s, ids), load(s, at[0]), load(s, at[1]), pixels, colors),
+        || resolve_lanes(s, context, load_u(s, ids), at.uv(s), pixels, colors),
     );
 }
 
@@ -72,8 +94,7 @@ fn resolve_lanes<S: Simd>(
     s: S,
     context: &Context<'_>,
     ids: U<S>,
-    u: F<S>,
-    v: F<S>,
+    [u, v]: [F<S>; 2],
     mut pixels: Option<&mut PixelGroup>,
     mut colors: Option<&mut Colors>,
 ) {

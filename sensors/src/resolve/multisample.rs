@@ -1,6 +1,6 @@
 //! Colours of pixels whose four samples do not see the same: the mean of the samples.
 
-use super::group::{Colors, Context, resolve};
+use super::group::{At, Colors, Context, resolve};
 use crate::lanes::{LANES, Simd, load, load_u, splat_u, store};
 use crate::visibility::raster::tile::{NOTHING, SAMPLES, Tile};
 
@@ -104,7 +104,7 @@ pub(crate) fn smooth<S: Simd>(
             (u[k], v[k], id[k]) = (request.u, request.v, request.id);
         }
         let mut out: Colors = [[0.0; LANES]; 3];
-        resolve(s, context, &id, [&u, &v], None, Some(&mut out));
+        resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut out));
         for (k, request) in batch.iter().enumerate() {
             let weight = f32::from(request.weight) * 0.25;
             for (to, from) in colors.iter_mut().zip(&out) {
@@ -153,7 +153,7 @@ pub(crate) fn blend<S: Simd>(
         }
     }
     let mut over: Colors = [[0.0; LANES]; 3];
-    resolve(s, context, &id, [&u, &v], None, Some(&mut over));
+    resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut over));
     let k = load(s, &share) * alpha;
     for (to, from) in colors.iter_mut().zip(&over) {
         let (below, above) = (load(s, to), load(s, from));

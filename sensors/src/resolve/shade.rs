@@ -4,7 +4,7 @@ use super::shadow::ShadowMap;
 use super::surface::{Source, Surface, planar_uv};
 use super::{texture, tone};
 use crate::lanes::{F, LANES, M, Simd, V3, abs, load, max, min, root, select, splat};
-use scene::{Light, LightKind, RenderScene};
+use scene::{Light, LightKind, Material, RenderScene};
 
 /// The largest number of lamps that are drawn.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -69,6 +69,58 @@ impl Lighting {
     }
 }
 
+/// Highlights weaker than this are black: a fortieth of what a screen can show.
+const FAINT: f32 = 1e-4;
+
+/// The numbers whose power is [`FAINT`], by exponent: below them there is no highlight to compute.
+const FAINT_ROOT: [f32; 129] = {
+    let mut roots = [0.0f32; 129];
+    let mut exponent = 1;
+    while exponent < roots.len() {
+        // Halving the interval: a constant is computed the same on every machine.
+        let (mut low, mut high) = (0.0f32, 1.0f32);
+        let mut halvings = 0;
+        while halvings < 24 {
+            let middle = 0.5 * (low + high);
+            let (mut power, mut k) = (1.0f32, 0);
+            while k < exponent {
+                power *= middle;
+                k += 1;
+            }
+            if power < FAINT {
+                low = middle
+            } else {
+                high = middle
+            }
+            halvings += 1;
+        }
+        roots[exponent] = low;
+        exponent += 1;
+    }
+    roots
+};
+
+/// How a surface shines.
+#[derive(Clone, Copy)]
+struct Gloss {
+    strength: f32,
+    exponent: u32,
+    /// Cosines below this give no highlight.
+    faint: f32,
+}
+
+impl Gloss {
+    fn of(material: &Material) -> Self {
+        let exponent = ((material.shininess * 128.0 + 0.5) as u32).clamp(1, 128);
+        Self { strength: material.specular, exponent, faint: FAINT_ROOT[exponent as usize] }
+    }
+
+    /// Whether it shines in a light of this colour.
+    fn shows(&self, specular: [f32; 3]) -> bool {
+        self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
+    }
+}
+
 /// x to an integer power, by squaring.
 #[inline(always)]
 fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
@@ -121,16 +173,16 @@ pub(crate) fn shade<S: Simd>(
     let ambient = |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission);
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     let mut gloss = [zero, zero, zero];
-    let exponent = ((material.shininess * 128.0 + 0.5) as u32).clamp(1, 128);
-    let glossy = |specular: [f32; 3]| material.specular != 0.0 && specular.iter().any(|&x| x != 0.0);
+    let shiny = Gloss::of(material);
     let headlight = &scene.headlight;
     if headlight.active {
         let facing = max(-n.dot(view), zero);
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
         }
-        if glossy(headlight.specular) {
-            let shine = power(s, facing, exponent) * material.specular;
+        let seen = lanes & facing.simd_gt(splat(s, shiny.faint));
+        if shiny.shows(headlight.specular) && seen.any_true() {
+            let shine = select(seen, power(s, facing, shiny.exponent) * shiny.strength, zero);
             for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
                 *gloss += shine * specular;
             }
@@ -165,12 +217,18 @@ pub(crate) fn shade<S: Simd>(
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
         }
-        if glossy(light.specular) {
-            let half = to.sub(view).unit(s);
-            let shine = power(s, max(n.dot(half), zero), exponent) * material.specular;
-            let shine = select(facing.simd_gt(zero), shine, zero);
-            for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
-                *gloss += shine * lit * specular;
+        if shiny.shows(light.specular) {
+            // The cosine between the normal and the half vector, compared before its root is taken.
+            let half = to.sub(view);
+            let (along, square) = (n.dot(half), half.dot(half));
+            let bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
+            let seen = lanes & bright & along.simd_gt(zero) & facing.simd_gt(zero);
+            if seen.any_true() {
+                let cosine = along / select(seen, square, splat(s, 1.0)).sqrt();
+                let shine = select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero);
+                for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
+                    *gloss += shine * lit * specular;
+                }
             }
         }
     }

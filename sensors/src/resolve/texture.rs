@@ -34,14 +34,20 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
     let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
     let (u, v) = (select(lanes, u, zero), select(lanes, v, zero));
     let (u, v) = (u - floor_lanes(s, u), one - (v - floor_lanes(s, v)));
-    let texels = footprint * levels[0].width.max(levels[0].height) as f32;
+    let texels = footprint * levels[0].width().max(levels[0].height()) as f32;
     let mut out = [zero, zero, zero];
-    // Level k is for pixels 2^k to 2^(k+1) texels wide, blended with the next by how much wider than 2^k they are.
+    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.5 times 2^k it is enough alone: the four texels of a point
+    // cover that; beyond it is blended with the next.
     let (mut from_last, mut left, mut width) = (zero, lanes, 1.0f32);
+    let mut carried = false;
     for (k, level) in levels.iter().enumerate() {
         let last = k + 1 == levels.len();
+        if !last && !carried && !(left & texels.simd_lt(splat(s, 2.0 * width))).any_true() {
+            width *= 2.0;
+            continue;
+        }
         let here = if last { left } else { left & texels.simd_lt(splat(s, 2.0 * width)) };
-        let to_next = if last { zero } else { min(max(texels * (1.0 / width) - 1.0, zero), one) };
+        let to_next = if last { zero } else { min(max(texels * (2.0 / width) - 3.0, zero), one) };
         let to_next = select(here, to_next, zero);
         let weight = select(here, one - to_next, zero) + from_last;
         let wanted = weight.simd_gt(zero);
@@ -51,7 +57,8 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
         }
         left &= !here;
         from_last = to_next;
-        if !left.any_true() && !from_last.simd_gt(zero).any_true() {
+        carried = from_last.simd_gt(zero).any_true();
+        if !carried && !left.any_true() {
             break;
         }
         width *= 2.0;
@@ -62,26 +69,37 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
 /// The colours between four texels each. Coordinates are in 0..=1, rows from the top; the image repeats.
 #[inline(always)]
 fn bilinear_lanes<S: Simd>(s: S, level: &Level, u: F<S>, v: F<S>, lanes: M<S>) -> [F<S>; 3] {
-    let (w, h) = (level.width as f32, level.height as f32);
+    let (w, h) = (level.width() as f32, level.height() as f32);
     let (x, y) = (u * w - 0.5, v * h - 0.5);
     let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
     let (fx, fy) = (x - ix, y - iy);
-    let (x0, x1) = (wrap(s, ix, w), wrap(s, ix + 1.0, w));
-    let (y0, y1) = (wrap(s, iy, h).to_int() * level.width as i32, wrap(s, iy + 1.0, h).to_int() * level.width as i32);
-    let (x0, x1) = (x0.to_int(), x1.to_int());
-    let at = [(y0 + x0).array(), (y0 + x1).array(), (y1 + x0).array(), (y1 + x1).array()];
-    let mut texel = [[0i32; LANES]; 4];
-    let bits = lanes.to_bitmask();
-    for lane in 0..LANES {
-        if bits >> lane & 1 == 1 {
-            for corner in 0..4 {
-                texel[corner][lane] = i32::from_le_bytes(level.pixels[at[corner][lane] as usize]);
-            }
+    let stride = level.width() as i32 + 1;
+    let at = wrap(s, iy, h).to_int() * stride + wrap(s, ix, w).to_int();
+    let at: [i32; LANES] = at.array();
+    // Bytes of two pixels, above and below.
+    let (mut above, mut below) = ([[0i32; LANES]; 2], [[0i32; LANES]; 2]);
+    let (bytes, bits, next_row) = (level.bytes(), lanes.to_bitmask(), 4 * stride as usize);
+    let pair = |from: usize| match bytes.get(from..from + 8) {
+        Some(&[a, b, c, d, e, f, g, h]) => u64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        _ => 0,
+    };
+    let mut put = |lane: usize| {
+        let first = 4 * at[lane] as usize;
+        let (upper, lower) = (pair(first), pair(first + next_row));
+        (above[0][lane], above[1][lane]) = (upper as i32, (upper >> 32) as i32);
+        (below[0][lane], below[1][lane]) = (lower as i32, (lower >> 32) as i32);
+    };
+    if bits == 0xffff {
+        for lane in 0..LANES {
+            put(lane);
+        }
+    } else {
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            put(lane);
         }
     }
-    let [a, b, c, d] = &texel;
-    let (a, b) = (load_i(s, a).bytes(), load_i(s, b).bytes());
-    let (c, d) = (load_i(s, c).bytes(), load_i(s, d).bytes());
+    let (a, b) = (load_i(s, &above[0]).bytes(), load_i(s, &above[1]).bytes());
+    let (c, d) = (load_i(s, &below[0]).bytes(), load_i(s, &below[1]).bytes());
     let mut out = a;
     for k in 0..3 {
         let (top, bottom) = (a[k] + (b[k] - a[k]) * fx, c[k] + (d[k] - c[k]) * fx);
@@ -112,8 +130,8 @@ pub(crate) fn sample_cube(texture: &Texture, d: [f32; 3], footprint: f32) -> [f3
         (5, a[2], -d[0], -d[1])
     };
     let k = 0.5 / if major > 0.0 { major } else { 1.0 };
-    mix(texture, footprint * 0.5 * texture.levels()[0].width as f32, |level| {
-        let side = level.width as i32;
+    mix(texture, footprint * 0.5 * texture.levels()[0].width() as f32, |level| {
+        let side = level.width() as i32;
         let at = |x: f32| (x * k + 0.5) * side as f32 - 0.5;
         bilinear(level, [at(u), at(v)], [face * side, (face + 1) * side])
     })
@@ -146,11 +164,11 @@ fn bilinear(level: &Level, [x, y]: [f32; 2], rows: [i32; 2]) -> [f32; 4] {
     let (ix, iy) = (floor(x), floor(y));
     let (fx, fy) = (x - ix as f32, y - iy as f32);
     let wrap = |i: i32, n: i32| i.clamp(0, n - 1) as usize;
-    let (width, height) = (level.width as i32, rows[1] - rows[0]);
-    let (x0, x1) = (wrap(ix, width), wrap(ix + 1, width));
-    let row = |i: i32| (wrap(i, height) + rows[0] as usize) * level.width as usize;
+    let (width, height) = (level.width() as i32, rows[1] - rows[0]);
+    let (x0, x1) = (wrap(ix, width) as u32, wrap(ix + 1, width) as u32);
+    let row = |i: i32| (wrap(i, height) + rows[0] as usize) as u32;
     let (y0, y1) = (row(iy), row(iy + 1));
-    let [a, b, c, d] = [level.pixels[y0 + x0], level.pixels[y0 + x1], level.pixels[y1 + x0], level.pixels[y1 + x1]];
+    let [a, b, c, d] = [level.pixel(x0, y0), level.pixel(x1, y0), level.pixel(x0, y1), level.pixel(x1, y1)];
     let mut out = [0.0; 4];
     for k in 0..4 {
         let (a, c) = (f32::from(a[k]), f32::from(c[k]));

@@ -19,4 +19,9 @@ impl Channel for Color {
     fn write(group: &PixelGroup, lane: usize, out: &mut [u8]) {
         out.copy_from_slice(&group.color[lane]);
     }
+
+    #[inline(always)]
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [u8]) {
+        out.copy_from_slice(&group.color.as_flattened()[4 * first..4 * first + out.len()]);
+    }
 }

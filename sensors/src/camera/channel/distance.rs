@@ -20,6 +20,11 @@ impl Channel for Distance {
         out[0] = group.distance[lane];
     }
 
+    #[inline(always)]
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [f32]) {
+        out.copy_from_slice(&group.distance[first..first + out.len()]);
+    }
+
     fn replace_misses(numbers: &mut [f32], value: f32) {
         numbers.iter_mut().filter(|x| x.is_infinite()).for_each(|x| *x = value);
     }

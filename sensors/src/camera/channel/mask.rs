@@ -19,4 +19,9 @@ impl Channel for Mask {
     fn write(group: &PixelGroup, lane: usize, out: &mut [i32]) {
         out[0] = group.mask[lane];
     }
+
+    #[inline(always)]
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [i32]) {
+        out.copy_from_slice(&group.mask[first..first + out.len()]);
+    }
 }

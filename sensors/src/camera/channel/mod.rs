@@ -70,6 +70,14 @@ pub trait Channel {
     /// The numbers of one pixel.
     fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Number]);
 
+    /// The numbers of pixels beside each other, at most 8 of them. Channels that have them in this order already copy them.
+    #[inline(always)]
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Number]) {
+        for (column, out) in out.chunks_exact_mut(Self::COMPONENTS).enumerate() {
+            Self::write(group, first + column, out);
+        }
+    }
+
     /// Puts `value` where nothing was hit: see [`DepthMiss`](super::DepthMiss). Only for channels that measure how far
     /// something is; the others have a value of their own for a miss.
     fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
@@ -321,10 +329,7 @@ fn put<C: Channel>(buffer: &mut [C::Number], group: &PixelGroup, [x, y]: [usize;
     let columns = 8.min(width - x);
     for row in 0..2.min(height - y) {
         let first = ((y + row) * width + x) * C::COMPONENTS;
-        let line = &mut buffer[first..first + columns * C::COMPONENTS];
-        for (column, out) in line.chunks_exact_mut(C::COMPONENTS).enumerate() {
-            C::write(group, row * 8 + column, out);
-        }
+        C::write_row(group, row * 8, &mut buffer[first..first + columns * C::COMPONENTS]);
     }
 }
 
