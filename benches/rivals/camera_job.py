@@ -6,7 +6,7 @@ hexadecimal bytes, 32-bit floats, top row first), `triangles` (of all meshes tha
 
 The job: `model` (an MJCF file with a camera "bench"), `size` (width and height), `groups` (geom groups that are drawn),
 `envs`, `starts` (positions of the joints of every environment), `images` (environments drawn per step, in turn),
-`physics` (physics steps of an environment before it is drawn), `look` (what is drawn, see the scripts).
+`physics` (physics steps of an environment before it is drawn), `look` and `passes` (what is drawn and how, see the scripts).
 """
 
 import json

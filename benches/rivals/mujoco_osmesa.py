@@ -1,9 +1,12 @@
 """MuJoCo's own renderer on OSMesa (Mesa's software renderer): colour, depth and segmentation of every image.
 
-The looks: `plain` (shadows, reflections, fog and multisampling off, one pass for colour and one for depth and
-segmentation together, buffers of the image's size), `full` (the same with shadows and four samples per pixel;
-`shadow_size` replaces the size of the shadow map),
-`defaults` (`mujoco.Renderer` as its documentation shows it, three passes). See camera_job.py for the commands.
+By `passes`: `api` is `mujoco.Renderer`, MuJoCo's renderer as its documentation shows it, a pass for each of the three;
+`by_hand` is the same library with as few passes as there can be, one for colour and one for depth and segmentation
+together, read without copies, for which members of `mujoco.Renderer` are used that are not public.
+
+The looks: `plain` (shadows, reflections, skybox, fog and multisampling off, buffers of the image's size), `full` (the same
+with shadows and four samples per pixel; `shadow_size` replaces the size of the shadow map), `defaults` (the model's own
+quality, nothing switched off). See camera_job.py for the commands.
 """
 
 import os
@@ -18,16 +21,29 @@ import numpy as np
 Flag = mujoco.mjtRndFlag
 
 
-class Defaults:
-    """`mujoco.Renderer` with the model's own quality."""
-
-    def __init__(self, job):
-        model = job.mj_model
+def renderer_of(job):
+    """`mujoco.Renderer` with the settings of the job's look."""
+    model, look = job.mj_model, job.look
+    if look == "defaults":
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, job.width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, job.height)
-        self.job = job
-        self.renderer = mujoco.Renderer(model, job.height, job.width)
-        self.option = option(job)
+        return mujoco.Renderer(model, job.height, job.width)
+    model.vis.global_.offwidth, model.vis.global_.offheight = job.width, job.height
+    model.vis.quality.offsamples = 4 if look == "full" else 0
+    if job.shadow_size:
+        model.vis.quality.shadowsize = job.shadow_size
+    renderer = mujoco.Renderer(model, job.height, job.width)
+    for flag in (Flag.mjRND_REFLECTION, Flag.mjRND_SKYBOX, Flag.mjRND_FOG, Flag.mjRND_HAZE):
+        renderer.scene.flags[flag] = False
+    renderer.scene.flags[Flag.mjRND_SHADOW] = look == "full"
+    return renderer
+
+
+class Api:
+    """What `mujoco.Renderer` offers."""
+
+    def __init__(self, job):
+        self.job, self.renderer, self.option = job, renderer_of(job), option(job)
 
     def draw(self, data):
         renderer = self.renderer
@@ -41,21 +57,12 @@ class Defaults:
         return color, depth, segmentation
 
 
-class Tuned:
-    """The same library with as few passes as there can be; `full` keeps shadows and multisampling on."""
+class ByHand:
+    """Two passes, and no copies."""
 
-    def __init__(self, job, full):
+    def __init__(self, job):
         model = job.mj_model
-        model.vis.global_.offwidth, model.vis.global_.offheight = job.width, job.height
-        model.vis.quality.offsamples = 4 if full else 0
-        if job.shadow_size:
-            model.vis.quality.shadowsize = job.shadow_size
-        self.job, self.option = job, option(job)
-        self.renderer = mujoco.Renderer(model, job.height, job.width)
-        scene = self.renderer.scene
-        for flag in (Flag.mjRND_REFLECTION, Flag.mjRND_SKYBOX, Flag.mjRND_FOG, Flag.mjRND_HAZE):
-            scene.flags[flag] = False
-        scene.flags[Flag.mjRND_SHADOW] = full
+        self.job, self.renderer, self.option = job, renderer_of(job), option(job)
         self.rect = mujoco.MjrRect(0, 0, job.width, job.height)
         self.color = np.empty((job.height, job.width, 3), np.uint8)
         self.ids = np.empty((job.height, job.width, 3), np.uint8)
@@ -90,7 +97,7 @@ def option(job):
 
 def main():
     job = camera_job.Job(sys.argv[1])
-    drawer = Defaults(job) if job.look == "defaults" else Tuned(job, job.look == "full")
+    drawer = Api(job) if job.passes == "api" else ByHand(job)
     datas = job.datas()
     turn = 0
 

@@ -166,6 +166,13 @@ fn check(name: &str, mjcf: &str, folder: &Path, eye: [f64; 3], target: [f64; 3])
     println!("{name}: {agreement:?}");
     assert!(agreement.seen > 20_000 && agreement.compared > SIZE[0] * SIZE[1] / 2, "{name}: {agreement:?}");
     assert!(agreement.same >= 0.999, "{name}: {agreement:?}");
+    // Light differs: ours has an ambient light by height, bends highlights and encodes for the screen. What must be alike
+    // is what is bright and what is dark, and the hue of things.
+    assert!(agreement.brightness > 0.7 && agreement.hue < 0.2, "{name}: {agreement:?}");
+    let exchanged = Pictures { color: pictures.color.iter().map(|&[r, g, b]| [b, r, g]).collect(), ..pictures };
+    let wrong = compare(&theirs, &exchanged, &mask_of);
+    println!("{name}, colours exchanged: {wrong:?}");
+    assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colours go unnoticed: {wrong:?}");
     // The control: a camera that looks 5 mm past the target.
     let aside = ours(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
     let wrong = compare(&theirs, &aside, &mask_of);

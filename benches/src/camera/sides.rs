@@ -131,7 +131,10 @@ impl Side for Ours<'_> {
 /// Who else draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Renderer {
+    /// `mujoco.Renderer`, MuJoCo's renderer as users have it.
     OsMesa,
+    /// The same library, called by hand with as few passes as there can be.
+    OsMesaByHand,
     Tiny,
     Warp,
 }
@@ -140,6 +143,7 @@ impl Renderer {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::OsMesa => "MuJoCo on OSMesa",
+            Self::OsMesaByHand => "OSMesa by hand",
             Self::Tiny => "PyBullet TinyRenderer",
             Self::Warp => "MuJoCo Warp on the CPU",
         }
@@ -147,7 +151,7 @@ impl Renderer {
 
     fn script(self) -> &'static str {
         match self {
-            Self::OsMesa => "mujoco_osmesa.py",
+            Self::OsMesa | Self::OsMesaByHand => "mujoco_osmesa.py",
             Self::Tiny => "pybullet_tiny.py",
             Self::Warp => "warp_rays.py",
         }
@@ -156,7 +160,9 @@ impl Renderer {
     /// What python must be able to run.
     pub(super) fn probe(self) -> &'static str {
         match self {
-            Self::OsMesa => "import os; os.environ['MUJOCO_GL'] = 'osmesa'; import mujoco; mujoco.GLContext(8, 8)",
+            Self::OsMesa | Self::OsMesaByHand => {
+                "import os; os.environ['MUJOCO_GL'] = 'osmesa'; import mujoco; mujoco.GLContext(8, 8)"
+            }
             Self::Tiny => "import mujoco, pybullet",
             Self::Warp => "import mujoco_warp",
         }
@@ -166,8 +172,8 @@ impl Renderer {
     pub(super) fn images(self, work: &Work) -> usize {
         match self {
             Self::Warp => work.envs,
-            Self::OsMesa if work.look != Look::Plain => 1,
-            Self::OsMesa => 4.min(work.envs),
+            Self::OsMesa | Self::OsMesaByHand if work.look != Look::Plain => 1,
+            Self::OsMesa | Self::OsMesaByHand => 4.min(work.envs),
             Self::Tiny => work.envs.min(4_000_000_usize.div_ceil(work.size[0] * work.size[1] * 8)),
         }
     }
@@ -191,6 +197,7 @@ impl Rival {
             "images": renderer.images(work),
             "physics": work.physics,
             "look": work.look.name(),
+            "passes": if renderer == Renderer::OsMesaByHand { "by_hand" } else { "api" },
             "shadow_size": work.shadow_size,
         });
         let process = Process::start(python, renderer.script(), &job, tempfile::tempdir()?)?;
