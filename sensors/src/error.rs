@@ -95,6 +95,36 @@ pub enum SensorError {
         /// What would be right.
         expected: &'static str,
     },
+    /// A contact sensor without bodies.
+    #[error("there are no bodies to watch; give patterns of their names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
+    NoBodies {
+        /// Bodies that exist.
+        candidates: Vec<String>,
+    },
+    /// A contact sensor of one body that looks for contacts of that body with itself.
+    #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
+    OwnFilter {
+        /// The body.
+        body: String,
+        /// The filter.
+        filter: String,
+    },
+    /// A link that fixed joints fuse to another one: no joint holds it alone.
+    #[error("the link {link:?} is fused to {carrier:?} by fixed joints; measure the joint of {carrier:?} instead")]
+    FusedLink {
+        /// The link.
+        link: String,
+        /// The link that moves it.
+        carrier: String,
+    },
+    /// Two things of a sensor are called alike.
+    #[error("there are two {what}s called {name:?}; give each a name of its own")]
+    NameTaken {
+        /// What they are.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
     /// History and latency need more memory than can be given.
     #[error(
         "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; make history_length \

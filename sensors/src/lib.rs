@@ -10,11 +10,16 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod contact_sensor;
 mod delay;
 pub mod error;
 pub mod expected;
+pub mod frame_transformer;
+mod frames;
 pub mod history;
+pub mod imu;
 pub mod joint_state;
+pub mod joint_wrench;
 pub(crate) mod lanes;
 pub mod noise;
 pub mod resolve;
@@ -25,10 +30,14 @@ pub mod sensor;
 pub mod visibility;
 
 pub use camera::{Camera, CameraCfg, CameraError};
+pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use error::SensorError;
 pub use expected::Expected;
+pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 pub use history::History;
+pub use imu::{Imu, ImuCfg};
 pub use joint_state::{JointState, JointStateCfg};
+pub use joint_wrench::{JointWrench, JointWrenchCfg};
 pub use noise::NoiseCfg;
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};

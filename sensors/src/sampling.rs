@@ -68,6 +68,7 @@ impl Channel {
 pub struct Sampler {
     expected: Expected,
     phases: Phases,
+    period: f64,
     quantities: Vec<Quantity>,
     stamps: Array1<f64>,
     force_stamps: Array1<f64>,
@@ -112,7 +113,8 @@ impl Sampler {
     ) -> Result<Self, SensorError> {
         let schedule = Schedule::new(cfg.update_period, context.dt, cfg.round_period)?;
         let period = schedule.period_steps();
-        let noise = Noise::new(context, cfg, period as f64 * context.dt, channels)?;
+        let seconds = period as f64 * context.dt;
+        let noise = Noise::new(context, cfg, seconds, channels)?;
         let n = context.num_envs;
         let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
@@ -129,6 +131,7 @@ impl Sampler {
         Ok(Self {
             expected: Expected::new(sensor, requires, context),
             phases: schedule.phases(n),
+            period: seconds,
             quantities: channels.iter().map(quantity).collect(),
             stamps: Array1::zeros(n),
             force_stamps: Array1::zeros(n),
@@ -148,6 +151,15 @@ impl Sampler {
     /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`].
     pub fn check(&self, state: &SceneState) -> Result<(), SensorError> {
         self.expected.check(state)
+    }
+
+    /// Checks indices of environments.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::IndexOutOfRange`].
+    pub fn check_envs(&self, env_ids: &[usize]) -> Result<(), SensorError> {
+        self.expected.check_envs(env_ids)
     }
 
     /// Measures in the environments that are due: `read(env, row)` writes the true values of all channels of one environment,
@@ -280,6 +292,26 @@ impl Sampler {
     /// When it measures.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
+    }
+
+    /// Time between measurements \[s\].
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Number of environments.
+    pub fn num_envs(&self) -> usize {
+        self.expected.num_envs()
+    }
+
+    /// Measurements that are remembered at most.
+    pub fn history_length(&self) -> usize {
+        self.stamp_history.length()
+    }
+
+    /// Whether the sampler was built with a channel.
+    pub fn has(&self, channel: &str) -> bool {
+        self.quantities.iter().any(|q| q.name == channel)
     }
 
     #[track_caller]
