@@ -1,10 +1,17 @@
-//! Sensors in a running simulation: schedule, values, resets, and a sensor of a user's own.
+//! Sensors in a running simulation: schedule, values, resets, and sensors of a user's own.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod contact;
+mod frames;
+mod imu;
+mod same_bits;
+mod worlds;
+mod wrench;
 
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{JointStateCfg, Requires, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
 
 fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
     let cfg = SimulationManagerCfg { num_envs, ..Default::default() };
@@ -118,6 +125,65 @@ fn a_sensor_of_another_crate_is_added_like_any_other() {
         let expected = sim.robot(robot).link_pose("ee_link").unwrap();
         assert_eq!(sim.sensor(id).unwrap().0, expected.column(2).to_vec());
     }
+}
+
+/// Speed of a body, with all that a sampler gives: rate, latency, noise.
+#[derive(Debug)]
+struct Speed {
+    body: usize,
+    sampler: Sampler,
+}
+
+struct SpeedCfg(&'static str, SamplingCfg);
+
+impl SensorCfg for SpeedCfg {
+    type Sensor = Speed;
+
+    fn requires(&self) -> Requires {
+        Requires::VELOCITIES
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Speed, SensorError> {
+        let channels = [Channel::new("speed", 1)];
+        let sampler = Sampler::new("speed", self.requires(), context, &self.1, &channels)?;
+        Ok(Speed { body: context.body(self.0)?, sampler })
+    }
+}
+
+fn speed(body: usize, state: &SceneState, env: usize) -> f64 {
+    let velocity = |k| state.body_velocities.as_ref().map_or(0.0, |v| v[(env, body, k)]);
+    (0..3).map(|k| velocity(k).powi(2)).sum::<f64>().sqrt()
+}
+
+impl Sensor for Speed {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+/// A free fall is `g t` fast, and what is read is 4 steps old.
+#[test]
+fn a_sampler_serves_sensors_of_other_crates_too() {
+    let mut sim = SimulationManager::new(worlds::cfg(2)).unwrap();
+    sim.add_rigid_object(worlds::cube("ball", 1.0, 0.1, [0.0, 0.0, 90.0])).unwrap();
+    let late = SamplingCfg { latency_steps: 4, ..SamplingCfg::every(0.01) };
+    let id = sim.add_sensor("speed", SpeedCfg("ball", late)).unwrap();
+    sim.update(101);
+    let seen = sim.sensor(id).unwrap().sampler.values("speed").to_owned();
+    // The newest capture that is 4 steps old is that of step 96.
+    worlds::assert_near(seen, &[9.81 * 96.0 * 0.005; 2], 1e-12);
 }
 
 #[test]
