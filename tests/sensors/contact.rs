@@ -190,3 +190,52 @@ fn forces_after_a_write_belong_to_what_was_written() {
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], 0.0, "up again");
     assert_near(stamps(&sim).1, &[0.05, 0.0], 1e-12);
 }
+
+/// RK4 solves its steps in the middle of them; what sensors get is solved for their beginning, as with Euler.
+#[test]
+fn forces_of_rk4_are_those_of_the_beginning_of_the_step() {
+    let first = |integrator| {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { integrator, ..cfg(1) }).unwrap();
+        sim.add_rigid_object(cube("box", 2.0, 0.2, [0.0, 0.0, 0.0995])).unwrap();
+        let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+        sim.update(1);
+        let sensor = sim.sensor(id).unwrap();
+        (sensor.total_forces_w()[(0, 0, 2)], sensor.force_stamps()[0])
+    };
+    let (force, stamp) = first(Integrator::Rk4);
+    assert!(force > 2.0 * G && stamp.abs() < 1e-15, "{force} N at {stamp} s");
+    assert_eq!((force, stamp), first(Integrator::Euler));
+}
+
+/// An environment that is put aside measures nothing more until it is reset, and the others do not notice.
+#[test]
+fn a_diverged_environment_keeps_its_last_measurement() {
+    let forces = |blow_up: bool| {
+        let mut sim = SimulationManager::new(cfg(2)).unwrap();
+        let box_ = sim.add_rigid_object(cube("box", 1.0, 0.2, [0.0, 0.0, 0.0995])).unwrap();
+        let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+        let imu = sim.add_sensor("imu", ImuCfg::on("box")).unwrap();
+        sim.update(10);
+        let before = sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)];
+        if blow_up {
+            let huge = array![[1e9, 0.0, 1e9, 1e9, 1e9, 1e9]];
+            sim.rigid_object_mut(box_).write_velocity(&huge, Some(&[EnvId(1)])).unwrap();
+        }
+        let mut told = Vec::new();
+        for _ in 0..40 {
+            sim.update(1);
+            told.push(sim.sensor(id).unwrap().net_forces_w()[(0, 0, 2)].to_bits());
+            told.push(sim.sensor(imu).unwrap().lin_acc_b()[(0, 2)].to_bits());
+        }
+        assert_eq!(sim.diverged().len(), usize::from(blow_up));
+        if blow_up {
+            let sensor = sim.sensor(id).unwrap();
+            assert!(sensor.sample_counts()[1] < 50 && sensor.sample_counts()[0] == 50);
+            sim.reset(Some(&[EnvId(1)])).unwrap();
+            sim.update(10);
+            assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], before, "alive again");
+        }
+        told
+    };
+    assert_eq!(forces(true), forces(false));
+}
