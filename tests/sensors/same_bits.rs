@@ -106,7 +106,7 @@ fn readings(settings: SimulationManagerCfg, stride: u32) -> Vec<Vec<u64>> {
             sim.reset(Some(&[EnvId(1)])).unwrap();
         }
         sim.update(stride);
-        if (k + 1) * stride % 12 != 0 {
+        if !((k + 1) * stride).is_multiple_of(12) {
             continue;
         }
         let (contact, imu) = (sim.sensor(ids.contact).unwrap(), sim.sensor(ids.imu).unwrap());

@@ -63,6 +63,6 @@ pub(crate) fn row(values: &Array2<f64>, env: usize, first: usize) -> Vector3<f64
 pub(crate) fn assert_near(found: impl IntoIterator<Item = f64>, expected: &[f64], tolerance: f64) {
     let found: Vec<f64> = found.into_iter().collect();
     assert_eq!(found.len(), expected.len());
-    let far = found.iter().zip(expected).any(|(f, e)| !((f - e).abs() <= tolerance));
-    assert!(!far, "{found:?} instead of {expected:?} within {tolerance}");
+    let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= tolerance);
+    assert!(near, "{found:?} instead of {expected:?} within {tolerance}");
 }
