@@ -15,7 +15,10 @@ pub mod prelude {
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
     };
-    pub use sensors::{JointState, JointStateCfg};
+    pub use sensors::{
+        ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu, ImuCfg, JointState, JointStateCfg,
+        JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
+    };
     pub use sim::{
         BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,
         MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId,

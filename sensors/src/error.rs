@@ -82,6 +82,62 @@ pub enum SensorError {
         /// What it may mean.
         candidates: Vec<String>,
     },
+    /// A name pattern is no regular expression, or two match the same name.
+    #[error("{0}")]
+    Pattern(String),
+    /// A number of the configuration is out of range.
+    #[error("{field} is {value}; {expected}")]
+    OutOfRange {
+        /// Which number.
+        field: String,
+        /// The value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A contact sensor without bodies.
+    #[error("there are no bodies to watch; give patterns of their names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
+    NoBodies {
+        /// Bodies that exist.
+        candidates: Vec<String>,
+    },
+    /// A contact sensor of one body that looks for contacts of that body with itself.
+    #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
+    OwnFilter {
+        /// The body.
+        body: String,
+        /// The filter.
+        filter: String,
+    },
+    /// A link that fixed joints fuse to another one: no joint holds it alone.
+    #[error("the link {link:?} is fused to {carrier:?} by fixed joints; measure the joint of {carrier:?} instead")]
+    FusedLink {
+        /// The link.
+        link: String,
+        /// The link that moves it.
+        carrier: String,
+    },
+    /// Two things of a sensor are called alike.
+    #[error("there are two {what}s called {name:?}; give each a name of its own")]
+    NameTaken {
+        /// What they are.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// History and latency need more memory than can be given.
+    #[error(
+        "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; make history_length \
+         or latency_steps smaller"
+    )]
+    TooLarge {
+        /// Measurements to keep in each environment.
+        rows: usize,
+        /// Numbers in a measurement.
+        width: usize,
+        /// Number of environments.
+        num_envs: usize,
+    },
     /// Something is wrong with a camera.
     #[error(transparent)]
     Camera(#[from] CameraError),

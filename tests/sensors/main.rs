@@ -1,10 +1,17 @@
-//! Sensors in a running simulation: schedule, values, resets, and a sensor of a user's own.
+//! Sensors in a running simulation: schedule, values, resets, and sensors of a user's own.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod contact;
+mod frames;
+mod imu;
+mod same_bits;
+mod worlds;
+mod wrench;
 
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{JointStateCfg, Requires, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
 
 fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
     let cfg = SimulationManagerCfg { num_envs, ..Default::default() };
@@ -19,7 +26,8 @@ fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
 #[test]
 fn a_joint_sensor_samples_on_its_ticks() {
     let (mut sim, robot) = arm(2);
-    let cfg = JointStateCfg { update_period: 0.05, history_length: 3, ..Default::default() };
+    let cfg =
+        JointStateCfg { sampling: SamplingCfg { history_length: 3, ..SamplingCfg::every(0.05) }, ..Default::default() };
     let id = sim.add_sensor("joints", cfg).unwrap();
     let mut sampled = Vec::new();
     for step in 1..=17_u32 {
@@ -48,7 +56,7 @@ fn a_joint_sensor_samples_on_its_ticks() {
 #[test]
 fn a_reset_restarts_the_clock_of_its_environment_only() {
     let (mut sim, robot) = arm(2);
-    let cfg = JointStateCfg { update_period: 0.05, ..Default::default() };
+    let cfg = JointStateCfg { sampling: SamplingCfg::every(0.05), ..Default::default() };
     let id = sim.add_sensor("joints", cfg).unwrap();
     sim.update(7);
     sim.reset(Some(&[EnvId(1)])).unwrap();
@@ -119,14 +127,74 @@ fn a_sensor_of_another_crate_is_added_like_any_other() {
     }
 }
 
+/// Speed of a body, with all that a sampler gives: rate, latency, noise.
+#[derive(Debug)]
+struct Speed {
+    body: usize,
+    sampler: Sampler,
+}
+
+struct SpeedCfg(&'static str, SamplingCfg);
+
+impl SensorCfg for SpeedCfg {
+    type Sensor = Speed;
+
+    fn requires(&self) -> Requires {
+        Requires::VELOCITIES
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Speed, SensorError> {
+        let channels = [Channel::new("speed", 1)];
+        let sampler = Sampler::new("speed", self.requires(), context, &self.1, &channels)?;
+        Ok(Speed { body: context.body(self.0)?, sampler })
+    }
+}
+
+fn speed(body: usize, state: &SceneState, env: usize) -> f64 {
+    let velocity = |k| state.body_velocities.as_ref().map_or(0.0, |v| v[(env, body, k)]);
+    (0..3).map(|k| velocity(k).powi(2)).sum::<f64>().sqrt()
+}
+
+impl Sensor for Speed {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| row[0] = speed(self.body, state, env))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+/// A free fall is `g t` fast, and what is read is 4 steps old.
+#[test]
+fn a_sampler_serves_sensors_of_other_crates_too() {
+    let mut sim = SimulationManager::new(worlds::cfg(2)).unwrap();
+    sim.add_rigid_object(worlds::cube("ball", 1.0, 0.1, [0.0, 0.0, 90.0])).unwrap();
+    let late = SamplingCfg { latency_steps: 4, ..SamplingCfg::every(0.01) };
+    let id = sim.add_sensor("speed", SpeedCfg("ball", late)).unwrap();
+    sim.update(101);
+    let seen = sim.sensor(id).unwrap().sampler.values("speed").to_owned();
+    // The newest capture that is 4 steps old is that of step 96.
+    worlds::assert_near(seen, &[9.81 * 96.0 * 0.005; 2], 1e-12);
+}
+
 #[test]
 fn what_is_wrong_is_said() {
     let (mut sim, _) = arm(1);
-    let odd = JointStateCfg { update_period: 0.013, ..Default::default() };
+    let odd = JointStateCfg { sampling: SamplingCfg::every(0.013), ..Default::default() };
     let text = sim.add_sensor("odd", odd).unwrap_err().to_string();
     assert!(text.contains("odd") && text.contains("0.013"), "{text}");
     sim.add_sensor("joints", JointStateCfg::default()).unwrap();
     assert!(matches!(sim.add_sensor("joints", JointStateCfg::default()), Err(Error::DuplicateUid(_))));
-    let beyond = JointStateCfg { joints: Some(vec![6]), ..Default::default() };
-    assert!(sim.add_sensor("beyond", beyond).is_err());
+    let beyond = JointStateCfg { joints: Some(vec!["JOINT7".into()]), ..Default::default() };
+    let text = sim.add_sensor("beyond", beyond).unwrap_err().to_string();
+    assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
 }

@@ -1,0 +1,122 @@
+//! What a contact sensor watches, and how it is built.
+
+use super::air_time::AirTimes;
+use super::pairs::{Layout, Pairs, count};
+use super::sensor::ContactSensor;
+use crate::error::SensorError;
+use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::select::{matching, select};
+use crate::sensor::{Requires, SensorCfg, SensorContext};
+
+/// Configuration of a [`ContactSensor`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactSensorCfg {
+    /// The bodies to watch, by patterns of their names (`uid/link`, `link` alone, or the uid of an object), in the order
+    /// they are reported. Links that are fused to others, such as feet behind a fixed joint, are bodies of their own here.
+    pub bodies: Vec<String>,
+    /// Groups of other bodies, one pattern each, for [`ContactSensor::force_matrix_w`]. `ground` and `world` stand for all that
+    /// belongs to the world itself. They change nothing else: net forces count every contact.
+    pub filters: Vec<String>,
+    /// Report the poses of the bodies.
+    pub track_pose: bool,
+    /// Report since when bodies touch or do not. Contact is then looked at in every physics step, whatever the period.
+    pub track_air_time: bool,
+    /// Report where bodies are touched.
+    pub track_contact_points: bool,
+    /// A body counts as touched where its net normal force is above this \[N\].
+    pub force_threshold: f64,
+    /// Rate, history, latency and noise. Channels that can have noise: `net_forces_w`, `friction_forces_w`,
+    /// `total_forces_w`, `force_matrix_w`, and `contact_points_w` and `pos_w` where they are tracked.
+    pub sampling: SamplingCfg,
+}
+
+impl Default for ContactSensorCfg {
+    /// Nothing to watch yet; contact from 1 N on.
+    fn default() -> Self {
+        Self {
+            bodies: Vec::new(),
+            filters: Vec::new(),
+            track_pose: false,
+            track_air_time: false,
+            track_contact_points: false,
+            force_threshold: 1.0,
+            sampling: SamplingCfg::default(),
+        }
+    }
+}
+
+impl ContactSensorCfg {
+    /// Watches the bodies that one pattern matches.
+    pub fn of(pattern: impl Into<String>) -> Self {
+        Self { bodies: vec![pattern.into()], ..Self::default() }
+    }
+}
+
+impl SensorCfg for ContactSensorCfg {
+    type Sensor = ContactSensor;
+
+    fn requires(&self) -> Requires {
+        if self.track_pose { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
+    }
+
+    /// # Errors
+    ///
+    /// No body to watch, a pattern that matches nothing or what another one matches, a filter that can see nothing but the
+    /// body itself, a threshold that is negative, and what is wrong with the sampling.
+    fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
+        let bodies = select(&self.bodies, &context.bodies, "body")?;
+        if bodies.is_empty() {
+            let candidates = context.bodies.iter().take(scene::pattern::MAX_CANDIDATES).cloned().collect();
+            return Err(SensorError::NoBodies { candidates });
+        }
+        if !(self.force_threshold >= 0.0 && self.force_threshold.is_finite()) {
+            let (field, value) = ("force_threshold".into(), self.force_threshold);
+            return Err(SensorError::OutOfRange { field, value, expected: "it must be 0 N or more" });
+        }
+        let groups =
+            self.filters.iter().map(|filter| group(filter, &bodies, context)).collect::<Result<Vec<_>, _>>()?;
+        let (b, m) = (bodies.len(), groups.len());
+        let layout = Layout {
+            bodies: b,
+            groups: m,
+            points: self.track_contact_points,
+            poses: self.track_pose,
+            air: self.track_air_time,
+        };
+        let mut channels =
+            ["net_forces_w", "friction_forces_w", "total_forces_w"].map(|c| Channel::new(c, 3 * b)).to_vec();
+        channels.push(Channel::new("force_matrix_w", 3 * b * m));
+        if layout.points {
+            channels.extend([Channel::new("contact_points_w", 3 * b), Channel::exact("contact_counts", b)]);
+        }
+        if layout.poses {
+            channels.extend([Channel::new("pos_w", 3 * b), Channel::exact("quat_w", 4 * b)]);
+        }
+        if layout.air {
+            channels.extend(AirTimes::CHANNELS.map(|name| Channel::exact(name, b)));
+        }
+        debug_assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), count(&layout));
+        Ok(ContactSensor {
+            names: bodies.iter().map(|&body| context.bodies[body].clone()).collect(),
+            filters: self.filters.clone(),
+            air: self.track_air_time.then(|| AirTimes::new(context.num_envs, b, context.dt, self.force_threshold)),
+            pairs: Pairs::new(layout, bodies, &groups, context.bodies.len()),
+            sampler: Sampler::new("contact", self.requires(), context, &self.sampling, &channels)?,
+            threshold: self.force_threshold,
+        })
+    }
+}
+
+/// The bodies that a filter means: indices of the body axis, and its length for the world.
+fn group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<usize>, SensorError> {
+    let world = context.bodies.len();
+    let mut names = context.bodies.to_vec();
+    names.extend(["ground".to_string(), "world".to_string()]);
+    let mut found = matching(filter, &names, "body")?;
+    found.iter_mut().for_each(|index| *index = (*index).min(world));
+    found.dedup();
+    if found == bodies && found.len() == 1 {
+        return Err(SensorError::OwnFilter { body: context.bodies[found[0]].clone(), filter: filter.into() });
+    }
+    Ok(found)
+}

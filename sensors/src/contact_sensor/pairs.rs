@@ -1,0 +1,117 @@
+//! From the list of contacts to forces per body and per pair.
+
+use ndarray::Axis;
+use scene::SceneState;
+use scene::state::Contact;
+
+/// Which numbers a measurement has.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    pub bodies: usize,
+    pub groups: usize,
+    pub points: bool,
+    pub poses: bool,
+    pub air: bool,
+}
+
+/// Numbers of a measurement.
+pub(super) fn count(layout: &Layout) -> usize {
+    let per_body = 9
+        + 3 * layout.groups
+        + if layout.points { 4 } else { 0 }
+        + if layout.poses { 7 } else { 0 }
+        + if layout.air { super::air_time::AirTimes::CHANNELS.len() } else { 0 };
+    layout.bodies * per_body
+}
+
+/// The bodies that are watched and the groups that are told apart.
+#[derive(Clone, Debug)]
+pub(super) struct Pairs {
+    layout: Layout,
+    /// Watched bodies as indices of the body axis.
+    bodies: Vec<usize>,
+    /// Place among the watched ones of every body of the axis, and of the world behind them.
+    slots: Vec<Option<usize>>,
+    /// Groups that every body of the axis is in, and the world behind them.
+    groups: Vec<Vec<usize>>,
+}
+
+impl Pairs {
+    /// `groups` holds indices of the body axis, `axis` for the world.
+    pub(super) fn new(layout: Layout, bodies: Vec<usize>, groups: &[Vec<usize>], axis: usize) -> Self {
+        let slots = (0..=axis).map(|body| bodies.iter().position(|&b| b == body)).collect();
+        let of = |body| (0..groups.len()).filter(|&g| groups[g].contains(&body)).collect();
+        Self { layout, bodies, slots, groups: (0..=axis).map(of).collect() }
+    }
+
+    /// The watched body and its side of every end of a contact, with the index of the body at the other end.
+    fn ends<'c>(&'c self, contact: &'c Contact) -> impl Iterator<Item = (usize, f64, usize)> + 'c {
+        let world = self.slots.len() - 1;
+        let index = move |side: usize| contact.bodies[side].map_or(world, |body| (body as usize).min(world));
+        // The force is that on the second body.
+        [(0, -1.0), (1, 1.0)].into_iter().filter_map(move |(side, sign)| {
+            let slot = self.slots[index(side)]?;
+            Some((slot, sign, index(1 - side)))
+        })
+    }
+
+    /// Adds the normal forces on the watched bodies of environment `env` to `net`, 3 numbers per body.
+    pub(super) fn net_forces(&self, state: &SceneState, env: usize, net: &mut [f64]) {
+        for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
+            for (slot, sign, _) in self.ends(contact) {
+                add(net, slot, sign * contact.normal_force, &contact.normal);
+            }
+        }
+    }
+
+    /// Writes forces, points and poses of environment `env` to `row`, which is zero before; gives what is left of the row.
+    pub(super) fn read<'r>(&self, state: &SceneState, env: usize, row: &'r mut [f64]) -> &'r mut [f64] {
+        let Layout { bodies: b, groups: m, .. } = self.layout;
+        let (net, row) = row.split_at_mut(3 * b);
+        let (friction, row) = row.split_at_mut(3 * b);
+        let (total, row) = row.split_at_mut(3 * b);
+        let (matrix, row) = row.split_at_mut(3 * b * m);
+        let (points, row) = row.split_at_mut(if self.layout.points { 3 * b } else { 0 });
+        let (counts, row) = row.split_at_mut(if self.layout.points { b } else { 0 });
+        for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
+            let sliding: [f64; 3] =
+                std::array::from_fn(|k| contact.force[k] - contact.normal_force * contact.normal[k]);
+            for (slot, sign, other) in self.ends(contact) {
+                add(net, slot, sign * contact.normal_force, &contact.normal);
+                add(friction, slot, sign, &sliding);
+                add(total, slot, sign, &contact.force);
+                for &group in &self.groups[other] {
+                    add(matrix, slot * m + group, sign * contact.normal_force, &contact.normal);
+                }
+                if self.layout.points {
+                    add(points, slot, 1.0, &contact.point);
+                    counts[slot] += 1.0;
+                }
+            }
+        }
+        for (point, count) in points.chunks_exact_mut(3).zip(&*counts) {
+            // 0 / 0 is NaN: a body that nothing touches is touched nowhere.
+            point.iter_mut().for_each(|x| *x /= count);
+        }
+        if !self.layout.poses {
+            return row;
+        }
+        let (positions, row) = row.split_at_mut(3 * b);
+        let (rotations, row) = row.split_at_mut(4 * b);
+        if let Some(poses) = &state.body_poses {
+            let poses = poses.index_axis(Axis(0), env);
+            for (slot, &body) in self.bodies.iter().enumerate() {
+                (0..3).for_each(|k| positions[3 * slot + k] = poses[(body, k)]);
+                (0..4).for_each(|k| rotations[4 * slot + k] = poses[(body, 3 + k)]);
+            }
+        }
+        row
+    }
+}
+
+/// Adds a multiple of a vector to one of a list.
+fn add(list: &mut [f64], index: usize, factor: f64, vector: &[f64; 3]) {
+    for (sum, component) in list[3 * index..3 * index + 3].iter_mut().zip(vector) {
+        *sum += factor * component;
+    }
+}

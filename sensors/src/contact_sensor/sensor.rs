@@ -1,0 +1,232 @@
+//! The contact sensor and what can be read of it.
+
+use super::air_time::AirTimes;
+use super::pairs::Pairs;
+use crate::error::SensorError;
+use crate::sampling::{Sampled, Sampler};
+use crate::select::matching;
+use crate::sensor::Sensor;
+use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
+use scene::SceneState;
+use std::fmt;
+
+/// Contact forces on bodies in all environments, world axes; [`Sampled`] has their stamps and counts.
+///
+/// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters, T
+/// measurements of history, newest first.
+#[derive(Clone, Debug)]
+pub struct ContactSensor {
+    pub(super) names: Vec<String>,
+    pub(super) filters: Vec<String>,
+    pub(super) pairs: Pairs,
+    pub(super) air: Option<AirTimes>,
+    pub(super) sampler: Sampler,
+    pub(super) threshold: f64,
+}
+
+impl Sensor for ContactSensor {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.check(state)?;
+        let Self { air, pairs, sampler, .. } = self;
+        if let Some(air) = air {
+            for (env, &step) in state.step.iter().enumerate() {
+                air.look(env, step, |net| pairs.net_forces(state, env, net));
+            }
+        }
+        sampler.update(state, |env, row| {
+            let row = pairs.read(state, env, row);
+            if let Some(air) = air {
+                air.read(env, row);
+                air.told(env);
+            }
+        })
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.check(state)?;
+        self.sampler.check_envs(env_ids)?;
+        if let Some(air) = &mut self.air {
+            for &env in env_ids {
+                air.reset(env, state.step[env], |net| self.pairs.net_forces(state, env, net));
+            }
+        }
+        let Self { air, pairs, sampler, .. } = self;
+        sampler.reset(env_ids, state, |env, row| read(pairs, air.as_ref(), state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        let Self { air, pairs, sampler, .. } = self;
+        sampler.refresh(env_ids, state, |env, row| read(pairs, air.as_ref(), state, env, row))
+    }
+
+    /// Where air times are tracked, every step.
+    fn due_in(&self, step: &[u64]) -> u64 {
+        if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
+    }
+}
+
+/// Writes what the sensor measures in environment `env` to `row`.
+fn read(pairs: &Pairs, air: Option<&AirTimes>, state: &SceneState, env: usize, row: &mut [f64]) {
+    let row = pairs.read(state, env, row);
+    if let Some(air) = air {
+        air.read(env, row);
+    }
+}
+
+impl Sampled for ContactSensor {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl ContactSensor {
+    /// Names of the watched bodies, in the order of the axis B.
+    pub fn body_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Places on the axis B of the bodies that a pattern matches, by full or bare name.
+    ///
+    /// # Errors
+    ///
+    /// The pattern is no regular expression or matches none of the watched bodies.
+    pub fn find_bodies(&self, pattern: &str) -> Result<Vec<usize>, SensorError> {
+        matching(pattern, &self.names, "watched body")
+    }
+
+    /// The filters, in the order of the axis M.
+    pub fn filters(&self) -> &[String] {
+        &self.filters
+    }
+
+    /// Net force above which a body counts as touched \[N\].
+    pub fn force_threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    fn vectors(&self, channel: &str) -> ArrayView3<'_, f64> {
+        self.sampler.values_as(channel, (self.sampler.num_envs(), self.names.len(), 3))
+    }
+
+    fn past_vectors(&self, channel: &str) -> ArrayView4<'_, f64> {
+        let (n, t) = (self.sampler.num_envs(), self.sampler.history_length());
+        self.sampler.history_as(channel, (n, t, self.names.len(), 3))
+    }
+
+    /// Sum of the normal forces on each body \[N\], shape (N, B, 3): all counterparts, friction left out.
+    pub fn net_forces_w(&self) -> ArrayView3<'_, f64> {
+        self.vectors("net_forces_w")
+    }
+
+    /// Past [`net_forces_w`](Self::net_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    pub fn net_forces_w_history(&self) -> ArrayView4<'_, f64> {
+        self.past_vectors("net_forces_w")
+    }
+
+    /// Sum of the friction forces on each body \[N\], shape (N, B, 3): what contacts exert across their normals.
+    pub fn friction_forces_w(&self) -> ArrayView3<'_, f64> {
+        self.vectors("friction_forces_w")
+    }
+
+    /// Past [`friction_forces_w`](Self::friction_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    pub fn friction_forces_w_history(&self) -> ArrayView4<'_, f64> {
+        self.past_vectors("friction_forces_w")
+    }
+
+    /// Sum of the contact forces on each body with friction \[N\], shape (N, B, 3).
+    pub fn total_forces_w(&self) -> ArrayView3<'_, f64> {
+        self.vectors("total_forces_w")
+    }
+
+    /// Past [`total_forces_w`](Self::total_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    pub fn total_forces_w_history(&self) -> ArrayView4<'_, f64> {
+        self.past_vectors("total_forces_w")
+    }
+
+    /// Sum of the normal forces that the bodies of each filter exert on each body \[N\], shape (N, B, M, 3).
+    pub fn force_matrix_w(&self) -> ArrayView4<'_, f64> {
+        let shape = (self.sampler.num_envs(), self.names.len(), self.filters.len(), 3);
+        self.sampler.values_as("force_matrix_w", shape)
+    }
+
+    /// Past [`force_matrix_w`](Self::force_matrix_w) \[N\], shape (N, T, B, M, 3); 0 where not filled yet.
+    pub fn force_matrix_w_history(&self) -> ArrayView5<'_, f64> {
+        let (n, t) = (self.sampler.num_envs(), self.sampler.history_length());
+        self.sampler.history_as("force_matrix_w", (n, t, self.names.len(), self.filters.len(), 3))
+    }
+
+    /// Mean of the points where each body is touched \[m\], shape (N, B, 3), NaN where nothing touches it; `None` unless
+    /// tracked.
+    pub fn contact_points_w(&self) -> Option<ArrayView3<'_, f64>> {
+        self.sampler.has("contact_points_w").then(|| self.vectors("contact_points_w"))
+    }
+
+    /// Number of contact points of each body, shape (N, B), whole numbers; `None` unless points are tracked.
+    pub fn contact_counts(&self) -> Option<ArrayView2<'_, f64>> {
+        self.optional("contact_counts")
+    }
+
+    /// Positions of the bodies \[m\], shape (N, B, 3); `None` unless tracked. They are of [`Sampled::stamps`], forces of
+    /// [`Sampled::force_stamps`].
+    pub fn pos_w(&self) -> Option<ArrayView3<'_, f64>> {
+        self.sampler.has("pos_w").then(|| self.vectors("pos_w"))
+    }
+
+    /// Orientations of the bodies, w x y z, shape (N, B, 4); `None` unless tracked.
+    pub fn quat_w(&self) -> Option<ArrayView3<'_, f64>> {
+        let shape = (self.sampler.num_envs(), self.names.len(), 4);
+        self.sampler.has("quat_w").then(|| self.sampler.values_as("quat_w", shape))
+    }
+
+    fn optional(&self, channel: &str) -> Option<ArrayView2<'_, f64>> {
+        self.sampler.has(channel).then(|| self.sampler.values(channel))
+    }
+
+    /// How long each body has not been touched \[s\], shape (N, B), 0 where it is; `None` unless air times are tracked. Times
+    /// are whole numbers of physics steps, counted from the reset on.
+    pub fn current_air_time(&self) -> Option<ArrayView2<'_, f64>> {
+        self.optional("current_air_time")
+    }
+
+    /// How long each body has been touched \[s\], shape (N, B), 0 where it is not; `None` unless air times are tracked.
+    pub fn current_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
+        self.optional("current_contact_time")
+    }
+
+    /// How long each body was in the air before its last contact began \[s\], shape (N, B); `None` unless air times are
+    /// tracked.
+    pub fn last_air_time(&self) -> Option<ArrayView2<'_, f64>> {
+        self.optional("last_air_time")
+    }
+
+    /// How long the last contact of each body lasted \[s\], shape (N, B); `None` unless air times are tracked.
+    pub fn last_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
+        self.optional("last_contact_time")
+    }
+
+    /// Whether contact of each body began since the measurement before, however short it was, shape (N, B); `None` unless
+    /// air times are tracked. What touches at a reset begins nothing.
+    pub fn first_contact(&self) -> Option<Array2<bool>> {
+        self.optional("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
+    }
+
+    /// Whether contact of each body ended since the measurement before, however short the time in the air was, shape (N, B);
+    /// `None` unless air times are tracked.
+    pub fn first_air(&self) -> Option<Array2<bool>> {
+        self.optional("first_air").map(|flags| flags.mapv(|flag| flag > 0.0))
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for ContactSensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |names: &[String]| if names.is_empty() { "none".into() } else { names.join(", ") };
+        writeln!(f, "Contact sensor")?;
+        writeln!(f, "  environments     : {}", self.sampler.num_envs())?;
+        writeln!(f, "  update period (s): {}", self.sampler.period())?;
+        writeln!(f, "  history length   : {}", self.sampler.history_length())?;
+        writeln!(f, "  number of bodies : {}", self.names.len())?;
+        writeln!(f, "  body names       : {}", list(&self.names))?;
+        write!(f, "  filters          : {}", list(&self.filters))
+    }
+}

@@ -1,0 +1,197 @@
+//! Where frames are, in the world and seen from another frame.
+
+use crate::error::SensorError;
+use crate::frames::{pose, put};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::select::matching;
+use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use ndarray::{ArrayView2, ArrayView3};
+use scene::pose::to_wxyz;
+use scene::{Pose, SceneState};
+
+/// Configuration of a [`FrameTransformer`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameTransformerCfg {
+    /// The body of the source frame: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
+    pub source: String,
+    /// The source frame in that of its body.
+    pub source_offset: Pose,
+    /// The target frames, in the order they are reported.
+    pub targets: Vec<TargetFrameCfg>,
+    /// Rate, history, latency and noise; channels that can have noise: `source_pos_w`, `target_pos_w` and
+    /// `target_pos_source`.
+    pub sampling: SamplingCfg,
+}
+
+/// One target frame, or one on each of several bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetFrameCfg {
+    /// Pattern of the names of the bodies, full or bare; the body of the source is no exception.
+    pub bodies: String,
+    /// What the frame is called; the full name of its body where `None`. With several bodies, `name/body`.
+    pub name: Option<String>,
+    /// The frame in that of its body.
+    pub offset: Pose,
+}
+
+impl TargetFrameCfg {
+    /// The frames of the bodies that a pattern matches.
+    pub fn of(bodies: impl Into<String>) -> Self {
+        Self { bodies: bodies.into(), name: None, offset: Pose::identity() }
+    }
+}
+
+impl FrameTransformerCfg {
+    /// Targets seen from a body.
+    pub fn from(source: impl Into<String>, targets: Vec<TargetFrameCfg>) -> Self {
+        let sampling = SamplingCfg::default();
+        Self { source: source.into(), source_offset: Pose::identity(), targets, sampling }
+    }
+}
+
+/// Poses of target frames in the world and in the source frame, in all environments. N environments, M targets.
+#[derive(Clone, Debug)]
+pub struct FrameTransformer {
+    source: (usize, Pose),
+    targets: Vec<(usize, Pose)>,
+    names: Vec<String>,
+    sampler: Sampler,
+}
+
+impl SensorCfg for FrameTransformerCfg {
+    type Sensor = FrameTransformer;
+
+    fn requires(&self) -> Requires {
+        Requires::POSES
+    }
+
+    /// # Errors
+    ///
+    /// There is no such body, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
+    /// is wrong with the sampling.
+    fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
+        let source = context.body(&self.source)?;
+        let (mut targets, mut names) = (Vec::new(), Vec::<String>::new());
+        for target in &self.targets {
+            let bodies = matching(&target.bodies, &context.bodies, "body")?;
+            for &body in &bodies {
+                let name = match &target.name {
+                    None => context.bodies[body].clone(),
+                    Some(name) if bodies.len() == 1 => name.clone(),
+                    Some(name) => format!("{name}/{}", context.bodies[body]),
+                };
+                if names.contains(&name) {
+                    return Err(SensorError::NameTaken { what: "target frame", name });
+                }
+                names.push(name);
+                targets.push((body, target.offset));
+            }
+        }
+        for offset in self.targets.iter().map(|t| &t.offset).chain([&self.source_offset]) {
+            let mut numbers = offset.translation.vector.iter().chain(offset.rotation.coords.iter());
+            if let Some(&value) = numbers.find(|x| !x.is_finite()) {
+                let expected = "every number must be finite";
+                return Err(SensorError::OutOfRange { field: "an offset".into(), value, expected });
+            }
+        }
+        let m = targets.len();
+        let channels = [
+            Channel::new("source_pos_w", 3),
+            Channel::exact("source_quat_w", 4),
+            Channel::new("target_pos_w", 3 * m),
+            Channel::exact("target_quat_w", 4 * m),
+            Channel::new("target_pos_source", 3 * m),
+            Channel::exact("target_quat_source", 4 * m),
+        ];
+        Ok(FrameTransformer {
+            source: (source, self.source_offset),
+            targets,
+            names,
+            sampler: Sampler::new("frame transformer", self.requires(), context, &self.sampling, &channels)?,
+        })
+    }
+}
+
+/// Writes what the sensor measures in environment `env` to `row`.
+fn read(source: &(usize, Pose), targets: &[(usize, Pose)], state: &SceneState, env: usize, row: &mut [f64]) {
+    let Some(poses) = &state.body_poses else { return };
+    let frame = |(body, body_from_frame): &(usize, Pose)| pose(poses, env, *body) * body_from_frame;
+    let world_from_source = frame(source);
+    let source_from_world = world_from_source.inverse();
+    let row = put(row, world_from_source.translation.vector.as_slice());
+    let mut row = put(row, &to_wxyz(&world_from_source.rotation));
+    for from_world in [Pose::identity(), source_from_world] {
+        for target in targets {
+            row = put(row, (from_world * frame(target)).translation.vector.as_slice());
+        }
+        for target in targets {
+            row = put(row, &to_wxyz(&(from_world * frame(target)).rotation));
+        }
+    }
+}
+
+impl Sensor for FrameTransformer {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| read(&self.source, &self.targets, state, env, row))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| read(&self.source, &self.targets, state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| read(&self.source, &self.targets, state, env, row))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+impl Sampled for FrameTransformer {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl FrameTransformer {
+    /// Names of the target frames, in the order of the axis M: that of the configuration, and within a pattern that of the
+    /// bodies.
+    pub fn target_frame_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Position of the source frame in the world \[m\], shape (N, 3).
+    pub fn source_pos_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("source_pos_w")
+    }
+
+    /// Orientation of the source frame in the world, w x y z, shape (N, 4).
+    pub fn source_quat_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("source_quat_w")
+    }
+
+    fn rows(&self, channel: &str, width: usize) -> ArrayView3<'_, f64> {
+        self.sampler.values_as(channel, (self.sampler.num_envs(), self.targets.len(), width))
+    }
+
+    /// Positions of the targets in the world \[m\], shape (N, M, 3).
+    pub fn target_pos_w(&self) -> ArrayView3<'_, f64> {
+        self.rows("target_pos_w", 3)
+    }
+
+    /// Orientations of the targets in the world, w x y z, shape (N, M, 4).
+    pub fn target_quat_w(&self) -> ArrayView3<'_, f64> {
+        self.rows("target_quat_w", 4)
+    }
+
+    /// Positions of the targets in the source frame \[m\], shape (N, M, 3).
+    pub fn target_pos_source(&self) -> ArrayView3<'_, f64> {
+        self.rows("target_pos_source", 3)
+    }
+
+    /// Orientations of the targets in the source frame, w x y z, shape (N, M, 4).
+    pub fn target_quat_source(&self) -> ArrayView3<'_, f64> {
+        self.rows("target_quat_source", 4)
+    }
+}

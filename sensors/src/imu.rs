@@ -1,0 +1,173 @@
+//! Inertial measurement units.
+
+use crate::error::SensorError;
+use crate::frames::{pose, put, vector};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use nalgebra::Vector3;
+use ndarray::ArrayView2;
+use scene::pose::to_wxyz;
+use scene::{Pose, SceneState};
+
+/// Configuration of an [`Imu`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImuCfg {
+    /// The body that it is fixed to: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
+    pub body: String,
+    /// Its frame in that of the body.
+    pub offset: Pose,
+    /// What it reads at rest beside its own acceleration \[m/s²\], in world axes; `None` for minus gravity, as a real one.
+    pub gravity_bias: Option<Vector3<f64>>,
+    /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
+    /// `ang_acc_b`.
+    pub sampling: SamplingCfg,
+}
+
+impl ImuCfg {
+    /// At the origin of a body.
+    pub fn on(body: impl Into<String>) -> Self {
+        Self { body: body.into(), ..Self::default() }
+    }
+}
+
+impl Default for ImuCfg {
+    /// At the origin of no body yet.
+    fn default() -> Self {
+        let sampling = SamplingCfg::default();
+        Self { body: String::new(), offset: Pose::identity(), gravity_bias: None, sampling }
+    }
+}
+
+/// Pose, velocities and accelerations of a frame that is fixed to a body, in all environments.
+///
+/// All of them are of one instant, [`Sampled::force_stamps`]: the physics engine knows the acceleration of the state before
+/// a step when the step is done. It is the engine's own acceleration, not a difference of velocities, so that neither the
+/// period nor a reset shows in it.
+#[derive(Clone, Debug)]
+pub struct Imu {
+    mount: Mount,
+    sampler: Sampler,
+}
+
+#[derive(Clone, Debug)]
+struct Mount {
+    body: usize,
+    body_from_imu: Pose,
+    gravity_bias: Vector3<f64>,
+}
+
+impl SensorCfg for ImuCfg {
+    type Sensor = Imu;
+
+    fn requires(&self) -> Requires {
+        Requires::ACCELERATIONS
+    }
+
+    /// # Errors
+    ///
+    /// There is no such body, an offset or a bias that is not finite, and what is wrong with the sampling.
+    fn build(&self, context: &SensorContext) -> Result<Imu, SensorError> {
+        let body = context.body(&self.body)?;
+        let gravity_bias = self.gravity_bias.unwrap_or(-context.gravity);
+        let numbers =
+            self.offset.translation.vector.iter().chain(self.offset.rotation.coords.iter()).chain(&gravity_bias);
+        if let Some(&value) = numbers.into_iter().find(|x| !x.is_finite()) {
+            let field = "offset or gravity_bias".into();
+            return Err(SensorError::OutOfRange { field, value, expected: "every number must be finite" });
+        }
+        let channels = [
+            Channel::new("pos_w", 3),
+            Channel::exact("quat_w", 4),
+            Channel::new("lin_vel_b", 3),
+            Channel::new("ang_vel_b", 3),
+            Channel::new("lin_acc_b", 3),
+            Channel::new("ang_acc_b", 3),
+        ];
+        Ok(Imu {
+            mount: Mount { body, body_from_imu: self.offset, gravity_bias },
+            sampler: Sampler::new("imu", self.requires(), context, &self.sampling, &channels)?,
+        })
+    }
+}
+
+impl Mount {
+    /// Writes what the sensor measures in environment `env` to `row`.
+    fn read(&self, state: &SceneState, env: usize, row: &mut [f64]) {
+        let (Some(poses), Some(velocities), Some(accelerations)) =
+            (&state.force_poses, &state.force_velocities, &state.body_accelerations)
+        else {
+            return;
+        };
+        let world_from_body = pose(poses, env, self.body);
+        let world_from_imu = world_from_body * self.body_from_imu;
+        let arm = world_from_body.rotation * self.body_from_imu.translation.vector;
+        let spin = vector(velocities, env, self.body, 3);
+        let spin_up = vector(accelerations, env, self.body, 3);
+        // The velocity and the acceleration of another point of the same rigid body.
+        let velocity = vector(velocities, env, self.body, 0) + spin.cross(&arm);
+        let acceleration =
+            vector(accelerations, env, self.body, 0) + spin_up.cross(&arm) + spin.cross(&spin.cross(&arm));
+        let mut row = put(row, world_from_imu.translation.vector.as_slice());
+        row = put(row, &to_wxyz(&world_from_imu.rotation));
+        for world in [velocity, spin, acceleration + self.gravity_bias, spin_up] {
+            row = put(row, world_from_imu.rotation.inverse_transform_vector(&world).as_slice());
+        }
+    }
+}
+
+impl Sensor for Imu {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| self.mount.read(state, env, row))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| self.mount.read(state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| self.mount.read(state, env, row))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+impl Sampled for Imu {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl Imu {
+    /// Position \[m\], shape \[num_envs, 3\].
+    pub fn pos_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("pos_w")
+    }
+
+    /// Orientation, w x y z, shape \[num_envs, 4\].
+    pub fn quat_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("quat_w")
+    }
+
+    /// Velocity \[m/s\] in the sensor's own axes, shape \[num_envs, 3\].
+    pub fn lin_vel_b(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("lin_vel_b")
+    }
+
+    /// Angular velocity \[rad/s\] in the sensor's own axes, shape \[num_envs, 3\].
+    pub fn ang_vel_b(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("ang_vel_b")
+    }
+
+    /// Acceleration with the gravity bias \[m/s²\] in the sensor's own axes, shape \[num_envs, 3\]: 0 in free fall, 9.81
+    /// upwards at rest.
+    pub fn lin_acc_b(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("lin_acc_b")
+    }
+
+    /// Angular acceleration \[rad/s²\] in the sensor's own axes, shape \[num_envs, 3\].
+    pub fn ang_acc_b(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("ang_acc_b")
+    }
+}

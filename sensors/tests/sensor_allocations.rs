@@ -1,0 +1,71 @@
+//! Sensors of numbers allocate nothing after they were built.
+
+use ndarray::Array3;
+use scene::SceneState;
+use scene::state::{Contact, Contacts};
+use sensors::{
+    ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointWrenchCfg, SamplingCfg, Sensor, SensorCfg, SensorContext,
+    TargetFrameCfg,
+};
+
+fn state() -> SceneState {
+    let contact = Contact {
+        bodies: [None, Some(1)],
+        point: [0.1, 0.2, 0.3],
+        normal: [0.0, 0.0, 1.0],
+        distance: 0.0,
+        force: [1.0, 2.0, 3.0],
+        normal_force: 3.0,
+    };
+    let rows = |width| Some(Array3::from_shape_fn((2, 3, width), |(e, b, k)| (1 + e + b + k) as f64));
+    SceneState {
+        contacts: Some(Contacts { first: vec![0, 3, 6], list: vec![contact; 6] }),
+        body_poses: rows(7),
+        force_poses: rows(7),
+        force_velocities: rows(6),
+        body_accelerations: rows(6),
+        joint_wrenches: rows(6),
+        ..SceneState::new(2)
+    }
+}
+
+#[test]
+fn no_sensor_allocates_when_it_measures() {
+    let bodies = ["a", "b", "c"].map(String::from);
+    let context = SensorContext { num_envs: 2, dt: 0.01, bodies: bodies.into(), ..SensorContext::default() };
+    let sampling = SamplingCfg { history_length: 3, latency_steps: 4, ..SamplingCfg::every(0.02) };
+    let contact = ContactSensorCfg {
+        filters: vec!["ground".into(), ".*".into()],
+        track_pose: true,
+        track_air_time: true,
+        track_contact_points: true,
+        sampling: sampling.clone(),
+        ..ContactSensorCfg::of(".*")
+    };
+    let imu = ImuCfg { sampling: sampling.clone(), ..ImuCfg::on("b") };
+    let frames = FrameTransformerCfg {
+        sampling: sampling.clone(),
+        ..FrameTransformerCfg::from("a", vec![TargetFrameCfg::of(".*")])
+    };
+    let wrench = JointWrenchCfg { links: vec![".*".into()], sampling };
+    let mut sensors: Vec<Box<dyn Sensor>> = vec![
+        Box::new(contact.build(&context).expect("good")),
+        Box::new(imu.build(&context).expect("good")),
+        Box::new(frames.build(&context).expect("good")),
+        Box::new(wrench.build(&context).expect("good")),
+    ];
+    let mut state = state();
+    for sensor in &mut sensors {
+        let count = allocation_counter::measure(|| {
+            sensor.reset(&[0, 1], &state).expect("fits");
+            for step in 1..=50 {
+                state.step.fill(step);
+                sensor.due_in(&state.step);
+                sensor.update(&state).expect("fits");
+                sensor.refresh(&[1], &state).expect("fits");
+            }
+        });
+        assert_eq!(count.count_total, 0, "{sensor:?}");
+        state.step.fill(0);
+    }
+}

@@ -1,0 +1,97 @@
+//! What joints carry, against closed forms.
+
+use crate::worlds::{G, assert_near, cfg, joint, link, robot};
+use kinetoscope::ndarray::array;
+use kinetoscope::prelude::*;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Rounding of accelerations from velocities divided by the step of 5 ms, times a few kilograms.
+const EXACT: f64 = 1e-7;
+
+/// A load that hangs pulls its joint down: the joint pulls it up with its weight, and needs no torque.
+#[test]
+fn a_hanging_load_reads_its_weight_upwards() {
+    let files = tempfile::tempdir().unwrap();
+    let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("load", 3.0, 0.01, [0.0, 0.0, -0.4], "");
+    content += &joint("pivot", "continuous", "load", [0.0, 0.0, 2.0], "0 1 0");
+    let mut sim = SimulationManager::new(cfg(2)).unwrap();
+    sim.add_robot(robot(files.path(), "crane", &content, true)).unwrap();
+    let links = vec!["load".into(), "crane/base".into()];
+    let id = sim.add_sensor("wrench", JointWrenchCfg { links, ..Default::default() }).unwrap();
+    for _ in 0..3 {
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.link_names(), ["crane/load", "crane/base"]);
+        // The base is held with the weight of both, the load 2 m above it exactly.
+        let per_env = [0.0, 0.0, 3.0 * G, 0.0, 0.0, 4.0 * G];
+        assert_near(sensor.forces().to_owned(), &[per_env, per_env].concat(), EXACT);
+        assert_near(sensor.torques().to_owned(), &[0.0; 12], EXACT);
+        sim.update(20);
+    }
+}
+
+/// A lever that its drive holds out sideways: the joint carries the weight, and the drive's effort about its axis is part of
+/// what it exerts.
+#[test]
+fn a_lever_is_held_by_the_torque_of_its_drive() {
+    let files = tempfile::tempdir().unwrap();
+    let (mass, com) = (2.0, Vector3::new(0.3, 0.1, 0.0));
+    let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("lever", mass, 0.01, com.into(), "");
+    content += &joint("pivot", "continuous", "lever", [0.0, 0.0, 2.0], "0 1 0");
+    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+    let drive = DriveCfg::default();
+    let lever = sim.add_robot(RobotCfg { drive, ..robot(files.path(), "lever", &content, true) }).unwrap();
+    let links = vec!["lever".into()];
+    let id = sim.add_sensor("wrench", JointWrenchCfg { links, ..Default::default() }).unwrap();
+    sim.update(2000);
+    let q = sim.robot(lever).get_qpos()[(0, 0)];
+    let weight = UnitQuaternion::from_euler_angles(0.0, q, 0.0).inverse() * Vector3::new(0.0, 0.0, -mass * G);
+    let sensor = sim.sensor(id).unwrap();
+    // After ten seconds of a damped drive nothing moves any more.
+    assert_near(sensor.forces().to_owned(), (-weight).as_slice(), 1e-6);
+    assert_near(sensor.torques().to_owned(), (-com.cross(&weight)).as_slice(), 1e-6);
+    assert_near([sensor.torques()[(0, 0, 1)]], &[sim.robot(lever).get_qf()[(0, 0)]], 1e-6);
+    assert!(sensor.torques()[(0, 0, 1)] < -5.0, "the control: it is not nothing");
+}
+
+/// A load that a torque spins up about the vertical: in its own axes, the joint pulls it inwards with `m omega² r`, pushes it
+/// on with `m alpha r`, and carries it.
+#[test]
+fn a_rotating_load_is_pulled_inwards() {
+    let files = tempfile::tempdir().unwrap();
+    let (mass, r, moment) = (1.5, 0.6, 0.02);
+    let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("load", mass, moment, [r, 0.0, 0.0], "");
+    content += &joint("turn", "continuous", "load", [0.1, 0.2, 1.0], "0 0 1");
+    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+    let arm = sim.add_robot(robot(files.path(), "arm", &content, true)).unwrap();
+    let links = vec!["load".into()];
+    let id = sim.add_sensor("wrench", JointWrenchCfg { links, ..Default::default() }).unwrap();
+    sim.robot_mut(arm).set_qf(&array![[2.0]], None, None).unwrap();
+    let dt = sim.cfg().physics_dt;
+    let mut before = 0.0;
+    for _ in 0..300 {
+        sim.update(1);
+        let after = sim.robot(arm).get_qvel()[(0, 0)];
+        let (omega, alpha) = (before, (after - before) / dt);
+        let sensor = sim.sensor(id).unwrap();
+        let force = [-mass * omega * omega * r, mass * alpha * r, mass * G];
+        assert_near(sensor.forces().to_owned(), &force, EXACT);
+        let torque = [0.0, -r * mass * G, (moment + mass * r * r) * alpha];
+        assert_near(sensor.torques().to_owned(), &torque, EXACT);
+        assert_near([sensor.torques()[(0, 0, 2)]], &[2.0], EXACT);
+        before = after;
+    }
+    assert!(before > 4.0, "it turned: {before}");
+}
+
+#[test]
+fn fused_links_have_no_joint_to_measure() {
+    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    sim.add_robot(RobotCfg { urdf, ..Default::default() }).unwrap();
+    let links = vec!["ee_link".into()];
+    let text = sim.add_sensor("w", JointWrenchCfg { links, ..Default::default() }).unwrap_err().to_string();
+    assert!(text.contains("\"robot/ee_link\" is fused to \"robot/link6\""), "{text}");
+    let links = vec!["link7".into()];
+    let text = sim.add_sensor("w", JointWrenchCfg { links, ..Default::default() }).unwrap_err().to_string();
+    assert!(text.contains("no link \"link7\"") && text.contains("link6"), "{text}");
+}
