@@ -13,6 +13,7 @@ pub mod error;
 pub mod history;
 pub mod joint_state;
 pub(crate) mod lanes;
+pub mod ray;
 pub mod resolve;
 pub mod schedule;
 pub mod sensor;
