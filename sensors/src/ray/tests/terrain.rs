@@ -11,9 +11,15 @@ use crate::ray::{Assets, shape::Solid};
 use scene::Shape;
 use scene::shape::HeightField;
 
+/// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.
 fn triangles(field: &HeightField) -> Vec<Triangle> {
     let mesh = field.mesh();
-    mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize])).collect()
+    let half = field.size();
+    let snap = |p: [f32; 3]| {
+        let snap = |x: f32, half: f64| (((f64::from(x) + half) * 4.0).round() / 4.0 - half) as f32;
+        [snap(p[0], half[0]), snap(p[1], half[1]), p[2]]
+    };
+    mesh.triangles().iter().map(|t| t.map(|i| snap(mesh.positions()[i as usize]))).collect()
 }
 
 fn solid(field: &HeightField) -> Solid {
