@@ -1,4 +1,4 @@
-//! Plain data that both the simulation and the sensors agree on: poses, meshes, materials, shapes.
+//! Plain data that both the simulation and the sensors agree on: poses, meshes, materials, shapes, random numbers.
 //!
 //! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
 #![forbid(unsafe_code)]
@@ -10,6 +10,7 @@ pub mod pattern;
 pub mod pose;
 pub mod pose_f32;
 pub mod pose_f64;
+pub mod random;
 pub mod render_scene;
 pub mod shape;
 pub mod state;
@@ -19,6 +20,7 @@ pub use material::{Material, Texture, TextureKind};
 pub use pose::Pose;
 pub use pose_f32::PoseF32;
 pub use pose_f64::PoseF64;
+pub use random::Random;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
 pub use shape::{RenderMesh, Shape};
 pub use state::{SceneState, VisibleState};

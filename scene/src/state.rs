@@ -16,8 +16,9 @@ pub struct SceneState {
     pub step: Vec<u64>,
     /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
     pub time: Vec<f64>,
-    /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step earlier than
-    /// [`time`](Self::time); the same right after a reset.
+    /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step of the physics
+    /// engine earlier than [`time`](Self::time); the same right after a reset or after somebody wrote to the state, when
+    /// accelerations and contacts are solved for the state as it is.
     pub force_time: Vec<f64>,
     /// Poses of bodies `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
     pub body_poses: Option<Array3<f64>>,
@@ -26,11 +27,20 @@ pub struct SceneState {
     /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity (0 at
     /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\].
     pub body_accelerations: Option<Array3<f64>>,
+    /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); there where
+    /// [`body_accelerations`](Self::body_accelerations) is.
+    pub force_poses: Option<Array3<f64>>,
+    /// Velocities of bodies at [`force_time`](Self::force_time), as in [`body_velocities`](Self::body_velocities); there
+    /// where [`body_accelerations`](Self::body_accelerations) is.
+    pub force_velocities: Option<Array3<f64>>,
+    /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
+    /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
+    pub joint_wrenches: Option<Array3<f64>>,
     /// Joint positions \[rad or m\], shape \[num_envs, joints\].
     pub joint_positions: Option<Array2<f64>>,
     /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
     pub joint_velocities: Option<Array2<f64>>,
-    /// Efforts of the joint drives \[N m or N\], shape \[num_envs, joints\].
+    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
     pub joint_efforts: Option<Array2<f64>>,
     /// Contacts with forces.
     pub contacts: Option<Contacts>,
@@ -76,6 +86,8 @@ pub struct Contact {
     pub distance: f64,
     /// Force on the second body \[N\], friction included; the first one gets its negative.
     pub force: [f64; 3],
+    /// Its part along [`normal`](Self::normal) \[N\], not negative where bodies do not stick; the rest is friction.
+    pub normal_force: f64,
 }
 
 impl SceneState {
@@ -114,6 +126,7 @@ mod tests {
             normal: [0.0, 0.0, 1.0],
             distance: 0.0,
             force: [0.0; 3],
+            normal_force: 0.0,
         };
         let contacts = Contacts { first: vec![0, 2, 2, 3], list: [0.0, 1.0, 2.0].map(contact).to_vec() };
         assert_eq!(contacts.of(0), &contacts.list[..2]);

@@ -83,6 +83,32 @@ pub enum SensorError {
         /// What it may mean.
         candidates: Vec<String>,
     },
+    /// A name pattern is no regular expression, or two match the same name.
+    #[error("{0}")]
+    Pattern(String),
+    /// A number of the configuration is out of range.
+    #[error("{field} is {value}; {expected}")]
+    OutOfRange {
+        /// Which number.
+        field: String,
+        /// The value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// History and latency need more memory than can be given.
+    #[error(
+        "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; make history_length \
+         or latency_steps smaller"
+    )]
+    TooLarge {
+        /// Measurements to keep in each environment.
+        rows: usize,
+        /// Numbers in a measurement.
+        width: usize,
+        /// Number of environments.
+        num_envs: usize,
+    },
     /// Something is wrong with a camera.
     #[error(transparent)]
     Camera(#[from] CameraError),

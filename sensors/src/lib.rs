@@ -1,27 +1,36 @@
 //! Sensors that have never heard of MuJoCo.
 //!
 //! One contract for all of them: a configuration ([`SensorCfg`]) says what it needs to see ([`Requires`]) and builds a
-//! sensor ([`Sensor`]), which turns each [`scene::SceneState`] into buffers of its own. [`Schedule`] decides when,
-//! [`History`] remembers. A new sensor is one new file; [`joint_state`] is the shortest example.
+//! sensor ([`Sensor`]), which turns each [`scene::SceneState`] into buffers of its own. Sensors of numbers share a
+//! [`Sampler`]: rate, history, latency, lost samples and noise. A new sensor is one new file; [`joint_state`] is the
+//! shortest example.
 //!
 //! Unsafe code is forbidden, which rules out ndarray's `s![]` (it expands to an `allow`): slice with `index_axis`,
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
 pub mod camera;
+mod delay;
 pub mod error;
+pub mod expected;
 pub mod history;
 pub mod joint_state;
 pub(crate) mod lanes;
+pub mod noise;
 pub mod ray;
 pub mod resolve;
+pub mod sampling;
 pub mod schedule;
+pub mod select;
 pub mod sensor;
 pub mod visibility;
 
 pub use camera::{Camera, CameraCfg, CameraError};
 pub use error::SensorError;
+pub use expected::Expected;
 pub use history::History;
 pub use joint_state::{JointState, JointStateCfg};
+pub use noise::NoiseCfg;
+pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{Requires, Sensor, SensorCfg, SensorContext};

@@ -1,6 +1,8 @@
 //! The contract of every sensor.
 
 use crate::error::SensorError;
+use crate::ray::RayAssets;
+use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest};
 use scene::{RenderScene, SceneState};
 use std::any::Any;
@@ -70,12 +72,25 @@ pub struct SensorContext {
     pub num_envs: usize,
     /// Physics step \[s\].
     pub dt: f64,
+    /// Gravity \[m/s²\], in world axes.
+    pub gravity: Vector3<f64>,
+    /// Name of the sensor: part of the key of its random numbers.
+    pub name: Arc<str>,
+    /// Seed of random numbers.
+    pub seed: u64,
+    /// Index of environment 0 among the environments of all processes: part of the key of random numbers.
+    pub first_env: usize,
     /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, or the uid of an object.
     pub bodies: Arc<[String]>,
+    /// For every body, the body that moves it: itself where it moves by a joint of its own or not at all, else the one that
+    /// fixed joints fuse it to. As long as `bodies`, or empty where nobody knows.
+    pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
-    /// What can be seen; there for sensors that require [`Requires::VISIBLE`].
+    /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
+    /// What ray casters have built for the assets of the scene, shared by all of them.
+    pub ray_assets: RayAssets,
     /// How many threads a sensor may use; 0 counts as 1.
     pub threads: usize,
 }
@@ -132,7 +147,8 @@ impl Requires {
     pub const POSES: Self = Self(1);
     /// [`SceneState::body_velocities`].
     pub const VELOCITIES: Self = Self(1 << 1);
-    /// [`SceneState::body_accelerations`]; costs the engine a pass of its own.
+    /// [`SceneState::body_accelerations`], [`SceneState::force_poses`] and [`SceneState::force_velocities`]; costs the
+    /// engine a pass of its own.
     pub const ACCELERATIONS: Self = Self(1 << 2);
     /// [`SceneState::contacts`].
     pub const CONTACTS: Self = Self(1 << 3);
@@ -144,8 +160,16 @@ impl Requires {
     pub const SENSORDATA: Self = Self(1 << 6);
     /// [`SceneState::visible`], and [`SensorContext::scene`].
     pub const VISIBLE: Self = Self(1 << 7);
+    /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
+    pub const JOINT_WRENCHES: Self = Self(1 << 8);
+    /// [`SceneState::instance_poses`], and [`SensorContext::scene`].
+    pub const INSTANCES: Self = Self(1 << 9);
 
-    const NAMES: [(Self, &str); 8] = [
+    /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
+    /// know before the step that somebody wants it.
+    pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
+
+    const NAMES: [(Self, &str); 10] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -154,11 +178,18 @@ impl Requires {
         (Self::JOINT_STATE, "joint_state"),
         (Self::SENSORDATA, "sensordata"),
         (Self::VISIBLE, "visible"),
+        (Self::JOINT_WRENCHES, "joint_wrenches"),
+        (Self::INSTANCES, "instances"),
     ];
 
     /// Whether all of `other` is in this set.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
+    }
+
+    /// What is in both sets.
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Both sets together.
@@ -181,12 +212,17 @@ impl Requires {
         let has = |present: bool, field: Self| if present { field } else { Self::NONE };
         has(state.body_poses.is_some(), Self::POSES)
             | has(state.body_velocities.is_some(), Self::VELOCITIES)
-            | has(state.body_accelerations.is_some(), Self::ACCELERATIONS)
+            | has(
+                state.body_accelerations.is_some() && state.force_poses.is_some() && state.force_velocities.is_some(),
+                Self::ACCELERATIONS,
+            )
             | has(state.contacts.is_some(), Self::CONTACTS)
             | has(state.joint_efforts.is_some(), Self::JOINT_EFFORTS)
             | has(state.joint_positions.is_some() && state.joint_velocities.is_some(), Self::JOINT_STATE)
             | has(state.sensordata.is_some(), Self::SENSORDATA)
             | has(state.visible.is_some(), Self::VISIBLE)
+            | has(state.joint_wrenches.is_some(), Self::JOINT_WRENCHES)
+            | has(state.instance_poses.is_some(), Self::INSTANCES)
     }
 
     /// The names of the fields in the set.

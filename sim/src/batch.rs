@@ -4,6 +4,7 @@
 //! mostly stays in the cache of one core, and then helps with what is left of the other shares. Which thread steps an
 //! environment decides nothing, since environments share only the immutable model.
 
+use crate::capture::Capture;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
 use crate::mj::{EngineError, Model};
@@ -171,6 +172,22 @@ impl Batch {
     /// Does `count` steps in every environment.
     pub fn step(&mut self, count: u32) {
         self.run(Arc::new(move |_, env: &mut Env| env.step(count)));
+    }
+
+    /// As [`step`](Self::step); of the last step, `capture` is kept in the environments.
+    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Capture) {
+        self.run(Arc::new(move |_, env: &mut Env| env.step_and_capture(count, Some(&capture))));
+    }
+
+    /// Captures in the environments `chosen` what MuJoCo solves for their present state.
+    pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: Capture) {
+        let mut mask = vec![false; self.num_envs];
+        chosen.iter().for_each(|&env| mask[env] = true);
+        self.run(Arc::new(move |i, env: &mut Env| {
+            if mask[i] {
+                env.capture_present(&capture);
+            }
+        }));
     }
 
     /// Does `count` steps in every environment and copies what `read` picks to `outs`, which have one row for each

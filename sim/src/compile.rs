@@ -1,6 +1,7 @@
 //! From robots to a running simulation: document, MuJoCo model, drives, batch.
 
 use crate::batch::Batch;
+use crate::capture::Plan;
 use crate::contents::{Contents, GROUND_MASK_ID};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::table::{Drive, DriveTable, Gains, Realization};
@@ -25,6 +26,8 @@ pub(crate) struct Simulation {
     pub(crate) robots: Vec<RobotIndex>,
     pub(crate) objects: Vec<ObjectIndex>,
     pub(crate) identities: Identities,
+    /// Where sensors find bodies and contacts.
+    pub(crate) plan: Arc<Plan>,
     /// What cameras draw; made when the first sensor asks for it.
     pub(crate) visible: Option<Arc<Visible>>,
     pub(crate) xml: String,
@@ -154,6 +157,7 @@ struct Built {
     robots: Vec<RobotIndex>,
     objects: Vec<ObjectIndex>,
     identities: Identities,
+    plan: Arc<Plan>,
     start: Arc<Start>,
     xml: String,
     diagnostics: Vec<Diagnostic>,
@@ -171,8 +175,9 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     let objects = find_objects(&compiled, contents)?;
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
     let identities = identify(&model, contents, &robots, &objects);
+    let plan = Arc::new(Plan::new(&model, &robots, &objects, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    Ok(Built { model, table, robots, objects, identities, start, xml: text.xml, diagnostics })
+    Ok(Built { model, table, robots, objects, identities, plan, start, xml: text.xml, diagnostics })
 }
 
 /// Threads for those who do not say how many.
@@ -310,6 +315,7 @@ impl Built {
             robots: self.robots,
             objects: self.objects,
             identities: self.identities,
+            plan: self.plan,
             visible: None,
             xml: self.xml,
             diagnostics,

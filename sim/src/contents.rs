@@ -1,5 +1,6 @@
 //! What was added to a simulation, in the order in which it was added.
 
+use crate::description::JointKind;
 use crate::error::{Error, Result};
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
@@ -39,6 +40,26 @@ impl Contents {
             links.map(|l| format!("{}/{}", r.uid(), l.name))
         });
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).collect()
+    }
+
+    /// For every body in the order of [`body_names`](Self::body_names), the one that moves it: the first link above it that
+    /// no fixed joint holds.
+    pub(crate) fn carriers(&self) -> Arc<[usize]> {
+        let mut carriers = Vec::new();
+        for robot in &self.robots {
+            let (description, first) = (robot.description(), carriers.len());
+            carriers.extend((0..description.links.len()).map(|mut link| {
+                while let Some(joint) = description.links[link].parent_joint.map(|id| description.joint(id))
+                    && joint.kind == JointKind::Fixed
+                {
+                    link = joint.parent.0;
+                }
+                first + link
+            }));
+        }
+        let first = carriers.len();
+        carriers.extend(first..first + self.objects.len());
+        carriers.into()
     }
 
     /// Names of the movable joints of all robots, `uid/joint`.

@@ -10,6 +10,7 @@
 //! beside MuJoCo's is waited for. What a step needs for itself is therefore in memory of the thread, and what it seldom
 //! needs is apart from what it always needs.
 
+use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts};
 use std::cell::Cell;
@@ -64,6 +65,8 @@ pub struct Env {
     diverged: Option<Box<EnvStatus>>,
     /// The rest of the present state is in `data`.
     raw_quats: RawQuats,
+    /// Whether what MuJoCo solves was last solved for the present state, not for the one before the last step.
+    solved_now: bool,
     seldom: Box<Seldom>,
 }
 
@@ -74,6 +77,8 @@ struct Seldom {
     growths: u32,
     /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
     inputs: Inputs,
+    /// What was captured of the last step that sensors wanted to see.
+    solved: Solved,
 }
 
 impl Env {
@@ -93,6 +98,7 @@ impl Env {
             steps: 0,
             diverged: None,
             raw_quats: RawQuats::new(model),
+            solved_now: true,
             seldom: Box::default(),
         };
         let initial = env.saved();
@@ -113,6 +119,7 @@ impl Env {
         self.raw_quats.restore(&mut self.data);
         let good = self.saved();
         change(&mut self.data);
+        self.solved_now = true;
         self.refresh(&good);
     }
 
@@ -123,6 +130,7 @@ impl Env {
         self.drives.reset();
         self.diverged = None;
         self.steps = 0;
+        self.solved_now = true;
         let initial = self.saved();
         change(&mut self.data, &mut self.drives);
         self.refresh(&initial);
@@ -201,25 +209,34 @@ impl Env {
 
     /// Does `count` steps; a diverged environment stands still.
     pub fn step(&mut self, count: u32) {
-        for _ in 0..count {
+        self.step_and_capture(count, None);
+    }
+
+    /// As [`step`](Self::step); of the last step, `capture` is kept.
+    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&Capture>) {
+        for left in (0..count).rev() {
             if self.diverged.is_some() {
                 return;
             }
-            self.step_once();
+            self.step_once(capture.filter(|_| left == 0));
         }
     }
 
-    fn step_once(&mut self) {
+    fn step_once(&mut self, mut capture: Option<&Capture>) {
+        if let Some(wanted) = capture.take_if(|_| self.data.model().integrator() == mj::mjINT_RK4) {
+            // RK4 leaves what it solved for a state in the middle of the step.
+            self.capture_present(wanted);
+        }
         let mut scratch = SCRATCH.take();
-        self.step_with(&mut scratch);
+        self.step_with(&mut scratch, capture);
         SCRATCH.set(scratch);
     }
 
-    fn step_with(&mut self, scratch: &mut Scratch) {
+    fn step_with(&mut self, scratch: &mut Scratch, capture: Option<&Capture>) {
         let Scratch { before, efforts } = scratch;
         self.save_present(before);
         loop {
-            let done = self.attempt(efforts);
+            let done = self.attempt(before, efforts, capture);
             let raised = self.data.take_warnings();
             match judge(done, &raised) {
                 Verdict::Good => {
@@ -228,6 +245,7 @@ impl Env {
                     }
                     self.drives.effort.copy_from_slice(efforts);
                     self.steps += 1;
+                    self.solved_now = false;
                     return;
                 }
                 Verdict::NeedsRoom(what) => {
@@ -243,8 +261,13 @@ impl Env {
         }
     }
 
-    /// One step, with the efforts the drives gave in it.
-    fn attempt(&mut self, efforts: &mut Vec<f64>) -> Result<(), EngineError> {
+    /// One step from `before`, with the efforts the drives gave in it.
+    fn attempt(
+        &mut self,
+        before: &Motion,
+        efforts: &mut Vec<f64>,
+        capture: Option<&Capture>,
+    ) -> Result<(), EngineError> {
         self.drives.apply(&mut self.data);
         if self.data.model().integrator() == mj::mjINT_RK4 {
             // mj_step2 would integrate with Euler, whatever the model says.
@@ -254,8 +277,58 @@ impl Env {
         }
         // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
         self.drives.read_efforts(&self.data, efforts);
+        if let Some(capture) = capture {
+            self.capture(before, capture)?;
+        }
         self.raw_quats.save(&self.data);
         self.data.step1()
+    }
+
+    /// After `mj_step2` of a step from `before`.
+    fn capture(&mut self, before: &Motion, capture: &Capture) -> Result<(), EngineError> {
+        let qvel = before.qvel(self.data.model());
+        capture.take(&mut self.data, qvel, &mut self.seldom.solved)
+    }
+
+    /// Captures what MuJoCo solves for the present state, with the drives as they are. The state stays as it is, to the
+    /// last bit. A diverged environment, and one whose next step will fail, has nothing to capture.
+    pub(crate) fn capture_present(&mut self, capture: &Capture) {
+        self.seldom.solved.clear();
+        self.solved_now = true;
+        if self.diverged.is_some() {
+            return;
+        }
+        let mut scratch = SCRATCH.take();
+        let before = &mut scratch.before;
+        self.save_present(before);
+        loop {
+            self.drives.apply(&mut self.data);
+            let done = self.data.step2().and_then(|()| self.capture(before, capture));
+            match judge(done, &self.data.take_warnings()) {
+                Verdict::Good => break,
+                Verdict::NeedsRoom(what) if self.grow(what, before).is_ok() => {}
+                Verdict::NeedsRoom(_) | Verdict::Bad(_) => {
+                    self.seldom.solved.clear();
+                    self.data.reset();
+                    break;
+                }
+            }
+        }
+        self.go_to(before);
+        // This state had a forward pass before, with this data or a smaller one.
+        let _ = self.data.step1();
+        self.data.take_warnings();
+        SCRATCH.set(scratch);
+    }
+
+    /// What was last captured.
+    pub(crate) fn solved(&self) -> &Solved {
+        &self.seldom.solved
+    }
+
+    /// Time for which forces and accelerations were last solved \[s\].
+    pub(crate) fn solved_time(&self) -> f64 {
+        if self.solved_now { self.data.time() } else { self.data.time() - self.data.model().timestep() }
     }
 
     /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
@@ -314,6 +387,7 @@ impl Env {
     /// Stands still in `good`, the last good state, from now on.
     fn quarantine(&mut self, reason: Divergence, good: &Motion) {
         self.diverged = Some(Box::new(EnvStatus::Diverged { step: self.steps, reason }));
+        self.seldom.solved.clear();
         self.data.reset();
         self.go_to(good);
         // The last good state had a forward pass before, with this data or a smaller one.

@@ -7,6 +7,7 @@
 
 pub mod batch;
 mod body_inertia;
+mod capture;
 mod compile;
 mod contents;
 pub mod description;

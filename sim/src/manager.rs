@@ -15,6 +15,7 @@ use crate::sensor_list::{SensorId, SensorList};
 use crate::visible::{MaskId, Visible, VisualCache};
 use nalgebra::Vector3;
 use ndarray::Array2;
+use sensors::ray::RayAssets;
 use sensors::{Requires, Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -41,7 +42,8 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of random numbers. Nothing in the simulation is random yet; reports and sensors with noise will use it.
+    /// Seed of random numbers. The physics has none; the noise of sensors is keyed by this seed, the environment and the
+    /// name of the sensor.
     pub seed: u64,
     /// Threads that step; every core where unset.
     pub threads: Option<usize>,
@@ -234,6 +236,8 @@ pub struct SimulationManager {
     cfg: SimulationManagerCfg,
     contents: Contents,
     visuals: VisualCache,
+    /// What ray casters have built.
+    ray_assets: RayAssets,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
     sensors: SensorList,
@@ -256,7 +260,8 @@ impl SimulationManager {
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(cfg.substeps);
         let visuals = VisualCache::default();
-        Ok(Self { serial, cfg, contents, visuals, diagnostics: Vec::new(), simulation, sensors })
+        Ok(Self { serial, cfg, contents, visuals,
+            ray_assets: RayAssets::default(), diagnostics: Vec::new(), simulation, sensors })
     }
 
     /// The configuration.
@@ -327,7 +332,7 @@ impl SimulationManager {
         self.diagnostics.extend(diagnostics);
         if !self.sensors.is_empty() {
             let context = self.sensor_context(self.sensors.requires());
-            self.sensors.rebuild(&self.simulation, &context);
+            self.sensors.rebuild(&mut self.simulation, &context);
         }
         Ok(())
     }
@@ -344,8 +349,8 @@ impl SimulationManager {
     {
         let uid = uid.into();
         self.sensors.check(&uid, cfg.requires())?;
-        let context = self.sensor_context(cfg.requires());
-        self.sensors.add(uid, cfg, &self.simulation, &context)
+        let context = SensorContext { name: uid.as_str().into(), ..self.sensor_context(cfg.requires()) };
+        self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
 
     /// A sensor, to read.
@@ -366,13 +371,20 @@ impl SimulationManager {
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
-        let scene = requires.contains(Requires::VISIBLE).then(|| Arc::clone(self.visible().scene()));
+        let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
+        let scene = sees.then(|| Arc::clone(self.visible().scene()));
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
+            gravity: self.cfg.gravity,
+            name: "".into(),
+            seed: self.cfg.seed,
+            first_env: 0,
             bodies: self.contents.body_names(),
+            carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),
             scene,
+            ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
         }
     }
@@ -468,16 +480,13 @@ impl SimulationManager {
     pub fn update(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
-            let mut block = left.min(BLOCK);
-            if !self.sensors.is_empty() {
-                let due_in = self.sensors.due_in(&self.simulation);
-                block = block.min(u32::try_from(due_in).unwrap_or(u32::MAX));
-            }
-            self.simulation.batch.step(block * self.cfg.substeps);
-            if !self.sensors.is_empty() {
-                self.sensors.update(&self.simulation, u64::from(block));
-            }
-            left -= block;
+            let block = left.min(BLOCK);
+            left -= if self.sensors.is_empty() {
+                self.simulation.batch.step(block * self.cfg.substeps);
+                block
+            } else {
+                self.sensors.advance(&mut self.simulation, block)
+            };
         }
     }
 
@@ -490,7 +499,7 @@ impl SimulationManager {
         self.simulation.reset(&chosen);
         if !self.sensors.is_empty() {
             let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
-            self.sensors.reset(&envs, &self.simulation);
+            self.sensors.reset(&envs, &mut self.simulation);
         }
         Ok(())
     }

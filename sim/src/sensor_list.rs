@@ -1,5 +1,6 @@
 //! The sensors of a simulation: built from their configurations, ticked after every step, read by typed handles.
 
+use crate::capture::Capture;
 use crate::compile::Simulation;
 use crate::error::{Error, Result};
 use crate::gather;
@@ -7,6 +8,7 @@ use scene::SceneState;
 use sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
 use std::any::Any;
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 /// Handle of a sensor; valid for the manager that made it.
 pub struct SensorId<S> {
@@ -44,6 +46,8 @@ struct Entry {
 pub(crate) struct SensorList {
     entries: Vec<Entry>,
     state: SceneState,
+    /// Which of them the current steps make due.
+    due: Vec<bool>,
     /// MuJoCo steps in a physics step.
     substeps: u32,
 }
@@ -87,7 +91,7 @@ impl SensorList {
         &mut self,
         uid: String,
         cfg: C,
-        simulation: &Simulation,
+        simulation: &mut Simulation,
         context: &SensorContext,
     ) -> Result<SensorId<C::Sensor>>
     where
@@ -98,9 +102,10 @@ impl SensorList {
         let mut sensor =
             build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         let all = self.requires() | requires;
-        let mut state = gather::allocate(simulation, all);
-        gather::gather(simulation, self.substeps, all, &mut state);
         let envs: Vec<usize> = (0..context.num_envs).collect();
+        let mut state = gather::allocate(simulation, all);
+        solve(simulation, all, &envs);
+        gather::gather(simulation, self.substeps, all, &mut state);
         sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         self.state = state;
         self.entries.push(Entry { uid, requires, build, sensor, fault: None });
@@ -108,13 +113,15 @@ impl SensorList {
     }
 
     /// Builds all sensors anew for a simulation that was compiled again; their histories start again.
-    pub(crate) fn rebuild(&mut self, simulation: &Simulation, context: &SensorContext) {
+    pub(crate) fn rebuild(&mut self, simulation: &mut Simulation, context: &SensorContext) {
         let all = self.requires();
-        self.state = gather::allocate(simulation, all);
-        gather::gather(simulation, self.substeps, all, &mut self.state);
         let envs: Vec<usize> = (0..context.num_envs).collect();
+        self.state = gather::allocate(simulation, all);
+        solve(simulation, all, &envs);
+        gather::gather(simulation, self.substeps, all, &mut self.state);
         for entry in &mut self.entries {
-            entry.fault = match (entry.build)(context) {
+            let context = SensorContext { name: entry.uid.as_str().into(), ..context.clone() };
+            entry.fault = match (entry.build)(&context) {
                 Ok(sensor) => {
                     entry.sensor = sensor;
                     entry.sensor.reset(&envs, &self.state).err()
@@ -124,49 +131,55 @@ impl SensorList {
         }
     }
 
-    /// Physics steps until a sensor is due, at least 1.
-    pub(crate) fn due_in(&mut self, simulation: &Simulation) -> u64 {
+    /// Does as many of `steps` physics steps as until a sensor is due, at least 1; those that are due then measure. Gives
+    /// the number of steps done.
+    pub(crate) fn advance(&mut self, simulation: &mut Simulation, steps: u32) -> u32 {
         gather::gather_steps(simulation, self.substeps, &mut self.state);
-        let steps = &self.state.step;
-        let due = self.running().map(|e| e.sensor.due_in(steps).max(1));
-        due.min().unwrap_or(u64::MAX)
-    }
-
-    /// After `steps` physics steps, of which at most the last made sensors due, those that are due measure. `before` are
-    /// the step counts of the environments before.
-    pub(crate) fn update(&mut self, simulation: &Simulation, steps: u64) {
-        // The state still holds the step counts before: `due_in` asked for them.
-        let due: Vec<bool> =
-            self.entries.iter().map(|e| e.fault.is_none() && e.sensor.due_in(&self.state.step) <= steps).collect();
-        let requires =
-            self.entries.iter().zip(&due).filter(|(_, due)| **due).fold(Requires::NONE, |r, (e, _)| r | e.requires);
-        gather::gather(simulation, self.substeps, requires, &mut self.state);
-        for (entry, _) in self.entries.iter_mut().zip(due).filter(|(_, due)| *due) {
+        let now = &self.state.step;
+        let wait = |e: &Entry| e.sensor.due_in(now).max(1);
+        let running = self.entries.iter().filter(|e| e.fault.is_none());
+        let block = running.map(wait).min().map_or(steps, |due| u32::try_from(due).unwrap_or(u32::MAX).min(steps));
+        self.due.clear();
+        self.due.extend(self.entries.iter().map(|e| e.fault.is_none() && wait(e) <= u64::from(block)));
+        let due = self.entries.iter().zip(&self.due).filter(|(_, due)| **due);
+        let requires = due.fold(Requires::NONE, |all, (e, _)| all | e.requires);
+        match capture(simulation, requires) {
+            None => simulation.batch.step(block * self.substeps),
+            Some(capture) => simulation.batch.step_and_capture(block * self.substeps, capture),
+        }
+        if self.due.contains(&true) {
+            gather::gather(simulation, self.substeps, requires, &mut self.state);
+        }
+        for (entry, _) in self.entries.iter_mut().zip(&self.due).filter(|(_, due)| **due) {
             entry.fault = entry.sensor.update(&self.state).err();
         }
+        block
     }
 
     /// After a reset of `env_ids`.
-    pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &Simulation) {
-        gather::gather(simulation, self.substeps, self.requires(), &mut self.state);
+    pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
+        self.renew(simulation, env_ids);
         for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
             entry.fault = entry.sensor.reset(env_ids, &self.state).err();
         }
     }
 
     /// After somebody wrote to the state of `env_ids`.
-    pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &Simulation) {
+    pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         if self.entries.is_empty() || env_ids.is_empty() {
             return;
         }
-        gather::gather(simulation, self.substeps, self.requires(), &mut self.state);
+        self.renew(simulation, env_ids);
         for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
             entry.fault = entry.sensor.refresh(env_ids, &self.state).err();
         }
     }
 
-    fn running(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|e| e.fault.is_none())
+    /// Gathers the state after `env_ids` were written to.
+    fn renew(&mut self, simulation: &mut Simulation, env_ids: &[usize]) {
+        let all = self.requires();
+        solve(simulation, all, env_ids);
+        gather::gather(simulation, self.substeps, all, &mut self.state);
     }
 
     /// The sensor of a handle.
@@ -194,5 +207,18 @@ impl SensorList {
             index: id.index,
             count,
         })
+    }
+}
+
+/// What must be captured inside the step for those who require `requires`.
+fn capture(simulation: &Simulation, requires: Requires) -> Option<Capture> {
+    let fields = requires.intersection(Requires::SOLVED);
+    (!fields.is_empty()).then(|| Capture { plan: Arc::clone(&simulation.plan), fields })
+}
+
+/// Solves and captures the present state of `envs`, where somebody requires what is solved.
+fn solve(simulation: &mut Simulation, requires: Requires, envs: &[usize]) {
+    if let Some(capture) = capture(simulation, requires) {
+        simulation.batch.capture_present(envs, capture);
     }
 }

@@ -44,11 +44,12 @@ fn primitives_are_hit_where_mujoco_hits_them() {
     }
 }
 
-/// A height field, meshes that move and meshes that do not.
+/// A height field, meshes that move and meshes that do not. The field has as many rows as columns: otherwise `mj_ray` puts
+/// the upper ends of its walls elsewhere than its triangles (on both lines it takes them from other numbers).
 #[test]
 fn terrain_and_meshes_are_hit_where_mujoco_hits_them() {
     let mut dice = Dice(2);
-    let (rows, columns) = (33i32, 25i32);
+    let (rows, columns) = (33i32, 33i32);
     let mut bytes: Vec<u8> = [rows, columns].iter().flat_map(|n| n.to_le_bytes()).collect();
     bytes.extend((0..rows * columns).flat_map(|_| (dice.number(0.0, 1.0) as f32).to_le_bytes()));
     let terrain = mj::Asset { name: "terrain.bin".into(), bytes };

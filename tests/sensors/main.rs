@@ -19,7 +19,8 @@ fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
 #[test]
 fn a_joint_sensor_samples_on_its_ticks() {
     let (mut sim, robot) = arm(2);
-    let cfg = JointStateCfg { update_period: 0.05, history_length: 3, ..Default::default() };
+    let cfg =
+        JointStateCfg { sampling: SamplingCfg { history_length: 3, ..SamplingCfg::every(0.05) }, ..Default::default() };
     let id = sim.add_sensor("joints", cfg).unwrap();
     let mut sampled = Vec::new();
     for step in 1..=17_u32 {
@@ -48,7 +49,7 @@ fn a_joint_sensor_samples_on_its_ticks() {
 #[test]
 fn a_reset_restarts_the_clock_of_its_environment_only() {
     let (mut sim, robot) = arm(2);
-    let cfg = JointStateCfg { update_period: 0.05, ..Default::default() };
+    let cfg = JointStateCfg { sampling: SamplingCfg::every(0.05), ..Default::default() };
     let id = sim.add_sensor("joints", cfg).unwrap();
     sim.update(7);
     sim.reset(Some(&[EnvId(1)])).unwrap();
@@ -122,11 +123,12 @@ fn a_sensor_of_another_crate_is_added_like_any_other() {
 #[test]
 fn what_is_wrong_is_said() {
     let (mut sim, _) = arm(1);
-    let odd = JointStateCfg { update_period: 0.013, ..Default::default() };
+    let odd = JointStateCfg { sampling: SamplingCfg::every(0.013), ..Default::default() };
     let text = sim.add_sensor("odd", odd).unwrap_err().to_string();
     assert!(text.contains("odd") && text.contains("0.013"), "{text}");
     sim.add_sensor("joints", JointStateCfg::default()).unwrap();
     assert!(matches!(sim.add_sensor("joints", JointStateCfg::default()), Err(Error::DuplicateUid(_))));
-    let beyond = JointStateCfg { joints: Some(vec![6]), ..Default::default() };
-    assert!(sim.add_sensor("beyond", beyond).is_err());
+    let beyond = JointStateCfg { joints: Some(vec!["JOINT7".into()]), ..Default::default() };
+    let text = sim.add_sensor("beyond", beyond).unwrap_err().to_string();
+    assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
 }

@@ -132,6 +132,8 @@ data_arrays! {
     xquat: f64, "Body orientations, wxyz, (nbody, 4).";
     xipos: f64, "Centres of mass \\[m\\], (nbody, 3).";
     cvel: f64, "Spatial velocities about the subtree's centre of mass, (nbody, 6).";
+    cacc: f64, "Spatial accelerations about the subtree's centre of mass, minus gravity, (nbody, 6); see [`Data::solve_accelerations`].";
+    cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's centre of mass, (nbody, 6); see [`Data::solve_accelerations`].";
     subtree_com: f64, "Centres of mass of subtrees \\[m\\], (nbody, 3).";
     light_xpos: f64, "Light positions \\[m\\], (nlight, 3).";
     light_xdir: f64, "Light directions, (nlight, 3).";

@@ -211,6 +211,31 @@ impl Data {
         guarded(|| unsafe { mj::mj_forward(m, d) })
     }
 
+    /// Accelerations of bodies and forces between them (`cacc`, `cfrc_int`), from the accelerations and constraint forces of
+    /// the last solve, which was done for the velocities `qvel`: those before the integration, where it is done already.
+    /// Nothing that decides a later step changes. `spare` is room for `nv` numbers.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    ///
+    /// # Panics
+    /// `qvel` does not have `nv` numbers.
+    pub fn solve_accelerations(&mut self, qvel: &[f64], spare: &mut Vec<f64>) -> Result<(), EngineError> {
+        spare.clear();
+        spare.extend_from_slice(self.qvel());
+        self.qvel_mut().copy_from_slice(qvel);
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        let done = guarded(|| unsafe { mj::mj_rnePostConstraint(m, d) });
+        self.qvel_mut().copy_from_slice(spare);
+        #[cfg(mj4)]
+        {
+            // MuJoCo's own sensors of the next step would take these for theirs.
+            self.header_mut().flg_rnepost = false;
+        }
+        done
+    }
+
     /// The dense joint-space inertia matrix, row-major, (nv, nv), of the last forward pass.
     ///
     /// # Errors

@@ -196,6 +196,11 @@ impl Model {
         self.header().opt.timestep
     }
 
+    /// Gravity \[m/s²\].
+    pub fn gravity(&self) -> [f64; 3] {
+        self.header().opt.gravity
+    }
+
     /// The integrator's code (`mjINT_EULER`, ...).
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32

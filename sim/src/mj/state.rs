@@ -96,6 +96,11 @@ impl Motion {
         &self.values[1..1 + model.nq()]
     }
 
+    /// The velocities of what was saved from a data of `model`.
+    pub(crate) fn qvel(&self, model: &Model) -> &[f64] {
+        &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
+    }
+
     /// Puts the values into `data`, which is of the same model (its buffers may be larger).
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {

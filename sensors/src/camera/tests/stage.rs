@@ -28,6 +28,7 @@ pub(super) fn context(num_envs: usize) -> SensorContext {
         joints: Vec::new().into(),
         scene: Some(Arc::new(RenderScene::new(instances).unwrap())),
         threads: 1,
+        ..SensorContext::default()
     }
 }
 

@@ -1,0 +1,141 @@
+//! What a real sensor does to a number: noise, a bias that wanders, steps of its converter, and samples that get lost.
+
+use crate::error::SensorError;
+use crate::sampling::{Channel, SamplingCfg};
+use crate::sensor::SensorContext;
+use ndarray::{Array2, Axis};
+use scene::Random;
+use scene::pattern::closest;
+use std::ops::Range;
+
+/// Errors of the numbers of one channel, each number for itself: `round(value + bias + std * n)`, n normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NoiseCfg {
+    /// Standard deviation of what each measurement adds, in the unit of the channel.
+    pub std: f64,
+    /// Standard deviation of the bias that is drawn at every reset, in the unit of the channel.
+    pub bias_std: f64,
+    /// How far the bias wanders: its standard deviation after one second, growing with the square root of time, in the unit
+    /// of the channel per sqrt(s).
+    pub bias_walk: f64,
+    /// Values are rounded to whole multiples of this, in the unit of the channel; 0 for no rounding.
+    pub resolution: f64,
+}
+
+impl NoiseCfg {
+    /// White noise and nothing else.
+    pub fn white(std: f64) -> Self {
+        Self { std, ..Self::default() }
+    }
+}
+
+/// The noise of a sensor in all environments.
+#[derive(Clone, Debug)]
+pub(crate) struct Noise {
+    channels: Vec<(Range<usize>, NoiseCfg)>,
+    dropout: f64,
+    /// Square root of the time between measurements.
+    sqrt_period: f64,
+    /// Shape \[num_envs, row\].
+    biases: Array2<f64>,
+    randoms: Vec<Random>,
+}
+
+impl Noise {
+    /// The noise that `cfg` asks for; `None` where it asks for none.
+    pub(crate) fn new(
+        context: &SensorContext,
+        cfg: &SamplingCfg,
+        period: f64,
+        channels: &[Channel],
+    ) -> Result<Option<Self>, SensorError> {
+        if !(0.0..=1.0).contains(&cfg.dropout) {
+            let expected = "it must be a probability, 0 to 1";
+            return Err(SensorError::OutOfRange { field: "dropout".into(), value: cfg.dropout, expected });
+        }
+        let mut wanted = Vec::new();
+        for (name, noise) in &cfg.noise {
+            wanted.push((columns(name, channels)?, *noise));
+            for (field, value) in [
+                ("std", noise.std),
+                ("bias_std", noise.bias_std),
+                ("bias_walk", noise.bias_walk),
+                ("resolution", noise.resolution),
+            ] {
+                if !(value >= 0.0 && value.is_finite()) {
+                    let (field, expected) = (format!("{field} of the noise of {name:?}"), "it must be 0 or positive");
+                    return Err(SensorError::OutOfRange { field, value, expected });
+                }
+            }
+        }
+        if wanted.is_empty() && cfg.dropout == 0.0 {
+            return Ok(None);
+        }
+        let width = channels.iter().map(|c| c.width).sum();
+        let random = |env: usize| Random::keyed(context.seed, (context.first_env + env) as u64, &context.name);
+        Ok(Some(Self {
+            channels: wanted,
+            dropout: cfg.dropout,
+            sqrt_period: period.sqrt(),
+            biases: Array2::zeros((context.num_envs, width)),
+            randoms: (0..context.num_envs).map(random).collect(),
+        }))
+    }
+
+    /// Draws the biases of environment `env` anew.
+    pub(crate) fn reset(&mut self, env: usize) {
+        let mut biases = self.biases.index_axis_mut(Axis(0), env);
+        for (columns, noise) in &self.channels {
+            for column in columns.clone().filter(|_| noise.bias_std > 0.0 || noise.bias_walk > 0.0) {
+                biases[column] = noise.bias_std * self.randoms[env].normal();
+            }
+        }
+    }
+
+    /// Makes a measurement of the true values of environment `env`; gives whether it arrives. How many numbers are drawn
+    /// does not depend on what they are.
+    pub(crate) fn measure(&mut self, env: usize, row: &mut [f64]) -> bool {
+        let mut biases = self.biases.index_axis_mut(Axis(0), env);
+        for (columns, noise) in self.channels.iter().filter(|(_, noise)| noise.bias_walk > 0.0) {
+            for column in columns.clone() {
+                biases[column] += noise.bias_walk * self.sqrt_period * self.randoms[env].normal();
+            }
+        }
+        self.disturb(env, row);
+        self.dropout == 0.0 || self.randoms[env].uniform() >= self.dropout
+    }
+
+    /// Adds the noise of environment `env` to true values; biases stay where they are.
+    pub(crate) fn disturb(&mut self, env: usize, row: &mut [f64]) {
+        let biases = self.biases.index_axis(Axis(0), env);
+        for (columns, noise) in &self.channels {
+            for column in columns.clone() {
+                let value = &mut row[column];
+                *value += biases[column];
+                if noise.std > 0.0 {
+                    *value += noise.std * self.randoms[env].normal();
+                }
+                if noise.resolution > 0.0 {
+                    *value = (*value / noise.resolution).round() * noise.resolution;
+                }
+            }
+        }
+    }
+}
+
+/// Columns of the channel called `name`.
+fn columns(name: &str, channels: &[Channel]) -> Result<Range<usize>, SensorError> {
+    let mut first = 0;
+    for channel in channels {
+        if channel.name == name && channel.noisy {
+            return Ok(first..first + channel.width);
+        }
+        first += channel.width;
+    }
+    let noisy = channels.iter().filter(|c| c.noisy).map(|c| c.name);
+    Err(SensorError::UnknownName {
+        what: "channel that can have noise",
+        name: name.into(),
+        candidates: closest(name, noisy).into_iter().map(str::to_owned).collect(),
+    })
+}

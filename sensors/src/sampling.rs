@@ -1,0 +1,390 @@
+//! What all sensors of numbers have in common: rate, history, latency, lost samples and noise.
+//!
+//! A sensor says which [`Channel`]s it has and how to read the true values of one environment; the [`Sampler`] does the
+//! rest. [`crate::joint_state`] is the model to follow.
+
+use crate::delay::Delay;
+use crate::error::SensorError;
+use crate::expected::Expected;
+use crate::history::History;
+use crate::noise::{Noise, NoiseCfg};
+use crate::schedule::{Phases, Schedule};
+use crate::sensor::{Requires, SensorContext};
+use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axis, Dimension, IntoDimension};
+use scene::SceneState;
+use std::collections::BTreeMap;
+
+/// When a sensor measures, what it remembers, and what goes wrong on the way. `Default` is a perfect sensor: every step,
+/// nothing late, lost or noisy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SamplingCfg {
+    /// Time between measurements \[s\]; 0 is every physics step.
+    pub update_period: f64,
+    /// Take the nearest whole number of physics steps where the period is none, instead of an error.
+    pub round_period: bool,
+    /// Measurements to remember, the newest included.
+    pub history_length: usize,
+    /// Physics steps from the capture of a measurement until it can be read. It keeps the stamp of its capture.
+    pub latency_steps: u32,
+    /// Probability that a measurement is lost on the way, 0 to 1: the one before stays.
+    pub dropout: f64,
+    /// Noise by the name of the channel. The numbers depend on the seed of the simulation, the environment and the name of
+    /// the sensor, and on nothing else.
+    pub noise: BTreeMap<String, NoiseCfg>,
+}
+
+impl SamplingCfg {
+    /// A perfect sensor that measures every `period` \[s\].
+    pub fn every(period: f64) -> Self {
+        Self { update_period: period, ..Self::default() }
+    }
+}
+
+/// Numbers of one kind in a measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// What they are called, in [`SamplingCfg::noise`] too.
+    pub name: &'static str,
+    /// How many there are in one environment.
+    pub width: usize,
+    /// Whether noise may be added: not to counts, nor to quaternions, which would no longer have length 1.
+    pub noisy: bool,
+}
+
+impl Channel {
+    /// `width` numbers that may have noise.
+    pub const fn new(name: &'static str, width: usize) -> Self {
+        Self { name, width, noisy: true }
+    }
+
+    /// `width` numbers without noise.
+    pub const fn exact(name: &'static str, width: usize) -> Self {
+        Self { name, width, noisy: false }
+    }
+}
+
+/// The measurements of a sensor in all environments: current ones, past ones, and those on their way.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    expected: Expected,
+    phases: Phases,
+    quantities: Vec<Quantity>,
+    stamps: Array1<f64>,
+    force_stamps: Array1<f64>,
+    /// Both stamps of past measurements.
+    stamp_history: History<f64>,
+    counts: Array1<u64>,
+    /// Step at which the current value was last refreshed: what was captured before does not replace it.
+    refreshed: Vec<u64>,
+    noise: Option<Noise>,
+    delay: Option<Delay>,
+    /// One measurement: two stamps, then the channels.
+    row: Vec<f64>,
+}
+
+/// Current values of a channel, shape \[num_envs, width\], and those of past measurements.
+#[derive(Clone, Debug)]
+struct Quantity {
+    name: &'static str,
+    now: Array2<f64>,
+    history: History<f64>,
+}
+
+/// Stamps stand before the channels of a row.
+const STAMPS: usize = 2;
+
+/// Most numbers that one sensor may hold: 32 GiB.
+const MAX_NUMBERS: usize = 1 << 32;
+
+impl Sampler {
+    /// A sampler for the kind of sensor called `sensor`, which requires `requires` and measures `channels`.
+    ///
+    /// # Errors
+    ///
+    /// A period that is no whole number of steps; noise of a channel that is not there, or that is negative or not finite; a
+    /// dropout that is no probability; a history or a latency that does not fit into memory.
+    pub fn new(
+        sensor: &'static str,
+        requires: Requires,
+        context: &SensorContext,
+        cfg: &SamplingCfg,
+        channels: &[Channel],
+    ) -> Result<Self, SensorError> {
+        let schedule = Schedule::new(cfg.update_period, context.dt, cfg.round_period)?;
+        let period = schedule.period_steps();
+        let noise = Noise::new(context, cfg, period as f64 * context.dt, channels)?;
+        let n = context.num_envs;
+        let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
+        let latency = u64::from(cfg.latency_steps);
+        let rows = Delay::capacity(latency, period).saturating_add(cfg.history_length);
+        let numbers = rows.saturating_mul(n).saturating_mul(width);
+        if numbers > MAX_NUMBERS {
+            return Err(SensorError::TooLarge { rows, width, num_envs: n });
+        }
+        let quantity = |channel: &Channel| Quantity {
+            name: channel.name,
+            now: Array2::zeros((n, channel.width)),
+            history: History::new(n, cfg.history_length, channel.width),
+        };
+        Ok(Self {
+            expected: Expected::new(sensor, requires, context),
+            phases: schedule.phases(n),
+            quantities: channels.iter().map(quantity).collect(),
+            stamps: Array1::zeros(n),
+            force_stamps: Array1::zeros(n),
+            stamp_history: History::new(n, cfg.history_length, STAMPS),
+            counts: Array1::zeros(n),
+            refreshed: vec![0; n],
+            noise,
+            delay: (latency > 0).then(|| Delay::new(n, width, latency, period)),
+            row: vec![0.0; width],
+        })
+    }
+
+    /// Checks that a state has what the sensor requires, of the scene that it was built for.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`].
+    pub fn check(&self, state: &SceneState) -> Result<(), SensorError> {
+        self.expected.check(state)
+    }
+
+    /// Measures in the environments that are due: `read(env, row)` writes the true values of all channels of one environment,
+    /// one after the other, to `row`, which is zero before. What is on its way and arrives now can be read afterwards.
+    ///
+    /// # Errors
+    ///
+    /// As [`check`](Self::check); nothing is measured then.
+    pub fn update(&mut self, state: &SceneState, mut read: impl FnMut(usize, &mut [f64])) -> Result<(), SensorError> {
+        self.check(state)?;
+        for env in 0..self.expected.num_envs() {
+            let step = state.step[env];
+            if self.phases.is_due(env, step) {
+                self.read(env, state, &mut read);
+                let arrives = self.noise.as_mut().is_none_or(|noise| noise.measure(env, &mut self.row[STAMPS..]));
+                match &mut self.delay {
+                    _ if !arrives => {}
+                    Some(delay) => delay.push(env, step, &self.row),
+                    None => {
+                        self.remember(env);
+                        self.show(env);
+                    }
+                }
+            }
+            while let Some(captured) = self.delay.as_mut().and_then(|delay| delay.take(env, step, &mut self.row)) {
+                self.remember(env);
+                if captured > self.refreshed[env] {
+                    self.show(env);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Starts the environments `env_ids` anew from `state`: see [`Sensor::reset`](crate::Sensor::reset). Biases are drawn
+    /// again.
+    ///
+    /// # Errors
+    ///
+    /// As [`check`](Self::check), and [`SensorError::IndexOutOfRange`]; nothing is reset then.
+    pub fn reset(
+        &mut self,
+        env_ids: &[usize],
+        state: &SceneState,
+        read: impl FnMut(usize, &mut [f64]),
+    ) -> Result<(), SensorError> {
+        self.check(state)?;
+        self.expected.check_envs(env_ids)?;
+        for &env in env_ids {
+            self.phases.reset(env, state.step[env]);
+            self.counts[env] = 0;
+            self.stamp_history.reset(env);
+            self.quantities.iter_mut().for_each(|q| q.history.reset(env));
+            if let Some(delay) = &mut self.delay {
+                delay.clear(env);
+            }
+            if let Some(noise) = &mut self.noise {
+                noise.reset(env);
+            }
+        }
+        self.refresh(env_ids, state, read)
+    }
+
+    /// Refreshes the current values of the environments `env_ids` from `state`, with noise: see
+    /// [`Sensor::refresh`](crate::Sensor::refresh). What is on its way arrives later in history and count, and does not
+    /// replace the fresh values.
+    ///
+    /// # Errors
+    ///
+    /// As [`reset`](Self::reset); nothing is refreshed then.
+    pub fn refresh(
+        &mut self,
+        env_ids: &[usize],
+        state: &SceneState,
+        mut read: impl FnMut(usize, &mut [f64]),
+    ) -> Result<(), SensorError> {
+        self.check(state)?;
+        self.expected.check_envs(env_ids)?;
+        for &env in env_ids {
+            self.refreshed[env] = state.step[env];
+            self.read(env, state, &mut read);
+            if let Some(noise) = &mut self.noise {
+                noise.disturb(env, &mut self.row[STAMPS..]);
+            }
+            self.show(env);
+        }
+        Ok(())
+    }
+
+    /// Puts stamps and true values of an environment into the row.
+    fn read(&mut self, env: usize, state: &SceneState, read: &mut impl FnMut(usize, &mut [f64])) {
+        let (stamps, values) = self.row.split_at_mut(STAMPS);
+        stamps.copy_from_slice(&[state.time[env], state.force_time[env]]);
+        values.fill(0.0);
+        read(env, values);
+    }
+
+    /// Puts the row into the history.
+    fn remember(&mut self, env: usize) {
+        let (stamps, mut values) = self.row.split_at(STAMPS);
+        self.stamp_history.push(env, stamps);
+        for quantity in &mut self.quantities {
+            let (mine, rest) = values.split_at(quantity.now.ncols());
+            quantity.history.push(env, mine);
+            values = rest;
+        }
+        self.counts[env] += 1;
+    }
+
+    /// Makes the row the current values.
+    fn show(&mut self, env: usize) {
+        (self.stamps[env], self.force_stamps[env]) = (self.row[0], self.row[1]);
+        let mut values = &self.row[STAMPS..];
+        for quantity in &mut self.quantities {
+            let (mine, rest) = values.split_at(quantity.now.ncols());
+            quantity.now.row_mut(env).iter_mut().zip(mine).for_each(|(now, value)| *now = *value);
+            values = rest;
+        }
+    }
+
+    /// Physics steps until the next measurement of any environment is captured or arrives, at least 1: see
+    /// [`Sensor::due_in`](crate::Sensor::due_in).
+    pub fn due_in(&self, step: &[u64]) -> u64 {
+        let due = self.phases.due_in(step.iter().copied());
+        let Some(delay) = &self.delay else { return due };
+        let arrivals = (0..).zip(step).filter_map(|(env, &now)| Some(delay.arrival(env)?.saturating_sub(now).max(1)));
+        arrivals.fold(due, u64::min)
+    }
+
+    /// When it measures.
+    pub fn schedule(&self) -> Schedule {
+        self.phases.schedule()
+    }
+
+    #[track_caller]
+    fn quantity(&self, channel: &str) -> &Quantity {
+        let found = self.quantities.iter().find(|q| q.name == channel);
+        found.unwrap_or_else(|| panic!("this sampler was built without the channel {channel:?}"))
+    }
+
+    /// Current values of a channel, shape \[num_envs, width\].
+    ///
+    /// # Panics
+    ///
+    /// If the sampler was built without the channel.
+    #[track_caller]
+    pub fn values(&self, channel: &str) -> ArrayView2<'_, f64> {
+        self.quantity(channel).now.view()
+    }
+
+    /// Current values of a channel in a shape with more axes, such as \[num_envs, bodies, 3\].
+    ///
+    /// # Panics
+    ///
+    /// If the sampler was built without the channel, or with another number of values.
+    #[track_caller]
+    pub fn values_as<D: Dimension>(&self, channel: &str, shape: impl IntoDimension<Dim = D>) -> ArrayView<'_, f64, D> {
+        shaped(self.quantity(channel).now.as_slice(), shape.into_dimension())
+    }
+
+    /// Past values of a channel, newest first, shape \[num_envs, history_length, width\]; 0 where not filled yet.
+    ///
+    /// # Panics
+    ///
+    /// If the sampler was built without the channel.
+    #[track_caller]
+    pub fn history(&self, channel: &str) -> ArrayView3<'_, f64> {
+        self.quantity(channel).history.view()
+    }
+
+    /// Past values of a channel in a shape with more axes, such as \[num_envs, history_length, bodies, 3\].
+    ///
+    /// # Panics
+    ///
+    /// If the sampler was built without the channel, or with another number of values.
+    #[track_caller]
+    pub fn history_as<D: Dimension>(&self, channel: &str, shape: impl IntoDimension<Dim = D>) -> ArrayView<'_, f64, D> {
+        shaped(self.quantity(channel).history.view().to_slice(), shape.into_dimension())
+    }
+}
+
+#[track_caller]
+fn shaped<D: Dimension>(values: Option<&[f64]>, shape: D) -> ArrayView<'_, f64, D> {
+    let values = values.unwrap_or_default();
+    match ArrayView::from_shape(shape.clone(), values) {
+        Ok(view) => view,
+        Err(_) => panic!("{} values in the shape {:?}", values.len(), shape.slice()),
+    }
+}
+
+/// What all sensors with a [`Sampler`] can tell.
+pub trait Sampled {
+    /// The sensor's sampler.
+    fn sampler(&self) -> &Sampler;
+
+    /// When it measures.
+    fn schedule(&self) -> Schedule {
+        self.sampler().schedule()
+    }
+
+    /// Time at which the current positions and velocities were captured \[s\], shape \[num_envs\]: see
+    /// [`SceneState::time`].
+    fn stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().stamps.view()
+    }
+
+    /// Time at which the current forces, efforts and accelerations were captured \[s\], shape \[num_envs\]: see
+    /// [`SceneState::force_time`].
+    fn force_stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().force_stamps.view()
+    }
+
+    /// Times of past measurements \[s\], newest first, shape \[num_envs, history_length\]; 0 where not filled yet.
+    fn stamp_history(&self) -> ArrayView2<'_, f64> {
+        self.sampler().stamp_history.view().index_axis_move(Axis(2), 0)
+    }
+
+    /// Times of past forces, efforts and accelerations \[s\], newest first, shape \[num_envs, history_length\].
+    fn force_stamp_history(&self) -> ArrayView2<'_, f64> {
+        self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
+    }
+
+    /// Measurements that arrived since the last reset, shape \[num_envs\]; the refresh of a reset is none.
+    fn sample_counts(&self) -> ArrayView1<'_, u64> {
+        self.sampler().counts.view()
+    }
+
+    /// How many rows of the histories of environment `env` are filled.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such environment.
+    #[track_caller]
+    fn history_filled(&self, env: usize) -> usize {
+        self.sampler().stamp_history.filled(env)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,74 @@
+//! Bodies and joints by name patterns.
+
+use crate::error::SensorError;
+use scene::pattern::{Pattern, PatternError, closest};
+
+/// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
+///
+/// A pattern is a regular expression that must match the whole name (see [`scene::pattern`]): the full one (`uid/link`), or
+/// the part behind the first slash. `what` says what the names are, such as `body`.
+///
+/// # Errors
+///
+/// A pattern that is no regular expression or matches nothing, and a name that two patterns match.
+pub fn select<P: AsRef<str>>(patterns: &[P], names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
+    let mut taken_by: Vec<Option<&str>> = vec![None; names.len()];
+    let mut selected = Vec::new();
+    for pattern in patterns {
+        let pattern = pattern.as_ref();
+        for index in matching(pattern, names, what)? {
+            if let Some(first) = taken_by[index].replace(pattern) {
+                let (first, second, name) = (first.into(), pattern.into(), names[index].clone());
+                return Err(SensorError::Pattern(PatternError::MatchedTwice { what, name, first, second }.to_string()));
+            }
+            selected.push(index);
+        }
+    }
+    Ok(selected)
+}
+
+/// Indices of the names that one pattern matches, at least one.
+///
+/// # Errors
+///
+/// As [`select`].
+pub fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
+    let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;
+    let matches = |name: &str| compiled.matches(name) || compiled.matches(bare(name));
+    let found: Vec<usize> = (0..names.len()).filter(|&i| matches(&names[i])).collect();
+    if found.is_empty() {
+        let candidates = if pattern.contains('/') {
+            closest(pattern, names.iter().map(String::as_str))
+        } else {
+            closest(pattern, names.iter().map(|name| bare(name)))
+        };
+        let candidates = candidates.into_iter().map(str::to_owned).collect();
+        return Err(SensorError::UnknownName { what, name: pattern.into(), candidates });
+    }
+    Ok(found)
+}
+
+/// The part of a name behind the first slash, where there is one.
+fn bare(name: &str) -> &str {
+    name.split_once('/').map_or(name, |(_, rest)| rest)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn full_and_bare_names_match_as_a_whole() {
+        let names = ["a/LF_FOOT", "a/RF_FOOT", "b/LF_FOOT", "cube", "a/x/y"].map(String::from);
+        let found = |patterns: &[&str]| select(patterns, &names, "body").unwrap();
+        assert_eq!(found(&[".F_FOOT"]), [0, 1, 2]);
+        assert_eq!(found(&["b/.*", "a/RF_FOOT"]), [2, 1]);
+        assert_eq!(found(&["cube", "x/y"]), [3, 4]);
+        assert_eq!(found(&[]), [0_usize; 0]);
+        let wrong = |patterns: &[&str]| select(patterns, &names, "body").unwrap_err().to_string();
+        assert!(wrong(&["F_FOOT"]).starts_with("there is no body \"F_FOOT\"; known are \"LF_FOOT\""));
+        assert!(wrong(&["cube", "c.*"]).contains("matched by both"));
+        assert!(wrong(&["(cube"]).contains("not a regular expression"));
+    }
+}

@@ -1,0 +1,111 @@
+//! What MuJoCo solves for the state before a step, captured inside the step: contacts, accelerations, joint wrenches.
+//!
+//! After `mj_step2` forces and contacts belong together; the `mj_step1` that follows makes a new contact list that nobody
+//! has solved yet. Between the two, positions and all that comes from them are still those of the beginning of the step,
+//! while `qpos` and `qvel` are those of its end.
+
+mod contacts;
+mod motion;
+
+use crate::compile::{ObjectIndex, RobotIndex};
+use crate::mj::{Data, EngineError, Model};
+use ::scene::Pose;
+use ::scene::state::Contact;
+use sensors::Requires;
+use std::sync::Arc;
+
+pub(crate) use motion::{body_velocity, link_pose};
+
+/// Where what is captured is in MuJoCo's arrays: the same for all environments.
+#[derive(Debug)]
+pub(crate) struct Plan {
+    /// Index on the body axis of what each geom belongs to; `None` is the world.
+    owners: Vec<Option<u32>>,
+    /// MuJoCo's body of everything on the body axis, and the frame of the link in it.
+    bodies: Vec<(usize, Pose)>,
+    /// Whether a body of the axis is a MuJoCo body of its own, not one that is fused to another.
+    carries: Vec<bool>,
+}
+
+/// What to capture in a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Capture {
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) fields: Requires,
+}
+
+/// What was captured in one environment; empty where nothing was, or where a step failed.
+#[derive(Debug, Default)]
+pub(crate) struct Solved {
+    pub(crate) contacts: Vec<Contact>,
+    /// Rows of 7 per body.
+    pub(crate) poses: Vec<f64>,
+    /// Rows of 6 per body.
+    pub(crate) velocities: Vec<f64>,
+    /// Rows of 6 per body.
+    pub(crate) accelerations: Vec<f64>,
+    /// Rows of 6 per body.
+    pub(crate) wrenches: Vec<f64>,
+    /// Room for the engine's velocities.
+    spare: Vec<f64>,
+}
+
+impl Plan {
+    /// The plan of a compiled scene; `carriers` is as in [`sensors::SensorContext`].
+    pub(crate) fn new(model: &Model, robots: &[RobotIndex], objects: &[ObjectIndex], carriers: &[usize]) -> Self {
+        let links = robots.iter().flat_map(|robot| robot.links.iter().copied());
+        let bodies: Vec<(usize, Pose)> =
+            links.chain(objects.iter().map(|object| (object.body, Pose::identity()))).collect();
+        let mut owners = vec![None; model.ngeom()];
+        let mut first = 0;
+        for robot in robots {
+            for geom in &robot.geoms {
+                owners[geom.geom] = Some((first + geom.link) as u32);
+            }
+            first += robot.links.len();
+        }
+        for (geom, &body) in model.geom_bodyid().iter().enumerate() {
+            if let Some(k) = objects.iter().position(|object| object.body == body as usize) {
+                owners[geom] = Some((first + k) as u32);
+            }
+        }
+        let carries = carriers.iter().enumerate().map(|(body, &carrier)| body == carrier).collect();
+        Self { owners, bodies, carries }
+    }
+
+    /// MuJoCo's body of everything on the body axis, and the frame of the link in it.
+    pub(crate) fn bodies(&self) -> &[(usize, Pose)] {
+        &self.bodies
+    }
+}
+
+impl Capture {
+    /// Captures after `mj_step2` of a step that began with the velocities `qvel`. Nothing that decides a later step changes.
+    pub(crate) fn take(&self, data: &mut Data, qvel: &[f64], solved: &mut Solved) -> Result<(), EngineError> {
+        if self.fields.contains(Requires::CONTACTS) {
+            contacts::capture(&self.plan.owners, data, &mut solved.contacts);
+        }
+        let (accelerations, wrenches) =
+            (self.fields.contains(Requires::ACCELERATIONS), self.fields.contains(Requires::JOINT_WRENCHES));
+        if accelerations || wrenches {
+            data.solve_accelerations(qvel, &mut solved.spare)?;
+        }
+        if accelerations {
+            motion::capture(&self.plan.bodies, data, solved);
+        }
+        if wrenches {
+            motion::capture_wrenches(&self.plan, data, &mut solved.wrenches);
+        }
+        Ok(())
+    }
+}
+
+impl Solved {
+    /// Forgets everything: what was captured is of a step that was not done.
+    pub(crate) fn clear(&mut self) {
+        self.contacts.clear();
+        for values in [&mut self.poses, &mut self.velocities, &mut self.accelerations, &mut self.wrenches] {
+            values.clear();
+        }
+    }
+}

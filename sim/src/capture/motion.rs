@@ -1,0 +1,71 @@
+//! Motion of links from MuJoCo's spatial vectors, which are about the centre of mass of the whole tree.
+//!
+//! With c the reference point, r the origin of the link, w and v the angular and linear parts of `cvel`, alpha and a those
+//! of `cacc`: the origin moves with `v_r = v + w x (r - c)`; the spatial acceleration there is `a + alpha x (r - c)`, and the
+//! acceleration that a point of the body has is that plus `w x v_r` (Featherstone, Rigid Body Dynamics Algorithms, 2.11).
+//! MuJoCo accelerates the world by minus gravity, so gravity is added: 0 at rest, gravity in free fall.
+
+use super::{Plan, Solved};
+use crate::mj::Data;
+use crate::objects::robot::body_pose;
+use ::scene::Pose;
+use ::scene::pose::to_row;
+use nalgebra::Vector3;
+
+/// Pose of a link in the environment.
+pub(crate) fn link_pose(data: &Data, (body, body_from_link): &(usize, Pose)) -> Pose {
+    body_pose(data, *body) * body_from_link
+}
+
+fn vector(values: &[f64], first: usize) -> Vector3<f64> {
+    Vector3::new(values[first], values[first + 1], values[first + 2])
+}
+
+/// The point that the spatial vectors of a body are about.
+fn reference(data: &Data, body: usize) -> Vector3<f64> {
+    vector(data.subtree_com(), 3 * data.model().body_rootid()[body] as usize)
+}
+
+/// Velocity of the point of `body` that is at `point`, and the body's angular velocity, in world axes.
+pub(crate) fn body_velocity(data: &Data, body: usize, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let angular = vector(data.cvel(), 6 * body);
+    [vector(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference(data, body))), angular]
+}
+
+/// Poses, velocities and accelerations of all links.
+pub(super) fn capture(bodies: &[(usize, Pose)], data: &Data, solved: &mut Solved) {
+    let Solved { poses, velocities, accelerations, .. } = solved;
+    for values in [&mut *poses, &mut *velocities, &mut *accelerations] {
+        values.clear();
+    }
+    let gravity = Vector3::from(data.model().gravity());
+    for link in bodies {
+        let (body, pose) = (link.0, link_pose(data, link));
+        let point = pose.translation.vector;
+        let [velocity, turning] = body_velocity(data, body, &point);
+        let alpha = vector(data.cacc(), 6 * body);
+        let spatial = vector(data.cacc(), 6 * body + 3) + alpha.cross(&(point - reference(data, body)));
+        let acceleration = spatial + turning.cross(&velocity) + gravity;
+        poses.extend(to_row(&pose));
+        velocities.extend(velocity.iter().chain(&turning));
+        accelerations.extend(acceleration.iter().chain(&alpha));
+    }
+}
+
+/// What parents exert on links through their joints: force and torque about the origin of the link, in its axes.
+pub(super) fn capture_wrenches(plan: &Plan, data: &Data, wrenches: &mut Vec<f64>) {
+    wrenches.clear();
+    for (link, &carries) in plan.bodies.iter().zip(&plan.carries) {
+        if !carries {
+            wrenches.extend([f64::NAN; 6]);
+            continue;
+        }
+        let (body, pose) = (link.0, link_pose(data, link));
+        let force = vector(data.cfrc_int(), 6 * body + 3);
+        let arm = reference(data, body) - pose.translation.vector;
+        let torque = vector(data.cfrc_int(), 6 * body) + arm.cross(&force);
+        for part in [force, torque] {
+            wrenches.extend(&pose.rotation.inverse_transform_vector(&part));
+        }
+    }
+}

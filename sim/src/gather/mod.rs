@@ -1,0 +1,113 @@
+//! From a batch of environments to the arrays that sensors read: only what somebody asked for.
+
+mod joints;
+mod motion;
+mod solved;
+
+use crate::compile::Simulation;
+use ndarray::{Array2, Array3};
+use scene::state::Contacts;
+use scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
+use sensors::Requires;
+
+/// What [`gather`] can fill so far.
+pub(crate) const AVAILABLE: Requires = Requires::POSES
+    .union(Requires::VELOCITIES)
+    .union(Requires::JOINT_STATE)
+    .union(Requires::JOINT_EFFORTS)
+    .union(Requires::VISIBLE)
+    .union(Requires::INSTANCES)
+    .union(Requires::SOLVED);
+
+/// A state with room for what `requires` names. The body axis has the links of all robots, then objects; the joint axis the
+/// movable joints of all robots.
+pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneState {
+    let n = simulation.batch.num_envs();
+    let bodies = simulation.plan.bodies().len();
+    let joints = simulation.robots.iter().map(|r| r.joints.len()).sum();
+    let per_body = |field, width| requires.contains(field).then(|| Array3::zeros((n, bodies, width)));
+    let per_joint = |field| requires.contains(field).then(|| Array2::zeros((n, joints)));
+    let visible = simulation.visible.as_ref().filter(|_| requires.contains(Requires::VISIBLE));
+    let exact = simulation.visible.as_ref().filter(|_| requires.contains(Requires::INSTANCES));
+    SceneState {
+        body_poses: per_body(Requires::POSES, 7),
+        body_velocities: per_body(Requires::VELOCITIES, 6),
+        body_accelerations: per_body(Requires::ACCELERATIONS, 6),
+        force_poses: per_body(Requires::ACCELERATIONS, 7),
+        force_velocities: per_body(Requires::ACCELERATIONS, 6),
+        joint_wrenches: per_body(Requires::JOINT_WRENCHES, 6),
+        joint_positions: per_joint(Requires::JOINT_STATE),
+        joint_velocities: per_joint(Requires::JOINT_STATE),
+        joint_efforts: per_joint(Requires::JOINT_EFFORTS),
+        contacts: requires.contains(Requires::CONTACTS).then(|| Contacts { first: vec![0; n + 1], list: Vec::new() }),
+        visible: visible.map(|visible| VisibleState {
+            instance_poses: Array2::from_elem((n, visible.scene().instances().len()), PoseF32::IDENTITY),
+            lights: Array2::from_elem((n, visible.scene().lights.len()), Light::default()),
+        }),
+        instance_poses: exact
+            .map(|visible| Array2::from_elem((n, visible.scene().instances().len()), PoseF64::IDENTITY)),
+        ..SceneState::new(n)
+    }
+}
+
+/// Steps and times of all environments.
+pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
+    simulation.batch.for_each(|i, env| {
+        state.step[i] = env.steps() / u64::from(substeps);
+        state.time[i] = env.data().time();
+        state.force_time[i] = env.solved_time();
+    });
+}
+
+/// Fills the arrays that `requires` names, which must be there.
+pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires, state: &mut SceneState) {
+    gather_steps(simulation, substeps, state);
+    if requires.is_empty() {
+        return;
+    }
+    let wants = |field| requires.contains(field);
+    let (bodies, robots) = (simulation.plan.bodies(), &simulation.robots[..]);
+    if let Some(contacts) = state.contacts.as_mut().filter(|_| wants(Requires::CONTACTS)) {
+        contacts.list.clear();
+    }
+    simulation.batch.for_each(|i, env| {
+        if wants(Requires::POSES) {
+            motion::poses(bodies, env.data(), i, &mut state.body_poses);
+        }
+        if wants(Requires::VELOCITIES) {
+            motion::velocities(bodies, env.data(), i, &mut state.body_velocities);
+        }
+        if wants(Requires::JOINT_STATE) {
+            joints::fill(&mut state.joint_positions, i, robots, |joint| env.data().qpos()[joint.qpos]);
+            joints::fill(&mut state.joint_velocities, i, robots, |joint| env.data().qvel()[joint.dof]);
+        }
+        if wants(Requires::JOINT_EFFORTS) {
+            let effort = |drive| env.drives.effort[drive];
+            joints::fill(&mut state.joint_efforts, i, robots, |joint| joint.drive.map_or(0.0, effort));
+        }
+        if wants(Requires::CONTACTS) {
+            solved::contacts(env.solved(), i, &mut state.contacts);
+        }
+        if wants(Requires::ACCELERATIONS) {
+            solved::rows(&env.solved().poses, i, &mut state.force_poses);
+            solved::rows(&env.solved().velocities, i, &mut state.force_velocities);
+            solved::rows(&env.solved().accelerations, i, &mut state.body_accelerations);
+        }
+        if wants(Requires::JOINT_WRENCHES) {
+            solved::rows(&env.solved().wrenches, i, &mut state.joint_wrenches);
+        }
+        if wants(Requires::VISIBLE)
+            && let (Some(visible), Some(seen)) = (&simulation.visible, &mut state.visible)
+            && let (Some(poses), Some(lights)) =
+                (seen.instance_poses.row_mut(i).as_slice_mut(), seen.lights.row_mut(i).as_slice_mut())
+        {
+            visible.read(env.data(), poses, lights);
+        }
+        if wants(Requires::INSTANCES)
+            && let (Some(visible), Some(poses)) = (&simulation.visible, &mut state.instance_poses)
+            && let Some(poses) = poses.row_mut(i).as_slice_mut()
+        {
+            visible.read_exact(env.data(), poses);
+        }
+    });
+}
