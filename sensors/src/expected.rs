@@ -63,7 +63,6 @@ impl Expected {
             self.rows(field, array.as_ref().map(Array2::shape), "joints", self.joints)?;
         }
         self.rows(Requires::INSTANCES, state.instance_poses.as_ref().map(Array2::shape), "instances", self.instances)
-
     }
 
     /// Checks that the array of a required field has the axes (environments, `count` of `what`).

@@ -23,6 +23,7 @@ pub mod sampling;
 pub mod schedule;
 pub mod select;
 pub mod sensor;
+pub(crate) mod share;
 pub mod visibility;
 
 pub use camera::{Camera, CameraCfg, CameraError};
@@ -31,6 +32,7 @@ pub use expected::Expected;
 pub use history::History;
 pub use joint_state::{JointState, JointStateCfg};
 pub use noise::NoiseCfg;
+pub use ray::{RayCaster, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{Requires, Sensor, SensorCfg, SensorContext};

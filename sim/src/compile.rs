@@ -220,7 +220,8 @@ fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objec
         if let Some(k) = objects.iter().position(|o| o.body == body as usize) {
             let object = &contents.objects[k];
             let body = Some((first + k) as u32);
-            owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object", body };
+            owners[geom] =
+                Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object", body };
         }
     }
     visible::of_simulation(model, &owners)

@@ -260,8 +260,16 @@ impl SimulationManager {
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(cfg.substeps);
         let visuals = VisualCache::default();
-        Ok(Self { serial, cfg, contents, visuals,
-            ray_assets: RayAssets::default(), diagnostics: Vec::new(), simulation, sensors })
+        Ok(Self {
+            serial,
+            cfg,
+            contents,
+            visuals,
+            ray_assets: RayAssets::default(),
+            diagnostics: Vec::new(),
+            simulation,
+            sensors,
+        })
     }
 
     /// The configuration.

@@ -61,24 +61,10 @@ pub enum RayError {
         /// The most that is allowed.
         limit: u64,
     },
-    /// A pattern of names that does not compile or matches nothing.
-    #[error("the targets of the ray caster: {reason}")]
-    Targets {
-        /// What is wrong, with the names there are.
-        reason: String,
-    },
     /// Something is wrong with the lens of a pattern.
     #[error(transparent)]
     Lens(#[from] CameraError),
     /// There is no scene to cast rays into.
     #[error("the ray caster was built without a scene")]
     NoScene,
-    /// Nothing can be hit.
-    #[error("nothing in the scene can be hit: the targets are {targets}, of geom groups {groups:#b}")]
-    NothingToHit {
-        /// Which targets were asked for.
-        targets: &'static str,
-        /// Which groups.
-        groups: u32,
-    },
 }

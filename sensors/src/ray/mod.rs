@@ -5,6 +5,7 @@
 
 mod assets;
 mod bvh;
+pub mod caster;
 mod error;
 pub mod pattern;
 mod shape;
@@ -17,6 +18,7 @@ mod tests;
 
 pub(crate) use assets::Assets;
 pub use assets::RayAssets;
+pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use pattern::RayPattern;
 pub use world::{RayHit, RayTargets, RayWorld};

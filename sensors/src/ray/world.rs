@@ -70,7 +70,7 @@ struct Placed {
 }
 
 /// Targets that do not move, where they are: shared by all environments where they are at the same places.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct FixedWorld {
     placed: Vec<Placed>,
     /// Over some of `placed`, given by the list; the others are tested one by one.
@@ -197,10 +197,9 @@ impl RayWorld {
     }
 
     pub(crate) fn with_level(targets: &Arc<RayTargets>, level: Level) -> Self {
-        let nothing = FixedWorld { placed: Vec::new(), tree: None, one_by_one: Vec::new() };
         Self {
             targets: Arc::clone(targets),
-            fixed: Arc::new(nothing),
+            fixed: Arc::new(FixedWorld::default()),
             moving: Vec::with_capacity(targets.moving.len()),
             level,
             outer: Stack::default(),

@@ -62,7 +62,13 @@ patterns! {
 
 impl RayPattern {
     /// The most rays of a pattern.
-    pub const MAX_RAYS: usize = 1 << 26;
+    pub const MAX_RAYS: usize = 1 << 24;
+
+    /// How many rays there are, without making them; 0 where the numbers make no sense.
+    pub(crate) fn count(&self) -> usize {
+        // A number that is none becomes 0.
+        self.inner().count() as usize
+    }
 
     /// The rays, directions of length 1.
     ///

@@ -85,7 +85,7 @@ fn mistakes_are_named() {
         let text = error(Bpearl { horizontal_resolution_deg: resolution, ..Bpearl::default() }.into());
         assert!(text.contains("positive"), "{text}");
     }
-    assert!(error(Grid { resolution: 1e-9, ..Grid::default() }.into()).contains("between 1 and 67108864"));
+    assert!(error(Grid { resolution: 1e-9, ..Grid::default() }.into()).contains("between 1 and 16777216"));
     assert!(error(Grid { size: [-1.0, 1.0], ..Grid::default() }.into()).contains("size along x"));
     assert!(error(Grid { direction: [0.0; 3], ..Grid::default() }.into()).contains("direction other than zero"));
     assert!(error(Lidar { channels: 0, ..Lidar::default() }.into()).contains("0e0 rays"));
