@@ -58,9 +58,8 @@ struct ShortRay {
     shift: f64,
     origin: [f32; 3],
     inverse: [f32; 3],
-    /// Which sides of a box come first.
-    near: [usize; 3],
-    far: [usize; 3],
+    /// Along which axes the larger sides come first.
+    backward: [bool; 3],
 }
 
 impl Bvh {
@@ -77,30 +76,42 @@ impl Bvh {
         let Some(short) = self.enter(ray, limit) else { return };
         let mut short_limit = short.limit(limit);
         stack.clear();
-        stack.push(Entry { near: 0.0, child: 0, count: 0 });
-        while let Some(entry) = stack.pop() {
-            if entry.near > short_limit {
-                continue;
-            }
-            let first = entry.child as usize;
-            if entry.count > 0 {
-                limit = leaf(first..first + entry.count as usize, limit);
-                short_limit = short.limit(limit);
-                continue;
-            }
-            let node = &self.nodes[first];
-            let (near, mut met) = short.meets(node, short_limit);
-            let bottom = stack.len();
-            while met != 0 {
-                let k = met.trailing_zeros() as usize;
-                met &= met - 1;
-                stack.push(Entry { near: near[k], child: node.child[k], count: node.count[k] });
-                // The nearest one on top; the first of those that are as near.
-                let mut at = stack.len() - 1;
-                while at > bottom && stack[at - 1].near <= stack[at].near {
-                    stack.swap(at - 1, at);
-                    at -= 1;
+        let mut entry = Entry { near: 0.0, child: 0, count: 0 };
+        loop {
+            if entry.near <= short_limit {
+                let first = entry.child as usize;
+                if entry.count > 0 {
+                    limit = leaf(first..first + entry.count as usize, limit);
+                    short_limit = short.limit(limit);
+                } else {
+                    let node = &self.nodes[first];
+                    let (near, mut met) = short.meets(node, short_limit);
+                    if met != 0 {
+                        let child = |k: usize| Entry { near: near[k], child: node.child[k], count: node.count[k] };
+                        entry = child(met.trailing_zeros() as usize & (WIDE - 1));
+                        met &= met - 1;
+                        let bottom = stack.len();
+                        while met != 0 {
+                            let mut next = child(met.trailing_zeros() as usize & (WIDE - 1));
+                            met &= met - 1;
+                            if next.near < entry.near {
+                                std::mem::swap(&mut next, &mut entry);
+                            }
+                            // The nearest one on top; the first of those that are as near.
+                            let mut at = stack.len();
+                            stack.push(next);
+                            while at > bottom && stack[at - 1].near <= stack[at].near {
+                                stack.swap(at - 1, at);
+                                at -= 1;
+                            }
+                        }
+                        continue;
+                    }
                 }
+            }
+            match stack.pop() {
+                Some(next) => entry = next,
+                None => return,
             }
         }
     }
@@ -134,9 +145,8 @@ impl Bvh {
             let d = d as f32;
             1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d }
         });
-        let near = [0, 1, 2].map(|k| if inverse[k] < 0.0 { k + 3 } else { k });
-        let far = [0, 1, 2].map(|k| if inverse[k] < 0.0 { k } else { k + 3 });
-        Some(ShortRay { shift, origin, inverse, near, far })
+        let backward = inverse.map(|x| x < 0.0);
+        Some(ShortRay { shift, origin, inverse, backward })
     }
 }
 
@@ -150,18 +160,20 @@ impl ShortRay {
     /// From where on the ray is in each of the boxes, and a bit for each box that it meets before `limit`.
     #[inline(always)]
     fn meets(&self, node: &Node, limit: f32) -> ([f32; WIDE], u32) {
-        let side = |which: usize, axis: usize| -> [f32; WIDE] {
-            let (o, inverse) = (self.origin[axis], self.inverse[axis]);
-            node.sides[which].map(|side| (side - o) * inverse)
-        };
-        let pick = |a: [f32; WIDE], b: [f32; WIDE], larger: bool| -> [f32; WIDE] {
-            std::array::from_fn(|k| if (a[k] > b[k]) == larger { a[k] } else { b[k] })
-        };
-        let [x, y, z] = [0, 1, 2].map(|k| side(self.near[k], k));
-        let near = pick(pick(x, y, true), pick(z, [0.0; WIDE], true), true);
-        let [x, y, z] = [0, 1, 2].map(|k| side(self.far[k], k));
-        let far = pick(pick(x, y, false), pick(z, [limit; WIDE], false), false);
-        let met: [u32; WIDE] = std::array::from_fn(|k| u32::from(near[k] <= far[k]) << k);
+        let [x0, y0, z0, x1, y1, z1] = &node.sides;
+        let sort = |k: usize, a, b| if self.backward[k] { (b, a) } else { (a, b) };
+        let ((nx, fx), (ny, fy), (nz, fz)) = (sort(0, x0, x1), sort(1, y0, y1), sort(2, z0, z1));
+        let ([ox, oy, oz], [ix, iy, iz]) = (self.origin, self.inverse);
+        let larger = |a: f32, b: f32| if a > b { a } else { b };
+        let smaller = |a: f32, b: f32| if a < b { a } else { b };
+        // One plain loop: compilers make vectors of it.
+        let mut near = [0.0f32; WIDE];
+        let mut met = [0u32; WIDE];
+        for k in 0..WIDE {
+            near[k] = larger(larger((nx[k] - ox) * ix, (ny[k] - oy) * iy), larger((nz[k] - oz) * iz, 0.0));
+            let far = smaller(smaller((fx[k] - ox) * ix, (fy[k] - oy) * iy), smaller((fz[k] - oz) * iz, limit));
+            met[k] = u32::from(near[k] <= far) << k;
+        }
         (near, met.iter().fold(0, |bits, bit| bits | bit))
     }
 }
