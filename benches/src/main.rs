@@ -9,6 +9,7 @@ mod interleave;
 mod memory;
 mod models;
 mod mujoco_batch;
+mod rays;
 mod rival;
 mod row;
 mod startup;
@@ -25,6 +26,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("drive", drive::run),
     ("mujoco-batch", mujoco_batch::run),
     ("camera", camera::run),
+    ("rays", rays::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -43,7 +45,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

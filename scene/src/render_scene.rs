@@ -3,6 +3,7 @@
 use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
 use crate::material::Material;
 use crate::shape::Shape;
+use std::sync::Arc;
 
 /// A thing to draw: a shape with a look and an identity.
 #[derive(Clone, Debug)]
@@ -17,12 +18,38 @@ pub struct Instance {
     pub group: u8,
     /// Whether it is drawn.
     pub visible: bool,
+    /// Whose it is: `uid/link`, the uid of an object, the name of a geom of the world (`ground`). Ray casters choose what
+    /// they hit by it; several instances may share it.
+    pub name: Arc<str>,
+    /// The body that it belongs to, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
+    pub body: Option<u32>,
+    /// Whether it is welded to the world: it never moves but by a write to the state.
+    pub fixed: bool,
 }
 
 impl Instance {
-    /// A visible instance in group 0.
+    /// A visible instance in group 0, without a name, that may move.
     pub fn new(shape: impl Into<Shape>, material: Material, mask_id: i32) -> Self {
-        Self { shape: shape.into(), material, mask_id, group: 0, visible: true }
+        let name = Arc::from("");
+        Self { shape: shape.into(), material, mask_id, group: 0, visible: true, name, body: None, fixed: false }
+    }
+
+    /// The same instance with a name.
+    #[must_use]
+    pub fn named(self, name: &str) -> Self {
+        Self { name: Arc::from(name), ..self }
+    }
+
+    /// The same instance as a part of a body.
+    #[must_use]
+    pub fn of_body(self, body: u32) -> Self {
+        Self { body: Some(body), ..self }
+    }
+
+    /// The same instance, welded to the world.
+    #[must_use]
+    pub fn fixed(self) -> Self {
+        Self { fixed: true, ..self }
     }
 }
 

@@ -6,7 +6,7 @@
 //! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
 //! and velocities are those of t_(k+1). Both times are given.
 
-use crate::{Light, PoseF32};
+use crate::{Light, PoseF32, PoseF64};
 use ndarray::{Array2, Array3};
 
 /// State of all environments after a physics step (or after a reset).
@@ -48,6 +48,9 @@ pub struct SceneState {
     pub sensordata: Option<Array2<f64>>,
     /// Where things are that can be seen.
     pub visible: Option<VisibleState>,
+    /// World from instance, in the order of [`RenderScene::instances`](crate::RenderScene::instances), in double precision
+    /// (what ray casters work with), shape \[num_envs, instances\].
+    pub instance_poses: Option<Array2<PoseF64>>,
 }
 
 /// Where everything of a [`RenderScene`](crate::RenderScene) is in all environments.

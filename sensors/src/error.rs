@@ -1,6 +1,7 @@
 //! What can be wrong with a sensor.
 
 use crate::camera::CameraError;
+use crate::ray::RayError;
 use crate::sensor::Requires;
 
 /// Why a sensor cannot be built or updated.
@@ -141,6 +142,9 @@ pub enum SensorError {
     /// Something is wrong with a camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// Something is wrong with a ray caster.
+    #[error(transparent)]
+    Ray(#[from] RayError),
 }
 
 fn quoted(names: &[String]) -> String {

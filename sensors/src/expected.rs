@@ -13,13 +13,15 @@ pub struct Expected {
     num_envs: usize,
     bodies: usize,
     joints: usize,
+    instances: usize,
 }
 
 impl Expected {
     /// States of the scene of `context` that have what the kind of sensor called `sensor` requires.
     pub fn new(sensor: &'static str, requires: Requires, context: &SensorContext) -> Self {
         let (num_envs, bodies, joints) = (context.num_envs, context.bodies.len(), context.joints.len());
-        Self { sensor, requires, num_envs, bodies, joints }
+        let instances = context.scene.as_ref().map_or(0, |scene| scene.instances().len());
+        Self { sensor, requires, num_envs, bodies, joints, instances }
     }
 
     /// Number of environments.
@@ -60,7 +62,7 @@ impl Expected {
         ] {
             self.rows(field, array.as_ref().map(Array2::shape), "joints", self.joints)?;
         }
-        Ok(())
+        self.rows(Requires::INSTANCES, state.instance_poses.as_ref().map(Array2::shape), "instances", self.instances)
     }
 
     /// Checks that the array of a required field has the axes (environments, `count` of `what`).

@@ -1,6 +1,7 @@
 //! The contract of every sensor.
 
 use crate::error::SensorError;
+use crate::ray::RayAssets;
 use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest};
 use scene::{RenderScene, SceneState};
@@ -86,8 +87,10 @@ pub struct SensorContext {
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
-    /// What can be seen; there for sensors that require [`Requires::VISIBLE`].
+    /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
+    /// What ray casters have built for the assets of the scene, shared by all of them.
+    pub ray_assets: RayAssets,
     /// How many threads a sensor may use; 0 counts as 1.
     pub threads: usize,
 }
@@ -159,12 +162,14 @@ impl Requires {
     pub const VISIBLE: Self = Self(1 << 7);
     /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
     pub const JOINT_WRENCHES: Self = Self(1 << 8);
+    /// [`SceneState::instance_poses`], and [`SensorContext::scene`].
+    pub const INSTANCES: Self = Self(1 << 9);
 
     /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
     /// know before the step that somebody wants it.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    const NAMES: [(Self, &str); 9] = [
+    const NAMES: [(Self, &str); 10] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -174,6 +179,7 @@ impl Requires {
         (Self::SENSORDATA, "sensordata"),
         (Self::VISIBLE, "visible"),
         (Self::JOINT_WRENCHES, "joint_wrenches"),
+        (Self::INSTANCES, "instances"),
     ];
 
     /// Whether all of `other` is in this set.
@@ -216,6 +222,7 @@ impl Requires {
             | has(state.sensordata.is_some(), Self::SENSORDATA)
             | has(state.visible.is_some(), Self::VISIBLE)
             | has(state.joint_wrenches.is_some(), Self::JOINT_WRENCHES)
+            | has(state.instance_poses.is_some(), Self::INSTANCES)
     }
 
     /// The names of the fields in the set.

@@ -200,8 +200,9 @@ fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<Free
 
 /// Who every geom belongs to.
 fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[FreeIndex]) -> Identities {
-    let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground" };
+    let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground", body: None };
     let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
+    let mut first = 0;
     for (data, index) in contents.robots.iter().zip(robots) {
         for geom in &index.geoms {
             owners[geom.geom] = Owner {
@@ -209,13 +210,17 @@ fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objec
                 object: data.uid().into(),
                 link: Some(data.description().links[geom.link].name.clone()),
                 class: "robot",
+                body: Some((first + geom.link) as u32),
             };
         }
+        first += index.links.len();
     }
     for (geom, &body) in model.geom_bodyid().iter().enumerate() {
         if let Some(k) = objects.iter().position(|o| o.body == body as usize) {
             let object = &contents.objects[k];
-            owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object" };
+            let body = Some((first + k) as u32);
+            owners[geom] =
+                Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object", body };
         }
     }
     visible::of_simulation(model, &owners)

@@ -15,6 +15,7 @@ use crate::sensor_list::{SensorId, SensorList};
 use crate::visible::{MaskId, Visible, VisualCache};
 use nalgebra::Vector3;
 use ndarray::Array2;
+use sensors::ray::RayAssets;
 use sensors::{Requires, Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -235,6 +236,8 @@ pub struct SimulationManager {
     cfg: SimulationManagerCfg,
     contents: Contents,
     visuals: VisualCache,
+    /// What ray casters have built.
+    ray_assets: RayAssets,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
     sensors: SensorList,
@@ -257,7 +260,16 @@ impl SimulationManager {
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(cfg.substeps);
         let visuals = VisualCache::default();
-        Ok(Self { serial, cfg, contents, visuals, diagnostics: Vec::new(), simulation, sensors })
+        Ok(Self {
+            serial,
+            cfg,
+            contents,
+            visuals,
+            ray_assets: RayAssets::default(),
+            diagnostics: Vec::new(),
+            simulation,
+            sensors,
+        })
     }
 
     /// The configuration.
@@ -367,7 +379,8 @@ impl SimulationManager {
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
-        let scene = requires.contains(Requires::VISIBLE).then(|| Arc::clone(self.visible().scene()));
+        let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
+        let scene = sees.then(|| Arc::clone(self.visible().scene()));
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
@@ -379,6 +392,7 @@ impl SimulationManager {
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),
             scene,
+            ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
         }
     }

@@ -7,19 +7,24 @@ use std::sync::Arc;
 /// Terrain: heights over a regular grid, with walls and a floor below.
 #[derive(Clone, Debug)]
 pub struct HeightField {
-    size: [f32; 4],
+    size: [f64; 4],
+    rows: usize,
+    columns: usize,
+    elevation: Arc<[f32]>,
     mesh: Arc<RenderMesh>,
 }
 
 impl HeightField {
     /// A height field as MuJoCo has it. `size` = half length along x, half length along y, height of elevation 1, depth of
     /// the floor below zero \[m\]; `elevation` holds `rows` rows (along y) of `columns` numbers (along x) in 0..=1.
-    /// `None` where there are fewer than two rows or columns, or not as many numbers as the grid has.
-    pub fn new(size: [f32; 4], rows: usize, columns: usize, elevation: &[f32]) -> Option<Self> {
-        if rows < 2 || columns < 2 || elevation.len() != rows.checked_mul(columns)? {
+    /// `None` where there are fewer than two rows or columns, not as many numbers as the grid has, or an elevation that is
+    /// negative or not finite.
+    pub fn new(size: [f64; 4], rows: usize, columns: usize, elevation: &[f32]) -> Option<Self> {
+        let elevations = elevation.iter().all(|e| e.is_finite() && *e >= 0.0);
+        if rows < 2 || columns < 2 || elevation.len() != rows.checked_mul(columns)? || !elevations {
             return None;
         }
-        let [x, y, top, bottom] = size;
+        let [x, y, top, bottom] = size.map(|x| x as f32);
         let at = |r: usize, c: usize, z: f32| {
             [x * (2.0 * c as f32 / (columns - 1) as f32 - 1.0), y * (2.0 * r as f32 / (rows - 1) as f32 - 1.0), z]
         };
@@ -52,12 +57,28 @@ impl HeightField {
             }
         }
         let mesh = TriMesh::from_triangles(positions, triangles);
-        Some(Self { size, mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+        let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE));
+        Some(Self { size, rows, columns, elevation: elevation.into(), mesh })
     }
 
     /// Half length along x, half length along y, height of elevation 1, depth of the floor below zero \[m\].
-    pub fn size(&self) -> [f32; 4] {
+    pub fn size(&self) -> [f64; 4] {
         self.size
+    }
+
+    /// Rows of the grid, along y.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Columns of the grid, along x.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Elevations, row after row.
+    pub fn elevation(&self) -> &Arc<[f32]> {
+        &self.elevation
     }
 
     /// The triangles.
@@ -76,6 +97,6 @@ impl ShapeImpl for HeightField {
     }
 
     fn sizes(&self) -> Vec<f32> {
-        self.size.to_vec()
+        self.size.iter().map(|&x| x as f32).collect()
     }
 }

@@ -3,6 +3,7 @@
 use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
 use crate::resolve::plan::{Plan, estimate};
+use crate::share::share;
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
 use std::sync::{Mutex, PoisonError};
@@ -98,37 +99,6 @@ impl Failure {
             }
         }
     }
-}
-
-/// Does all the work, on as many threads as there are rasterizers, each taking the next thing when it is done with one.
-fn share<I>(rasterizers: &mut [Rasterizer], work: I, act: impl Fn(&mut Rasterizer, I::Item) + Sync)
-where
-    I: Iterator + Send,
-{
-    let Some((mine, others)) = rasterizers.split_first_mut() else { return };
-    // No more threads than things to do, where their number is known.
-    let count = match work.size_hint() {
-        (least, Some(most)) if least == most => most.saturating_sub(1).min(others.len()),
-        _ => others.len(),
-    };
-    let others = &mut others[..count];
-    if others.is_empty() {
-        return work.for_each(|item| act(mine, item));
-    }
-    let work = Mutex::new(work);
-    let run = |rasterizer: &mut Rasterizer| {
-        loop {
-            let next = work.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some(item) = next else { break };
-            act(rasterizer, item);
-        }
-    };
-    std::thread::scope(|scope| {
-        for rasterizer in others {
-            scope.spawn(|| run(rasterizer));
-        }
-        run(mine);
-    });
 }
 
 /// Draws a few shots, each by all threads.

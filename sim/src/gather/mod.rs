@@ -7,7 +7,7 @@ mod solved;
 use crate::compile::Simulation;
 use ndarray::{Array2, Array3};
 use scene::state::Contacts;
-use scene::{Light, PoseF32, SceneState, VisibleState};
+use scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
 use sensors::Requires;
 
 /// What [`gather`] can fill so far.
@@ -16,6 +16,7 @@ pub(crate) const AVAILABLE: Requires = Requires::POSES
     .union(Requires::JOINT_STATE)
     .union(Requires::JOINT_EFFORTS)
     .union(Requires::VISIBLE)
+    .union(Requires::INSTANCES)
     .union(Requires::SOLVED);
 
 /// A state with room for what `requires` names. The body axis has the links of all robots, then objects; the joint axis the
@@ -27,6 +28,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
     let per_body = |field, width| requires.contains(field).then(|| Array3::zeros((n, bodies, width)));
     let per_joint = |field| requires.contains(field).then(|| Array2::zeros((n, joints)));
     let visible = simulation.visible.as_ref().filter(|_| requires.contains(Requires::VISIBLE));
+    let exact = simulation.visible.as_ref().filter(|_| requires.contains(Requires::INSTANCES));
     SceneState {
         body_poses: per_body(Requires::POSES, 7),
         body_velocities: per_body(Requires::VELOCITIES, 6),
@@ -42,6 +44,8 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
             instance_poses: Array2::from_elem((n, visible.scene().instances().len()), PoseF32::IDENTITY),
             lights: Array2::from_elem((n, visible.scene().lights.len()), Light::default()),
         }),
+        instance_poses: exact
+            .map(|visible| Array2::from_elem((n, visible.scene().instances().len()), PoseF64::IDENTITY)),
         ..SceneState::new(n)
     }
 }
@@ -98,6 +102,12 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
                 (seen.instance_poses.row_mut(i).as_slice_mut(), seen.lights.row_mut(i).as_slice_mut())
         {
             visible.read(env.data(), poses, lights);
+        }
+        if wants(Requires::INSTANCES)
+            && let (Some(visible), Some(poses)) = (&simulation.visible, &mut state.instance_poses)
+            && let Some(poses) = poses.row_mut(i).as_slice_mut()
+        {
+            visible.read_exact(env.data(), poses);
         }
     });
 }

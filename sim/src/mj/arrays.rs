@@ -71,6 +71,7 @@ model_arrays! {
     body_parentid: i32, "Parent of each body, (nbody,).";
     body_rootid: i32, "Root of each body's tree, (nbody,).";
     body_weldid: i32, "Body each body is welded to, (nbody,).";
+    body_mocapid: i32, "Index of each body among those moved by hand, -1 for others, (nbody,).";
     body_mass: f64, "Mass \\[kg\\], (nbody,).";
     body_inertia: f64, "Principal moments of inertia \\[kg m²\\], (nbody, 3).";
     body_ipos: f64, "Centre of mass in the body frame \\[m\\], (nbody, 3).";

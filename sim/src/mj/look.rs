@@ -161,6 +161,16 @@ fn span<T>(values: &[T], first: i64, count: i64) -> &[T] {
 }
 
 impl Model {
+    /// Whether a body is a part of the world: no joint moves it, nor a hand.
+    ///
+    /// # Panics
+    /// There is no such body.
+    pub fn is_fixed(&self, body: usize) -> bool {
+        // A body moved by hand counts as welded to the world, and so does what hangs on it.
+        let by_hand = |body: usize| self.body_mocapid()[self.body_rootid()[body] as usize] >= 0;
+        self.body_weldid()[body] == 0 && !by_hand(body)
+    }
+
     /// Number of height fields.
     pub fn nhfield(&self) -> usize {
         self.header().nhfield as usize

@@ -49,7 +49,7 @@ impl<'a> Shapes<'a> {
             .entry(field)
             .or_insert_with(|| {
                 let arrays = model.height_field(field);
-                HeightField::new(arrays.size.map(|x| x as f32), arrays.rows, arrays.columns, arrays.elevation)
+                HeightField::new(arrays.size, arrays.rows, arrays.columns, arrays.elevation)
             })
             .clone()
     }

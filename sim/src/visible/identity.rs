@@ -25,13 +25,23 @@ pub struct MaskId {
 #[derive(Clone, Debug)]
 pub(crate) struct Identities {
     table: Arc<[MaskId]>,
-    of_geom: Vec<i32>,
+    of_geom: Vec<GeomIdentity>,
+}
+
+/// Who owns a geom.
+#[derive(Clone, Debug)]
+pub(super) struct GeomIdentity {
+    pub(super) mask_id: i32,
+    /// `uid/link`, the uid of an object, the name of a geom of the world.
+    pub(super) name: Arc<str>,
+    /// On the body axis of sensors; `None` for the world, and where there are no sensors.
+    pub(super) body: Option<u32>,
 }
 
 impl Identities {
-    /// The mask id of a geom.
-    pub(super) fn id_of(&self, geom: usize) -> i32 {
-        self.of_geom[geom]
+    /// Who owns a geom.
+    pub(super) fn of(&self, geom: usize) -> &GeomIdentity {
+        &self.of_geom[geom]
     }
 
     /// What each mask id is, in order.
@@ -61,10 +71,12 @@ pub(super) fn by_body(model: &Model) -> Identities {
     let of_geom = (0..model.ngeom())
         .map(|geom| {
             let body = model.geom_bodyid()[geom] as usize;
+            let name = if body > 0 { body_name(model, body) } else { geom_name(model, geom) };
+            let identity = |mask_id| GeomIdentity { mask_id, name: name.into(), body: None };
             if body > 0 && of_body[body] > 0 {
                 let id: i32 = of_body[body];
                 table[id as usize - 1].geoms.push(geom_name(model, geom));
-                return id;
+                return identity(id);
             }
             let id = table.len() as i32 + 1;
             of_body[body] = id;
@@ -78,7 +90,7 @@ pub(super) fn by_body(model: &Model) -> Identities {
                 body: name,
                 geoms: vec![geom_name(model, geom)],
             });
-            id
+            identity(id)
         })
         .collect();
     Identities { table: table.into(), of_geom }
@@ -91,6 +103,8 @@ pub(crate) struct Owner {
     pub(crate) object: String,
     pub(crate) link: Option<String>,
     pub(crate) class: &'static str,
+    /// On the body axis of sensors; `None` for the world.
+    pub(crate) body: Option<u32>,
 }
 
 /// Identities of a simulation, given the owner of every geom.
@@ -107,5 +121,12 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
         });
         entry.geoms.push(geom_name(model, geom));
     }
-    Identities { table: table.into_values().collect(), of_geom: owners.iter().map(|o| o.id).collect() }
+    let identity = |owner: &Owner| {
+        let name = match &owner.link {
+            Some(link) => format!("{}/{link}", owner.object).into(),
+            None => owner.object.as_str().into(),
+        };
+        GeomIdentity { mask_id: owner.id, name, body: owner.body }
+    };
+    Identities { table: table.into_values().collect(), of_geom: owners.iter().map(identity).collect() }
 }

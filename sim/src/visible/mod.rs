@@ -12,6 +12,7 @@ mod still;
 mod surface;
 mod urdf_visual;
 
+use identity::GeomIdentity;
 pub use identity::MaskId;
 pub(crate) use identity::{Identities, Owner, of_simulation};
 pub use still::{FreeCamera, ModelCamera, Still};
@@ -20,7 +21,7 @@ pub(crate) use urdf_visual::{Replacements, VisualCache};
 use crate::manager::GroundCfg;
 use crate::mj::{Data, Model};
 use scene::shape::Plane;
-use scene::{Headlight, Instance, Light, Material, PoseF32, RenderScene, Shape, Texture};
+use scene::{Headlight, Instance, Light, Material, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
 /// What can be seen of a model.
@@ -78,7 +79,9 @@ impl Visible {
             for Part { shape, material } in parts {
                 let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
                 let visible = material.rgba[3] > 0.0;
-                let instance = Instance { shape, material, mask_id: identities.id_of(geom), group, visible };
+                let GeomIdentity { mask_id, name, body } = identities.of(geom).clone();
+                let fixed = model.is_fixed(model.geom_bodyid()[geom] as usize);
+                let instance = Instance { shape, material, mask_id, group, visible, name, body, fixed };
                 if let Err(reason) = instance.validate() {
                     left_out.push(format!("geom {geom} is not drawn: {reason}"));
                     continue;
@@ -122,6 +125,20 @@ impl Visible {
     /// What is not drawn, and why: textures or meshes that cannot be read.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
+    }
+
+    /// Copies where everything is in `data`, in double precision: a pose for each instance, world from instance.
+    ///
+    /// # Panics
+    /// The slice has another length than the scene's instances.
+    #[track_caller]
+    pub fn read_exact(&self, data: &Data, poses: &mut [PoseF64]) {
+        assert_eq!(poses.len(), self.geoms.len(), "a slice of another scene");
+        let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
+        for (pose, &geom) in poses.iter_mut().zip(&self.geoms) {
+            let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotations[geom];
+            *pose = PoseF64 { rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]], translation: positions[geom] };
+        }
     }
 
     /// Copies where everything is in `data`: a pose for each instance, world from instance, and the lamps.

@@ -1,0 +1,239 @@
+//! Height scans: our ray caster against `mj_ray`, one ray at a time, on the same rough terrain of 100 000 triangles, as a
+//! mesh and as a height field. (`mj_multiRay` casts all of its rays from one point, so it is of no use for parallel ones.)
+//!
+//! Ours is the whole sensor, as a simulation updates it: frames, 187 vertical rays in each of 64 environments from 20 m
+//! above, points, normals and ids. One thread on both sides. That both measure the same distances is checked before.
+
+use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::ndarray::{Array2, Array3, Axis};
+use kinetoscope::scene::mesh::write_binary_stl;
+use kinetoscope::scene::shape::HeightField;
+use kinetoscope::scene::{Pose, PoseF64, SceneState, pose};
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext};
+use kinetoscope::sim::Visible;
+use kinetoscope::sim::mj::{self, Data, TARGET, Target};
+use std::time::{Duration, Instant};
+
+const ENVS: usize = 64;
+/// Points along a side: 224 squared cells of two triangles.
+const SIDE: usize = 225;
+/// Half a side \[m\]: cells of 0.1 m.
+const HALF: f64 = 11.2;
+const HEIGHT: f64 = 1.0;
+const FLOOR: f64 = 0.5;
+/// The sensor is this far above its body \[m\].
+const ABOVE: f64 = 20.0;
+/// Times of the ratio that was set as the aim.
+const WANTED: f64 = 5.0;
+/// How far distances may differ \[m\]: those of a mesh are of single precision on both sides, rounded in other frames.
+const SAME: f64 = 1e-4;
+
+/// Terrain as a mesh, or as a height field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Terrain {
+    Mesh,
+    Field,
+}
+
+impl Terrain {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Mesh => "mesh",
+            Self::Field => "height field",
+        }
+    }
+
+    /// Rays that the rival casts in a step: 2.2.2 tests every triangle of a mesh.
+    fn rival_rays(self) -> usize {
+        if self == Self::Mesh && TARGET == Target::V2 { 16 } else { 4096 }
+    }
+
+    fn data(self) -> Outcome<Data> {
+        let elevation: Vec<f32> = (0..SIDE * SIDE).map(|k| rough(k % SIDE, k / SIDE) as f32).collect();
+        let (asset, geom, file) = match self {
+            Self::Mesh => {
+                let field = HeightField::new([HALF, HALF, HEIGHT, FLOOR], SIDE, SIDE, &elevation);
+                let field = field.ok_or("terrain without points")?;
+                let mut bytes = Vec::new();
+                write_binary_stl(&field.mesh().to_tri_mesh(), &mut bytes)?;
+                ("<mesh name='t' file='t.stl'/>".into(), "type='mesh' mesh='t'", ("t.stl", bytes))
+            }
+            Self::Field => {
+                let side = SIDE as i32;
+                let mut bytes: Vec<u8> = [side, side].iter().flat_map(|n| n.to_le_bytes()).collect();
+                bytes.extend(elevation.iter().flat_map(|e| e.to_le_bytes()));
+                let asset = format!("<hfield name='t' file='t.bin' size='{HALF} {HALF} {HEIGHT} {FLOOR}'/>");
+                (asset, "type='hfield' hfield='t'", ("t.bin", bytes))
+            }
+        };
+        let xml = format!(
+            "<mujoco><asset>{asset}</asset><worldbody><geom name='terrain' {geom} contype='0' conaffinity='0'/></worldbody></mujoco>"
+        );
+        let assets = [mj::Asset { name: file.0.into(), bytes: file.1 }];
+        let mut data = Data::new(&mj::compile(&xml, &assets)?.into_model())?;
+        data.step1()?;
+        Ok(data)
+    }
+}
+
+/// Hills with noise on them, between 0 and 1; MuJoCo stretches them to exactly that.
+fn rough(i: usize, j: usize) -> f64 {
+    let mut hash = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    hash = (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let noise = (hash >> 40) as f64 / f64::from(1u32 << 24);
+    match (i, j) {
+        (0, 0) => 0.0,
+        (0, 1) => 1.0,
+        _ => 0.5 + 0.3 * (0.13 * i as f64).sin() * (0.17 * j as f64).cos() + 0.2 * (noise - 0.5),
+    }
+}
+
+/// Ours: the sensor, and the state that it reads.
+struct Ours {
+    caster: RayCaster,
+    state: SceneState,
+}
+
+impl Ours {
+    fn new(data: &Data) -> Outcome<Self> {
+        let visible = Visible::of_model(data.model());
+        let instances = visible.scene().instances().len();
+        let mut poses = vec![PoseF64::IDENTITY; instances];
+        visible.read_exact(data, &mut poses);
+        let mut bodies = Array3::zeros((ENVS, 1, 7));
+        for (env, mut rows) in bodies.axis_iter_mut(Axis(0)).enumerate() {
+            let (x, y) = (1.1 * (env % 8) as f64 - 3.9, 1.1 * (env / 8) as f64 - 3.9);
+            let pose = pose::from_xyz_rpy([2.0 * x + 0.013, 2.0 * y + 0.029, 1.5], [0.1, -0.2, 0.7 * env as f64]);
+            rows.iter_mut().zip(pose::to_row(&pose)).for_each(|(to, from)| *to = from);
+        }
+        let state = SceneState {
+            body_poses: Some(bodies),
+            instance_poses: Some(Array2::from_shape_fn((ENVS, instances), |(_, k)| poses[k])),
+            ..SceneState::new(ENVS)
+        };
+        let context = SensorContext {
+            num_envs: ENVS,
+            dt: 0.005,
+            name: "scanner".into(),
+            bodies: ["base".to_string()].into(),
+            scene: Some(visible.scene().clone()),
+            threads: 1,
+            ..SensorContext::default()
+        };
+        let cfg = RayCasterCfg {
+            parent: Some("base".into()),
+            offset: Pose::translation(0.0, 0.0, ABOVE),
+            alignment: RayAlignment::Yaw,
+            targets: HitTargets::StaticOnly,
+            ..RayCasterCfg::default()
+        };
+        let mut caster = cfg.build(&context)?;
+        caster.reset(&(0..ENVS).collect::<Vec<_>>(), &state)?;
+        Ok(Self { caster, state })
+    }
+
+    fn rays(&self) -> usize {
+        ENVS * self.caster.num_rays()
+    }
+}
+
+impl Side for Ours {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.state.step.iter_mut().for_each(|step| *step += 1);
+            self.caster.update(&self.state)?;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+/// The rival: one ray after the other, a part of all of them in every step.
+struct Bare<'d> {
+    data: &'d Data,
+    rays: Vec<([f64; 3], [f64; 3])>,
+    distances: Vec<f64>,
+    per_step: usize,
+    next: usize,
+}
+
+impl<'d> Bare<'d> {
+    fn new(data: &'d Data, ours: &Ours, per_step: usize) -> Self {
+        let (starts, directions) = (ours.caster.ray_starts(), ours.caster.ray_directions());
+        let row = |a: &Array3<f64>, env, k| [0, 1, 2].map(|axis| a[(env, k, axis)]);
+        let all = (0..ENVS).flat_map(|env| (0..ours.caster.num_rays()).map(move |k| (env, k)));
+        let rays: Vec<_> = all.map(|(env, k)| (row(&starts, env, k), row(&directions, env, k))).collect();
+        Self { data, distances: vec![0.0; rays.len()], rays, per_step, next: 0 }
+    }
+
+    fn cast(&mut self, count: usize) -> Outcome<()> {
+        for _ in 0..count {
+            let (origin, direction) = self.rays[self.next];
+            let hit = self.data.ray(origin, direction, 1)?;
+            self.distances[self.next] = hit.map_or(f64::INFINITY, |hit| hit.distance);
+            self.next = (self.next + 1) % self.rays.len();
+        }
+        Ok(())
+    }
+
+    /// Every so many rays, so that the slowest rival is done within seconds.
+    fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
+        let (every, rays) = (if self.per_step < 1000 { 37 } else { 1 }, ours.caster.num_rays());
+        for k in (0..self.rays.len()).step_by(every) {
+            self.next = k;
+            self.cast(1)?;
+            let (a, b) = (ours.caster.distances()[(k / rays, k % rays)], self.distances[k]);
+            if a.is_nan() || a.is_infinite() || (a - b).abs() > SAME {
+                return Err(format!("ray {k}: ours measures {a} m, mj_ray {b} m").into());
+            }
+        }
+        self.next = 0;
+        Ok(())
+    }
+}
+
+impl Side for Bare<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.cast(self.per_step)?;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for terrain in [Terrain::Mesh, Terrain::Field] {
+        let name = format!("{ENVS} scans of 187 rays, {}", terrain.name());
+        eprintln!("  {name}");
+        let data = terrain.data()?;
+        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: u32::MAX };
+        let count = [ENVS * 187, terrain.rival_rays()].map(|n| n as f64);
+        let times = in_both_orders(|_| {
+            let mut ours = Ours::new(&data)?;
+            let mut bare = Bare::new(&data, &ours, terrain.rival_rays());
+            if ours.rays() != ENVS * 187 {
+                return Err("a scan has 187 rays".into());
+            }
+            bare.must_agree(&ours)?;
+            measure(plan, &mut [&mut ours, &mut bare])
+        })?;
+        let per_ray = |t: &[f64]| [t[0] / count[0], t[1] / count[1]];
+        let ratio = times.mean_of(|t| per_ray(t)[1] / per_ray(t)[0]);
+        let rate = |side: usize| times.rate(side, count[side] as usize);
+        rows.push(Row::new("rays", &name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).wanted(WANTED));
+    }
+    Ok(rows)
+}

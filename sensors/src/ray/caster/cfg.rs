@@ -1,0 +1,136 @@
+//! What a ray caster is, before it exists.
+
+use super::scan::Scan;
+use super::sensor::RayCaster;
+use super::{HitTargets, RayAlignment};
+use crate::error::SensorError;
+use crate::ray::pattern::Grid;
+use crate::ray::{Ray, RayError, RayPattern, RayTargets};
+use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
+use crate::sensor::{Requires, SensorCfg, SensorContext};
+use scene::{Pose, PoseF64};
+
+/// The most memory that the rays of a ray caster may take \[bytes\].
+const MAX_BYTES: u64 = 64 << 30;
+
+/// Configuration of a [`RayCaster`].
+///
+/// The height scanner of Isaac's tutorials, 20 m over its robot so that it looks at the ground from above:
+///
+/// ```
+/// use scene::Pose;
+/// use sensors::ray::pattern::Grid;
+/// use sensors::ray::{HitTargets, RayAlignment, RayCasterCfg};
+/// use sensors::SamplingCfg;
+///
+/// let scanner = RayCasterCfg {
+///     parent: Some("anymal/base".into()),
+///     offset: Pose::translation(0.0, 0.0, 20.0),
+///     alignment: RayAlignment::Yaw,
+///     pattern: Grid { resolution: 0.1, size: [1.6, 1.0], ..Grid::default() }.into(),
+///     targets: HitTargets::Named(vec!["ground".into()]),
+///     sampling: SamplingCfg::every(0.02),
+///     ..RayCasterCfg::default()
+/// };
+/// assert_eq!(scanner.pattern.rays()?.len(), 187);
+/// # Ok::<(), sensors::SensorError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayCasterCfg {
+    /// The body that the rays move with: `uid/link`, or the link alone where only one is called so; links that were fused
+    /// into another count too. `None` is the environment's frame.
+    pub parent: Option<String>,
+    /// Where the pattern is on the body: starts and directions are both turned by its rotation.
+    pub offset: Pose,
+    /// How the rays turn with the body.
+    pub alignment: RayAlignment,
+    /// How the rays are laid out, x forward, y left, z up.
+    pub pattern: RayPattern,
+    /// Nothing farther away is hit \[m\]; may be infinite.
+    pub max_distance: f64,
+    /// Smallest and largest error of the sensor's position, drawn for each axis at every reset \[m\].
+    pub drift: [f64; 2],
+    /// What is hit.
+    pub targets: HitTargets,
+    /// Geom groups that are hit: bit k is group k. MuJoCo's own viewers show the first three; collision shapes are usually
+    /// in group 3 or above.
+    pub groups: u32,
+    /// Rate, history, latency and noise; the channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
+    /// `distances` may have noise. Points are along the ray at the noisy distance.
+    pub sampling: SamplingCfg,
+}
+
+impl Default for RayCasterCfg {
+    /// A grid of 17 by 11 rays straight down from where the sensor is, at everything but what it hangs on.
+    fn default() -> Self {
+        Self {
+            parent: None,
+            offset: Pose::identity(),
+            alignment: RayAlignment::default(),
+            pattern: Grid::default().into(),
+            max_distance: 1e6,
+            drift: [0.0; 2],
+            targets: HitTargets::default(),
+            groups: 0b111,
+            sampling: SamplingCfg::default(),
+        }
+    }
+}
+
+impl SensorCfg for RayCasterCfg {
+    type Sensor = RayCaster;
+
+    /// Where things are; the poses of bodies only where it hangs on one.
+    fn requires(&self) -> Requires {
+        if self.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    }
+
+    /// # Errors
+    ///
+    /// A pattern, a distance, an offset or a drift that is no good; an unknown parent or target; a period that is no whole
+    /// number of steps; rays that do not fit into memory.
+    fn build(&self, context: &SensorContext) -> Result<RayCaster, SensorError> {
+        let scene = context.scene.as_ref().ok_or(RayError::NoScene)?;
+        let parent = self.parent.as_deref().map(|name| context.body(name)).transpose()?;
+        let schedule = Schedule::new(self.sampling.update_period, context.dt, self.sampling.round_period)?;
+        let number = |what, value, allowed| RayError::Number { what, of: "ray caster", value, allowed };
+        if self.max_distance.is_nan() || self.max_distance <= 0.0 {
+            return Err(number("max_distance", self.max_distance, "positive").into());
+        }
+        let [low, high] = self.drift;
+        if !(low <= high && low.is_finite() && high.is_finite()) {
+            let wrong = if low.is_finite() { high } else { low };
+            return Err(number("a bound of the drift", wrong, "finite, the smaller one first").into());
+        }
+        let offset = PoseF64::from(&self.offset);
+        if !offset.is_finite() || (self.offset.rotation.norm() - 1.0).abs() > 1e-6 {
+            let wrong = self.offset.translation.vector.iter().chain(self.offset.rotation.coords.iter());
+            let wrong = wrong.copied().find(|x| !x.is_finite()).unwrap_or(self.offset.rotation.norm());
+            return Err(number("a number of the offset", wrong, "finite, and its quaternion of length 1").into());
+        }
+        check_memory(context.num_envs, self.pattern.count())?;
+        let rays: Vec<Ray> = self.pattern.rays()?.into_iter().map(|ray| ray.mapped_by(&offset)).collect();
+        let wanted = self.targets.select(scene, self.groups, parent, context)?;
+        let targets = RayTargets::new(scene, wanted, &context.ray_assets);
+        let channels = [
+            Channel::new("distances", rays.len()),
+            Channel::exact("normals", 3 * rays.len()),
+            Channel::exact("ids", rays.len()),
+            Channel::exact("pos_w", 3),
+            Channel::exact("quat_w", 4),
+        ];
+        let sampler = Sampler::new("ray caster", self.requires(), context, &self.sampling, &channels)?;
+        let scan = Scan::new(targets, context.num_envs, context.threads);
+        Ok(RayCaster::new(self, context, parent, rays, scan, schedule.phases(context.num_envs), sampler))
+    }
+}
+
+/// Refuses what would end the process: an allocation that fails.
+fn check_memory(envs: usize, rays: usize) -> Result<(), RayError> {
+    // A hit of 40 bytes; twice five numbers of the sampler; point, id and mask.
+    const BYTES_PER_RAY: usize = 40 + 80 + 32;
+    let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(BYTES_PER_RAY)).filter(|&b| b as u64 <= MAX_BYTES);
+    let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
+    if granted { Ok(()) } else { Err(RayError::Memory { envs, rays, limit: MAX_BYTES }) }
+}

@@ -1,0 +1,331 @@
+//! The ray caster as a sensor.
+
+use super::RayAlignment;
+use super::cfg::RayCasterCfg;
+use super::scan::{Scan, View};
+use crate::error::SensorError;
+use crate::expected::Expected;
+use crate::ray::{Ray, RayHit, RayTargets};
+use crate::sampling::{Sampled, Sampler};
+use crate::schedule::Phases;
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+use scene::pose::{from_row, to_row};
+use scene::{Pose, PoseF64, Random, SceneState};
+
+/// Distances along rays that move with a body, in all environments; [`Sampled`] has their stamps and counts.
+///
+/// Everything is in the frame of the environment \[m\]. A ray that hits nothing has the distance +inf, the point
+/// (+inf, +inf, +inf), the normal 0 and the id 0; nothing is ever NaN.
+#[derive(Clone, Debug)]
+pub struct RayCaster {
+    name: String,
+    /// The kind of pattern.
+    pattern: &'static str,
+    parent: Option<usize>,
+    alignment: RayAlignment,
+    /// In the frame that [`RayAlignment::align`] gives: the pattern, with its offset.
+    rays: Vec<Ray>,
+    max_distance: f64,
+    scan: Scan,
+    sampler: Sampler,
+    /// The sampler's own, to know before it asks which environments are due.
+    phases: Phases,
+    drift: Drift,
+    expected: Expected,
+    due: Vec<usize>,
+    /// Rays that were cast last: their environments, frames and hits, and where each environment is among them.
+    views: Vec<View>,
+    sensor_rows: Vec<[f64; 7]>,
+    hits: Vec<RayHit>,
+    slots: Vec<usize>,
+    shown: Shown,
+}
+
+/// What is made of the current values.
+#[derive(Clone, Debug)]
+struct Shown {
+    /// Measurements that it was made of.
+    counts: Vec<u64>,
+    points: Array3<f64>,
+    ids: Array2<i32>,
+    mask: Array2<bool>,
+}
+
+/// Errors of the sensor's position.
+#[derive(Clone, Debug)]
+struct Drift {
+    range: [f64; 2],
+    randoms: Vec<Random>,
+    now: Vec<[f64; 3]>,
+}
+
+impl RayCaster {
+    pub(super) fn new(
+        cfg: &RayCasterCfg,
+        context: &SensorContext,
+        parent: Option<usize>,
+        rays: Vec<Ray>,
+        scan: Scan,
+        phases: Phases,
+        sampler: Sampler,
+    ) -> Self {
+        let (n, b) = (context.num_envs, rays.len());
+        let random =
+            |env| Random::keyed(context.seed, (context.first_env + env) as u64, &format!("{}/drift", context.name));
+        Self {
+            name: context.name.to_string(),
+            pattern: cfg.pattern.name(),
+            expected: Expected::new("ray caster", cfg.requires(), context),
+            due: Vec::with_capacity(n),
+            slots: vec![usize::MAX; n],
+            parent,
+            alignment: cfg.alignment,
+            max_distance: cfg.max_distance,
+            scan,
+            sampler,
+            phases,
+            drift: Drift { range: cfg.drift, randoms: (0..n).map(random).collect(), now: vec![[0.0; 3]; n] },
+            views: Vec::with_capacity(n),
+            sensor_rows: Vec::with_capacity(n),
+            hits: vec![RayHit::MISS; n * b],
+            shown: Shown {
+                counts: vec![0; n],
+                points: Array3::from_elem((n, b, 3), f64::INFINITY),
+                ids: Array2::zeros((n, b)),
+                mask: Array2::from_elem((n, b), false),
+            },
+            rays,
+        }
+    }
+
+    /// Casts the rays of some environments; `state` was checked. An environment that is named twice is cast once.
+    fn cast(&mut self, envs: &[usize], state: &SceneState) {
+        let Some(poses) = &state.instance_poses else { return };
+        for view in self.views.drain(..) {
+            self.slots[view.env] = usize::MAX;
+        }
+        self.sensor_rows.clear();
+        for &env in envs {
+            if self.slots[env] != usize::MAX {
+                continue;
+            }
+            let parent = self.parent.zip(state.body_poses.as_ref());
+            let mut row = parent.map_or_else(
+                || to_row(&Pose::identity()),
+                |(body, poses)| std::array::from_fn(|k| poses[(env, body, k)]),
+            );
+            row.iter_mut().zip(self.drift.now[env]).for_each(|(x, drift)| *x += drift);
+            self.slots[env] = self.views.len();
+            self.views.push(View { env, world_from_rays: self.alignment.align(&from_row(&row)) });
+            self.sensor_rows.push(row);
+        }
+        let hits = &mut self.hits[..self.views.len() * self.rays.len()];
+        self.scan.cast(&self.rays, self.max_distance, &self.views, poses, hits);
+    }
+
+    /// The same, after somebody may have moved what does not move by itself.
+    fn cast_anew(&mut self, envs: &[usize], state: &SceneState) {
+        let Some(poses) = &state.instance_poses else { return };
+        envs.iter().for_each(|&env| self.scan.settle(env, poses));
+        self.cast(envs, state);
+    }
+
+    /// The sampler, and what was cast last.
+    fn sampled(&mut self) -> (&mut Sampler, Cast<'_>) {
+        let Self { sampler, slots, sensor_rows, hits, rays, .. } = self;
+        (sampler, Cast { slots, sensors: sensor_rows, hits, rays: rays.len() })
+    }
+
+    /// Makes points, ids and masks of the current values of an environment.
+    fn show(&mut self, env: usize) {
+        let (frame, count) = (self.frame(env), self.sample_counts()[env]);
+        let Self { sampler, shown, rays, .. } = self;
+        shown.counts[env] = count;
+        let (distances, ids) = (sampler.values("distances"), sampler.values("ids"));
+        for (k, ray) in rays.iter().enumerate() {
+            let (distance, id) = (distances[(env, k)], ids[(env, k)] as i32);
+            let is_hit = id != 0;
+            let point = if is_hit { ray.mapped_by(&frame).at(distance) } else { [f64::INFINITY; 3] };
+            for (axis, x) in point.into_iter().enumerate() {
+                shown.points[(env, k, axis)] = x;
+            }
+            (shown.ids[(env, k)], shown.mask[(env, k)]) = (id, is_hit);
+        }
+    }
+
+    /// World from the frame of the rays, of the current values.
+    fn frame(&self, env: usize) -> PoseF64 {
+        let (pos, quat) = (self.sampler.values("pos_w"), self.sampler.values("quat_w"));
+        let row = std::array::from_fn(|k| if k < 3 { pos[(env, k)] } else { quat[(env, k - 3)] });
+        self.alignment.align(&from_row(&row))
+    }
+}
+
+/// What was cast, for the sampler.
+struct Cast<'a> {
+    slots: &'a [usize],
+    sensors: &'a [[f64; 7]],
+    hits: &'a [RayHit],
+    rays: usize,
+}
+
+impl Cast<'_> {
+    /// Writes the values of an environment that was cast to a row of the sampler.
+    fn write(&self, env: usize, row: &mut [f64]) {
+        let (at, rays) = (self.slots[env], self.rays);
+        let (distances, row) = row.split_at_mut(rays);
+        let (normals, row) = row.split_at_mut(3 * rays);
+        let (ids, sensor) = row.split_at_mut(rays);
+        for (k, hit) in self.hits[at * rays..(at + 1) * rays].iter().enumerate() {
+            distances[k] = hit.distance;
+            normals[3 * k..3 * k + 3].copy_from_slice(&hit.normal);
+            ids[k] = hit.mask_id.into();
+        }
+        sensor.copy_from_slice(&self.sensors[at]);
+    }
+}
+
+impl Sensor for RayCaster {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.expected.check(state)?;
+        let mut due = std::mem::take(&mut self.due);
+        due.clear();
+        due.extend((0..state.num_envs()).filter(|&env| self.phases.is_due(env, state.step[env])));
+        self.cast(&due, state);
+        self.due = due;
+        let (sampler, cast) = self.sampled();
+        sampler.update(state, |env, row| cast.write(env, row))?;
+        for env in 0..state.num_envs() {
+            if self.sample_counts()[env] != self.shown.counts[env] {
+                self.show(env);
+            }
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.expected.check(state)?;
+        self.expected.check_envs(env_ids)?;
+        for &env in env_ids {
+            self.phases.reset(env, state.step[env]);
+            self.drift.draw(env);
+        }
+        self.cast_anew(env_ids, state);
+        let (sampler, cast) = self.sampled();
+        sampler.reset(env_ids, state, |env, row| cast.write(env, row))?;
+        env_ids.iter().for_each(|&env| self.show(env));
+        Ok(())
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.expected.check(state)?;
+        self.expected.check_envs(env_ids)?;
+        self.cast_anew(env_ids, state);
+        let (sampler, cast) = self.sampled();
+        sampler.refresh(env_ids, state, |env, row| cast.write(env, row))?;
+        env_ids.iter().for_each(|&env| self.show(env));
+        Ok(())
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+impl Sampled for RayCaster {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl Drift {
+    fn draw(&mut self, env: usize) {
+        let [low, high] = self.range;
+        if low < high {
+            self.now[env] = [0; 3].map(|_| low + (high - low) * self.randoms[env].uniform());
+        } else {
+            self.now[env] = [low; 3];
+        }
+    }
+}
+
+impl RayCaster {
+    /// Number of rays in an environment: the second axis of what is measured.
+    pub fn num_rays(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Where rays hit, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
+    pub fn hits(&self) -> ArrayView3<'_, f64> {
+        self.shown.points.view()
+    }
+
+    /// Distances along the rays, shape (N, B) \[m\]; +inf for a miss.
+    pub fn distances(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("distances")
+    }
+
+    /// Which rays hit something, shape (N, B).
+    pub fn hit_mask(&self) -> ArrayView2<'_, bool> {
+        self.shown.mask.view()
+    }
+
+    /// Mask ids of what was hit, shape (N, B): those of the mask channel of cameras. 0 for a miss.
+    pub fn hit_ids(&self) -> ArrayView2<'_, i32> {
+        self.shown.ids.view()
+    }
+
+    /// Unit normals of the surfaces, turned to where the ray comes from, shape (N, B, 3); 0 for a miss.
+    pub fn normals(&self) -> ArrayView3<'_, f64> {
+        self.sampler.values_as("normals", (self.shown.counts.len(), self.rays.len(), 3))
+    }
+
+    /// Where rays begin, shape (N, B, 3) \[m\]; made when asked.
+    pub fn ray_starts(&self) -> Array3<f64> {
+        self.of_rays(|ray| ray.origin)
+    }
+
+    /// Where rays go, of length 1, shape (N, B, 3); made when asked.
+    pub fn ray_directions(&self) -> Array3<f64> {
+        self.of_rays(|ray| ray.direction)
+    }
+
+    fn of_rays(&self, what: impl Fn(&Ray) -> [f64; 3]) -> Array3<f64> {
+        let (n, b) = self.shown.ids.dim();
+        let mut out = Array3::zeros((n, b, 3));
+        for env in 0..n {
+            let frame = self.frame(env);
+            for (k, ray) in self.rays.iter().enumerate() {
+                let values = what(&ray.mapped_by(&frame));
+                values.into_iter().enumerate().for_each(|(axis, x)| out[(env, k, axis)] = x);
+            }
+        }
+        out
+    }
+
+    /// Position of the body that the sensor hangs on, with its drift, without the offset, as in Isaac Lab, shape (N, 3)
+    /// \[m\].
+    pub fn pos_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("pos_w")
+    }
+
+    /// Rotation of the body that the sensor hangs on, rows w, x, y, z, shape (N, 4).
+    pub fn quat_w(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("quat_w")
+    }
+
+    /// Past distances, newest first, shape (N, history_length, B) \[m\]; 0 where not filled yet.
+    pub fn distance_history(&self) -> ArrayView3<'_, f64> {
+        self.sampler.history("distances")
+    }
+
+    /// Indices of the instances of the scene that can be hit.
+    pub fn target_instances(&self) -> impl Iterator<Item = usize> {
+        self.scan.targets().instances()
+    }
+
+    pub(super) fn parts(&self) -> (&str, &str, RayAlignment, &RayTargets) {
+        (&self.name, self.pattern, self.alignment, self.scan.targets())
+    }
+}

@@ -1,0 +1,74 @@
+//! What rays hit.
+
+use crate::error::SensorError;
+use crate::select::matching;
+use crate::sensor::SensorContext;
+use scene::RenderScene;
+
+/// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HitTargets {
+    /// What is welded to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
+    StaticOnly,
+    /// What these patterns name: links `uid/link` (or `link` alone), objects by their uid, geoms of the world by their name
+    /// (`ground`). Regular expressions that must match the whole name.
+    Named(Vec<String>),
+    /// Everything that can be seen.
+    Everything {
+        /// But not the body that the sensor hangs on, with all that is fused to it.
+        exclude_parent: bool,
+    },
+}
+
+impl Default for HitTargets {
+    fn default() -> Self {
+        Self::Everything { exclude_parent: true }
+    }
+}
+
+impl HitTargets {
+    /// Indices of the instances, in order.
+    ///
+    /// # Errors
+    ///
+    /// A pattern that is no regular expression or matches nothing.
+    pub(crate) fn select(
+        &self,
+        scene: &RenderScene,
+        groups: u32,
+        parent: Option<usize>,
+        context: &SensorContext,
+    ) -> Result<Vec<usize>, SensorError> {
+        let named = match self {
+            Self::Named(patterns) => Some(names(scene, patterns)?),
+            _ => None,
+        };
+        let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
+        let wanted = |(index, instance): &(usize, &scene::Instance)| {
+            let seen = instance.visible && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
+            seen && match self {
+                Self::StaticOnly => instance.fixed,
+                Self::Named(_) => named.as_ref().is_some_and(|named| named[*index]),
+                Self::Everything { exclude_parent } => {
+                    let body = instance.body.map(|body| carrier(body as usize));
+                    !exclude_parent || parent.is_none() || body != parent.map(carrier)
+                }
+            }
+        };
+        Ok(scene.instances().iter().enumerate().filter(wanted).map(|(index, _)| index).collect())
+    }
+}
+
+/// Which instances the patterns name.
+fn names(scene: &RenderScene, patterns: &[String]) -> Result<Vec<bool>, SensorError> {
+    let mut names: Vec<String> =
+        scene.instances().iter().map(|i| i.name.to_string()).filter(|n| !n.is_empty()).collect();
+    names.sort();
+    names.dedup();
+    let mut named = vec![false; names.len()];
+    for pattern in patterns {
+        matching(pattern, &names, "thing to hit")?.into_iter().for_each(|index| named[index] = true);
+    }
+    let is_named = |name: &str| names.binary_search_by(|n| n.as_str().cmp(name)).is_ok_and(|index| named[index]);
+    Ok(scene.instances().iter().map(|i| is_named(&i.name)).collect())
+}

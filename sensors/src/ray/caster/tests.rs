@@ -1,0 +1,352 @@
+//! The ray caster as a sensor: on a floor with a step, a ball that moves and the robot itself.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use super::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+use crate::ray::pattern::{Custom, Grid, Lidar};
+use crate::sampling::{Sampled, SamplingCfg};
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use crate::{NoiseCfg, SensorError};
+use ndarray::{Array2, Array3, Axis, array};
+use scene::pose::{from_xyz_rpy, to_row};
+use scene::shape::{Box, Plane, Sphere};
+use scene::{Instance, Material, Pose, PoseF64, RenderScene, SceneState};
+use std::sync::Arc;
+
+const DT: f64 = 0.005;
+const GROUND: i32 = 1;
+const STEP: i32 = 2;
+const BASE: i32 = 3;
+const FOOT: i32 = 4;
+const BALL: i32 = 5;
+
+/// Ground at z = 0, a block 0.25 m high for x > 1, a robot's base (a box) with a foot fused to it, a ball.
+fn context(num_envs: usize, threads: usize) -> SensorContext {
+    let instance = |shape: scene::Shape, id, name: &str| Instance::new(shape, Material::default(), id).named(name);
+    let instances = vec![
+        instance(Plane::INFINITE.into(), GROUND, "ground").fixed(),
+        instance(Box { half: [5.0, 5.0, 0.125] }.into(), STEP, "step").fixed(),
+        instance(Box { half: [0.3, 0.2, 0.1] }.into(), BASE, "dog/base").of_body(0),
+        instance(Sphere { radius: 0.125 }.into(), FOOT, "dog/foot").of_body(1),
+        instance(Sphere { radius: 0.25 }.into(), BALL, "ball").of_body(2),
+    ];
+    SensorContext {
+        num_envs,
+        dt: DT,
+        name: "scanner".into(),
+        bodies: ["dog/base", "dog/foot", "ball"].map(String::from).into(),
+        carriers: [0, 0, 2].into(),
+        scene: Some(Arc::new(RenderScene::new(instances).unwrap())),
+        threads,
+        ..SensorContext::default()
+    }
+}
+
+fn base(env: usize, step: u64) -> Pose {
+    let (k, s) = (env as f64, step as f64);
+    from_xyz_rpy([-0.2 * k, 0.1 + 0.01 * s, 0.75], [0.2, -0.1 + 0.02 * k, 0.5 + 0.1 * s])
+}
+
+fn state_with(steps: &[u64], base: impl Fn(usize, u64) -> Pose) -> SceneState {
+    let n = steps.len();
+    let (mut bodies, mut instances) = (Array3::zeros((n, 3, 7)), Array2::from_elem((n, 5), PoseF64::IDENTITY));
+    for (env, &step) in steps.iter().enumerate() {
+        let base = base(env, step);
+        let foot = base * Pose::translation(0.0, 0.0, -0.25);
+        let ball = Pose::translation(-0.5, 0.3 * env as f64, 0.25);
+        for (body, pose) in [base, foot, ball].iter().enumerate() {
+            to_row(pose).iter().enumerate().for_each(|(k, x)| bodies[(env, body, k)] = *x);
+            instances[(env, 2 + body)] = PoseF64::from(pose);
+        }
+        instances[(env, 1)] = PoseF64::from_translation([6.0, 0.0, 0.125]);
+    }
+    SceneState {
+        step: steps.to_vec(),
+        time: steps.iter().map(|&s| s as f64 * DT).collect(),
+        force_time: steps.iter().map(|&s| s.saturating_sub(1) as f64 * DT).collect(),
+        body_poses: Some(bodies),
+        instance_poses: Some(instances),
+        ..SceneState::default()
+    }
+}
+
+fn state(steps: &[u64]) -> SceneState {
+    state_with(steps, base)
+}
+
+fn built_in(cfg: &RayCasterCfg, context: &SensorContext, state: &SceneState) -> RayCaster {
+    let mut caster = cfg.build(context).unwrap();
+    caster.reset(&(0..context.num_envs).collect::<Vec<_>>(), state).unwrap();
+    caster
+}
+
+/// The height scanner of the tutorial.
+fn scanner() -> RayCasterCfg {
+    RayCasterCfg {
+        parent: Some("base".into()),
+        offset: Pose::translation(0.0, 0.0, 20.0),
+        alignment: RayAlignment::Yaw,
+        targets: HitTargets::Named(vec!["ground".into(), "step".into()]),
+        ..RayCasterCfg::default()
+    }
+}
+
+#[test]
+fn a_height_scan_is_exact_and_level_on_a_tilted_robot() {
+    let caster = built_in(&scanner(), &context(2, 1), &state(&[0, 7]));
+    assert_eq!((caster.num_rays(), caster.hits().dim(), caster.distances().dim()), (187, (2, 187, 3), (2, 187)));
+    let (starts, directions) = (caster.ray_starts(), caster.ray_directions());
+    let mut steps = 0;
+    for (env, step) in [(0, 0), (1, 7)] {
+        let pose = base(env, step);
+        let (roll, _, yaw) = pose.rotation.euler_angles();
+        assert!(roll.abs() > 0.1, "tilted");
+        for k in 0..187 {
+            // x fastest, turned by the yaw alone, about the base's origin.
+            let (x, y) = (-0.8 + 0.1 * (k % 17) as f64, -0.5 + 0.1 * (k / 17) as f64);
+            let p = pose.translation.vector;
+            let at = [p.x + x * yaw.cos() - y * yaw.sin(), p.y + x * yaw.sin() + y * yaw.cos(), p.z + 20.0];
+            let height = if at[0] > 1.0 { 0.25 } else { 0.0 };
+            steps += usize::from(height > 0.0);
+            for axis in 0..3 {
+                let hit = [at[0], at[1], height][axis];
+                assert!((starts[(env, k, axis)] - at[axis]).abs() < 1e-12);
+                assert!((caster.hits()[(env, k, axis)] - hit).abs() < 1e-12, "{env} {k} {axis}");
+                assert_eq!(directions[(env, k, axis)], [0.0, 0.0, -1.0][axis]);
+                assert_eq!(caster.normals()[(env, k, axis)], [0.0, 0.0, 1.0][axis]);
+            }
+            assert!((caster.distances()[(env, k)] - (at[2] - height)).abs() < 1e-12);
+            assert_eq!(caster.hit_ids()[(env, k)], if height > 0.0 { STEP } else { GROUND });
+        }
+        assert!((0..3).all(|k| caster.pos_w()[(env, k)] == pose.translation.vector[k]), "without the 20 m");
+        assert_eq!(caster.quat_w()[(env, 0)], pose.rotation.w);
+    }
+    assert_eq!(steps, 0, "nobody is near the step");
+    assert!(caster.hit_mask().iter().all(|hit| *hit));
+}
+
+/// All three alignments, with rays that are not vertical and an offset that turns: starts and directions both turn.
+#[test]
+fn alignments_and_offsets_turn_starts_and_directions() {
+    let pose = base(1, 3);
+    let offset = from_xyz_rpy([0.1, -0.2, 0.3], [0.3, 0.2, -0.7]);
+    let (start, direction) = ([0.4, 0.1, 0.2], [0.6, 0.0, -0.8]);
+    let (_, _, yaw) = pose.rotation.euler_angles();
+    for (alignment, rotation) in [
+        (RayAlignment::Base, pose.rotation),
+        (RayAlignment::Yaw, nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, yaw)),
+        (RayAlignment::World, nalgebra::UnitQuaternion::identity()),
+    ] {
+        let pattern = Custom { starts: vec![start], directions: vec![direction] }.into();
+        let cfg = RayCasterCfg { parent: Some("dog/base".into()), offset, alignment, pattern, ..scanner() };
+        let caster = built_in(&cfg, &context(2, 1), &state(&[0, 3]));
+        let frame = Pose::from_parts(pose.translation, rotation) * offset;
+        let expected =
+            [(frame * nalgebra::Point3::from(start)).coords, frame.rotation * nalgebra::Vector3::from(direction)];
+        for axis in 0..3 {
+            assert!((caster.ray_starts()[(1, 0, axis)] - expected[0][axis]).abs() < 1e-12, "{alignment:?}");
+            assert!((caster.ray_directions()[(1, 0, axis)] - expected[1][axis]).abs() < 1e-12, "{alignment:?}");
+        }
+    }
+}
+
+#[test]
+fn looking_straight_up_has_no_yaw_and_no_nan() {
+    let up = |_, _| from_xyz_rpy([0.0, 0.0, 1.0], [0.3, -std::f64::consts::FRAC_PI_2, 0.0]);
+    let caster = built_in(&scanner(), &context(1, 1), &state_with(&[0], up));
+    assert!(caster.hits().iter().chain(caster.distances().iter()).all(|x| x.is_finite()));
+}
+
+#[test]
+fn targets_are_chosen_by_what_moves_and_by_name() {
+    let down = |targets, alignment| RayCasterCfg {
+        parent: Some("base".into()),
+        offset: Pose::translation(0.0, 0.0, 5.0),
+        pattern: Custom { starts: vec![[0.0; 3]], directions: vec![[0.0, 0.0, -1.0]] }.into(),
+        alignment,
+        targets,
+        ..RayCasterCfg::default()
+    };
+    let seen = |targets: HitTargets| {
+        let caster = built_in(&down(targets, RayAlignment::Yaw), &context(1, 1), &state(&[0]));
+        (caster.hit_ids()[(0, 0)], caster.target_instances().collect::<Vec<_>>())
+    };
+    assert_eq!(seen(HitTargets::Everything { exclude_parent: false }), (BASE, vec![0, 1, 2, 3, 4]));
+    // The foot is fused to the base, and goes with it.
+    assert_eq!(seen(HitTargets::Everything { exclude_parent: true }), (GROUND, vec![0, 1, 4]));
+    assert_eq!(seen(HitTargets::StaticOnly), (GROUND, vec![0, 1]));
+    assert_eq!(seen(HitTargets::Named(vec!["dog/.*".into()])), (BASE, vec![2, 3]));
+    assert_eq!(seen(HitTargets::Named(vec!["foot".into(), "ball".into()])), (FOOT, vec![3, 4]));
+    let none = RayCasterCfg { groups: 0b1000, ..down(HitTargets::default(), RayAlignment::Base) };
+    let caster = built_in(&none, &context(1, 1), &state(&[0]));
+    assert_eq!((caster.hit_ids()[(0, 0)], caster.hits()[(0, 0, 1)]), (0, f64::INFINITY));
+}
+
+#[test]
+fn misses_are_infinite_and_masked_and_never_nan() {
+    let cfg = RayCasterCfg {
+        parent: Some("base".into()),
+        pattern: Lidar { channels: 5, horizontal_resolution_deg: 30.0, ..Lidar::default() }.into(),
+        max_distance: 3.0,
+        ..RayCasterCfg::default()
+    };
+    let caster = built_in(&cfg, &context(2, 1), &state(&[0, 0]));
+    let mut misses = 0;
+    for ((env, k), hit) in caster.hit_mask().indexed_iter() {
+        let point = caster.hits().index_axis(Axis(0), env).index_axis_move(Axis(0), k).to_owned();
+        let normal = caster.normals().index_axis(Axis(0), env).index_axis_move(Axis(0), k).to_owned();
+        assert!(point.iter().chain(&normal).all(|x| !x.is_nan()));
+        assert_eq!(*hit, caster.hit_ids()[(env, k)] != 0);
+        if !hit {
+            misses += 1;
+            assert!(caster.distances()[(env, k)] == f64::INFINITY && point.iter().all(|x| *x == f64::INFINITY));
+            assert_eq!(normal, array![0.0, 0.0, 0.0]);
+        } else {
+            assert!(caster.distances()[(env, k)] <= 3.0);
+        }
+    }
+    assert!(misses > 10 && misses < 110, "{misses}");
+}
+
+/// What one environment measures does not depend on the others, nor on threads.
+#[test]
+fn environments_are_alone_and_threads_change_nothing() {
+    let cfg = RayCasterCfg {
+        parent: Some("base".into()),
+        pattern: Lidar { channels: 40, ..Lidar::default() }.into(),
+        ..RayCasterCfg::default()
+    };
+    let steps = [3, 4, 5, 6];
+    let bits = |caster: &RayCaster, env: usize| -> Vec<u64> {
+        let all = [caster.hits().into_dyn(), caster.normals().into_dyn(), caster.distances().into_dyn()];
+        all.iter().flat_map(|a| a.index_axis(Axis(0), env).iter().map(|x| x.to_bits()).collect::<Vec<_>>()).collect()
+    };
+    let one = built_in(&cfg, &context(4, 1), &state(&steps));
+    // 36000 rays in 4 environments are worth four threads.
+    let four = built_in(&cfg, &context(4, 4), &state(&steps));
+    for env in 0..4 {
+        assert_eq!(bits(&one, env), bits(&four, env));
+        let alone = built_in(&cfg, &context(1, 1), &state_with(&[steps[env]], |_, step| base(env, step)));
+        // The ball is where it is in environment 0 there: rays that hit neither are the same.
+        let same = (0..one.num_rays()).filter(|&k| one.hit_ids()[(env, k)] != BALL && alone.hit_ids()[(0, k)] != BALL);
+        let mut count = 0;
+        for k in same {
+            count += 1;
+            assert_eq!(one.distances()[(env, k)].to_bits(), alone.distances()[(0, k)].to_bits());
+        }
+        assert!(count > 30_000);
+    }
+    assert_ne!(bits(&one, 0), bits(&one, 1), "the control");
+}
+
+#[test]
+fn drift_is_drawn_at_resets_and_stays_within_its_range() {
+    let cfg = RayCasterCfg { drift: [-0.1, 0.3], ..scanner() };
+    let context = SensorContext { seed: 5, ..context(2, 1) };
+    let mut caster = built_in(&cfg, &context, &state(&[0, 0]));
+    let drift = |caster: &RayCaster, env: usize, step| -> [f64; 3] {
+        std::array::from_fn(|k| caster.pos_w()[(env, k)] - base(env, step).translation.vector[k])
+    };
+    let first = [drift(&caster, 0, 0), drift(&caster, 1, 0)];
+    assert!(first.iter().flatten().all(|d| (-0.1 - 1e-12..0.3 + 1e-12).contains(d)));
+    assert!(first[0] != first[1] && first[0][0] != first[0][1]);
+    let moved = caster.hits()[(0, 0, 0)] - built_in(&scanner(), &context, &state(&[0, 0])).hits()[(0, 0, 0)];
+    assert!((moved - first[0][0]).abs() < 1e-12, "rays move with it");
+    caster.update(&state(&[1, 1])).unwrap();
+    assert!((0..3).all(|k| (drift(&caster, 0, 1)[k] - first[0][k]).abs() < 1e-12), "it stays until a reset");
+    caster.reset(&[0], &state(&[0, 1])).unwrap();
+    assert!((drift(&caster, 0, 0)[0] - first[0][0]).abs() > 1e-6, "drawn anew");
+    assert!((drift(&caster, 1, 1)[0] - first[1][0]).abs() < 1e-12, "only there");
+    let again = built_in(&cfg, &context, &state(&[0, 0]));
+    assert_eq!(drift(&again, 1, 0), first[1], "the same seed");
+}
+
+#[test]
+fn it_measures_when_due_with_latency_and_history() {
+    let sampling = SamplingCfg { update_period: 0.01, history_length: 2, latency_steps: 1, ..SamplingCfg::default() };
+    let mut caster = built_in(&RayCasterCfg { sampling, ..scanner() }, &context(1, 1), &state(&[0]));
+    let y = |step: u64| base(0, step).translation.vector.y;
+    assert!((caster.pos_w()[(0, 1)] - y(0)).abs() < 1e-12, "a reset refreshes");
+    for step in 1..=4 {
+        caster.update(&state(&[step])).unwrap();
+        // Captured at 2 and 4, readable one step later.
+        let captured = if step >= 3 { 2 } else { 0 };
+        assert!((caster.pos_w()[(0, 1)] - y(captured)).abs() < 1e-12, "step {step}");
+        let ray = caster.ray_starts();
+        let hit = caster.hits();
+        assert!((ray[(0, 0, 0)] - hit[(0, 0, 0)]).abs() < 1e-12, "points belong to their rays");
+    }
+    assert_eq!((caster.sample_counts()[0], caster.history_filled(0)), (1, 1));
+    assert_eq!(caster.stamps()[0], 0.01);
+    assert_eq!(caster.distance_history().dim(), (1, 2, 187));
+    assert_eq!(caster.distance_history()[(0, 0, 0)], caster.distances()[(0, 0)]);
+}
+
+#[test]
+fn noise_moves_points_along_their_rays() {
+    let noise = [("distances".to_string(), NoiseCfg::white(0.1))].into();
+    let cfg = RayCasterCfg { sampling: SamplingCfg { noise, ..SamplingCfg::default() }, ..scanner() };
+    let caster = built_in(&cfg, &context(1, 1), &state(&[0]));
+    let heights: Vec<f64> = (0..187).map(|k| caster.hits()[(0, k, 2)]).collect();
+    let spread = (heights.iter().map(|z| z * z).sum::<f64>() / 187.0).sqrt();
+    // Five sigma of the deviation of 187 normal numbers.
+    assert!((spread - 0.1).abs() < 5.0 * 0.1 / (2.0 * 187f64).sqrt(), "{spread}");
+    let exact = built_in(&scanner(), &context(1, 1), &state(&[0]));
+    assert!((0..187).all(|k| caster.hits()[(0, k, 0)] == exact.hits()[(0, k, 0)]));
+}
+
+/// Somebody moves what does not move by itself, in one environment.
+#[test]
+fn what_is_fixed_is_found_where_it_was_put() {
+    let mut caster = built_in(&scanner(), &context(3, 1), &state(&[0; 3]));
+    let mut state = state(&[0; 3]);
+    state.instance_poses.as_mut().unwrap()[(1, 0)] = PoseF64::from_translation([0.0, 0.0, -0.5]);
+    caster.refresh(&[1], &state).unwrap();
+    assert_eq!([0, 1, 2].map(|env| (caster.hits()[(env, 0, 2)] * 1e9).round()), [0.0, -0.5e9, 0.0]);
+}
+
+#[test]
+fn nothing_is_allocated_per_step() {
+    let cfg = RayCasterCfg { targets: HitTargets::default(), ..scanner() };
+    let mut caster = built_in(&cfg, &context(8, 1), &state(&[0; 8]));
+    let states: Vec<SceneState> = (1..6).map(|step| state(&[step; 8])).collect();
+    caster.update(&states[0]).unwrap();
+    let mut rest = states[1..].iter();
+    let count =
+        allocation_counter::measure(|| rest.by_ref().for_each(|state| caster.update(state).unwrap())).count_total;
+    assert_eq!(count, 0);
+}
+
+#[test]
+fn mistakes_are_typed_errors() {
+    let error = |cfg: RayCasterCfg| cfg.build(&context(1, 1)).unwrap_err().to_string();
+    assert!(error(RayCasterCfg { parent: Some("bsae".into()), ..scanner() }).contains("dog/base"));
+    assert!(error(RayCasterCfg { targets: HitTargets::Named(vec!["gruond".into()]), ..scanner() }).contains("ground"));
+    assert!(
+        error(RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() })
+            .contains("resolution")
+    );
+    for max_distance in [0.0, -1.0, f64::NAN] {
+        assert!(error(RayCasterCfg { max_distance, ..scanner() }).contains("max_distance"));
+    }
+    assert!(error(RayCasterCfg { drift: [0.1, -0.1], ..scanner() }).contains("drift"));
+    assert!(error(RayCasterCfg { drift: [f64::NAN, 0.1], ..scanner() }).contains("NaN"));
+    assert!(error(RayCasterCfg { offset: Pose::translation(f64::NAN, 0.0, 0.0), ..scanner() }).contains("offset"));
+    assert!(error(RayCasterCfg { sampling: SamplingCfg::every(0.007), ..scanner() }).contains("update_period"));
+    let many = Grid { resolution: 1e-3, size: [1.0, 1.0], ..Grid::default() };
+    let error = RayCasterCfg { pattern: many.into(), ..scanner() }.build(&context(1_000_000, 1)).unwrap_err();
+    assert!(matches!(error, SensorError::Ray(crate::ray::RayError::Memory { rays: 1_002_001, .. })), "{error}");
+    let mut caster = built_in(&scanner(), &context(1, 1), &state(&[0]));
+    assert!(matches!(caster.reset(&[1], &state(&[0])), Err(SensorError::IndexOutOfRange { .. })));
+    assert!(matches!(caster.update(&SceneState::new(1)), Err(SensorError::MissingFields { .. })));
+    assert!(matches!(caster.update(&state(&[1, 1])), Err(SensorError::WrongShape { .. })));
+    assert!(scanner().build(&SensorContext { scene: None, ..context(1, 1) }).is_err());
+    caster.reset(&[0, 0], &state(&[0])).unwrap();
+}
+
+#[test]
+fn it_says_what_it_is() {
+    let caster = built_in(&scanner(), &context(2, 1), &state(&[0, 0]));
+    let text = caster.to_string();
+    assert!(text.starts_with("Ray-caster @ \"scanner\":\n"), "{text}");
+    assert!(text.contains("number of rays/sensor: 187\n") && text.ends_with("total number of rays : 374"), "{text}");
+}

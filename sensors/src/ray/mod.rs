@@ -1,0 +1,56 @@
+//! Rays: exact distances to what is in a scene, for ray casters and the cameras made of rays.
+//!
+//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometre, up to the single precision
+//! sizes of shapes. [`RayTargets`] is what can be hit, prepared once; [`RayWorld`] is where it is in one environment.
+
+mod assets;
+mod bvh;
+pub mod caster;
+mod error;
+pub mod pattern;
+mod shape;
+mod triangle;
+pub(crate) mod vector;
+mod world;
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use assets::Assets;
+pub use assets::RayAssets;
+pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+pub use error::RayError;
+pub use pattern::RayPattern;
+pub use world::{RayHit, RayTargets, RayWorld};
+
+/// A ray: where it begins, and which way it goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it begins \[m\].
+    pub origin: [f64; 3],
+    /// Which way it goes; of length 1.
+    pub direction: [f64; 3],
+}
+
+impl Ray {
+    /// The point at a distance \[m\].
+    #[inline]
+    pub fn at(&self, distance: f64) -> [f64; 3] {
+        vector::along(self.origin, distance, self.direction)
+    }
+
+    /// The ray in the frame that `pose` maps from.
+    #[inline(always)]
+    fn seen_from(&self, pose: &scene::PoseF64) -> Self {
+        Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
+    }
+
+    /// The ray of this frame in the frame that `pose` maps to.
+    pub(crate) fn mapped_by(&self, pose: &scene::PoseF64) -> Self {
+        Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.origin.iter().chain(&self.direction).all(|x| x.is_finite())
+    }
+}

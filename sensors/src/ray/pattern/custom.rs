@@ -1,0 +1,27 @@
+//! Any rays.
+
+use super::PatternImpl;
+use crate::ray::RayError;
+
+/// Any rays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Custom {
+    /// Where they begin \[m\].
+    pub starts: Vec<[f64; 3]>,
+    /// Where they go; of any length.
+    pub directions: Vec<[f64; 3]>,
+}
+
+impl PatternImpl for Custom {
+    fn count(&self) -> f64 {
+        if self.starts.len() == self.directions.len() { self.starts.len() as f64 } else { f64::NAN }
+    }
+
+    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+        let (starts, directions) = (self.starts.len(), self.directions.len());
+        if starts != directions {
+            return Err(RayError::Lengths { starts, directions });
+        }
+        Ok(self.starts.iter().copied().zip(self.directions.iter().copied()).collect())
+    }
+}

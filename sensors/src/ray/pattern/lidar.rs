@@ -1,0 +1,81 @@
+//! A spinning laser.
+
+use super::{PatternImpl, finite, positive};
+use crate::ray::RayError;
+
+/// A spinning laser: channels at equal steps of elevation, each a ring of rays at equal steps of azimuth. Channel after
+/// channel, azimuth fastest.
+///
+/// The last azimuth is left out for a full turn, where it would be the first one again; otherwise it is there if it falls on
+/// the grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lidar {
+    /// Number of elevations.
+    pub channels: usize,
+    /// Lowest and highest elevation, positive above the horizon \[deg\].
+    pub vertical_fov_deg: [f64; 2],
+    /// First and last azimuth, from x towards y \[deg\].
+    pub horizontal_fov_deg: [f64; 2],
+    /// Azimuth between neighbours \[deg\].
+    pub horizontal_resolution_deg: f64,
+}
+
+impl Default for Lidar {
+    /// 16 channels from -15 to 15 degrees, a ray every 0.4 degrees, all around.
+    fn default() -> Self {
+        Self {
+            channels: 16,
+            vertical_fov_deg: [-15.0, 15.0],
+            horizontal_fov_deg: [-180.0, 180.0],
+            horizontal_resolution_deg: 0.4,
+        }
+    }
+}
+
+impl Lidar {
+    /// Rays of a channel.
+    fn azimuths(&self) -> f64 {
+        let [first, last] = self.horizontal_fov_deg;
+        let steps = (last - first) / self.horizontal_resolution_deg;
+        // Decimal degrees are not exact: a step that is almost whole is.
+        let whole = (steps + 1e-6).floor();
+        let is_turn = (last - first - 360.0).abs() < 1e-6;
+        let ends_on_grid = (steps - whole).abs() < 1e-6;
+        if is_turn && ends_on_grid { whole } else { whole + 1.0 }
+    }
+}
+
+impl PatternImpl for Lidar {
+    fn count(&self) -> f64 {
+        let [first, last] = self.horizontal_fov_deg;
+        let step = self.horizontal_resolution_deg;
+        let valid = step > 0.0 && step.is_finite() && first <= last && last - first < 360.0 + 1e-6;
+        if valid { self.channels as f64 * self.azimuths() } else { f64::NAN }
+    }
+
+    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+        positive("lidar", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
+        let [first, last] = self.horizontal_fov_deg;
+        finite("lidar", "horizontal_fov_deg", first)?;
+        finite("lidar", "horizontal_fov_deg", last)?;
+        if !(first <= last && last - first < 360.0 + 1e-6) {
+            let (what, allowed) = ("the span of horizontal_fov_deg", "between 0 and 360 degrees");
+            return Err(RayError::Number { what, of: "lidar", value: last - first, allowed });
+        }
+        let [low, high] = self.vertical_fov_deg;
+        for value in [low, high] {
+            if !(-90.0..=90.0).contains(&value) {
+                let (what, allowed) = ("vertical_fov_deg", "between -90 and 90 degrees");
+                return Err(RayError::Number { what, of: "lidar", value, allowed });
+            }
+        }
+        let azimuths = self.azimuths() as usize;
+        let ray = |channel: usize, azimuth: usize| {
+            let part = if self.channels > 1 { channel as f64 / (self.channels - 1) as f64 } else { 0.0 };
+            let v = (low + part * (high - low)).to_radians();
+            let h = (first + azimuth as f64 * self.horizontal_resolution_deg).to_radians();
+            ([0.0; 3], [v.cos() * h.cos(), v.cos() * h.sin(), v.sin()])
+        };
+        Ok((0..self.channels).flat_map(|c| (0..azimuths).map(move |a| ray(c, a))).collect())
+    }
+}

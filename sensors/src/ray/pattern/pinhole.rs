@@ -1,0 +1,39 @@
+//! A ray through every pixel of a camera.
+
+use super::PatternImpl;
+use crate::camera::Intrinsics;
+use crate::ray::RayError;
+
+/// A ray through the centre of every pixel of a pinhole camera that looks along x with z up: row by row from the top left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+}
+
+impl Default for Pinhole {
+    /// 64 by 48 pixels behind Isaac's default lens.
+    fn default() -> Self {
+        Self { width: 64, height: 48, intrinsics: Intrinsics::ISAAC }
+    }
+}
+
+impl PatternImpl for Pinhole {
+    fn count(&self) -> f64 {
+        self.width as f64 * self.height as f64
+    }
+
+    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+        let lens = self.intrinsics.to_pixels(self.width, self.height)?;
+        let ray = |u: usize, v: usize| {
+            // Right of the axis and below it, for a depth of 1.
+            let (right, below) = ((u as f64 + 0.5 - lens.cx) / lens.fx, (v as f64 + 0.5 - lens.cy) / lens.fy);
+            ([0.0; 3], [1.0, -right, -below])
+        };
+        Ok((0..self.height).flat_map(|v| (0..self.width).map(move |u| ray(u, v))).collect())
+    }
+}

@@ -1,0 +1,39 @@
+//! A cylinder.
+
+use super::interval::{slab, tube};
+use super::{RayShape, Touch};
+use crate::ray::bvh::Stack;
+use crate::ray::vector::{V3, along, unit};
+use crate::ray::{Assets, Ray};
+
+/// A cylinder along z with flat ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cylinder {
+    radius: f64,
+    half_length: f64,
+}
+
+impl Cylinder {
+    pub(super) fn of(shape: &scene::shape::Cylinder, _assets: &mut Assets) -> Self {
+        Self { radius: shape.radius.into(), half_length: shape.half_length.into() }
+    }
+}
+
+impl RayShape for Cylinder {
+    #[inline(always)]
+    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Touch> {
+        let (o, d) = (ray.origin, ray.direction);
+        let (side, ends) = (tube(o, d, self.radius), slab(o[2], d[2], self.half_length));
+        let t = side.and(ends).first(limit)?;
+        // The end that decided, if one did.
+        let flat = if t == ends.enter || t == ends.leave { t != side.enter && t != side.leave } else { false };
+        let [x, y, _] = along(o, t, d);
+        let normal = if flat { [0.0, 0.0, 1.0] } else { unit([x, y, 0.0])? };
+        Some(Touch { t, normal })
+    }
+
+    fn bounds(&self) -> Option<[V3; 2]> {
+        let (r, h) = (self.radius, self.half_length);
+        Some([[-r, -r, -h], [r, r, h]])
+    }
+}

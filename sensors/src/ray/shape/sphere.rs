@@ -1,0 +1,31 @@
+//! A ball.
+
+use super::interval::ball;
+use super::{RayShape, Touch};
+use crate::ray::bvh::Stack;
+use crate::ray::vector::{V3, along, scale};
+use crate::ray::{Assets, Ray};
+
+/// A ball.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sphere {
+    radius: f64,
+}
+
+impl Sphere {
+    pub(super) fn of(shape: &scene::shape::Sphere, _assets: &mut Assets) -> Self {
+        Self { radius: shape.radius.into() }
+    }
+}
+
+impl RayShape for Sphere {
+    #[inline(always)]
+    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Touch> {
+        let t = ball(ray.origin, ray.direction, self.radius).first(limit)?;
+        Some(Touch { t, normal: scale(along(ray.origin, t, ray.direction), 1.0 / self.radius) })
+    }
+
+    fn bounds(&self) -> Option<[V3; 2]> {
+        Some([[-self.radius; 3], [self.radius; 3]])
+    }
+}

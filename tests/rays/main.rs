@@ -1,0 +1,5 @@
+//! Ray casters in a simulation, held against MuJoCo's own rays and against closed forms.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod judge;
+mod primitives;
