@@ -6,8 +6,8 @@ use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::matching;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use ndarray::{ArrayView2, ArrayView3};
-use scene::pose::to_wxyz;
-use scene::{Pose, SceneState};
+use scene::pose::{from_row, to_wxyz};
+use scene::{Marker, Pose, SceneState};
 
 /// Configuration of a [`FrameTransformer`].
 #[derive(Clone, Debug, PartialEq)]
@@ -145,6 +145,17 @@ impl Sensor for FrameTransformer {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+
+    /// The axes of all frames.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let axes = |p: [f64; 3], q: [f64; 4]| Marker::axes(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0.2);
+        let (p, q) = (self.source_pos_w(), self.source_quat_w());
+        let mut markers = vec![axes([0, 1, 2].map(|k| p[(env, k)]), [0, 1, 2, 3].map(|k| q[(env, k)]))];
+        let (p, q) = (self.target_pos_w(), self.target_quat_w());
+        let target = |t| axes([0, 1, 2].map(|k| p[(env, t, k)]), [0, 1, 2, 3].map(|k| q[(env, t, k)]));
+        markers.extend((0..self.target_frame_names().len()).map(target));
+        markers
     }
 }
 

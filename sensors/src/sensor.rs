@@ -4,7 +4,7 @@ use crate::error::SensorError;
 use crate::ray::RayAssets;
 use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest};
-use scene::{RenderScene, SceneState};
+use scene::{Marker, RenderScene, SceneState};
 use std::any::Any;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -56,6 +56,12 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     ///
     /// As [`reset`](Self::reset); nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
+
+    /// What it shows people of its last measurement in environment `env`: drawn in overviews, never measured.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let _ = env;
+        Vec::new()
+    }
 
     /// Physics steps until the next measurement of any environment, at least 1, when the environments are at `step`: the
     /// owner may leave out updates before.

@@ -50,6 +50,15 @@ pub enum Error {
         #[source]
         error: Box<PatternError>,
     },
+    /// The patterns of a payload are wrong.
+    #[error("robot {robot:?}, payload: {error}")]
+    Payload {
+        /// The robot.
+        robot: String,
+        /// What is wrong.
+        #[source]
+        error: Box<PatternError>,
+    },
     /// Two control parts have the same name.
     #[error("robot {robot:?}: control part {part:?} is given twice; join its patterns in one list")]
     ControlPartRepeated {

@@ -13,6 +13,7 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData,
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::visible::{MaskId, Visible, VisualCache};
+use ::scene::Marker;
 use nalgebra::Vector3;
 use ndarray::Array2;
 use sensors::ray::RayAssets;
@@ -114,9 +115,10 @@ impl SimulationManagerCfg {
         Self { cone: Cone::Elliptic, impratio: 10.0, ..Self::default() }
     }
 
-    /// For robots on legs: 200 Hz.
+    /// For robots on legs: 200 Hz, and elliptic friction cones that are a hundred times as stiff along the ground as the
+    /// default, where loaded feet creep apart until the robot kneels.
     pub fn legged() -> Self {
-        Self { physics_dt: 0.005, ..Self::default() }
+        Self { physics_dt: 0.005, cone: Cone::Elliptic, impratio: 100.0, ..Self::default() }
     }
 
     /// Checks every number.
@@ -375,6 +377,11 @@ impl SimulationManager {
     /// The sensor failed in an earlier step.
     pub fn sensor_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.sensors.get_mut(id)
+    }
+
+    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview).
+    pub fn markers(&self) -> Vec<(EnvId, Marker)> {
+        self.sensors.markers(self.num_envs())
     }
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.

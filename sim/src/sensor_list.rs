@@ -4,7 +4,8 @@ use crate::capture::Capture;
 use crate::compile::Simulation;
 use crate::error::{Error, Result};
 use crate::gather;
-use scene::SceneState;
+use crate::manager::EnvId;
+use scene::{Marker, SceneState};
 use sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
 use std::any::Any;
 use std::marker::PhantomData;
@@ -180,6 +181,13 @@ impl SensorList {
         let all = self.requires();
         solve(simulation, all, env_ids);
         gather::gather(simulation, self.substeps, all, &mut self.state);
+    }
+
+    /// What they show of their last measurements.
+    pub(crate) fn markers(&self, num_envs: usize) -> Vec<(EnvId, Marker)> {
+        let running = || self.entries.iter().filter(|e| e.fault.is_none());
+        let of = |env| running().flat_map(move |e| e.sensor.markers(env)).map(move |marker| (EnvId(env), marker));
+        (0..num_envs).flat_map(of).collect()
     }
 
     /// The sensor of a handle.

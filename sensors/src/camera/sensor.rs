@@ -606,6 +606,16 @@ impl fmt::Debug for Camera {
     }
 }
 
+impl fmt::Display for Camera {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Camera")?;
+        writeln!(f, "  environments       : {}", self.env_ids.len())?;
+        writeln!(f, "  update period steps: {}", self.phases.schedule().period_steps())?;
+        writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
+        write!(f, "  channels           : {}", self.channels.names().join(", "))
+    }
+}
+
 /// Values for `count` environments: one each, or one for all.
 fn one_each<'a, T>(
     what: &'static str,

@@ -7,7 +7,7 @@ use crate::sampling::{Sampled, Sampler};
 use crate::select::matching;
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
-use scene::SceneState;
+use scene::{Marker, SceneState};
 use std::fmt;
 
 /// Contact forces on bodies in all environments, world axes; [`Sampled`] has their stamps and counts.
@@ -62,6 +62,20 @@ impl Sensor for ContactSensor {
     /// Where air times are tracked, every step.
     fn due_in(&self, step: &[u64]) -> u64 {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
+    }
+
+    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N. Only where poses are tracked.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let (Some(places), forces) = (self.pos_w(), self.net_forces_w()) else { return Vec::new() };
+        let mut markers = Vec::new();
+        for body in 0..self.names.len() {
+            let [place, force] = [&places, &forces].map(|a| [0, 1, 2].map(|k| a[(env, body, k)]));
+            if force.iter().map(|f| f * f).sum::<f64>().sqrt() > self.force_threshold() {
+                markers.push(Marker::sphere(place, 0.05, [0.9, 0.05, 0.05, 1.0]));
+                markers.extend(Marker::arrow(place, force.map(|f| f / 500.0), [0.95, 0.6, 0.1, 1.0]));
+            }
+        }
+        markers
     }
 }
 

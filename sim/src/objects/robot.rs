@@ -1,7 +1,7 @@
 //! Robots: configuration, the loaded robot, and its views of a running simulation.
 
 use crate::compile::{JointIndexing, RobotIndex, Simulation};
-use crate::description::{JointKind, RobotDescription};
+use crate::description::{Inertial, JointKind, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::{DriveCfg, DriveModel};
@@ -18,6 +18,7 @@ use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ::scene::pose::to_row;
+use nalgebra::Matrix3;
 use ndarray::{Array2, Array3, ArrayView2, AsArray, Ix2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -39,6 +40,9 @@ pub struct RobotCfg {
     pub init_pose: Pose,
     /// Start positions by joint pattern or control part \[rad or m\]; 0 where none matches.
     pub init_qpos: Vec<(String, f64)>,
+    /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass, or in the
+    /// origin of a link without mass.
+    pub payload: Vec<(String, f64)>,
     /// Whether links of this robot collide with each other.
     pub self_collision: bool,
     /// How collision meshes become convex hulls.
@@ -55,6 +59,7 @@ impl Default for RobotCfg {
             fix_base: true,
             init_pose: Pose::identity(),
             init_qpos: Vec::new(),
+            payload: Vec::new(),
             self_collision: false,
             hull: HullCfg::default(),
         }
@@ -92,7 +97,8 @@ impl RobotData {
         }
         let assembly = assemble(&cfg.urdf)?;
         let mut found = assembly.diagnostics;
-        let description = assembly.description;
+        let mut description = assembly.description;
+        load_up(&mut description, &cfg)?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
         for (part, patterns) in &cfg.control_parts {
@@ -151,6 +157,25 @@ impl RobotData {
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
+}
+
+/// Adds what links carry.
+fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
+    if let Some((_, mass)) = cfg.payload.iter().find(|(_, mass)| !(mass.is_finite() && *mass >= 0.0)) {
+        let expected = "a payload must be a finite mass >= 0 kg";
+        return Err(Error::Config { field: "payload", value: mass.to_string(), expected });
+    }
+    let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+    let payloads = pattern::assign(&cfg.payload, &BTreeMap::new(), &names, "link")
+        .map_err(|error| Error::Payload { robot: cfg.uid.clone(), error: Box::new(error) })?;
+    for (link, payload) in description.links.iter_mut().zip(payloads) {
+        let Some(payload) = payload.filter(|mass| *mass > 0.0) else { continue };
+        let source = link.source.clone();
+        // A point in the centre of mass: neither the centre nor the inertia about it change.
+        let nothing = || Inertial { source, link_from_com: Pose::identity(), mass: 0.0, inertia: Matrix3::zeros() };
+        link.inertial.get_or_insert_with(nothing).mass += payload;
+    }
+    Ok(())
 }
 
 pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {

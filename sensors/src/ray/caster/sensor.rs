@@ -9,9 +9,9 @@ use crate::ray::{Ray, RayHit, RayTargets};
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use scene::pose::{from_row, to_row};
-use scene::{Pose, PoseF64, Random, SceneState};
+use scene::{Marker, Pose, PoseF64, Random, SceneState};
 
 /// Distances along rays that move with a body, in all environments; [`Sampled`] has their stamps and counts.
 ///
@@ -230,6 +230,14 @@ impl Sensor for RayCaster {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+
+    /// Red balls where rays hit, as in Isaac Lab; none where they miss.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let hits = self.shown.points.index_axis(Axis(0), env);
+        let places = hits.axis_iter(Axis(0)).map(|p| [p[0], p[1], p[2]]);
+        let seen = places.filter(|p| p.iter().all(|x| x.is_finite()));
+        seen.map(|p| Marker::sphere(p, 0.02, [0.9, 0.05, 0.05, 1.0])).collect()
     }
 }
 
