@@ -25,7 +25,8 @@ pub struct SceneState {
     /// Velocities of body origins, then angular velocities \[m/s, rad/s\], in world axes, shape \[num_envs, bodies, 6\].
     pub body_velocities: Option<Array3<f64>>,
     /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity (0 at
-    /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\].
+    /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\]. They are what the engine solved for; where it damps
+    /// joints implicitly after that (the `damping` of joints with native actuators), velocities change by a little less.
     pub body_accelerations: Option<Array3<f64>>,
     /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); there where
     /// [`body_accelerations`](Self::body_accelerations) is.

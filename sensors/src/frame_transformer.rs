@@ -119,14 +119,17 @@ fn read(source: &(usize, Pose), targets: &[(usize, Pose)], state: &SceneState, e
     let world_from_source = frame(source);
     let source_from_world = world_from_source.inverse();
     let row = put(row, world_from_source.translation.vector.as_slice());
-    let mut row = put(row, &to_wxyz(&world_from_source.rotation));
-    for from_world in [Pose::identity(), source_from_world] {
-        for target in targets {
-            row = put(row, (from_world * frame(target)).translation.vector.as_slice());
-        }
-        for target in targets {
-            row = put(row, &to_wxyz(&(from_world * frame(target)).rotation));
-        }
+    let row = put(row, &to_wxyz(&world_from_source.rotation));
+    let (mut positions, row) = row.split_at_mut(3 * targets.len());
+    let (mut rotations, row) = row.split_at_mut(4 * targets.len());
+    let (mut seen_positions, mut seen_rotations) = row.split_at_mut(3 * targets.len());
+    for target in targets {
+        let world_from_target = frame(target);
+        let source_from_target = source_from_world * world_from_target;
+        positions = put(positions, world_from_target.translation.vector.as_slice());
+        rotations = put(rotations, &to_wxyz(&world_from_target.rotation));
+        seen_positions = put(seen_positions, source_from_target.translation.vector.as_slice());
+        seen_rotations = put(seen_rotations, &to_wxyz(&source_from_target.rotation));
     }
 }
 

@@ -23,7 +23,8 @@ pub struct JointWrenchCfg {
 /// Both are in the axes of the link, and about its origin: the frame of the joint on the side of the child, as URDF defines
 /// it. The sign is that of what acts **on the link**: a load that hangs from its joint reads a force of its weight, upwards.
 /// Gravity and contacts of the link are not part of it, what they need to be held is; the drive's effort is part of it,
-/// along the axis of the joint. For the root of a fixed robot it is what the world holds the robot with.
+/// along the axis of the joint. For the root of a fixed robot it is what the world holds the robot with; it is 0 for what
+/// floats freely.
 #[derive(Clone, Debug)]
 pub struct JointWrench {
     links: Vec<usize>,

@@ -94,8 +94,8 @@ struct Quantity {
 /// Stamps stand before the channels of a row.
 const STAMPS: usize = 2;
 
-/// Most numbers that one sensor may hold: 32 GiB.
-const MAX_NUMBERS: usize = 1 << 32;
+/// Most numbers that one sensor may hold: 4 GiB. What is asked for by mistake is far above.
+const MAX_NUMBERS: usize = 1 << 29;
 
 impl Sampler {
     /// A sampler for the kind of sensor called `sensor`, which requires `requires` and measures `channels`.

@@ -83,6 +83,52 @@ fn a_rotating_load_is_pulled_inwards() {
     assert!(before > 4.0, "it turned: {before}");
 }
 
+/// A moving arm by Newton and Euler: what the joint of a link exerts is what all links beyond it need to be accelerated, by
+/// the readings of an IMU in the centre of mass of each.
+#[test]
+fn a_joint_exerts_what_all_links_beyond_it_need() {
+    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    let arm = sim.add_robot(RobotCfg { uid: "arm".into(), urdf, ..Default::default() }).unwrap();
+    let links: Vec<String> = (3..=6).map(|k| format!("link{k}")).collect();
+    let description = sim.robot(arm).description().clone();
+    let inertial = |name: &str| description.link(description.link_id(name).unwrap()).inertial.clone().unwrap();
+    let imus: Vec<_> = links
+        .iter()
+        .map(|name| {
+            let imu = ImuCfg { offset: inertial(name).link_from_com, ..ImuCfg::on(name) };
+            (sim.add_sensor(format!("imu of {name}"), imu).unwrap(), inertial(name))
+        })
+        .collect();
+    let frame = sim.add_sensor("origin", ImuCfg::on("link3")).unwrap();
+    let wanted = JointWrenchCfg { links: vec!["link3".into()], ..Default::default() };
+    let id = sim.add_sensor("wrench", wanted).unwrap();
+    sim.robot_mut(arm).set_qpos(&array![[1.0, 0.4, -0.5, 0.8, 0.6, -0.7]], None, None).unwrap();
+    let vector = |view: kinetoscope::ndarray::ArrayView2<'_, f64>| Vector3::from_fn(|k, _| view[(0, k)]);
+    let rotation = |imu: &Imu| kinetoscope::scene::pose::from_wxyz(std::array::from_fn(|k| imu.quat_w()[(0, k)]));
+    let mut fastest = 0.0_f64;
+    for _ in 0..60 {
+        sim.update(1);
+        let origin = sim.sensor(frame).unwrap();
+        let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
+        for (imu, inertial) in &imus {
+            let imu = sim.sensor(*imu).unwrap();
+            let (turn, spin) = (rotation(imu), vector(imu.ang_vel_b()));
+            let needed = turn * (inertial.mass * vector(imu.lin_acc_b()));
+            let about_com = inertial.inertia * vector(imu.ang_acc_b()) + spin.cross(&(inertial.inertia * spin));
+            force += needed;
+            torque += (vector(imu.pos_w()) - vector(origin.pos_w())).cross(&needed) + turn * about_com;
+            fastest = fastest.max(spin.norm());
+        }
+        let into_link = rotation(origin).inverse();
+        let sensor = sim.sensor(id).unwrap();
+        // Hundreds of newtons, summed in another order; MuJoCo keeps principal axes as quaternions of 16 digits.
+        assert_near(sensor.forces().to_owned(), (into_link * force).as_slice(), 1e-6);
+        assert_near(sensor.torques().to_owned(), (into_link * torque).as_slice(), 1e-6);
+    }
+    assert!(fastest > 1.0, "it moved: {fastest} rad/s");
+}
+
 #[test]
 fn fused_links_have_no_joint_to_measure() {
     let mut sim = SimulationManager::new(cfg(1)).unwrap();
