@@ -15,13 +15,14 @@ pub mod prelude {
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
     };
+    pub use sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg, RayPattern};
     pub use sensors::{
         ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu, ImuCfg, JointState, JointStateCfg,
         JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,
-        MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId,
-        SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
+        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, GroundCfg, Integrator,
+        JointIndex, LightCfg, MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg,
+        RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
     };
 }

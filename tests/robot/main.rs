@@ -3,3 +3,4 @@
 
 mod quadruped;
 mod root;
+mod standing;

@@ -2,7 +2,7 @@
 
 use kinetoscope::prelude::*;
 
-fn cfg(urdf: std::path::PathBuf, stiffness: f64, damping: f64) -> RobotCfg {
+pub(crate) fn cfg(urdf: std::path::PathBuf, stiffness: f64, damping: f64) -> RobotCfg {
     RobotCfg {
         urdf: UrdfCfg::single(urdf),
         fix_base: false,
@@ -15,8 +15,19 @@ fn cfg(urdf: std::path::PathBuf, stiffness: f64, damping: f64) -> RobotCfg {
     }
 }
 
-fn bundled() -> std::path::PathBuf {
+pub(crate) fn bundled() -> std::path::PathBuf {
     assets::path("quadruped/quadruped.urdf").unwrap()
+}
+
+/// ANYbotics' own robot, where it is there.
+pub(crate) fn vendor() -> Option<std::path::PathBuf> {
+    let urdf = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/robots/anymal_c_simple_description/urdf/anymal.urdf");
+    if !urdf.is_file() {
+        eprintln!("skipped: {} is not there", urdf.display());
+        return None;
+    }
+    Some(urdf)
 }
 
 #[test]
@@ -50,12 +61,7 @@ fn it_has_the_joints_limits_and_mass_of_the_tutorials_robot() {
 /// at the same place.
 #[test]
 fn its_feet_are_where_those_of_the_vendors_robot_are() {
-    let vendor = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/robots/anymal_c_simple_description/urdf/anymal.urdf");
-    if !vendor.is_file() {
-        eprintln!("skipped: {} is not there", vendor.display());
-        return;
-    }
+    let Some(vendor) = vendor() else { return };
     let mut sim = SimulationManager::new(SimulationManagerCfg::legged()).unwrap();
     let ours = sim.add_robot(cfg(bundled(), 80.0, 5.0)).unwrap();
     let theirs = sim.add_robot(RobotCfg { uid: "vendor".into(), ..cfg(vendor, 80.0, 5.0) }).unwrap();

@@ -48,6 +48,19 @@ const TABLE: &[Run] = &[
     run_of("create_sensor", &[2], "--headless --steps 1 --attach-sensor --attach-link no_such_link --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --width 0 --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --enable-rt --out {out}/none"),
+    run_of(
+        "add_sensors_on_robot",
+        &[0],
+        "--headless --num-envs 2 --steps 600 --out {out}/add_sensors_on_robot --report {out}/add_sensors_on_robot.json",
+    ),
+    run_of(
+        "add_sensors_on_robot",
+        &[0],
+        "--headless --num-envs 1 --steps 400 --reset-every 0 --payload 5 --out {out}/anymal_sensors \
+         --robot {robots}/anymal_c_simple_description/urdf/anymal.urdf",
+    ),
+    run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --payload -1"),
+    run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --robot sr5/SR5.urdf"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",

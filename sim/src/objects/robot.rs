@@ -40,8 +40,8 @@ pub struct RobotCfg {
     pub init_pose: Pose,
     /// Start positions by joint pattern or control part \[rad or m\]; 0 where none matches.
     pub init_qpos: Vec<(String, f64)>,
-    /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass, or in the
-    /// origin of a link without mass.
+    /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
+    /// the density of water in the origin of a link without mass.
     pub payload: Vec<(String, f64)>,
     /// Whether links of this robot collide with each other.
     pub self_collision: bool,
@@ -170,10 +170,16 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         .map_err(|error| Error::Payload { robot: cfg.uid.clone(), error: Box::new(error) })?;
     for (link, payload) in description.links.iter_mut().zip(payloads) {
         let Some(payload) = payload.filter(|mass| *mass > 0.0) else { continue };
-        let source = link.source.clone();
-        // A point in the centre of mass: neither the centre nor the inertia about it change.
-        let nothing = || Inertial { source, link_from_com: Pose::identity(), mass: 0.0, inertia: Matrix3::zeros() };
-        link.inertial.get_or_insert_with(nothing).mass += payload;
+        match &mut link.inertial {
+            // A point in the centre of mass: neither the centre nor the inertia about it change.
+            Some(inertial) => inertial.mass += payload,
+            None => {
+                let (source, link_from_com) = (link.source.clone(), Pose::identity());
+                let radius = (payload / 1000.0 * 0.75 / std::f64::consts::PI).cbrt();
+                let inertia = Matrix3::from_diagonal_element(0.4 * payload * radius * radius);
+                link.inertial = Some(Inertial { source, link_from_com, mass: payload, inertia });
+            }
+        }
     }
     Ok(())
 }
