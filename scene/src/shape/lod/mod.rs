@@ -34,12 +34,14 @@ pub struct Level {
 
 /// Meshes of fewer triangles have no coarser versions.
 pub(super) const MIN_TRIANGLES: usize = 1000;
-/// The bounds that are aimed at \[m\]: 1/16 mm to 1 mm.
-const BOUNDS: [f64; 5] = [0.0625e-3, 0.125e-3, 0.25e-3, 0.5e-3, 1e-3];
+/// The bound that is aimed at before the first level, so that the cheaper collapses come first \[m\].
+const BEFORE: f64 = 0.0625e-3;
+/// The bounds of the levels \[m\]: 1/8 mm is half a pixel at a distance of 15 cm, where the focal length is 600 pixels.
+const BOUNDS: [f64; 4] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3];
 /// No level has a smaller bound \[m\].
 pub(super) const FINEST: f32 = 0.01e-3;
 /// A level has this share of the triangles of the one before, or less; others are not worth their memory.
-const WORTH: f64 = 0.75;
+const WORTH: f64 = 0.8;
 /// Rounding of all collapses of a vertex together, as a share of the mesh's extent: computed with 53 bits, from positions
 /// that are taken over bit by bit.
 const ROUNDING: f64 = 1e-7;
@@ -55,6 +57,7 @@ pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
     let rounding = ROUNDING * (0..3).map(|k| f64::from(hi[k]) - f64::from(lo[k])).fold(0.0, f64::max);
     let mut surface = Surface::new(mesh);
     let mut last = mesh.triangles().len();
+    surface.simplify(BEFORE - rounding);
     for bound in BOUNDS {
         // A part in a thousand for the rounding to 24 bits.
         surface.simplify(0.999 * bound - rounding);

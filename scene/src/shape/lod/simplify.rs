@@ -2,7 +2,7 @@
 
 use super::super::RenderMesh;
 use super::super::crease::weld;
-use super::star::{Fan, Star};
+use super::star::{Best, Fan, Star};
 
 /// Rounds of collapses for one bound, at most.
 const ROUNDS: usize = 40;
@@ -21,15 +21,8 @@ pub(super) struct Surface<'a> {
     /// Triangles around each vertex, and which of their corners it is: `around[start[v]..start[v + 1]]`.
     start: Vec<u32>,
     around: Vec<(u32, u8)>,
-    /// The best collapse of each vertex, where it is known.
-    known: Vec<Option<Collapse>>,
-}
-
-/// Onto which neighbour, and the bound then; the vertex itself where there is none.
-#[derive(Clone, Copy, Debug)]
-struct Collapse {
-    onto: u32,
-    error: f32,
+    /// The smallest bound of a triangle after a collapse of each vertex, as far as it is known \[m\].
+    least: Vec<f32>,
 }
 
 impl<'a> Surface<'a> {
@@ -43,8 +36,8 @@ impl<'a> Surface<'a> {
         let triangles: Vec<[u32; 3]> = mesh.triangles().iter().filter(|t| !flat(t)).copied().collect();
         let count = mesh.positions().len();
         let error = vec![0.0; triangles.len()];
-        let (start, around, known) = (vec![0; count + 1], Vec::new(), vec![None; count]);
-        Self { mesh, vertex, triangles, error, start, around, known }
+        let (start, around, least) = (vec![0; count + 1], Vec::new(), vec![0.0; count]);
+        Self { mesh, vertex, triangles, error, start, around, least }
     }
 
     pub(super) fn triangles(&self) -> &[[u32; 3]] {
@@ -70,7 +63,7 @@ impl<'a> Surface<'a> {
     /// A corner of a triangle, counted on from 0, 1, 2.
     #[inline]
     pub(super) fn corner(&self, triangle: u32, corner: u8) -> u32 {
-        self.triangles[triangle as usize][usize::from(corner) % 3]
+        self.triangles[triangle as usize][usize::from(if corner < 3 { corner } else { corner - 3 })]
     }
 
     /// The vertex at a corner of a triangle.
@@ -99,54 +92,34 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// One round: the cheapest collapses first, each where no other has changed anything. Returns how many vertices there
-    /// were, and how many were removed.
+    /// One round, in the order of the vertices: each is looked at once, and not at all where another collapse changed what is
+    /// around it. Returns how many vertices there were, and how many were removed.
     fn round(&mut self, bound: f64) -> (usize, usize) {
         self.connect();
         let (mut star, mut fan) = (Star::empty(), Fan::empty());
-        let mut order = Vec::new();
-        let mut vertices = 0;
-        for v in (0..self.known.len() as u32).filter(|&v| self.vertex[v as usize] == v) {
+        let mut changed = vec![false; self.least.len()];
+        let (mut vertices, mut removed) = (0, 0);
+        for v in 0..self.least.len() as u32 {
             if self.around(v).is_empty() {
                 continue;
             }
             vertices += 1;
-            let known = self.known[v as usize].unwrap_or_else(|| {
-                let best = if star.look(self, v) { star.best(self, &mut fan, bound) } else { None };
-                best.map_or(Collapse { onto: v, error: f32::INFINITY }, |(onto, error)| Collapse {
-                    onto,
-                    error: (error as f32).next_up(),
-                })
-            });
-            self.known[v as usize] = Some(known);
-            if f64::from(known.error) <= bound {
-                // Bounds are not negative: their bits are in the order of their values.
-                order.push(u64::from(known.error.to_bits()) << 32 | u64::from(v));
-            }
-        }
-        order.sort_unstable();
-        let mut changed = vec![false; self.known.len()];
-        let mut removed = 0;
-        for v in order.iter().map(|key| *key as u32) {
-            if changed[v as usize] || !star.look(self, v) {
+            if changed[v as usize] || f64::from(self.least[v as usize]) > bound {
                 continue;
             }
-            let ring = &star.ring[..star.count];
-            if ring.iter().any(|&w| changed[w as usize]) {
-                continue;
+            let best = if star.look(self, v) { star.best(self, &mut fan, &changed, bound) } else { Best::None };
+            match best {
+                Best::Enough(onto) => {
+                    for &w in star.ring[..star.count].iter().chain([&v]) {
+                        (changed[w as usize], self.least[w as usize]) = (true, 0.0);
+                    }
+                    self.apply(&star, onto, &fan);
+                    removed += 1;
+                }
+                Best::Least(error) => self.least[v as usize] = error as f32,
+                Best::None => self.least[v as usize] = f32::INFINITY,
+                Best::Unknown => {}
             }
-            let onto = self.known[v as usize].and_then(|known| ring.iter().position(|&w| w == known.onto));
-            // What is around the neighbour may have changed since the collapse became known.
-            self.known[v as usize] = None;
-            let Some(onto) = onto else { continue };
-            if star.collapse(self, onto, &mut fan).is_none_or(|error| error > bound) {
-                continue;
-            }
-            for &w in ring.iter().chain([&v]) {
-                (changed[w as usize], self.known[w as usize]) = (true, None);
-            }
-            self.apply(&star, onto, &fan);
-            removed += 1;
         }
         self.sweep();
         (vertices, removed)

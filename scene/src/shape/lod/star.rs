@@ -45,6 +45,19 @@ pub(super) struct Star {
     quadric: [f64; 6],
 }
 
+/// What the best collapse of a vertex is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Best {
+    /// Onto that place of the ring, within the bound.
+    Enough(usize),
+    /// None is within the bound; the smallest that was found.
+    Least(f64),
+    /// None is possible.
+    None,
+    /// Neighbours have changed.
+    Unknown,
+}
+
 /// The triangles after a collapse onto `ring[onto]`: triangle `j`, of `1..count - 1` counted from there, is (that
 /// neighbour, `ring[onto + j]`, `ring[onto + j + 1]`).
 #[derive(Clone, Debug)]
@@ -53,6 +66,16 @@ pub(super) struct Fan {
     pub(super) error: [f64; MOST],
     /// The neighbour as a corner of each: which of its normals.
     pub(super) corner: [u32; MOST],
+    /// The ring counted from that neighbour: from the vertex, and looked at along the mean normal.
+    to: [V; MOST],
+    flat: [[f64; 2]; MOST],
+    height: [f64; MOST],
+    /// Normals of the new triangles, of any length.
+    planes: [V; MOST],
+    /// The largest difference in height over each new triangle.
+    apart: [f64; MOST],
+    /// Which old triangles are above or below each new one.
+    over: [u32; MOST],
 }
 
 impl Star {
@@ -110,11 +133,12 @@ impl Star {
         for i in 0..count {
             self.to[i] = sub(surface.position(self.ring[i]), middle);
         }
+        let next = |i: usize| if i + 1 < count { i + 1 } else { 0 };
         let mut faces = [[0.0; 3]; MOST];
         let mut sum = [0.0; 3];
-        for i in 0..count {
-            faces[i] = cross(self.to[i], self.to[(i + 1) % count]);
-            sum = [0, 1, 2].map(|k| sum[k] + faces[i][k]);
+        for (i, face) in faces[..count].iter_mut().enumerate() {
+            *face = cross(self.to[i], self.to[next(i)]);
+            sum = [0, 1, 2].map(|k| sum[k] + face[k]);
         }
         let length = dot(sum, sum).sqrt();
         if length == 0.0 || !length.is_finite() {
@@ -129,11 +153,11 @@ impl Star {
         let up = [b, sign + n[1] * n[1] * a, -n[1]];
         self.normal = n;
         self.quadric = [0.0; 6];
-        for i in 0..count {
-            let (d, c) = (self.to[i], faces[i]);
+        for (i, &c) in faces[..count].iter().enumerate() {
+            let d = self.to[i];
             self.flat[i] = [dot(d, right), dot(d, up)];
             self.height[i] = dot(d, n);
-            let longest = dot(d, d).max(dot(self.to[(i + 1) % count], self.to[(i + 1) % count]));
+            let longest = dot(d, d).max(dot(self.to[next(i)], self.to[next(i)]));
             if dot(c, n) <= PARALLEL * longest {
                 return false;
             }
@@ -142,7 +166,7 @@ impl Star {
             self.quadric = std::array::from_fn(|q| self.quadric[q] + k * products[q]);
         }
         // All turn the same way: they cover nothing twice if they go around once.
-        let rises = (0..count).filter(|&i| self.flat[i][1] < 0.0 && self.flat[(i + 1) % count][1] >= 0.0).count();
+        let rises = (0..count).filter(|&i| self.flat[i][1] < 0.0 && self.flat[next(i)][1] >= 0.0).count();
         rises == 1
     }
 
@@ -157,117 +181,143 @@ impl Star {
         planes / (q[0] + q[1] + q[2]) + 1e-8 * dot(d, d)
     }
 
-    /// The collapse with the smallest bound among those few that look best, and that bound; the first that keeps `enough`
-    /// is good enough.
-    pub(super) fn best(&self, surface: &Surface<'_>, fan: &mut Fan, enough: f64) -> Option<(u32, f64)> {
+    /// Tries the few collapses that look best, onto neighbours that are not `changed`, until one keeps `bound`; that is in
+    /// `fan` then.
+    pub(super) fn best(&self, surface: &Surface<'_>, fan: &mut Fan, changed: &[bool], bound: f64) -> Best {
         const TRIES: usize = 3;
-        let mut costs: [(f64, u8); MOST] = std::array::from_fn(|k| (0.0, k as u8));
-        let costs = &mut costs[..self.count];
-        for (k, entry) in costs.iter_mut().enumerate() {
-            entry.0 = self.cost(k);
+        let mut costs = [(0.0, 0); MOST];
+        let mut count = 0;
+        for k in (0..self.count).filter(|&k| !changed[self.ring[k] as usize]) {
+            costs[count] = (self.cost(k), k);
+            count += 1;
         }
-        costs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut best: Option<(u32, f64)> = None;
-        let mut tries = 0;
-        for &(_, k) in costs.iter() {
-            let onto = usize::from(k);
+        costs[..count].sort_unstable_by(|a: &(f64, usize), b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let (mut least, mut tries) = (f64::INFINITY, 0);
+        for &(_, onto) in &costs[..count] {
             let Some(error) = self.collapse(surface, onto, fan) else { continue };
-            if best.is_none_or(|(_, least)| error < least) {
-                best = Some((self.ring[onto], error));
+            if error <= bound {
+                return Best::Enough(onto);
             }
+            least = least.min(error);
             tries += 1;
-            if error <= enough || tries == TRIES {
+            if tries == TRIES {
                 break;
             }
         }
-        best
+        match (count == self.count, tries) {
+            (false, _) => Best::Unknown,
+            (true, 0) => Best::None,
+            (true, _) => Best::Least(least),
+        }
     }
 
     /// The triangles after the collapse onto `ring[onto]`, and the largest of their bounds. `None` where it would make
     /// triangles that cover each other, that face elsewhere than their corners, or an edge with more than two triangles.
     pub(super) fn collapse(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<f64> {
         let m = self.count;
-        let at = |j: usize| (onto + j) % m;
-        let (start, rise) = (self.flat[onto], self.height[onto]);
-        let from_start = |j: usize| [self.flat[at(j)][0] - start[0], self.flat[at(j)][1] - start[1]];
-        let mut planes = [[0.0; 3]; MOST];
+        for (j, i) in (onto..m).chain(0..onto).enumerate() {
+            (fan.to[j], fan.flat[j], fan.height[j]) = (self.to[i], self.flat[i], self.height[i]);
+        }
+        let [start, ..] = fan.flat;
+        let from_start = |p: [f64; 2]| [p[0] - start[0], p[1] - start[1]];
         for j in 1..m - 1 {
-            let (a, b) = (from_start(j), from_start(j + 1));
+            let (a, b) = (from_start(fan.flat[j]), from_start(fan.flat[j + 1]));
             let longest = (a[0] * a[0] + a[1] * a[1]).max(b[0] * b[0] + b[1] * b[1]);
             if area(a, b) <= PARALLEL * longest {
                 return None;
             }
-            planes[j] = cross(sub(self.to[at(j)], self.to[onto]), sub(self.to[at(j + 1)], self.to[onto]));
         }
-        self.corners(surface, onto, &planes, fan)?;
+        for j in 1..m - 1 {
+            fan.planes[j] = cross(sub(fan.to[j], fan.to[0]), sub(fan.to[j + 1], fan.to[0]));
+        }
+        self.corners(surface, onto, fan)?;
         if self.pinches(surface, onto) {
             return None;
         }
-        // Where pieces of old and new triangles meet: the largest difference in height over each new triangle, and which
-        // old ones are below or above it.
-        let mut apart = [0.0f64; MOST];
-        let mut over = [0u32; MOST];
-        for i in 0..m {
-            // Old triangle `i` and a new one have an edge of the polygon in common.
-            over[i.clamp(1, m - 2)] |= 1 << i;
-        }
-        for j in 1..m - 1 {
-            let sides = [self.flat[onto], self.flat[at(j)], self.flat[at(j + 1)]];
-            // The vertex itself, at the origin.
-            if (0..3).all(|k| area(sides[k], sides[(k + 1) % 3]) >= 0.0) {
-                let gap = dot(planes[j], self.to[onto]) / dot(planes[j], self.normal);
-                apart[j] = apart[j].max(gap.abs());
-                over[j] = u32::MAX >> (32 - m);
-            }
-        }
-        for j in 2..m - 1 {
-            let edge = from_start(j);
-            let edge_rise = self.height[at(j)] - rise;
-            let before = area(start, edge);
-            for i in (1..m).filter(|&i| i != j) {
-                let spoke = self.flat[at(i)];
-                let turn = area(spoke, edge);
-                let scale = (spoke[0] * spoke[0] + spoke[1] * spoke[1]) * (edge[0] * edge[0] + edge[1] * edge[1]);
-                // Parallel ones that lie on each other part at ends that are looked at anyway.
-                if turn * turn <= PARALLEL * PARALLEL * scale {
-                    continue;
-                }
-                let (s, t) = (before / turn, area(start, spoke) / turn);
-                let within = -PARALLEL..=1.0 + PARALLEL;
-                if within.contains(&s) && within.contains(&t) {
-                    let gap = (s * self.height[at(i)] - (rise + t * edge_rise)).abs();
-                    for side in [j - 1, j] {
-                        apart[side] = apart[side].max(gap);
-                        over[side] |= 1 << (i - 1) | 1 << i;
-                    }
-                }
-            }
-        }
+        self.overlay(fan);
         let mut largest = 0.0f64;
         for j in 1..m - 1 {
-            let below = (0..m).filter(|i| over[j] >> i & 1 == 1).map(|i| surface.error_of(self.triangles[at(i)].0));
-            fan.error[j] = below.fold(0.0, f64::max) + apart[j];
+            let mut error = 0.0f64;
+            let mut left = fan.over[j];
+            while left != 0 {
+                let i = onto + left.trailing_zeros() as usize;
+                left &= left - 1;
+                error = error.max(surface.error_of(self.triangles[if i < m { i } else { i - m }].0));
+            }
+            fan.error[j] = error + fan.apart[j];
             largest = largest.max(fan.error[j]);
         }
         Some(largest)
     }
 
+    /// Where pieces of old and new triangles meet: the largest difference in height over each new triangle, and which old
+    /// ones are below or above it.
+    fn overlay(&self, fan: &mut Fan) {
+        let m = self.count;
+        let Fan { to, flat, height, planes, apart, over, .. } = fan;
+        let (start, rise) = (flat[0], height[0]);
+        apart[1..m - 1].fill(0.0);
+        over[1..m - 1].fill(0);
+        for i in 0..m {
+            // Old triangle `i` and a new one have an edge of the polygon in common.
+            over[i.clamp(1, m - 2)] |= 1 << i;
+        }
+        for j in 1..m - 1 {
+            // The vertex itself, at the origin.
+            let sides = [area(start, flat[j]), area(flat[j], flat[j + 1]), area(flat[j + 1], start)];
+            if sides.iter().all(|&side| side >= 0.0) {
+                let gap = dot(planes[j], to[0]) / dot(planes[j], self.normal);
+                apart[j] = apart[j].max(gap.abs());
+                over[j] = u32::MAX >> (32 - m);
+            }
+        }
+        for j in 2..m - 1 {
+            let edge = [flat[j][0] - start[0], flat[j][1] - start[1]];
+            let edge_rise = height[j] - rise;
+            let length = edge[0] * edge[0] + edge[1] * edge[1];
+            let before = area(start, edge);
+            for i in 1..m {
+                let spoke = flat[i];
+                let turn = area(spoke, edge);
+                // They cross at the shares s = before / turn of the spoke and t = after / turn of the edge.
+                let after = area(start, spoke);
+                let most = (1.0 + PARALLEL) * turn.abs();
+                let (s, t) = if turn < 0.0 { (-before, -after) } else { (before, after) };
+                let least = most - turn.abs();
+                if s < -least || s > most || t < -least || t > most || i == j {
+                    continue;
+                }
+                // Parallel ones that lie on each other part at ends that are looked at anyway.
+                if turn * turn <= PARALLEL * PARALLEL * length * (spoke[0] * spoke[0] + spoke[1] * spoke[1]) {
+                    continue;
+                }
+                let inverse = 1.0 / turn.abs();
+                let gap = (s * inverse * height[i] - (rise + t * inverse * edge_rise)).abs();
+                for side in [j - 1, j] {
+                    apart[side] = apart[side].max(gap);
+                    over[side] |= 1 << (i - 1) | 1 << i;
+                }
+            }
+        }
+    }
+
     /// Finds which normal of the neighbour each new triangle gets: of the two along the collapsed edge the one that is
     /// nearer to what the corner had. `None` where a triangle would face elsewhere than its corners.
-    fn corners(&self, surface: &Surface<'_>, onto: usize, planes: &[V; MOST], fan: &mut Fan) -> Option<()> {
+    fn corners(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<()> {
         let m = self.count;
         let corner = |(triangle, corner): (u32, u8), step: u8| surface.corner(triangle, corner + step);
         let (first, last) = (corner(self.triangles[onto], 1), corner(self.triangles[(onto + m - 1) % m], 2));
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let normals = [surface.normal(first), surface.normal(last)];
         for j in 1..m - 1 {
-            let old = self.triangles[(onto + j) % m];
+            let old = self.triangles[if onto + j < m { onto + j } else { onto + j - m }];
             let had = surface.normal(corner(old, 0));
             let take_last = dot(had, normals[1]) > dot(had, normals[0]);
-            let n = planes[j];
+            let n = fan.planes[j];
             let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
             let face = n.map(|x| (x / length) as f32);
-            let kept = [normals[usize::from(take_last)], surface.normal(corner(old, 1)), surface.normal(corner(old, 2))];
+            let kept =
+                [normals[usize::from(take_last)], surface.normal(corner(old, 1)), surface.normal(corner(old, 2))];
             if !kept.iter().all(|&n| dot(n, face) >= FACING) {
                 return None;
             }
@@ -280,19 +330,30 @@ impl Star {
     /// two cover each other.
     fn pinches(&self, surface: &Surface<'_>, onto: usize) -> bool {
         let m = self.count;
-        let ring = |j: usize| self.ring[(onto + j) % m];
+        let next = |i: usize, step: usize| if i + step < m { i + step } else { i + step - m };
+        // Its neighbours along the ring, which it has edges to; nobody else of the ring may be one.
+        let (after, before) = (self.ring[next(onto, 1)], self.ring[next(onto, m - 1)]);
         let own = |triangle: u32| self.triangles[..m].iter().any(|&(t, _)| t == triangle);
-        surface.around(ring(0)).iter().any(|&(triangle, corner)| {
+        surface.around(self.ring[onto]).iter().any(|&(triangle, corner)| {
             let ends = [surface.vertex_of(triangle, corner + 1), surface.vertex_of(triangle, corner + 2)];
-            let far = (2..m - 1).any(|j| ends.contains(&ring(j)));
-            let same = m == 3 && !own(triangle) && ends.contains(&ring(1)) && ends.contains(&ring(2));
-            far || same
+            let far = |v: u32| v != after && v != before && self.ring[..m].contains(&v);
+            let same = m == 3 && !own(triangle) && ends.contains(&after) && ends.contains(&before);
+            far(ends[0]) || far(ends[1]) || same
         })
     }
 }
 
 impl Fan {
     pub(super) fn empty() -> Self {
-        Self { error: [0.0; MOST], corner: [0; MOST] }
+        Self {
+            error: [0.0; MOST],
+            corner: [0; MOST],
+            to: [[0.0; 3]; MOST],
+            flat: [[0.0; 2]; MOST],
+            height: [0.0; MOST],
+            planes: [[0.0; 3]; MOST],
+            apart: [0.0; MOST],
+            over: [0; MOST],
+        }
     }
 }

@@ -36,10 +36,8 @@ fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: 
     // At depth z, where rays have the slopes p, a displacement d moves a point by f / z (d_xy - p d_z) pixels, which is
     // at most f / z |d| sqrt(1 + p²).
     let slope = |size: usize, c: f32, f: f32| c.abs().max((size as f32 - c).abs()) / f;
-    let (x, y) = (
-        slope(projection.width, projection.cx, projection.fx),
-        slope(projection.height, projection.cy, projection.fy),
-    );
+    let (x, y) =
+        (slope(projection.width, projection.cx, projection.fx), slope(projection.height, projection.cy, projection.fy));
     DISTANCE.min(PIXELS * near / (f * (1.0 + x * x + y * y).sqrt()))
 }
 
