@@ -4,10 +4,12 @@
 
 mod crease;
 mod grid;
+mod lod;
 pub mod render_mesh;
 
 use crate::mesh::TriMesh;
 pub(crate) use grid::revolve;
+pub use lod::Level;
 pub use render_mesh::{Cluster, RenderMesh};
 
 /// What a shape must be able to do.

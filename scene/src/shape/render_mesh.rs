@@ -1,8 +1,10 @@
 //! Triangles prepared for drawing: normals, clusters, bounds.
 
 use super::crease::{corner_normals, cross, dot, sub, unit, weld};
+use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// A mesh prepared for drawing, once per asset and shared by all environments.
 ///
@@ -18,6 +20,7 @@ pub struct RenderMesh {
     lanes: [Vec<f32>; 3],
     corners: Vec<[u8; 3]>,
     bounds: [[f32; 3]; 2],
+    levels: OnceLock<Vec<Level>>,
 }
 
 /// A handful of neighbouring triangles.
@@ -197,6 +200,34 @@ impl RenderMesh {
     /// Smallest and largest coordinates \[m\]; zero without triangles.
     pub fn bounds(&self) -> [[f32; 3]; 2] {
         self.bounds
+    }
+
+    /// Coarser versions of the mesh, the finest first: each with a bound on how far it is from the mesh, 1 mm at most. They
+    /// are made when they are first asked for, which takes some time (about 2 µs for each triangle), and shared by everybody
+    /// who has the mesh. Meshes of fewer than 1000 triangles and meshes with texture coordinates have none.
+    pub fn levels(&self) -> &[Level] {
+        self.levels.get_or_init(|| lod::chain(self))
+    }
+
+    /// The number of the coarsest level whose [`Level::error`] is not larger than `error` \[m\]; 0 is the mesh itself. Makes
+    /// the levels only where one of them could be that.
+    pub fn level_within(&self, error: f32) -> usize {
+        let may = error >= lod::FINEST && self.triangles.len() >= lod::MIN_TRIANGLES && self.uvs.is_none();
+        if may { self.levels().iter().take_while(|level| level.error <= error).count() } else { 0 }
+    }
+
+    /// A level by its number, as [`RenderMesh::level_within`] says it; 0, and numbers that have no level, are the mesh
+    /// itself.
+    #[inline]
+    pub fn level(&self, number: usize) -> &Self {
+        let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
+        number.checked_sub(1).and_then(level).map_or(self, |level| &level.mesh)
+    }
+
+    /// The [`Level::error`] of a level by its number \[m\]; 0 for the mesh itself.
+    pub fn level_error(&self, number: usize) -> f32 {
+        let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
+        number.checked_sub(1).and_then(level).map_or(0.0, |level| level.error)
     }
 
     /// The mesh as it is drawn.

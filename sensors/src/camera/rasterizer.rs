@@ -19,11 +19,30 @@ pub struct RasterCfg {
     pub shadow_size: usize,
     /// Geom groups that are drawn: bit k is group k.
     pub groups: u32,
+    /// Draw dense meshes coarser where that is hardly seen (level of detail).
+    ///
+    /// The surface that is drawn instead of a mesh is joined to it by a continuous map that moves no point by more than
+    /// 1 mm, nor by more than half a pixel anywhere in the picture (both are proven, see [`scene::RenderMesh::levels`];
+    /// vertices are snapped to 1/256 pixel besides, with or without levels). So:
+    /// - what is seen at a pixel is seen within half a pixel of it without levels; of things that are less than 2 mm
+    ///   behind each other, either may be seen;
+    /// - depth, distance and position are those of a point not farther than 1 mm from a point of the mesh that is seen
+    ///   within half a pixel; where a surface is seen at a slant, or near a silhouette, depth changes by more than that
+    ///   within half a pixel, and may differ by as much;
+    /// - flat normals are those of the larger triangles: on smooth surfaces within some degrees of the mesh's, and
+    ///   arbitrary on features that are smaller than half a pixel or 1 mm. Shading normals are blended from normals of the
+    ///   mesh's own vertices, and no new triangle faces more than 40° away from them;
+    /// - shadow maps follow the same rule in texels.
+    ///
+    /// The level depends on the mesh, its pose and the view, on nothing else in the picture. Meshes of fewer than 1000
+    /// triangles, with texture coordinates, that reach behind the near plane, and terrain are drawn as they are. The
+    /// levels of a mesh are made when a picture first needs one, and shared by all environments.
+    pub lod: bool,
 }
 
 impl Default for RasterCfg {
     fn default() -> Self {
-        Self { samples: 4, shadows: true, shadow_size: 0, groups: u32::MAX }
+        Self { samples: 4, shadows: true, shadow_size: 0, groups: u32::MAX, lod: true }
     }
 }
 

@@ -7,8 +7,9 @@ use crate::camera::RasterCfg;
 use crate::camera::channel::{FrameMut, Stage};
 use crate::camera::rasterizer::Shot;
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
-use crate::visibility::raster::{DrawList, Layer};
+use crate::visibility::raster::{DrawList, Layer, level};
 use crate::visibility::{Projection, RenderError, View};
+use scene::{Instance, PoseF32};
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
 const BAND: usize = 128 * 1024;
@@ -56,7 +57,7 @@ impl Plan {
             self.light(cfg, shot);
         }
         self.planes = if wants_color && cfg.samples == 4 { SAMPLES.len() } else { 1 };
-        self.list.build(&projection, scene, poses, |instance| Layer::of(instance, cfg.groups));
+        self.list.build(&projection, scene, poses, cfg.lod, |instance| Layer::of(instance, cfg.groups));
         self.projection = Some(projection);
         Ok(())
     }
@@ -76,7 +77,7 @@ impl Plan {
                 if self.shadows.len() == self.maps {
                     self.shadows.push(ShadowMap::empty());
                 }
-                if self.shadows[self.maps].prepare(light, scene, poses, cfg.groups, side) {
+                if self.shadows[self.maps].prepare(light, scene, poses, cfg, side) {
                     maps[k] = Some(self.maps);
                     self.maps += 1;
                 }
@@ -130,11 +131,26 @@ fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     }
 }
 
+/// Triangles of all meshes, each as coarse as it is drawn.
+fn triangle_count(cfg: RasterCfg, shot: &Shot<'_>) -> usize {
+    let Shot { scene, poses, view, .. } = *shot;
+    if !cfg.lod {
+        return scene.triangle_count();
+    }
+    let projection = Projection::from(view);
+    let count = |(instance, pose): (&Instance, &PoseF32)| {
+        let mesh = instance.mesh().filter(|_| Layer::of(instance, cfg.groups) != Layer::Hidden)?;
+        let level = level(&projection, instance, &view.world_from_camera.inverse_times(pose));
+        Some(mesh.level(usize::from(level)).triangles().len())
+    };
+    scene.instances().iter().zip(poses).filter_map(count).sum()
+}
+
 /// How long a shot takes, about \[ns\]: to tell whether another thread is worth its start.
 pub(crate) fn estimate(cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> usize {
     let Shot { scene, view, .. } = *shot;
     let wants_color = frame.wants(Stage::Color);
-    let (pixels, triangles) = (view.width.saturating_mul(view.height), scene.triangle_count());
+    let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, shot));
     let shadows = if wants_color && cfg.shadows {
         let texels = shadow_side(cfg, view).pow(2);
         scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels

@@ -211,7 +211,7 @@ pub(crate) fn shade<S: Simd>(
         if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                lit = lit * map.light(s, at.position, at.normal, matters);
+                lit = lit * map.light(s, at.position, at.normal, source.placed.error, matters);
             }
         }
         for (k, diffuse) in diffuse.iter_mut().enumerate() {

@@ -1,5 +1,6 @@
 //! Shadow maps: what a lamp sees.
 
+use crate::camera::RasterCfg;
 use crate::lanes::{F, Level};
 use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
@@ -77,11 +78,11 @@ impl ShadowMap {
         light: &Light,
         scene: &RenderScene,
         poses: &[PoseF32],
-        groups: u32,
+        cfg: RasterCfg,
         side: usize,
     ) -> bool {
         let solid = |instance: &Instance| {
-            let solid = matches!(Layer::of(instance, groups), Layer::Opaque | Layer::Veil);
+            let solid = matches!(Layer::of(instance, cfg.groups), Layer::Opaque | Layer::Veil);
             solid && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
         let along = super::shade::unit(light.direction);
@@ -96,7 +97,7 @@ impl ShadowMap {
         self.texel = 1.0 / projection.fx;
         self.projection = projection;
         self.side = side;
-        self.list.build(&projection, scene, poses, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        self.list.build(&projection, scene, poses, cfg.lod, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
         // All of it is written when it is drawn.
         self.nearness.resize(side * side, 0.0);
         self.range.resize((side / BLOCK) * (side / BLOCK), [0.0; 2]);
@@ -123,16 +124,17 @@ impl ShadowMap {
     }
 
     /// How much of the lamp's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
-    /// moved off the surface first, by more than a texel, so that a surface does not shadow itself.
+    /// moved off the surface first, by more than a texel, so that a surface does not shadow itself: and farther where it is
+    /// drawn coarser by up to `error` \[m\], or what casts the shadow is.
     #[inline(always)]
-    pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, lanes: M<S>) -> F<S> {
+    pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
         let p = &self.projection;
         let camera = &p.world_from_camera;
         let inverse = [0, 1, 2].map(|j| [0, 1, 2].map(|i| camera.rotation[i][j]));
         let to_lamp = |v: V3<S>| v.sub(V3::splat(s, camera.translation)).rotate(&inverse);
         let mut c = to_lamp(position);
         let width = if p.parallel { splat(s, self.texel) } else { c.z * self.texel };
-        c = c.add(normal.rotate(&inverse).scale(width * 1.8));
+        c = c.add(normal.rotate(&inverse).scale(width * 1.8 + (error + self.list.error)));
         let (x, y) = if p.parallel { (c.x * p.fx, c.y * p.fy) } else { (c.x * p.fx / c.z, c.y * p.fy / c.z) };
         let (x, y) = (x + (p.cx - 0.5), y + (p.cy - 0.5));
         let nearness = p.nearness_lanes(c.z - width * 0.3);

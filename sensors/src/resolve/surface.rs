@@ -49,7 +49,7 @@ pub(crate) fn surface<S: Simd>(
     let (o, d) = projection.rays(s, &source.placed.local, u, v);
     let zero = splat(s, 0.0);
     let (depth, normal, shading, uv, uv_density);
-    if let Some(mesh) = source.instance.mesh() {
+    if let Some(mesh) = source.placed.mesh(source.instance) {
         let axis = source.placed.local.instance_from_camera.rotation.map(|r| r[2]);
         let hit = triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
         (depth, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);

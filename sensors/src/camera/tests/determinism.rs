@@ -19,7 +19,7 @@ fn rich(seed: u64) -> (RenderScene, Vec<PoseF32>, View) {
 }
 
 /// Frames are compared as bits: NaN would equal itself.
-fn bits(frame: &Frame) -> Vec<u32> {
+pub(super) fn bits(frame: &Frame) -> Vec<u32> {
     let mut out: Vec<u32> = frame.color.iter().flatten().map(|&x| x.into()).collect();
     out.extend(frame.mask.iter().flatten().map(|&x| x as u32));
     let floats = [&frame.depth, &frame.distance, &frame.normal, &frame.shading_normal, &frame.position];

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod degenerate;
+mod detail;
 mod determinism;
 mod golden;
 mod pictures;

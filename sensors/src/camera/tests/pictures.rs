@@ -75,13 +75,15 @@ pub(super) fn report(name: &str, scene: &RenderScene, poses: &[PoseF32], view: &
     }
     println!("{name}, {} x {}, {} triangles", view.width, view.height, scene.triangle_count());
     for (shadows, samples) in [(false, 1), (true, 1), (false, 4), (true, 4)] {
-        let cfg = RasterCfg { samples, shadows, ..RasterCfg::default() };
-        let (ms, bytes) = milliseconds(cfg, scene, poses, view);
-        let rate = 1e3 / ms;
-        println!(
-            "  shadows {shadows}, {samples} samples: {ms:.3} ms, {rate:.0} images/s, scratch {} KiB",
-            bytes / 1024
-        );
+        for lod in [false, true] {
+            let cfg = RasterCfg { samples, shadows, lod, ..RasterCfg::default() };
+            let (ms, bytes) = milliseconds(cfg, scene, poses, view);
+            let rate = 1e3 / ms;
+            println!(
+                "  shadows {shadows}, {samples} samples, lod {lod}: {ms:.3} ms, {rate:.0} images/s, scratch {} KiB",
+                bytes / 1024
+            );
+        }
     }
 }
 

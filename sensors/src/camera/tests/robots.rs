@@ -23,9 +23,9 @@ fn robots() -> Option<PathBuf> {
     found
 }
 
-#[test]
-fn sr5_is_drawn_from_its_own_meshes() {
-    let Some(folder) = robots() else { return };
+/// So many of the vendor's SR5, one beside the other, on a checkered ground; mask ids count links.
+pub(super) fn sr5(copies: usize) -> Option<(RenderScene, Vec<PoseF32>)> {
+    let folder = robots()?;
     let meshes = folder.join("rokae_description/meshes/xMateSR5/visual");
     // The joint frames at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
     let links: [(&str, [f64; 3], [f64; 3]); 7] = [
@@ -47,18 +47,46 @@ fn sr5_is_drawn_from_its_own_meshes() {
         let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE));
         let closed = mesh.clusters().iter().filter(|c| c.closed).count();
         println!("{name}: {} triangles, {closed} of {} clusters closed", mesh.triangles().len(), mesh.clusters().len());
-        instances.push(Instance::new(Mesh { mesh }, white.clone(), k as i32 + 1));
-        poses.push(PoseF32::from(&world));
+        for copy in 0..copies {
+            let id = (7 * copy + k) as i32 + 1;
+            instances.push(Instance::new(Mesh { mesh: Arc::clone(&mesh) }, white.clone(), id));
+            let beside = scene::pose::from_xyz_rpy([0.1 * copy as f64, 0.45 * copy as f64, 0.], [0.; 3]);
+            poses.push(PoseF32::from(&(beside * world)));
+        }
     }
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights[0].direction = [0.1, 0.8, -1.0];
     scene.haze = Some(scene::Haze { color: None, start: 4.0, end: 40.0 });
-    let view = View::look_at([640, 480], 0.7, [1.5, -1.1, 1.0], [0.3, 0.1, 0.45], [0., 0., 1.]).unwrap();
+    Some((scene, poses))
+}
+
+/// A camera that sees one of them, or three.
+pub(super) fn sr5_view(copies: usize, size: [usize; 2]) -> View {
+    let y = 0.2 * copies as f32 - 0.1;
+    View::look_at(size, 0.7, [1.5 * (copies as f32).sqrt(), -1.1, 1.0], [0.3, y, 0.45], [0., 0., 1.]).unwrap()
+}
+
+#[test]
+fn sr5_is_drawn_from_its_own_meshes() {
+    let Some((scene, poses)) = sr5(1) else { return };
+    let view = sr5_view(1, [640, 480]);
     let frame = save("sr5", &scene, &poses, &view);
     let mask = frame.mask.unwrap();
     assert!((1..=7).all(|id| mask.contains(&id)), "every link is seen");
     report("SR5", &scene, &poses, &view);
+    report("SR5", &scene, &poses, &sr5_view(1, [64, 64]));
     report_threads("SR5", &scene, &poses, &view);
+}
+
+#[test]
+fn three_sr5_are_drawn_from_their_own_meshes() {
+    let Some((scene, poses)) = sr5(3) else { return };
+    let view = sr5_view(3, [640, 480]);
+    let frame = save("three-sr5", &scene, &poses, &view);
+    let mask = frame.mask.unwrap();
+    assert!((1..=21).all(|id| mask.contains(&id)), "every link is seen");
+    report("three SR5", &scene, &poses, &view);
+    report("three SR5", &scene, &poses, &sr5_view(3, [64, 64]));
 }
 
 /// The meshes of ANYmal's base, each with its JPEG texture.

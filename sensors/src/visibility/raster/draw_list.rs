@@ -1,10 +1,11 @@
 //! What is drawn in a frame, in which order, and where in the picture.
 
+use super::detail;
 use super::tile::BLOCK;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use scene::shape::Cluster;
-use scene::{Instance, PoseF32, RenderScene};
+use scene::{Instance, PoseF32, RenderMesh, RenderScene};
 
 /// A primitive or a cluster that may be seen.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +28,19 @@ pub(crate) struct Placed {
     pub(crate) local: LocalCamera,
     /// Whether the camera is outside of the instance's bounds, far enough that nothing is cut off in front.
     pub(crate) outside: bool,
+    /// The level of its mesh that is drawn: ids count that level's triangles.
+    pub(crate) level: u8,
+    /// How far that may be from the mesh \[m\].
+    pub(crate) error: f32,
+}
+
+impl Placed {
+    /// The triangles that are drawn of the instance that is placed.
+    #[inline(always)]
+    pub(crate) fn mesh<'a>(&self, instance: &'a Instance) -> Option<&'a RenderMesh> {
+        let mesh = instance.mesh()?;
+        Some(if self.level == 0 { mesh } else { mesh.level(usize::from(self.level)) })
+    }
 }
 
 /// Which instances are drawn where.
@@ -65,6 +79,8 @@ pub(crate) struct DrawList {
     pub(crate) opaque: Vec<Item>,
     /// Things that are not quite opaque, the farthest instance first.
     pub(crate) blended: Vec<(Layer, Item)>,
+    /// The largest [`Placed::error`].
+    pub(crate) error: f32,
 }
 
 impl DrawList {
@@ -74,14 +90,16 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
-    /// Finds what may be seen. `keep` tells instances apart.
+    /// Finds what may be seen, and with `lod` how coarse each mesh may be. `keep` tells instances apart.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,
         scene: &RenderScene,
         poses: &[PoseF32],
+        lod: bool,
         keep: impl Fn(&Instance) -> Layer,
     ) {
+        self.error = 0.0;
         self.placed.clear();
         self.opaque.clear();
         self.blended.clear();
@@ -91,8 +109,8 @@ impl DrawList {
             let t = local.instance_from_camera.translation;
             let margin = if projection.parallel { f32::NEG_INFINITY } else { 2.0 * projection.near };
             let outside = (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin);
-            let placed =
-                Placed { camera_from_instance: projection.world_from_camera.inverse_times(pose), local, outside };
+            let camera_from_instance = projection.world_from_camera.inverse_times(pose);
+            let placed = Placed { camera_from_instance, local, outside, level: 0, error: 0.0 };
             self.placed.push(placed);
             let layer = keep(instance);
             if layer == Layer::Hidden {
@@ -113,7 +131,11 @@ impl DrawList {
                 push(whole);
                 continue;
             };
-            for (k, cluster) in mesh.clusters().iter().enumerate() {
+            let level = if lod { detail::level(projection, instance, &placed.camera_from_instance) } else { 0 };
+            let error = mesh.level_error(usize::from(level));
+            self.placed[index] = Placed { level, error, ..placed };
+            self.error = self.error.max(error);
+            for (k, cluster) in mesh.level(usize::from(level)).clusters().iter().enumerate() {
                 if outside && faces_away(projection, &placed, cluster) {
                     continue;
                 }

@@ -5,6 +5,7 @@
 //! of nearer things are skipped.
 
 mod cluster;
+mod detail;
 mod draw_list;
 pub(crate) mod tile;
 mod triangle;
@@ -12,6 +13,7 @@ mod triangle;
 use super::{Projection, primitive};
 use crate::lanes::{COLUMN, ROW, Simd, load, load_u, select, select_u, splat_u, store, store_u};
 use cluster::{Pass, Vertices};
+pub(crate) use detail::level;
 pub(crate) use draw_list::{DrawList, Item, Layer, Placed};
 use scene::RenderScene;
 use tile::{BLOCK, SAMPLES, Tile};
@@ -38,7 +40,7 @@ impl Painter {
         let index = item.instance as usize;
         let (instance, placed) = (&scene.instances()[index], &placed[index]);
         let first_id = scene.first_ids()[index];
-        match (item.cluster, instance.mesh()) {
+        match (item.cluster, placed.mesh(instance)) {
             (Some(k), Some(mesh)) => {
                 let mut hidden = true;
                 'search: for by in area[1]..=area[3] {

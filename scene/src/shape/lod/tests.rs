@@ -1,0 +1,271 @@
+//! The bounds against distances found by brute force, and what else levels promise.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+use super::super::crease::weld;
+use super::super::{RenderMesh, Shape, Sphere};
+use super::{Level, MIN_TRIANGLES, chain};
+use crate::mesh::{TriMesh, load};
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+type V = [f64; 3];
+
+fn sub(a: V, b: V) -> V {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: V, b: V) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn along(a: V, d: V, t: f64) -> V {
+    [a[0] + t * d[0], a[1] + t * d[1], a[2] + t * d[2]]
+}
+
+/// Square of the distance of a point from a triangle. Source: Ericson, Real-Time Collision Detection, section 5.1.5.
+fn squared(p: V, [a, b, c]: [V; 3]) -> f64 {
+    let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
+    let to = |q: V| dot(sub(p, q), sub(p, q));
+    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return to(a);
+    }
+    let (d3, d4) = (dot(ab, sub(p, b)), dot(ac, sub(p, b)));
+    if d3 >= 0.0 && d4 <= d3 {
+        return to(b);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return to(along(a, ab, d1 / (d1 - d3)));
+    }
+    let (d5, d6) = (dot(ab, sub(p, c)), dot(ac, sub(p, c)));
+    if d6 >= 0.0 && d5 <= d6 {
+        return to(c);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return to(along(a, ac, d2 / (d2 - d6)));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return to(along(b, sub(c, b), (d4 - d3) / ((d4 - d3) + (d5 - d6))));
+    }
+    let scale = 1.0 / (va + vb + vc);
+    to(along(along(a, ab, vb * scale), ac, vc * scale))
+}
+
+fn corners(mesh: &RenderMesh) -> Vec<[V; 3]> {
+    mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize].map(f64::from))).collect()
+}
+
+/// The largest distance of points of `from` to `to`: the corners, middles of edges and middles of some triangles.
+fn farthest(from: &[[V; 3]], to: &[[V; 3]], triangles: usize) -> f64 {
+    let step = (from.len() / triangles).max(1);
+    let points = from.iter().step_by(step).flat_map(|t| {
+        let mix = |w: V| std::array::from_fn(|k| w[0] * t[0][k] + w[1] * t[1][k] + w[2] * t[2][k]);
+        [[1., 0., 0.], [0.5, 0.5, 0.], [0.5, 0., 0.5], [0., 0.5, 0.5], [1. / 3.; 3]].map(mix)
+    });
+    points.map(|p| to.iter().map(|t| squared(p, *t)).fold(f64::MAX, f64::min)).fold(0.0, f64::max).sqrt()
+}
+
+/// A plate of 40 x 30 x 2 cm with fillets of 4 mm all around, in 100 thousand triangles.
+fn plate() -> TriMesh {
+    const RADIUS: f64 = 0.004;
+    let half = [0.2, 0.15, 0.01];
+    let line = |half: f64, flat: usize| -> Vec<f64> {
+        let core = half - RADIUS;
+        let round = |k: usize| core + RADIUS * (k as f64 / 16.0 * std::f64::consts::FRAC_PI_4).tan();
+        let mut line: Vec<f64> = (1..=16).rev().map(|k| -round(k)).collect();
+        line.extend((0..=flat).map(|k| core * (2.0 * k as f64 / flat as f64 - 1.0)));
+        line.extend((1..=16).map(round));
+        line
+    };
+    let lines = [line(half[0], 140), line(half[1], 100), line(half[2], 8)];
+    let mut index: HashMap<[usize; 3], u32> = HashMap::new();
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    let mut vertex = |at: [usize; 3]| {
+        *index.entry(at).or_insert_with(|| {
+            let p: V = [0, 1, 2].map(|k| lines[k][at[k]]);
+            let core: V = [0, 1, 2].map(|k| p[k].clamp(RADIUS - half[k], half[k] - RADIUS));
+            let out = sub(p, core);
+            positions.push(along(core, out, RADIUS / dot(out, out).sqrt()).map(|x| x as f32));
+            positions.len() as u32 - 1
+        })
+    };
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for end in [0, lines[axis].len() - 1] {
+            for i in 0..lines[u].len() - 1 {
+                for j in 0..lines[v].len() - 1 {
+                    let mut at = |di: usize, dj: usize| {
+                        let mut at = [0; 3];
+                        (at[axis], at[u], at[v]) = (end, i + di, j + dj);
+                        vertex(at)
+                    };
+                    let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+                    let new = if end == 0 { [[a, c, b], [a, d, c]] } else { [[a, b, c], [a, c, d]] };
+                    triangles.extend(new);
+                }
+            }
+        }
+    }
+    TriMesh::from_triangles(positions, triangles)
+}
+
+fn render(mesh: &TriMesh) -> RenderMesh {
+    RenderMesh::new(mesh, RenderMesh::CREASE)
+}
+
+fn sphere() -> RenderMesh {
+    render(&Shape::from(Sphere { radius: 0.3 }).tessellate(316))
+}
+
+/// A link of the vendor's robot, where it is present: `KINETOSCOPE_ROBOTS`, or `shared/robots` in a folder above.
+fn vendor(link: &str) -> Option<RenderMesh> {
+    let named = std::env::var_os("KINETOSCOPE_ROBOTS").map(std::path::PathBuf::from);
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let above = || here.ancestors().map(|dir| dir.join("shared/robots")).find(|dir| dir.is_dir());
+    let Some(folder) = named.or_else(above).filter(|dir| dir.is_dir()) else {
+        println!("skipped: no robot descriptions; set KINETOSCOPE_ROBOTS to their folder");
+        return None;
+    };
+    let file = folder.join(format!("rokae_description/meshes/xMateSR5/visual/xMateSR5_{link}.stl"));
+    Some(render(&load(&file).unwrap().scaled([0.001; 3])))
+}
+
+/// How often each directed edge occurs.
+fn edges(mesh: &RenderMesh) -> BTreeMap<(u32, u32), u32> {
+    let welded = weld(mesh.positions());
+    let mut edges = BTreeMap::new();
+    for t in mesh.triangles() {
+        for k in 0..3 {
+            *edges.entry((welded[t[k] as usize], welded[t[(k + 1) % 3] as usize])).or_default() += 1;
+        }
+    }
+    edges
+}
+
+/// How many triangles levels have, and whether they keep what they promise.
+fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
+    let start = std::time::Instant::now();
+    let levels = mesh.levels();
+    println!("{name}: {} triangles, levels in {:?}", mesh.triangles().len(), start.elapsed());
+    let fine = corners(mesh);
+    let borders = |mesh: &RenderMesh| {
+        let edges = edges(mesh);
+        edges.iter().filter(|((a, b), n)| **n != 1 || edges.get(&(*b, *a)) != Some(&1)).count()
+    };
+    let open = borders(mesh);
+    for (level, &most) in levels.iter().zip(most) {
+        let coarse = corners(&level.mesh);
+        let error = f64::from(level.error);
+        let (there, back) = (farthest(&fine, &coarse, 600), farthest(&coarse, &fine, 120));
+        println!(
+            "  {} triangles, bound {:.4} mm, found {:.4} and {:.4} mm",
+            coarse.len(),
+            1e3 * error,
+            1e3 * there,
+            1e3 * back
+        );
+        assert!(there <= error, "{name}: {there} from the mesh to its level, bound {error}");
+        assert!(back <= error, "{name}: {back} from a level to the mesh, bound {error}");
+        assert!(coarse.len() <= most, "{name}: {} triangles instead of {most}", coarse.len());
+        assert_eq!(borders(&level.mesh), open, "{name}: edges without exactly one neighbour");
+        // The control: what is moved by twice the bound is found.
+        let moved: Vec<[V; 3]> = coarse.iter().map(|t| t.map(|p| along(p, [1.0, 0.9, 0.8], 2.0 * error))).collect();
+        assert!(farthest(&fine, &moved, 600) > error, "{name}: a level that is elsewhere must be found");
+        facing(name, &level.mesh);
+    }
+    assert_eq!(levels.len(), most.len(), "{name}: number of levels");
+    assert!(levels.windows(2).all(|pair| pair[0].error <= pair[1].error));
+    for error in [0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1.0] {
+        let number = mesh.level_within(error);
+        assert!(mesh.level_error(number) <= error);
+        assert!(number == levels.len() || levels[number].error > error, "the coarsest");
+    }
+}
+
+/// Normals are kept from the mesh; new triangles face where their corners do.
+fn facing(name: &str, level: &RenderMesh) {
+    let mut elsewhere = 0;
+    for t in level.triangles() {
+        let [a, b, c] = t.map(|i| level.positions()[i as usize].map(f64::from));
+        let (u, v) = (sub(b, a), sub(c, a));
+        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let face = |i: &u32| dot(n, level.normals()[*i as usize].map(f64::from)) >= 0.76 * dot(n, n).sqrt();
+        elsewhere += usize::from(!t.iter().all(face));
+    }
+    // Needles of the mesh itself may face anywhere.
+    assert!(elsewhere * 50 <= level.triangles().len(), "{name}: {elsewhere} of {}", level.triangles().len());
+}
+
+#[test]
+fn bounds_hold_on_a_ball() {
+    // A ball of 99224 triangles; a regular triangle inside of it that is d below the surface has an area of 3 sqrt(3) r d / 2:
+    // no fewer than 1452 triangles stay within 1 mm.
+    check("ball", &sphere(), &[43_000, 26_000, 15_500, 8_500]);
+}
+
+#[test]
+fn bounds_hold_on_a_plate_with_fillets() {
+    // Of 139456.
+    check("plate", &render(&plate()), &[1_400, 640, 330, 180]);
+}
+
+#[test]
+fn bounds_hold_on_the_vendors_robot() {
+    for link in ["base", "link1"] {
+        let Some(mesh) = vendor(link) else { return };
+        check(link, &mesh, &[13_000, 9_200, 6_300, 4_300]);
+    }
+}
+
+#[test]
+fn small_and_textured_meshes_have_no_levels() {
+    let ball = |segments| Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
+    let small = render(&ball(30));
+    assert!(small.triangles().len() < MIN_TRIANGLES && small.levels().is_empty());
+    let mut textured = ball(100);
+    assert!(!render(&textured).levels().is_empty());
+    textured.uvs = Some(vec![[0.0; 2]; textured.positions.len()]);
+    let textured = render(&textured);
+    assert!(
+        textured.levels().is_empty() && textured.level_within(1.0) == 0 && textured.level(3).triangles().len() > 1000
+    );
+}
+
+#[test]
+fn levels_are_the_same_on_every_run() {
+    let mesh = render(&Shape::from(Sphere { radius: 0.3 }).tessellate(120));
+    let numbers = |levels: &[Level]| -> Vec<u32> {
+        let of = |l: &Level| {
+            let positions = l.mesh.positions().as_flattened().iter().map(|x| x.to_bits());
+            let triangles = l.mesh.triangles().as_flattened().iter().copied();
+            [l.error.to_bits()].into_iter().chain(positions).chain(triangles).collect::<Vec<_>>()
+        };
+        levels.iter().flat_map(of).collect()
+    };
+    assert_eq!(numbers(&chain(&mesh)), numbers(mesh.levels()));
+    assert_eq!(mesh.levels().len(), mesh.clone().levels().len());
+}
+
+/// Half a ball: the border is open. Every vertex of it must stay, so that a neighbour of another material fits.
+#[test]
+fn borders_stay() {
+    let mut half = Shape::from(Sphere { radius: 0.3 }).tessellate(160);
+    half.triangles.truncate(half.triangles.len() / 2);
+    let mesh =
+        RenderMesh::of_part(&half, &crate::mesh::MeshPart { triangles: 0..half.triangles.len(), material: None }, 0.5);
+    let border = |mesh: &RenderMesh| -> Vec<[[u32; 3]; 2]> {
+        let edges = edges(mesh);
+        let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a)));
+        let at = |i: u32| mesh.positions()[i as usize].map(f32::to_bits);
+        let mut places: Vec<_> = open.map(|&(a, b)| [at(a), at(b)]).collect();
+        places.sort_unstable();
+        places
+    };
+    assert_eq!(border(&mesh).len(), 160);
+    assert!(!mesh.levels().is_empty());
+    for level in mesh.levels() {
+        assert_eq!(border(&level.mesh), border(&mesh));
+    }
+}
