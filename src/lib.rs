@@ -15,7 +15,7 @@ pub mod prelude {
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
     };
-    pub use sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+    pub use sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
     pub use sensors::{JointState, JointStateCfg, NoiseCfg, Sampled, SamplingCfg};
     pub use sim::{
         BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,

@@ -32,7 +32,7 @@ pub use expected::Expected;
 pub use history::History;
 pub use joint_state::{JointState, JointStateCfg};
 pub use noise::NoiseCfg;
-pub use ray::{RayCaster, RayCasterCfg};
+pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{Requires, Sensor, SensorCfg, SensorContext};

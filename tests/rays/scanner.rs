@@ -193,3 +193,39 @@ fn a_robot_sees_itself_but_not_what_carries_the_sensor() {
     let carrier: Vec<&String> = all.iter().filter(|name| !others.contains(name)).collect();
     assert!(!carrier.is_empty(), "the link under the sensor is seen only where it is not left out: {all:?} {others:?}");
 }
+
+/// Two ways to the same picture: the rasterizer and one ray per pixel, off silhouettes.
+#[test]
+fn a_camera_of_rays_sees_what_the_rasterizer_draws() {
+    let (mut sim, _) = tumbling(2, 1);
+    let extrinsics = Extrinsics {
+        placement: Placement::LookAt { eye: [-1.5, 1.0, 1.4], target: [0.1, 0.0, 0.5], up: [0.0, 0.0, 1.0] },
+        ..Extrinsics::default()
+    };
+    let intrinsics = Intrinsics::Fovy { radians: 0.9 };
+    let (width, height) = (160, 120);
+    let rays = RayCasterCameraCfg { width, height, intrinsics, extrinsics: extrinsics.clone(), ..Default::default() };
+    let channels = Channels::from_names(&["depth", "mask", "normal"]).unwrap();
+    let camera = CameraCfg { width, height, intrinsics, extrinsics, channels, ..Default::default() };
+    let (rays, camera) = (sim.add_sensor("rays", rays).unwrap(), sim.add_sensor("camera", camera).unwrap());
+    sim.update(9);
+    let (rays, camera) = (sim.sensor(rays).unwrap(), sim.sensor(camera).unwrap());
+    let (mask, depth, normal) = (camera.mask().unwrap(), camera.depth().unwrap(), camera.normal().unwrap());
+    let (mut differing, mut compared) = (0, 0);
+    for (at, id) in rays.mask().indexed_iter() {
+        // Beyond the camera's far plane of 100 m there is still ground.
+        if rays.depth()[at] > 99.0 {
+            continue;
+        }
+        compared += 1;
+        let close = (rays.depth()[at] / depth[at] - 1.0).abs() < 1e-4;
+        let same_normal = (0..3)
+            .map(|k| (rays.normal()[(at.0, at.1, at.2, k)] - normal[(at.0, at.1, at.2, k)]).abs())
+            .all(|error| error < 1e-3);
+        differing += usize::from(*id != mask[at] || !close || !same_normal);
+    }
+    println!("{differing} of {compared} pixels differ");
+    // The outlines of a box, a wall and a ball: coverage of the rasterizer is snapped to 1/256 pixel or so.
+    assert!(compared > 30_000 && differing < 40, "{differing} of {compared} pixels differ");
+    assert!(rays.mask().iter().collect::<std::collections::BTreeSet<_>>().len() >= 4, "ground, trunk, wall, ball");
+}
