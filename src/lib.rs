@@ -15,7 +15,9 @@ pub mod prelude {
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
     };
-    pub use sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg, RayPattern};
+    pub use sensors::ray::{
+        HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,
+    };
     pub use sensors::{
         ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu, ImuCfg, JointState, JointStateCfg,
         JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,

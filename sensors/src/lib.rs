@@ -41,7 +41,7 @@ pub use imu::{Imu, ImuCfg};
 pub use joint_state::{JointState, JointStateCfg};
 pub use joint_wrench::{JointWrench, JointWrenchCfg};
 pub use noise::NoiseCfg;
-pub use ray::{RayCaster, RayCasterCfg};
+pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{Requires, Sensor, SensorCfg, SensorContext};

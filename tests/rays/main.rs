@@ -3,3 +3,4 @@
 
 mod judge;
 mod primitives;
+mod scanner;

@@ -5,6 +5,7 @@
 
 mod assets;
 mod bvh;
+pub mod camera;
 pub mod caster;
 mod error;
 pub mod pattern;
@@ -18,6 +19,7 @@ mod tests;
 
 pub(crate) use assets::Assets;
 pub use assets::RayAssets;
+pub use camera::{RayCasterCamera, RayCasterCameraCfg};
 pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use pattern::RayPattern;

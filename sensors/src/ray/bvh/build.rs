@@ -76,9 +76,9 @@ impl Bvh {
             };
             let node = &mut self.nodes[index];
             (node.child[k], node.count[k]) = (to, count);
-            for axis in 0..3 {
-                node.sides[axis][k] = ((f64::from(bounds[0][axis]) - pad) as f32).next_down();
-                node.sides[axis + 3][k] = ((f64::from(bounds[1][axis]) + pad) as f32).next_up();
+            for (axis, (&lo, &hi)) in bounds[0].iter().zip(&bounds[1]).enumerate() {
+                node.sides[axis][k] = ((f64::from(lo) - pad) as f32).next_down();
+                node.sides[axis + 3][k] = ((f64::from(hi) + pad) as f32).next_up();
             }
         }
         index as u32
@@ -130,7 +130,7 @@ impl Builder<'_> {
     fn best_plane(&self, items: &Range<usize>, middles: &Aabb) -> Option<(f32, usize, usize)> {
         let mut best: Option<(f32, usize, usize)> = None;
         for axis in 0..3 {
-            if !(middles[1][axis] > middles[0][axis]) {
+            if middles[1][axis] <= middles[0][axis] {
                 continue;
             }
             let mut bins = [(0usize, NOTHING); BINS];

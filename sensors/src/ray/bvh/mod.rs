@@ -97,13 +97,7 @@ impl Bvh {
                             if next.near < entry.near {
                                 std::mem::swap(&mut next, &mut entry);
                             }
-                            // The nearest one on top; the first of those that are as near.
-                            let mut at = stack.len();
-                            stack.push(next);
-                            while at > bottom && stack[at - 1].near <= stack[at].near {
-                                stack.swap(at - 1, at);
-                                at -= 1;
-                            }
+                            insert(stack, bottom, next);
                         }
                         continue;
                     }
@@ -136,7 +130,7 @@ impl Bvh {
             let (a, b) = ((lo[k] - o) * inverse, (hi[k] - o) * inverse);
             (shift, leave) = (shift.max(a.min(b)), leave.min(a.max(b)));
         }
-        if !(shift <= leave) {
+        if shift > leave {
             return None;
         }
         let origin = along(ray.origin, shift, ray.direction).map(|x| x as f32);
@@ -147,6 +141,17 @@ impl Bvh {
         });
         let backward = inverse.map(|x| x < 0.0);
         Some(ShortRay { shift, origin, inverse, backward })
+    }
+}
+
+/// Puts an entry where it belongs above `bottom`: the nearest one on top, the first of those that are as near.
+#[inline(always)]
+fn insert(stack: &mut Vec<Entry>, bottom: usize, entry: Entry) {
+    let mut at = stack.len();
+    stack.push(entry);
+    while at > bottom && stack[at - 1].near <= stack[at].near {
+        stack.swap(at - 1, at);
+        at -= 1;
     }
 }
 

@@ -142,9 +142,9 @@ fn alignments_and_offsets_turn_starts_and_directions() {
         let frame = Pose::from_parts(pose.translation, rotation) * offset;
         let expected =
             [(frame * nalgebra::Point3::from(start)).coords, frame.rotation * nalgebra::Vector3::from(direction)];
-        for axis in 0..3 {
-            assert!((caster.ray_starts()[(1, 0, axis)] - expected[0][axis]).abs() < 1e-12, "{alignment:?}");
-            assert!((caster.ray_directions()[(1, 0, axis)] - expected[1][axis]).abs() < 1e-12, "{alignment:?}");
+        for (measured, expected) in [caster.ray_starts(), caster.ray_directions()].iter().zip(expected) {
+            let errors = (0..3).map(|axis| (measured[(1, 0, axis)] - expected[axis]).abs());
+            assert!(errors.fold(0.0, f64::max) < 1e-12, "{alignment:?}");
         }
     }
 }
@@ -223,9 +223,9 @@ fn environments_are_alone_and_threads_change_nothing() {
     let one = built_in(&cfg, &context(4, 1), &state(&steps));
     // 36000 rays in 4 environments are worth four threads.
     let four = built_in(&cfg, &context(4, 4), &state(&steps));
-    for env in 0..4 {
+    for (env, &step) in steps.iter().enumerate() {
         assert_eq!(bits(&one, env), bits(&four, env));
-        let alone = built_in(&cfg, &context(1, 1), &state_with(&[steps[env]], |_, step| base(env, step)));
+        let alone = built_in(&cfg, &context(1, 1), &state_with(&[step], |_, step| base(env, step)));
         // The ball is where it is in environment 0 there: rays that hit neither are the same.
         let same = (0..one.num_rays()).filter(|&k| one.hit_ids()[(env, k)] != BALL && alone.hit_ids()[(0, k)] != BALL);
         let mut count = 0;

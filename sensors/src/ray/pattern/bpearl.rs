@@ -1,6 +1,6 @@
 //! The hemispherical laser RS-Bpearl.
 
-use super::{PatternImpl, finite, positive};
+use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
 
 /// Elevations of the beams \[deg\]. Source: Isaac Lab's `BpearlPatternCfg`.
@@ -43,7 +43,7 @@ impl PatternImpl for Bpearl {
         if valid { self.azimuths() * self.vertical_deg.len() as f64 } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+    fn rays(&self) -> Result<Vec<Line>, RayError> {
         positive("bpearl", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
         positive("bpearl", "horizontal_fov_deg", self.horizontal_fov_deg)?;
         for &angle in &self.vertical_deg {

@@ -1,6 +1,6 @@
 //! Any rays.
 
-use super::PatternImpl;
+use super::{Line, PatternImpl};
 use crate::ray::RayError;
 
 /// Any rays.
@@ -17,7 +17,7 @@ impl PatternImpl for Custom {
         if self.starts.len() == self.directions.len() { self.starts.len() as f64 } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+    fn rays(&self) -> Result<Vec<Line>, RayError> {
         let (starts, directions) = (self.starts.len(), self.directions.len());
         if starts != directions {
             return Err(RayError::Lengths { starts, directions });

@@ -1,6 +1,6 @@
 //! Parallel rays over a rectangle.
 
-use super::{PatternImpl, finite, positive};
+use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
 
 /// Which axis runs fastest in the order of the rays.
@@ -62,7 +62,7 @@ impl PatternImpl for Grid {
         if valid { self.counts()[0] * self.counts()[1] } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+    fn rays(&self) -> Result<Vec<Line>, RayError> {
         positive("grid", "resolution", self.resolution)?;
         for (what, length) in ["size along x", "size along y"].into_iter().zip(self.size) {
             finite("grid", what, length)?;

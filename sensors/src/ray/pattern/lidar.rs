@@ -1,6 +1,6 @@
 //! A spinning laser.
 
-use super::{PatternImpl, finite, positive};
+use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
 
 /// A spinning laser: channels at equal steps of elevation, each a ring of rays at equal steps of azimuth. Channel after
@@ -53,7 +53,7 @@ impl PatternImpl for Lidar {
         if valid { self.channels as f64 * self.azimuths() } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+    fn rays(&self) -> Result<Vec<Line>, RayError> {
         positive("lidar", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
         let [first, last] = self.horizontal_fov_deg;
         finite("lidar", "horizontal_fov_deg", first)?;

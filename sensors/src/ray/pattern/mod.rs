@@ -7,13 +7,16 @@ pub use grid::GridOrder;
 use super::vector::unit;
 use super::{Ray, RayError};
 
+/// A start, and a direction of any length.
+type Line = ([f64; 3], [f64; 3]);
+
 /// What a pattern must be able to do.
 trait PatternImpl {
     /// How many rays there are, before they are made; the numbers were not checked yet.
     fn count(&self) -> f64;
 
-    /// Starts and directions, of any length; called where the count is possible.
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError>;
+    /// The rays; called where the count is possible.
+    fn rays(&self) -> Result<Vec<Line>, RayError>;
 }
 
 /// Declares the patterns: a module with a type of its own each.
@@ -88,7 +91,7 @@ impl RayPattern {
             return Err(RayError::Count { pattern, count: rays.len() as f64, limit: Self::MAX_RAYS });
         }
         let ray =
-            |(index, (start, direction)): (usize, ([f64; 3], [f64; 3]))| {
+            |(index, (start, direction)): (usize, Line)| {
                 let finite = start.iter().chain(&direction).all(|x| x.is_finite());
                 unit(direction)
                     .filter(|_| finite)

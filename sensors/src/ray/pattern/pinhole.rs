@@ -1,6 +1,6 @@
 //! A ray through every pixel of a camera.
 
-use super::PatternImpl;
+use super::{Line, PatternImpl};
 use crate::camera::Intrinsics;
 use crate::ray::RayError;
 
@@ -27,7 +27,7 @@ impl PatternImpl for Pinhole {
         self.width as f64 * self.height as f64
     }
 
-    fn rays(&self) -> Result<Vec<([f64; 3], [f64; 3])>, RayError> {
+    fn rays(&self) -> Result<Vec<Line>, RayError> {
         let lens = self.intrinsics.to_pixels(self.width, self.height)?;
         let ray = |u: usize, v: usize| {
             // Right of the axis and below it, for a depth of 1.

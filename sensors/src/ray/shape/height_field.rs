@@ -163,11 +163,11 @@ impl Field {
             // Where the ray leaves the block, and across which side.
             let mut leave = to;
             let mut axis = None;
-            for k in 0..2 {
+            for (k, &block) in block.iter().enumerate() {
                 if walk.direction[k] == 0.0 {
                     continue;
                 }
-                let line = if walk.direction[k] > 0.0 { (block[k] + 1) << level } else { block[k] << level };
+                let line = if walk.direction[k] > 0.0 { (block + 1) << level } else { block << level };
                 let t = (line as f64 - walk.origin[k]) * walk.inverse[k];
                 if t < leave {
                     (leave, axis) = (t, Some(k));
