@@ -242,8 +242,8 @@ impl Totals {
             sim.sensor(scanner)?.sample_counts()[0],
             contacts.sample_counts()[0],
         ];
-        for k in 0..3 {
-            self.updates[k] += if now[k] >= self.seen[k] { now[k] - self.seen[k] } else { now[k] };
+        for ((updates, seen), now) in self.updates.iter_mut().zip(self.seen).zip(now) {
+            *updates += now.checked_sub(seen).unwrap_or(now);
         }
         self.seen = now;
         self.max_force = self.max_force.max(largest(contacts.net_forces_w()));

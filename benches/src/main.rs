@@ -3,6 +3,7 @@
 //! `cargo xtask bench` runs this on both lines of MuJoCo. A table goes to standard error, the rows as JSON to a file.
 
 mod camera;
+mod contacts;
 mod drive;
 mod foreign;
 mod interleave;
@@ -27,6 +28,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("mujoco-batch", mujoco_batch::run),
     ("camera", camera::run),
     ("rays", rays::run),
+    ("contacts", contacts::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -45,7 +47,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

@@ -1,0 +1,77 @@
+//! What a contact sensor costs: quadrupeds that stand, with a sensor on their feet that measures in every step and keeps six
+//! measurements, against the same quadrupeds without. The sides are created in both orders, half the time each.
+
+use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::prelude::*;
+use std::time::{Duration, Instant};
+
+const ENVS: usize = 64;
+/// A sensor may take 3 % of a step.
+const WANTED: f64 = 1.0 / 1.03;
+/// They stand: there is no need to start again.
+const STEPS: u32 = 1_000_000;
+/// Steps until they stand.
+const SETTLING: u32 = 400;
+
+struct Quadrupeds {
+    sim: SimulationManager,
+    feet: Option<SensorId<ContactSensor>>,
+}
+
+impl Quadrupeds {
+    fn new(sensor: bool) -> Outcome<Self> {
+        let cfg = SimulationManagerCfg { num_envs: ENVS, threads: Some(1), ..SimulationManagerCfg::legged() };
+        let mut sim = SimulationManager::new(cfg)?;
+        let pose = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
+        sim.add_robot(RobotCfg {
+            urdf: UrdfCfg::single(assets::path("quadruped/quadruped.urdf")?),
+            fix_base: false,
+            init_pose: Pose::translation(0.0, 0.0, 0.6),
+            init_qpos: pose.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
+            drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
+            ..Default::default()
+        })?;
+        sim.update(SETTLING);
+        let sampling = SamplingCfg { history_length: 6, ..Default::default() };
+        let cfg = ContactSensorCfg { sampling, ..ContactSensorCfg::of(".*_FOOT") };
+        let feet = if sensor { Some(sim.add_sensor("feet", cfg)?) } else { None };
+        Ok(Self { sim, feet })
+    }
+}
+
+impl Side for Quadrupeds {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.sim.update(1);
+        }
+        let took = start.elapsed();
+        if let Some(feet) = self.feet {
+            let forces = self.sim.sensor(feet)?.net_forces_w();
+            if !(0..ENVS).all(|env| (0..4).any(|foot| forces[(env, foot, 2)] > 1.0)) {
+                return Err("a quadruped stands on no foot".into());
+            }
+        }
+        Ok(took)
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let times = in_both_orders(|order| {
+        let (mut with, mut without) = order.create(|| Quadrupeds::new(true), || Quadrupeds::new(false))?;
+        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: STEPS };
+        measure(plan, &mut [&mut with, &mut without])
+    })?;
+    let micros = |side: usize| 1e6 / times.rate(side, ENVS);
+    Ok(vec![
+        Row::new("contacts", format!("quadruped, {ENVS} envs"), "us/env-step", 1, micros(0))
+            .against("no sensor", micros(1), times.ratio(0, 1))
+            .wanted(WANTED),
+    ])
+}
