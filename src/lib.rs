@@ -20,8 +20,9 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,
-        MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId,
-        SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
+        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error,
+        Integrator, InteractiveScene, JointIndex, MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint,
+        Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Still,
+        UrdfCfg,
     };
 }

@@ -7,9 +7,11 @@ use crate::resolve::plan::Plan;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::{RenderError, View};
 use scene::{Light, PoseF32, RenderScene};
+use serde::{Deserialize, Serialize};
 
 /// How frames are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RasterCfg {
     /// Samples per pixel for the colour: 1 or 4. All other channels see the pixel's centre.
     pub samples: u8,
