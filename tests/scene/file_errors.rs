@@ -21,7 +21,7 @@ fn a_mistake_is_named_with_its_line() {
         (
             "[entities.c]\ntype = \"camera\"\nextrinsics.placement.look_at = { eye = [1, 0, 0], tarket = [0, 0, 0] }",
             3,
-            &["tarket", "`target`"],
+            &["tarket", "target,"],
         ),
         ("[entities.i]\ntype = \"imu\"\n[entities.i.sampling.noise.lin_acc_b]\nstdd = 0.1", 4, &["stdd", "`std`"]),
         // Kinds that nobody knows.

@@ -95,7 +95,7 @@ impl Default for CameraCfg {
             round_period: false,
             channels: Channels { color: true, ..Channels::default() },
             depth_miss: DepthMiss::Inf,
-            raster: RasterCfg { groups: 0b111, ..RasterCfg::default() },
+            raster: RasterCfg::of_cameras(),
             env_ids: None,
             lazy: true,
         }
