@@ -329,7 +329,7 @@ mod tests {
                 pose: Pose::from_parts([angle, 0.1, -0.0].into(), rotation.inverse()),
                 rotation,
                 vector: Vector3::new(0.1, 0.2, angle),
-                bias: (k % 2 == 0).then(|| Vector3::x()),
+                bias: (k % 2 == 0).then(Vector3::x),
                 pairs: vec![("z.*".into(), 1), ("a".into(), 2)],
                 thickness: (k % 3 == 0).then_some(angle),
             };

@@ -35,8 +35,7 @@ use std::path::Path;
 ///
 /// The same in a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
 ///
-/// ```
-/// # let text = r#"
+/// ```toml
 /// [simulation]               # the fields of SimulationManagerCfg; preset = "legged" or "manipulation" changes the defaults
 /// num_envs = 2
 ///
@@ -47,11 +46,6 @@ use std::path::Path;
 /// [entities.touch]
 /// type = "contact_sensor"
 /// bodies = ["{ENV_REGEX_NS}/cube"]
-/// # "#;
-/// # let text = text.replace("/// ", "");
-/// # let cfg = sim::SceneCfg::from_toml(&text, "scene.toml", &sim::EntityTypes::default())?;
-/// # assert_eq!(cfg.keys().collect::<Vec<_>>(), ["cube", "touch"]);
-/// # Ok::<(), sim::Error>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct SceneCfg {
