@@ -23,8 +23,9 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, GroundCfg, Integrator,
-        JointIndex, LightCfg, MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg,
-        RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
+        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error,
+        GroundCfg, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId, NameCase, NameCaseCfg, ObjectId,
+        ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager,
+        SimulationManagerCfg, Still, UrdfCfg,
     };
 }

@@ -3,6 +3,7 @@
 //! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
 #![forbid(unsafe_code)]
 
+pub mod file_format;
 pub mod light;
 pub mod marker;
 pub mod material;

@@ -194,6 +194,12 @@ fn claim<'k, N: AsRef<str>>(
     }
 }
 
+/// A name or pattern without what says "in every environment" before it, `{ENV}/` or Isaac's `{ENV_REGEX_NS}/`: whatever is
+/// named is named in all of them.
+pub fn in_every_env(name: &str) -> &str {
+    ["{ENV}/", "{ENV_REGEX_NS}/"].into_iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name)
+}
+
 /// The candidates most like `name`, best first, at most [`MAX_CANDIDATES`]; case counts little.
 pub fn closest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Vec<&'c str> {
     let mut ranked: Vec<(usize, &str)> = candidates.into_iter().map(|c| (edit_distance(name, c), c)).collect();

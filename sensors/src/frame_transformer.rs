@@ -8,29 +8,35 @@ use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use ndarray::{ArrayView2, ArrayView3};
 use scene::pose::{from_row, to_wxyz};
 use scene::{Marker, Pose, SceneState};
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`FrameTransformer`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrameTransformerCfg {
     /// The body of the source frame: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
     pub source: String,
     /// The source frame in that of its body.
+    #[serde(default, with = "scene::file_format::pose")]
     pub source_offset: Pose,
     /// The target frames, in the order they are reported.
     pub targets: Vec<TargetFrameCfg>,
     /// Rate, history, latency and noise; channels that can have noise: `source_pos_w`, `target_pos_w` and
     /// `target_pos_source`.
+    #[serde(default)]
     pub sampling: SamplingCfg,
 }
 
 /// One target frame, or one on each of several bodies.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TargetFrameCfg {
     /// Pattern of the names of the bodies, full or bare; the body of the source is no exception.
     pub bodies: String,
     /// What the frame is called; the full name of its body where `None`. With several bodies, `name/body`.
     pub name: Option<String>,
     /// The frame in that of its body.
+    #[serde(default, with = "scene::file_format::pose")]
     pub offset: Pose,
 }
 

@@ -8,15 +8,19 @@ use nalgebra::Vector3;
 use ndarray::ArrayView2;
 use scene::pose::to_wxyz;
 use scene::{Pose, SceneState};
+use serde::{Deserialize, Serialize};
 
 /// Configuration of an [`Imu`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ImuCfg {
     /// The body that it is fixed to: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
     pub body: String,
     /// Its frame in that of the body.
+    #[serde(with = "scene::file_format::pose")]
     pub offset: Pose,
     /// What it reads at rest beside its own acceleration \[m/s²\], in world axes; `None` for minus gravity, as a real one.
+    #[serde(with = "scene::file_format::optional_vector")]
     pub gravity_bias: Option<Vector3<f64>>,
     /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
     /// `ang_acc_b`.

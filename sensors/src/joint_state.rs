@@ -9,9 +9,11 @@ use crate::select::select;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
 use scene::SceneState;
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`JointState`] sensor.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct JointStateCfg {
     /// The joints to measure, by patterns of their names (`uid/joint`, or `joint` alone), in the order they are reported;
     /// `None` is all of them.

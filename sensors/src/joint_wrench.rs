@@ -6,9 +6,11 @@ use crate::select::select;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use ndarray::ArrayView3;
 use scene::SceneState;
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`JointWrench`] sensor.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct JointWrenchCfg {
     /// The links whose joints are measured, by patterns of their names (`uid/link`, or `link` alone), in the order they are
     /// reported. Links that fixed joints fuse to others have no joint that could be measured.

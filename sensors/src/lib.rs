@@ -14,6 +14,7 @@ pub mod contact_sensor;
 mod delay;
 pub mod error;
 pub mod expected;
+mod file_format;
 pub mod frame_transformer;
 mod frames;
 pub mod history;

@@ -6,10 +6,12 @@ use crate::sensor::SensorContext;
 use ndarray::{Array2, Axis};
 use scene::Random;
 use scene::pattern::closest;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Errors of the numbers of one channel, each number for itself: `round(value + bias + std * n)`, n normal.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct NoiseCfg {
     /// Standard deviation of what each measurement adds, in the unit of the channel.
     pub std: f64,

@@ -12,11 +12,13 @@ use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, SensorContext};
 use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axis, Dimension, IntoDimension};
 use scene::SceneState;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// When a sensor measures, what it remembers, and what goes wrong on the way. `Default` is a perfect sensor: every step,
 /// nothing late, lost or noisy.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SamplingCfg {
     /// Time between measurements \[s\]; 0 is every physics step.
     pub update_period: f64,

@@ -1,12 +1,12 @@
 //! Bodies and joints by name patterns.
 
 use crate::error::SensorError;
-use scene::pattern::{Pattern, PatternError, closest};
+use scene::pattern::{Pattern, PatternError, closest, in_every_env};
 
 /// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
 ///
 /// A pattern is a regular expression that must match the whole name (see [`scene::pattern`]): the full one (`uid/link`), or
-/// the part behind the first slash. `what` says what the names are, such as `body`.
+/// the part behind the first slash. `{ENV}/` and `{ENV_REGEX_NS}/` before it change nothing. `what` says what the names are, such as `body`.
 ///
 /// # Errors
 ///
@@ -33,6 +33,7 @@ pub fn select<P: AsRef<str>>(patterns: &[P], names: &[String], what: &'static st
 ///
 /// As [`select`].
 pub fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
+    let pattern = in_every_env(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;
     let matches = |name: &str| compiled.matches(name) || compiled.matches(bare(name));
     let found: Vec<usize> = (0..names.len()).filter(|&i| matches(&names[i])).collect();

@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::ray::RayAssets;
 use nalgebra::Vector3;
-use scene::pattern::{MAX_CANDIDATES, closest};
+use scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
 use scene::{Marker, RenderScene, SceneState};
 use std::any::Any;
 use std::fmt;
@@ -103,12 +103,13 @@ pub struct SensorContext {
 
 impl SensorContext {
     /// Index of a body on the body axis, by its full name (`uid/link`), or by the part behind the first slash where only
-    /// one body is called so.
+    /// one body is called so. `{ENV}/` and `{ENV_REGEX_NS}/` before it change nothing.
     ///
     /// # Errors
     ///
     /// [`SensorError::UnknownName`] with the nearest names, [`SensorError::AmbiguousName`] with those that it may mean.
     pub fn body(&self, name: &str) -> Result<usize, SensorError> {
+        let name = in_every_env(name);
         if let Some(index) = self.bodies.iter().position(|b| b == name) {
             return Ok(index);
         }

@@ -143,6 +143,32 @@ pub enum Error {
         /// Names that exist, nearest first.
         candidates: Vec<String>,
     },
+    /// An entity of a scene is something else.
+    #[error("{name:?} is a {found}, not a {wanted}")]
+    EntityType {
+        /// The entity.
+        name: String,
+        /// What it is.
+        found: String,
+        /// What it was taken for.
+        wanted: String,
+    },
+    /// A scene file is wrong.
+    #[error("{at}: {reason}")]
+    SceneFile {
+        /// Where.
+        at: Source,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
+    /// A scene cannot be written as a file.
+    #[error("{what} cannot be written to a scene file: {reason}")]
+    SceneFileWrite {
+        /// The part of the scene.
+        what: String,
+        /// Why.
+        reason: String,
+    },
     /// No such index.
     #[error("{what} {index} does not exist; there are {count} (0 to {})", count.saturating_sub(1))]
     UnknownIndex {

@@ -18,12 +18,14 @@ use nalgebra::Vector3;
 use ndarray::Array2;
 use sensors::ray::RayAssets;
 use sensors::{Requires, Sensor, SensorCfg, SensorContext};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SimulationManagerCfg {
     /// Number of environments.
     pub num_envs: usize,
@@ -32,6 +34,7 @@ pub struct SimulationManagerCfg {
     /// MuJoCo steps in one `physics_dt`.
     pub substeps: u32,
     /// Gravity \[m/s²\].
+    #[serde(with = "scene::file_format::vector")]
     pub gravity: Vector3<f64>,
     /// Integrator.
     pub integrator: Integrator,
@@ -51,13 +54,15 @@ pub struct SimulationManagerCfg {
     /// Distance of environments in the overview \[m\].
     pub arena_space: f64,
     /// Ground plane at z = 0; `None` for none.
+    #[serde(with = "scene::file_format::or_false")]
     pub ground: Option<GroundCfg>,
     /// Lights.
     pub lights: Vec<LightCfg>,
 }
 
 /// A ground plane at z = 0.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct GroundCfg {
     /// Half of the side that is drawn \[m\]; the plane itself is infinite.
     pub half_size: f64,
@@ -74,9 +79,11 @@ impl Default for GroundCfg {
 }
 
 /// A directional light.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct LightCfg {
     /// Direction in which it shines.
+    #[serde(with = "scene::file_format::vector")]
     pub direction: Vector3<f64>,
     /// Colour, 0..=1.
     pub color: [f64; 3],

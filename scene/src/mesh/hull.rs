@@ -7,6 +7,7 @@
 //! (4e-12 of it, far below what `f32` coordinates resolve), where planes are integers. With rounding instead, faces of
 //! CAD parts with many points in one plane give slivers that point anywhere.
 
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 
 use super::TriMesh;
@@ -23,7 +24,8 @@ const RESOLUTION: f64 = 1e-8;
 const GRID_BITS: i32 = 38;
 
 /// How a hull is simplified.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct HullCfg {
     /// The most vertices of the hull, at least 4. Contact tests cost time per vertex.
     pub max_vertices: usize,
@@ -33,6 +35,7 @@ pub struct HullCfg {
     pub tolerance: f64,
     /// The thickness \[m\] that a flat point set gets, half on each side of its plane. Flat means thinner than the
     /// tolerance. `None` makes a flat point set an error.
+    #[serde(with = "crate::file_format::or_false")]
     pub min_thickness: Option<f64>,
 }
 

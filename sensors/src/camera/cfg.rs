@@ -11,12 +11,14 @@ use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use crate::visibility::RenderError;
 use scene::{Light, PoseF32};
+use serde::{Deserialize, Serialize};
 
 /// The most memory that the pictures of a camera may take \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
 
 /// What depth and distance say where nothing is hit between the near and the far plane.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum DepthMiss {
     /// +inf.
     #[default]
@@ -46,7 +48,8 @@ pub enum DepthMiss {
 /// assert!(cfg.channels.color && cfg.channels.depth);
 /// # Ok::<(), sensors::SensorError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct CameraCfg {
     /// Pixels per row.
     pub width: usize,
@@ -92,7 +95,7 @@ impl Default for CameraCfg {
             round_period: false,
             channels: Channels { color: true, ..Channels::default() },
             depth_miss: DepthMiss::Inf,
-            raster: RasterCfg { groups: 0b111, ..RasterCfg::default() },
+            raster: RasterCfg::of_cameras(),
             env_ids: None,
             lazy: true,
         }

@@ -5,14 +5,17 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use ndarray::{Array2, ArrayView2, Axis};
 use scene::pose::to_row;
 use scene::{Pose, PoseF32};
+use serde::{Deserialize, Serialize};
 
 /// Which way the axes of a camera point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraConvention {
     /// ROS's optical frame, also OpenCV's: x right, y down, z forward.
     #[default]
     Ros,
     /// OpenGL's and USD's, also MuJoCo's: x right, y up, z backward.
+    #[serde(alias = "opengl")]
     OpenGl,
     /// ROS's body frame: x forward, y left, z up.
     World,
@@ -43,7 +46,8 @@ impl CameraConvention {
 }
 
 /// Where a camera is, relative to what.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Extrinsics {
     /// The body that it moves with: `uid/link`, or the link alone where only one is called so; links that were fused
     /// into another count too. `None` is the environment's frame.
@@ -55,13 +59,16 @@ pub struct Extrinsics {
 }
 
 /// Where a camera is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Placement {
     /// By a pose; the axes are those of [`Extrinsics::convention`].
     Pose {
         /// Position \[m\].
+        #[serde(default)]
         pos: [f64; 3],
         /// Rotation.
+        #[serde(default, with = "scene::file_format::rotation")]
         rotation: UnitQuaternion<f64>,
     },
     /// By what it looks at: see [`look_at_pose`].
@@ -71,8 +78,14 @@ pub enum Placement {
         /// What is in the middle of the picture (if the principal point is) \[m\].
         target: [f64; 3],
         /// What is up in the picture.
+        #[serde(default = "z_axis")]
         up: [f64; 3],
     },
+}
+
+/// Up, where nobody says what it is.
+fn z_axis() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
 }
 
 impl Default for Placement {

@@ -2,10 +2,12 @@
 
 use super::error::CameraError;
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A pinhole lens without distortion, in the terms that users have. The centre of pixel (u, v) is (u + 0.5, v + 0.5).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Intrinsics {
     /// Focal lengths and principal point \[pixels\]; fx and fy may differ, the principal point may lie anywhere.
@@ -33,8 +35,10 @@ pub enum Intrinsics {
         /// Height of the film; `None` makes pixels square.
         vertical_aperture: Option<f64>,
         /// The principal point, right of the middle.
+        #[serde(default)]
         horizontal_offset: f64,
         /// The principal point, below the middle.
+        #[serde(default)]
         vertical_offset: f64,
     },
     /// Square pixels, the principal point in the middle, and this angle between the lower and the upper edge.

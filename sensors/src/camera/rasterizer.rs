@@ -7,9 +7,11 @@ use crate::resolve::plan::Plan;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::{RenderError, View};
 use scene::{Light, PoseF32, RenderScene};
+use serde::{Deserialize, Serialize};
 
 /// How frames are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default = "RasterCfg::of_cameras", deny_unknown_fields)]
 pub struct RasterCfg {
     /// Samples per pixel for the colour: 1 or 4. All other channels see the pixel's centre.
     pub samples: u8,
@@ -43,6 +45,13 @@ pub struct RasterCfg {
 impl Default for RasterCfg {
     fn default() -> Self {
         Self { samples: 4, shadows: true, shadow_size: 0, groups: u32::MAX, lod: true }
+    }
+}
+
+impl RasterCfg {
+    /// What cameras have by default, in files too: geom groups 0, 1 and 2, as in MuJoCo's own viewers.
+    pub fn of_cameras() -> Self {
+        Self { groups: 0b111, ..Self::default() }
     }
 }
 

@@ -7,9 +7,11 @@ use crate::error::SensorError;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::select::{matching, select};
 use crate::sensor::{Requires, SensorCfg, SensorContext};
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`ContactSensor`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactSensorCfg {
     /// The bodies to watch, by patterns of their names (`uid/link`, `link` alone, or the uid of an object), in the order
     /// they are reported. Links that are fused to others, such as feet behind a fixed joint, are bodies of their own here.

@@ -2,6 +2,7 @@
 
 use super::{DriveModel, DriveType};
 use crate::pattern::{self, PatternError};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One number for all joints, or numbers by name pattern or control part.
@@ -26,7 +27,8 @@ impl<K: Into<String>, const N: usize> From<[(K, f64); N]> for PerJoint {
 }
 
 /// Drive properties of a robot. Every field is a number for all joints or `{pattern: value}`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DriveCfg {
     /// What stiffness and damping mean.
     pub drive_type: DriveType,

@@ -22,6 +22,8 @@ pub mod table;
 
 pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};
 
+use serde::{Deserialize, Serialize};
+
 /// What a drive mode knows of its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointInfo {
@@ -51,7 +53,8 @@ pub trait DriveMode: std::fmt::Debug + Sync {
 macro_rules! drive_modes {
     ($($(#[$doc:meta])* $variant:ident => $mode:expr,)*) => {
         /// What stiffness and damping mean.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
         pub enum DriveType {
             $($(#[$doc])* $variant,)*
         }
@@ -92,7 +95,8 @@ impl std::str::FromStr for DriveType {
 }
 
 /// Who evaluates the drive law.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum DriveModel {
     /// A friction-type constraint row, solved together with contacts at the end of the step: stable for any gains and
     /// exact at the effort limit. Integrators: Euler, and implicitfast on MuJoCo 4.x.

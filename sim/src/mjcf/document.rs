@@ -5,6 +5,7 @@
 use crate::source::Source;
 use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
+use serde::{Deserialize, Serialize};
 
 /// A whole document.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +58,8 @@ pub struct PhysicsOption {
 }
 
 /// Integrators that the two lines know.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Integrator {
     /// Semi-implicit Euler.
     #[default]
@@ -67,6 +69,7 @@ pub enum Integrator {
     /// Implicit in velocity.
     Implicit,
     /// Implicit in velocity without Coriolis terms: MuJoCo 4.x.
+    #[serde(alias = "implicitfast")]
     ImplicitFast,
 }
 
@@ -83,7 +86,8 @@ impl Integrator {
 }
 
 /// Friction cones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Cone {
     /// Four-sided pyramid.
     #[default]

@@ -10,10 +10,12 @@ use crate::sensor_list::SensorList;
 use ::scene::Pose;
 use nalgebra::Vector3;
 use ndarray::{Array2, AsArray, Ix2};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Whether an object moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum BodyType {
     /// Falls, is pushed and held.
@@ -24,7 +26,8 @@ pub enum BodyType {
 }
 
 /// Configuration of a rigid object.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RigidObjectCfg {
     /// Name of the object, unique in the simulation.
     pub uid: String,
@@ -40,6 +43,7 @@ pub struct RigidObjectCfg {
     /// MuJoCo takes the larger of the two surfaces that touch.
     pub friction: Option<[f64; 3]>,
     /// Pose at the start, in the environment.
+    #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1.
     pub rgba: [f64; 4],

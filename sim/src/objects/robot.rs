@@ -20,28 +20,35 @@ use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ::scene::pose::to_row;
 use nalgebra::Matrix3;
 use ndarray::{Array2, Array3, ArrayView2, AsArray, Ix2};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Configuration of a robot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RobotCfg {
     /// Name of the robot, unique in the simulation; prefix of its names in MuJoCo.
     pub uid: String,
     /// The URDF files.
+    #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
     /// Named groups of joints: patterns that each match whole joint names.
+    #[serde(with = "scene::file_format::pairs")]
     pub control_parts: Vec<(String, Vec<String>)>,
     /// Drive properties.
     pub drive: DriveCfg,
     /// Whether the root link stands fixed in the environment.
     pub fix_base: bool,
     /// Pose of the root link in the environment.
+    #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
     /// Start positions by joint pattern or control part \[rad or m\]; 0 where none matches.
+    #[serde(with = "scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
     /// the density of water in the origin of a link without mass.
+    #[serde(with = "scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
     /// Whether links of this robot collide with each other.
     pub self_collision: bool,

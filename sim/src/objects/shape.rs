@@ -2,10 +2,12 @@
 
 use crate::mjcf::document::Shape;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// The shape of a rigid object; its frame is in the middle, the axis of round shapes is z.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum ObjectShape {
     /// Edge lengths \[m\].

@@ -1,6 +1,7 @@
 //! Which URDF files make a robot, and how they are joined.
 
 use scene::Pose;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// };
 /// assert_eq!(cfg.components[1].name, "hand"); // hangs from the tip of "arm" by default
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct UrdfCfg {
     /// The files, in any order.
     pub components: Vec<ComponentCfg>,
@@ -49,7 +51,8 @@ impl UrdfCfg {
 }
 
 /// Case of the names of a merged robot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct NameCaseCfg {
     /// Joints.
     pub joint: NameCase,
@@ -58,7 +61,8 @@ pub struct NameCaseCfg {
 }
 
 /// What becomes of the case of a name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NameCase {
     /// As in the file.
     #[default]
@@ -81,7 +85,8 @@ impl NameCase {
 }
 
 /// One URDF file of a robot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ComponentCfg {
     /// What it is: `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`, `left_hand`, `right_hand`, `arm`, `hand`,
     /// which know their usual parent, or any other name.
@@ -90,6 +95,7 @@ pub struct ComponentCfg {
     pub urdf: PathBuf,
     /// Pose of the root link in the frame of the link it is attached to; for a component without a parent, in the frame
     /// of the robot.
+    #[serde(default, with = "scene::file_format::pose")]
     pub transform: Pose,
     /// The component it is attached to; by default the usual parent, if present.
     pub parent: Option<String>,

@@ -1,9 +1,11 @@
 //! How rays turn with the body they hang on.
 
 use scene::{Pose, PoseF64};
+use serde::{Deserialize, Serialize};
 
 /// How rays turn with the body they hang on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RayAlignment {
     /// As the body does.
     #[default]

@@ -10,6 +10,7 @@ use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use scene::{Pose, PoseF64};
+use serde::{Deserialize, Serialize};
 
 /// The most memory that the rays of a ray caster may take \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
@@ -36,12 +37,14 @@ const MAX_BYTES: u64 = 64 << 30;
 /// assert_eq!(scanner.pattern.rays()?.len(), 187);
 /// # Ok::<(), sensors::SensorError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RayCasterCfg {
     /// The body that the rays move with: `uid/link`, or the link alone where only one is called so; links that were fused
     /// into another count too. `None` is the environment's frame.
     pub parent: Option<String>,
     /// Where the pattern is on the body: starts and directions are both turned by its rotation.
+    #[serde(with = "scene::file_format::pose")]
     pub offset: Pose,
     /// How the rays turn with the body.
     pub alignment: RayAlignment,

@@ -4,9 +4,11 @@ use crate::error::SensorError;
 use crate::select::matching;
 use crate::sensor::SensorContext;
 use scene::RenderScene;
+use serde::{Deserialize, Serialize};
 
 /// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum HitTargets {
     /// What is welded to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
     StaticOnly,

@@ -2,6 +2,7 @@
 
 use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
+use serde::{Deserialize, Serialize};
 
 /// Elevations of the beams \[deg\]. Source: Isaac Lab's `BpearlPatternCfg`.
 const VERTICAL_DEG: [f64; 32] = [
@@ -12,7 +13,8 @@ const VERTICAL_DEG: [f64; 32] = [
 
 /// The hemispherical laser RS-Bpearl, its dome along z (robots carry it upside down or tilted: turn the sensor). 32 beams at
 /// each azimuth; the beams of an azimuth come one after the other.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Bpearl {
     /// The span of azimuths, about x; the last one is left out \[deg\].
     pub horizontal_fov_deg: f64,

@@ -2,9 +2,11 @@
 
 use super::{Line, PatternImpl};
 use crate::ray::RayError;
+use serde::{Deserialize, Serialize};
 
 /// Any rays.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Custom {
     /// Where they begin \[m\].
     pub starts: Vec<[f64; 3]>,

@@ -2,9 +2,11 @@
 
 use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
+use serde::{Deserialize, Serialize};
 
 /// Which axis runs fastest in the order of the rays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GridOrder {
     /// x fastest: all points of the smallest y first. Isaac's `"xy"`.
     #[default]
@@ -17,7 +19,8 @@ pub enum GridOrder {
 ///
 /// Along an axis of length L there are ceil((L + 1e-9) / resolution) rays, the first one at -L / 2, as in Isaac Lab: for
 /// a length that is no multiple of the resolution they are not in the middle, unless [`centered`](Self::centered).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Grid {
     /// Distance of neighbours \[m\].
     pub resolution: f64,

@@ -2,13 +2,15 @@
 
 use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
+use serde::{Deserialize, Serialize};
 
 /// A spinning laser: channels at equal steps of elevation, each a ring of rays at equal steps of azimuth. Channel after
 /// channel, azimuth fastest.
 ///
 /// The last azimuth is left out for a full turn, where it would be the first one again; otherwise it is there if it falls on
 /// the grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Lidar {
     /// Number of elevations.
     pub channels: usize,

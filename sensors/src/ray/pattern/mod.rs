@@ -6,6 +6,7 @@ pub use grid::GridOrder;
 
 use super::vector::unit;
 use super::{Ray, RayError};
+use serde::{Deserialize, Serialize};
 
 /// A start, and a direction of any length.
 type Line = ([f64; 3], [f64; 3]);
@@ -25,7 +26,8 @@ macro_rules! patterns {
         $(mod $module; pub use $module::$Name;)*
 
         /// How the rays are laid out.
-        #[derive(Clone, Debug, PartialEq)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
         #[non_exhaustive]
         pub enum RayPattern {
             $($(#[$doc])* $Name($Name),)*

@@ -3,9 +3,11 @@
 use super::{Line, PatternImpl};
 use crate::camera::Intrinsics;
 use crate::ray::RayError;
+use serde::{Deserialize, Serialize};
 
 /// A ray through the centre of every pixel of a pinhole camera that looks along x with z up: row by row from the top left.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Pinhole {
     /// Pixels per row.
     pub width: usize,

@@ -1,0 +1,146 @@
+//! What a scene can hold: robots, rigid objects, and sensors of any crate.
+
+use crate::error::{Error, Result};
+use crate::manager::{ObjectId, RobotId, SimulationManager};
+use crate::objects::rigid_object::RigidObjectCfg;
+use crate::objects::robot::RobotCfg;
+use crate::sensor_list::SensorId;
+use sensors::{Sensor, SensorCfg};
+use std::any::Any;
+use std::fmt::Debug;
+
+/// What one entity of a scene is, before it exists.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum EntityCfg {
+    /// A robot. Its uid is the name of the entity.
+    Robot(Box<RobotCfg>),
+    /// A rigid object. Its uid is the name of the entity.
+    RigidObject(RigidObjectCfg),
+    /// A sensor of any kind.
+    Sensor(Box<dyn SensorEntity>),
+}
+
+impl From<RobotCfg> for EntityCfg {
+    fn from(cfg: RobotCfg) -> Self {
+        Self::Robot(Box::new(cfg))
+    }
+}
+
+impl From<RigidObjectCfg> for EntityCfg {
+    fn from(cfg: RigidObjectCfg) -> Self {
+        Self::RigidObject(cfg)
+    }
+}
+
+impl<C: SensorEntity> From<C> for EntityCfg {
+    fn from(cfg: C) -> Self {
+        Self::Sensor(Box::new(cfg))
+    }
+}
+
+/// The configuration of a sensor whose kind is not known where it is kept: every [`SensorCfg`] that can be cloned, shown and
+/// shared is one. `&dyn SensorEntity` converts to `&dyn Any`, from which the configuration is found back.
+pub trait SensorEntity: Any + Debug + Send + Sync {
+    /// A copy.
+    fn boxed_clone(&self) -> Box<dyn SensorEntity>;
+
+    /// Adds the sensor to a simulation.
+    ///
+    /// # Errors
+    /// As [`SimulationManager::add_sensor`].
+    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<SensorHandle>;
+}
+
+impl<C> SensorEntity for C
+where
+    C: SensorCfg + Clone + Debug + Send + Sync + 'static,
+{
+    fn boxed_clone(&self) -> Box<dyn SensorEntity> {
+        Box::new(self.clone())
+    }
+
+    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<SensorHandle> {
+        sim.add_sensor(uid, self.clone()).map(SensorHandle::new)
+    }
+}
+
+impl Clone for Box<dyn SensorEntity> {
+    fn clone(&self) -> Self {
+        (**self).boxed_clone()
+    }
+}
+
+/// The [`SensorId`] of a sensor whose kind is not known where it is kept.
+#[derive(Debug)]
+pub struct SensorHandle {
+    id: Box<dyn Any + Send + Sync>,
+    type_name: &'static str,
+}
+
+impl SensorHandle {
+    fn new<S: Sensor>(id: SensorId<S>) -> Self {
+        Self { id: Box::new(id), type_name: short_name::<S>() }
+    }
+
+    /// The handle, where the sensor is of this type.
+    pub fn get<S: Sensor>(&self) -> Option<SensorId<S>> {
+        self.id.downcast_ref().copied()
+    }
+
+    /// Name of the type of the sensor, such as `Camera`.
+    pub fn type_name(&self) -> &'static str {
+        self.type_name
+    }
+}
+
+/// Name of a type without its path.
+pub(super) fn short_name<T>() -> &'static str {
+    let full = std::any::type_name::<T>();
+    // Arguments of a generic type have paths of their own.
+    let end = full.find('<').unwrap_or(full.len());
+    let start = full[..end].rfind("::").map_or(0, |at| at + 2);
+    &full[start..]
+}
+
+/// The handle of an entity of a scene.
+#[derive(Debug)]
+pub(super) enum Handle {
+    Robot(RobotId),
+    RigidObject(ObjectId),
+    Sensor(SensorHandle),
+}
+
+impl Handle {
+    /// Adds what `cfg` says to a simulation, under the name `uid`.
+    pub(super) fn add(sim: &mut SimulationManager, uid: &str, cfg: &EntityCfg) -> Result<Self> {
+        match cfg {
+            EntityCfg::Robot(cfg) => sim.add_robot(RobotCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Robot),
+            EntityCfg::RigidObject(cfg) => {
+                sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..cfg.clone() }).map(Self::RigidObject)
+            }
+            EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
+        }
+    }
+
+    /// The error of somebody who takes the entity `name` for a `wanted`.
+    pub(super) fn is_no(&self, name: &str, wanted: String) -> Error {
+        let found = match self {
+            Self::Robot(_) => "robot".into(),
+            Self::RigidObject(_) => "rigid object".into(),
+            Self::Sensor(handle) => format!("sensor of type {}", handle.type_name),
+        };
+        Error::EntityType { name: name.into(), found, wanted }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short_name;
+
+    #[test]
+    fn names_of_types_are_short() {
+        assert_eq!(short_name::<sensors::Camera>(), "Camera");
+        assert_eq!(short_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
+    }
+}

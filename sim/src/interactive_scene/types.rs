@@ -1,0 +1,123 @@
+//! The kinds of entities that a scene file can name: one line each.
+
+use super::entity::{EntityCfg, SensorEntity};
+use crate::objects::rigid_object::RigidObjectCfg;
+use crate::objects::robot::RobotCfg;
+use sensors::{CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, RayCasterCfg};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize as _, Serialize};
+use std::any::Any;
+use toml::de::ValueDeserializer;
+
+/// The kinds of entities that a scene file can name by `type`: the built-in ones, and those of your crates.
+///
+/// ```
+/// use sim::EntityTypes;
+///
+/// let types = EntityTypes::default();
+/// assert!(types.names().any(|name| name == "ray_caster"));
+/// // Any SensorCfg with serde's two traits; here a built-in one under another name.
+/// let types = types.with_sensor::<sensors::ImuCfg>("accelerometer");
+/// ```
+#[derive(Clone, Debug)]
+pub struct EntityTypes {
+    entries: Vec<EntityType>,
+}
+
+/// One kind of entity: its name in files, and how it is read and written.
+#[derive(Clone, Debug)]
+pub(super) struct EntityType {
+    pub(super) name: String,
+    pub(super) read: fn(ValueDeserializer<'_>) -> Result<EntityCfg, toml::de::Error>,
+    /// `None` for entities of other kinds.
+    pub(super) write: fn(&EntityCfg) -> Option<Result<toml::Table, toml::ser::Error>>,
+}
+
+impl Default for EntityTypes {
+    /// Everything built in.
+    fn default() -> Self {
+        Self { entries: Vec::new() }
+            .with::<RobotCfg>("robot")
+            .with::<RigidObjectCfg>("rigid_object")
+            .with_sensor::<CameraCfg>("camera")
+            .with_sensor::<RayCasterCfg>("ray_caster")
+            .with_sensor::<ContactSensorCfg>("contact_sensor")
+            .with_sensor::<ImuCfg>("imu")
+            .with_sensor::<FrameTransformerCfg>("frame_transformer")
+            .with_sensor::<JointStateCfg>("joint_state")
+            .with_sensor::<JointWrenchCfg>("joint_wrench")
+    }
+}
+
+impl EntityTypes {
+    /// Adds a kind of sensor under a name; a kind of the same name is replaced. Paths that its configuration holds are not
+    /// made relative to the file: only the sensor knows which of its texts are paths.
+    #[must_use]
+    pub fn with_sensor<C>(self, name: impl Into<String>) -> Self
+    where
+        C: SensorEntity + Serialize + DeserializeOwned,
+    {
+        self.with::<Sensor<C>>(name)
+    }
+
+    /// The names, in the order in which they were added.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|entry| entry.name.as_str())
+    }
+
+    fn with<K: Kind>(mut self, name: impl Into<String>) -> Self {
+        let entry = EntityType {
+            name: name.into(),
+            read: |value| K::Cfg::deserialize(value).map(Into::into),
+            write: |entity| K::of(entity).map(toml::Table::try_from),
+        };
+        self.entries.retain(|other| other.name != entry.name);
+        self.entries.push(entry);
+        self
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<&EntityType> {
+        self.entries.iter().find(|entry| entry.name == name)
+    }
+
+    /// The name of the kind of an entity and its table.
+    pub(super) fn write(&self, entity: &EntityCfg) -> Option<(&str, Result<toml::Table, toml::ser::Error>)> {
+        self.entries.iter().find_map(|entry| Some((entry.name.as_str(), (entry.write)(entity)?)))
+    }
+}
+
+/// A kind of entity that can be read, and found back among entities.
+trait Kind {
+    type Cfg: Serialize + DeserializeOwned + Into<EntityCfg>;
+
+    fn of(entity: &EntityCfg) -> Option<&Self::Cfg>;
+}
+
+impl Kind for RobotCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Robot(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for RigidObjectCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::RigidObject(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+/// The kind of a sensor.
+struct Sensor<C>(std::marker::PhantomData<C>);
+
+impl<C: SensorEntity + Serialize + DeserializeOwned> Kind for Sensor<C> {
+    type Cfg = C;
+
+    fn of(entity: &EntityCfg) -> Option<&C> {
+        let EntityCfg::Sensor(sensor) = entity else { return None };
+        let any: &dyn Any = sensor.as_ref();
+        any.downcast_ref()
+    }
+}

@@ -1,0 +1,89 @@
+//! Mistakes in scene files: each names the file, the line, and what would be right.
+
+use kinetoscope::prelude::*;
+
+fn error(text: &str) -> String {
+    SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_mistake_is_named_with_its_line() {
+    for (text, line, parts) in [
+        // Keys that nobody knows, at every depth.
+        ("[simulation]\nnum_envs = 2\nphysics_td = 0.01\n", 3, &["physics_td", "physics_dt"][..]),
+        ("\n\n[simulatoin]\n", 3, &["simulatoin", "simulation", "entities"]),
+        ("[entities.cube]\ntype = \"rigid_object\"\n\nmas = 1.0", 4, &["mas", "`mass`", "`density`"]),
+        (
+            "[entities.r]\ntype = \"robot\"\nurdf = \"a.urdf\"\n[entities.r.drive]\nstiffness = 1\ndampin = 2",
+            6,
+            &["dampin", "`damping`"],
+        ),
+        (
+            "[entities.c]\ntype = \"camera\"\nextrinsics.placement.look_at = { eye = [1, 0, 0], tarket = [0, 0, 0] }",
+            3,
+            &["tarket", "target,"],
+        ),
+        ("[entities.i]\ntype = \"imu\"\n[entities.i.sampling.noise.lin_acc_b]\nstdd = 0.1", 4, &["stdd", "`std`"]),
+        // Kinds that nobody knows.
+        ("[entities.c]\n# first\ntype = \"camara\"", 3, &["\"c\"", "`camera`", "`ray_caster`"]),
+        ("\n[entities.c]\nwidth = 2", 2, &["\"c\"", "type", "`camera`"]),
+        ("[entities.s]\ntype = \"ray_caster\"\npattern.gird.resolution = 0.1", 3, &["gird", "`grid`"]),
+        ("[simulation]\npreset = \"walking\"", 2, &["`legged`", "`manipulation`"]),
+        ("[entities.c]\ntype = \"camera\"\nchannels = [\n\"rgb\",\n\"deph\"]", 3, &["deph", "depth"]),
+        ("[simulation]\nintegrator = \"eular\"", 2, &["eular", "`euler`"]),
+        // Values of another form.
+        ("[simulation]\nnum_envs = \"two\"", 2, &["two", "usize"]),
+        ("[simulation]\nnum_envs = -1", 2, &["-1"]),
+        ("[simulation]\n\ngravity = [0, 1]", 3, &["array of length 3"]),
+        ("[simulation]\nground = true", 2, &["true", "false for none"]),
+        ("simulation = 3", 1, &["`simulation`", "integer", "table"]),
+        ("entities = []", 1, &["`entities`", "array", "table"]),
+        ("[entities]\ncube = 1", 2, &["`cube`", "integer", "table"]),
+        ("[entities.r]\ntype = \"robot\"\ndrive.stiffness = \"high\"", 3, &["high", "a number for all joints"]),
+        ("[entities.r]\ntype = \"robot\"\nurdf = 3", 3, &["3", "URDF"]),
+        ("[entities.r]\ntype = \"robot\"\nurdf.components = [{ name = \"arm\" }]", 3, &["urdf"]),
+        ("[entities.o]\ntype = \"rigid_object\"\ninit_pose = [0, 0, 0, 0, 0, 0, 0]", 3, &["no rotation"]),
+        // Names stand in one place only.
+        ("[entities.o]\ntype = \"rigid_object\"\nuid = \"o\"", 3, &["\"o\"", "uid"]),
+        // What is no TOML.
+        ("[simulation]\nnum_envs = 1\nnum_envs = 2", 3, &["duplicate"]),
+        ("[entities.a]\ntype = \"imu\"\n[entities.a]\ntype = \"imu\"", 3, &["duplicate"]),
+        ("a b", 1, &[]),
+    ] {
+        let message = error(text);
+        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
+        for part in parts {
+            assert!(message.contains(part), "{text}\n{message}: no {part}");
+        }
+    }
+}
+
+/// Whatever stands in a file, reading it ends with a scene or an error.
+#[test]
+fn no_text_ends_the_process() {
+    let good = std::fs::read_to_string(assets::path("scenes/quadruped.toml").unwrap()).unwrap();
+    let read = |text: &str| SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default());
+    assert!(read(&good).is_ok());
+    let (mut wrong, mut tried) = (0, 0);
+    for (at, _) in good.char_indices().step_by(7) {
+        let (before, after) = good.split_at(at);
+        for text in [before.to_owned(), format!("{before}]{after}"), format!("{before}9{after}")] {
+            tried += 1;
+            match read(&text) {
+                Ok(_) => {}
+                Err(Error::SceneFile { at, .. }) => {
+                    wrong += 1;
+                    assert!(at.line >= 1 && at.line as usize <= text.lines().count() + 1, "{at}");
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+    }
+    assert!(wrong > tried / 4, "{wrong} of {tried}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let message = SceneCfg::from_file("no/such/scene.toml").unwrap_err().to_string();
+    assert!(message.starts_with("no/such/scene.toml: "), "{message}");
+}

@@ -1,0 +1,256 @@
+//! Every kind of entity from a file, a sensor of one's own among them.
+
+use kinetoscope::prelude::*;
+use kinetoscope::scene::SceneState;
+use kinetoscope::sensors::ray::{HitTargets, RayPattern};
+use kinetoscope::sensors::{Channel, RayCasterCfg, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+fn read(text: &str) -> SceneCfg {
+    SceneCfg::from_toml(text, "somewhere/scene.toml", &EntityTypes::default()).unwrap()
+}
+
+/// The configuration of the only entity, a sensor of this kind.
+fn only<C: 'static>(scene: &SceneCfg) -> &C {
+    let [(_, EntityCfg::Sensor(sensor))] = scene.entities.as_slice() else { panic!("{scene:?}") };
+    let any: &dyn std::any::Any = sensor.as_ref();
+    any.downcast_ref().unwrap()
+}
+
+#[test]
+fn the_simulation_starts_from_a_preset() {
+    assert_eq!(read("").simulation, SimulationManagerCfg::default());
+    assert_eq!(read("[simulation]\npreset = \"legged\"").simulation, SimulationManagerCfg::legged());
+    let text = "[simulation]\nimpratio = 7\npreset = \"legged\"\nground = false\nlights = []\nintegrator = \"rk4\"\n\
+                gravity = [0, 0, -1.62]\nthreads = 1";
+    let expected = SimulationManagerCfg {
+        impratio: 7.0,
+        ground: None,
+        lights: Vec::new(),
+        integrator: Integrator::Rk4,
+        gravity: [0.0, 0.0, -1.62].into(),
+        threads: Some(1),
+        ..SimulationManagerCfg::legged()
+    };
+    assert_eq!(read(text).simulation, expected);
+}
+
+#[test]
+fn a_robot_of_components_is_beside_the_file() {
+    let text = r#"
+        [entities.arm]
+        type = "robot"
+        self_collision = true
+        control_parts = { hand = ["finger.*", "thumb"], arm = ["joint[1-6]"] }
+        payload = { "ee.*" = 0.5 }
+        hull = { max_vertices = 32, min_thickness = false }
+        init_pose = { pos = [0, 0, 1], rpy_deg = [0, 0, 90] }
+
+        [entities.arm.drive]
+        drive_type = "acceleration"
+        model = "actuator"
+        stiffness = { "z.*" = 2, arm = 1e3 }
+        max_effort = inf
+
+        [entities.arm.urdf]
+        name_case.joint = "upper"
+        packages.meshes = "../meshes"
+        components = [
+            { name = "arm", urdf = "arm.urdf" },
+            { name = "hand", urdf = "/abs/hand.urdf", transform = [0, 0, 0.1, 1, 0, 0, 0], prefix = "h_" },
+        ]
+    "#;
+    let scene = read(text);
+    let [(name, EntityCfg::Robot(robot))] = scene.entities.as_slice() else { panic!("{scene:?}") };
+    assert_eq!((name.as_str(), robot.uid.as_str()), ("arm", "arm"));
+    let [arm, hand] = robot.urdf.components.as_slice() else { panic!("{robot:?}") };
+    assert_eq!(
+        (arm.urdf.as_path(), hand.urdf.as_path()),
+        (Path::new("somewhere/arm.urdf"), Path::new("/abs/hand.urdf"))
+    );
+    assert_eq!((hand.transform, hand.prefix.as_deref()), (Pose::translation(0.0, 0.0, 0.1), Some("h_")));
+    assert_eq!(robot.urdf.packages["meshes"], Path::new("somewhere/../meshes"));
+    assert_eq!(robot.urdf.name_case, NameCaseCfg { joint: NameCase::Upper, link: NameCase::Original });
+    assert_eq!(robot.control_parts[0], ("hand".into(), vec!["finger.*".into(), "thumb".into()]), "the order is kept");
+    assert_eq!(robot.drive.stiffness, PerJoint::By(vec![("z.*".into(), 2.0), ("arm".into(), 1e3)]));
+    assert_eq!(robot.drive.damping, DriveCfg::default().damping);
+    assert_eq!(robot.drive.max_effort, Some(PerJoint::All(f64::INFINITY)));
+    assert_eq!((robot.drive.drive_type, robot.drive.model), (DriveType::Acceleration, DriveModel::Actuator));
+    assert_eq!((robot.hull.max_vertices, robot.hull.min_thickness), (32, None));
+    assert!(robot.self_collision && robot.fix_base);
+    assert_eq!(robot.payload, [("ee.*".to_string(), 0.5)]);
+    let turned = robot.init_pose * nalgebra::Point3::new(1.0, 0.0, 0.0);
+    assert!((turned - nalgebra::Point3::new(0.0, 1.0, 1.0)).norm() < 1e-15);
+}
+
+#[test]
+fn objects_have_their_shapes() {
+    for (shape, expected) in [
+        ("shape.box.size = [1, 2, 3]", ObjectShape::Box { size: [1.0, 2.0, 3.0] }),
+        ("shape.sphere.radius = 0.5", ObjectShape::Sphere { radius: 0.5 }),
+        ("shape.cylinder = { radius = 0.5, length = 2 }", ObjectShape::Cylinder { radius: 0.5, length: 2.0 }),
+        ("shape = { capsule = { radius = 0.5, length = 2 } }", ObjectShape::Capsule { radius: 0.5, length: 2.0 }),
+    ] {
+        let scene = read(&format!("[entities.o]\ntype = \"rigid_object\"\nbody_type = \"static\"\n{shape}"));
+        let [(_, EntityCfg::RigidObject(object))] = scene.entities.as_slice() else { panic!("{scene:?}") };
+        let expected =
+            RigidObjectCfg { uid: "o".into(), shape: expected, body_type: BodyType::Static, ..Default::default() };
+        assert_eq!(*object, expected);
+    }
+}
+
+#[test]
+fn sensors_have_all_their_fields() {
+    let scene = read(
+        "[entities.s]\ntype = \"imu\"\nbody = \"base\"\ngravity_bias = [0, 0, 0]\n\
+         [entities.s.sampling]\nupdate_period = 0.01\nhistory_length = 3\nlatency_steps = 1\ndropout = 0.5\n\
+         noise.lin_acc_b = { std = 0.1, bias_walk = 0.01 }",
+    );
+    let noise = NoiseCfg { std: 0.1, bias_walk: 0.01, ..Default::default() };
+    let sampling = SamplingCfg {
+        update_period: 0.01,
+        history_length: 3,
+        latency_steps: 1,
+        dropout: 0.5,
+        noise: [("lin_acc_b".to_string(), noise)].into(),
+        ..Default::default()
+    };
+    let expected = ImuCfg { gravity_bias: Some([0.0; 3].into()), sampling, ..ImuCfg::on("base") };
+    assert_eq!(*only::<ImuCfg>(&scene), expected);
+
+    let scene = read(
+        "[entities.s]\ntype = \"frame_transformer\"\nsource = \"base\"\n\
+         targets = [{ bodies = \".*_FOOT\" }, { bodies = \"tip\", name = \"tool\", offset = { pos = [0, 0, 1] } }]",
+    );
+    let tool = TargetFrameCfg {
+        name: Some("tool".into()),
+        offset: Pose::translation(0.0, 0.0, 1.0),
+        ..TargetFrameCfg::of("tip")
+    };
+    let expected = FrameTransformerCfg::from("base", vec![TargetFrameCfg::of(".*_FOOT"), tool]);
+    assert_eq!(*only::<FrameTransformerCfg>(&scene), expected);
+
+    let scene = read("[entities.s]\ntype = \"joint_state\"\njoints = [\"a\"]");
+    assert_eq!(only::<JointStateCfg>(&scene).joints, Some(vec!["a".into()]));
+    let scene = read("[entities.s]\ntype = \"joint_wrench\"\nlinks = [\"a\"]");
+    assert_eq!(only::<JointWrenchCfg>(&scene).links, ["a"]);
+
+    for (pattern, name) in [
+        ("grid.order = \"yx\"", "grid"),
+        ("lidar = { channels = 4 }", "lidar"),
+        ("bpearl.horizontal_fov_deg = 90", "bpearl"),
+        ("pinhole.intrinsics.fovy.radians = 0.9", "pinhole"),
+        ("custom = { starts = [[0, 0, 0]], directions = [[0, 0, -1]] }", "custom"),
+    ] {
+        let text = format!("[entities.s]\ntype = \"ray_caster\"\ntargets = \"static_only\"\npattern.{pattern}");
+        let scene = read(&text);
+        let cfg = only::<RayCasterCfg>(&scene);
+        assert_eq!((cfg.pattern.name(), &cfg.targets), (name, &HitTargets::StaticOnly));
+        assert!(cfg.pattern.rays().is_ok_and(|rays| !rays.is_empty()));
+        if let RayPattern::Lidar(lidar) = &cfg.pattern {
+            assert_eq!(lidar.channels, 4);
+        }
+    }
+
+    let scene = read(
+        "[entities.s]\ntype = \"camera\"\nintrinsics.fovy.radians = 0.9\ndepth_miss = \"far\"\nraster.samples = 1\n\
+         extrinsics = { convention = \"opengl\", placement = { look_at = { eye = [1, 0, 1], target = [0, 0, 0] } } }",
+    );
+    let expected = CameraCfg {
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        depth_miss: DepthMiss::Far,
+        raster: RasterCfg { samples: 1, ..CameraCfg::default().raster },
+        extrinsics: Extrinsics {
+            convention: CameraConvention::OpenGl,
+            placement: Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0; 3], up: [0.0, 0.0, 1.0] },
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    assert_eq!(*only::<CameraCfg>(&scene), expected);
+}
+
+/// A sensor that the library has never heard of: how high bodies are above a level.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AltimeterCfg {
+    body: String,
+    #[serde(default)]
+    level: f64,
+}
+
+#[derive(Debug)]
+struct Altimeter {
+    body: usize,
+    level: f64,
+    sampler: Sampler,
+}
+
+impl Altimeter {
+    fn read(body: usize, level: f64) -> impl Fn(&SceneState, usize, &mut [f64]) {
+        move |state, env, row| {
+            if let Some(poses) = &state.body_poses {
+                row[0] = poses[(env, body, 2)] - level;
+            }
+        }
+    }
+}
+
+impl SensorCfg for AltimeterCfg {
+    type Sensor = Altimeter;
+
+    fn requires(&self) -> Requires {
+        Requires::POSES
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Altimeter, SensorError> {
+        let channels = [Channel::new("altitude", 1)];
+        Ok(Altimeter {
+            body: context.body(&self.body)?,
+            level: self.level,
+            sampler: Sampler::new("altimeter", self.requires(), context, &SamplingCfg::default(), &channels)?,
+        })
+    }
+}
+
+impl Sensor for Altimeter {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        let read = Self::read(self.body, self.level);
+        self.sampler.update(state, |env, row| read(state, env, row))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        let read = Self::read(self.body, self.level);
+        self.sampler.reset(env_ids, state, |env, row| read(state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        let read = Self::read(self.body, self.level);
+        self.sampler.refresh(env_ids, state, |env, row| read(state, env, row))
+    }
+}
+
+impl Sampled for Altimeter {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+#[test]
+fn a_sensor_of_ones_own_is_an_entity_of_files() {
+    let types = EntityTypes::default().with_sensor::<AltimeterCfg>("altimeter");
+    let text = "[entities.ball]\ntype = \"rigid_object\"\nshape.sphere.radius = 0.1\ninit_pose.pos = [0, 0, 5]\n\
+                [entities.height]\ntype = \"altimeter\"\nbody = \"{ENV}/ball\"\nlevel = 1\n";
+    let cfg = SceneCfg::from_toml(text, "scene.toml", &types).unwrap();
+    let written = cfg.to_toml(&types).unwrap();
+    let scene = InteractiveScene::new(SceneCfg::from_toml(&written, "scene.toml", &types).unwrap()).unwrap();
+    let altimeter = scene.sensor::<Altimeter>("height").unwrap();
+    assert_eq!(altimeter.sampler.values("altitude").iter().copied().collect::<Vec<_>>(), [4.0]);
+
+    let error = SceneCfg::from_toml(&text.replace("level", "levle"), "scene.toml", &types).unwrap_err().to_string();
+    assert!(error.starts_with("scene.toml:8: ") && error.contains("`level`"), "{error}");
+    let error = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
+    assert!(error.contains("height") && error.contains("with_sensor"), "{error}");
+    assert!(SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).is_err());
+}

@@ -1,0 +1,89 @@
+//! Entities by name and type, and what is said where either is wrong.
+
+use kinetoscope::prelude::*;
+
+fn cube(x: f64) -> RigidObjectCfg {
+    RigidObjectCfg { shape: ObjectShape::cube(0.2), init_pose: Pose::translation(x, 0.0, 0.1), ..Default::default() }
+}
+
+fn two_cubes() -> SceneCfg {
+    // The sensor stands before what it watches.
+    SceneCfg::new(SimulationManagerCfg { num_envs: 3, ..Default::default() })
+        .with("touch", ContactSensorCfg::of("{ENV_REGEX_NS}/zebra"))
+        .with("zebra", cube(0.0))
+        .with("{ENV}/apple", cube(1.0))
+}
+
+#[test]
+fn names_keep_the_order_of_their_declaration() {
+    let scene = InteractiveScene::new(two_cubes()).unwrap();
+    assert_eq!(scene.keys().collect::<Vec<_>>(), ["touch", "zebra", "apple"]);
+    assert_eq!(scene.rigid_object("apple").unwrap().uid(), "apple");
+    assert_eq!(scene.rigid_object_id("{ENV_REGEX_NS}/apple").unwrap(), scene.rigid_object_id("apple").unwrap());
+    assert_eq!(scene.sim().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
+}
+
+#[test]
+fn a_sensor_may_stand_before_what_it_watches() {
+    let mut scene = InteractiveScene::new(two_cubes()).unwrap();
+    scene.update(100);
+    // A cube of 8 kg at rest: 78.48 N, which a soft contact that settles for a second keeps to a thousandth.
+    let forces = scene.sensor::<ContactSensor>("touch").unwrap().net_forces_w();
+    for env in 0..3 {
+        assert!((forces[(env, 0, 2)] - 8.0 * 9.81).abs() < 0.08, "{forces}");
+    }
+}
+
+#[test]
+fn writers_act_at_once() {
+    let mut scene = InteractiveScene::new(two_cubes()).unwrap();
+    let pose = kinetoscope::ndarray::array![[3.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0]];
+    scene.rigid_object_mut("apple").unwrap().write_pose(&pose, Some(&[EnvId(2)])).unwrap();
+    let poses = scene.rigid_object("apple").unwrap().get_pose();
+    assert_eq!(poses.row(2), pose.row(0));
+    assert_eq!(poses[(1, 0)], 1.0);
+}
+
+#[test]
+fn a_wrong_type_says_what_it_is() {
+    let mut scene = InteractiveScene::new(two_cubes()).unwrap();
+    for (error, expected) in [
+        (scene.robot("zebra").unwrap_err(), "\"zebra\" is a rigid object, not a robot"),
+        (scene.rigid_object("touch").unwrap_err(), "\"touch\" is a sensor of type ContactSensor, not a rigid object"),
+        (
+            scene.sensor::<Camera>("touch").unwrap_err(),
+            "\"touch\" is a sensor of type ContactSensor, not a sensor of type Camera",
+        ),
+        (scene.sensor::<Imu>("apple").unwrap_err(), "\"apple\" is a rigid object, not a sensor of type Imu"),
+    ] {
+        assert!(matches!(error, Error::EntityType { .. }));
+        assert_eq!(error.to_string(), expected);
+    }
+    assert!(matches!(scene.robot_mut("zebra"), Err(Error::EntityType { .. })));
+    assert!(matches!(scene.sensor_mut::<Camera>("touch"), Err(Error::EntityType { .. })));
+}
+
+#[test]
+fn an_unknown_name_lists_the_nearest() {
+    let scene = InteractiveScene::new(two_cubes()).unwrap();
+    let message = scene.rigid_object("zebre").unwrap_err().to_string();
+    assert!(
+        message.starts_with("there is no entity of the scene called \"zebre\"; known are \"zebra\", "),
+        "{message}"
+    );
+    assert!(message.contains("apple") && message.contains("touch"), "{message}");
+}
+
+#[test]
+fn two_entities_of_one_name_are_an_error() {
+    for cfg in [two_cubes().with("zebra", cube(2.0)), two_cubes().with("{ENV}/touch", cube(2.0))] {
+        assert!(matches!(InteractiveScene::new(cfg), Err(Error::DuplicateUid(_))));
+    }
+}
+
+#[test]
+fn what_a_sensor_misses_is_named() {
+    let cfg = SceneCfg::default().with("touch", ContactSensorCfg::of("{ENV}/cube"));
+    let message = InteractiveScene::new(cfg).unwrap_err().to_string();
+    assert!(message.contains("\"touch\"") && message.contains("\"cube\""), "{message}");
+}

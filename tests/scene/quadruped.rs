@@ -1,0 +1,149 @@
+//! The scene of the tutorial, from the bundled file and from Rust: the same bits, and the numbers that the tutorial prints.
+
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment};
+use kinetoscope::sensors::{RayCaster, RayCasterCfg};
+use kinetoscope::sim::GroundCfg;
+
+pub(crate) fn declared() -> SceneCfg {
+    let robot = RobotCfg {
+        urdf: UrdfCfg::single(assets::path("quadruped/quadruped.urdf").unwrap()),
+        fix_base: false,
+        init_pose: Pose::translation(0.0, 0.0, 0.6),
+        init_qpos: [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)]
+            .map(|(joints, angle)| (joints.to_string(), angle))
+            .to_vec(),
+        drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
+        ..Default::default()
+    };
+    let camera = CameraCfg {
+        width: 640,
+        height: 480,
+        update_period: 0.1,
+        channels: Channels::from_names(&["rgb", "distance_to_image_plane"]).unwrap(),
+        near: 0.1,
+        far: 1e5,
+        intrinsics: Intrinsics::ISAAC,
+        extrinsics: Extrinsics {
+            parent: Some("robot/base".into()),
+            placement: Placement::Pose {
+                pos: [0.510, 0.0, 0.015],
+                rotation: kinetoscope::scene::pose::from_wxyz([0.5, -0.5, 0.5, -0.5]),
+            },
+            convention: CameraConvention::Ros,
+        },
+        ..Default::default()
+    };
+    let scanner = RayCasterCfg {
+        parent: Some("robot/base".into()),
+        offset: Pose::translation(0.0, 0.0, 20.0),
+        alignment: RayAlignment::Yaw,
+        pattern: Grid { resolution: 0.1, size: [1.6, 1.0], ..Default::default() }.into(),
+        targets: HitTargets::Named(vec!["ground".into()]),
+        sampling: SamplingCfg::every(0.02),
+        ..Default::default()
+    };
+    let contacts = ContactSensorCfg {
+        sampling: SamplingCfg { history_length: 6, ..Default::default() },
+        ..ContactSensorCfg::of("robot/.*_FOOT")
+    };
+    let simulation = SimulationManagerCfg {
+        num_envs: 2,
+        arena_space: 2.0,
+        ground: Some(GroundCfg { color: [0.1; 3], ..Default::default() }),
+        ..SimulationManagerCfg::legged()
+    };
+    SceneCfg::new(simulation)
+        .with("robot", robot)
+        .with("camera", camera)
+        .with("height_scanner", scanner)
+        .with("contact_forces", contacts)
+}
+
+/// Everything that the scene says after `steps`: equal bits or not at all.
+pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
+    // Environments that differ, so that a mix-up would be seen.
+    let mut start = scene.robot("robot").unwrap().get_qpos();
+    start.row_mut(1).iter_mut().for_each(|angle| *angle += 0.05);
+    scene.robot_mut("robot").unwrap().write_qpos(&start, None, None).unwrap();
+    scene.update(steps);
+    let bits = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(f64::to_bits).collect::<Vec<u64>>();
+    let robot = scene.robot("robot").unwrap();
+    let mut all = Vec::new();
+    for array in [robot.get_qpos(), robot.get_qvel(), robot.get_root_pose(), robot.get_root_velocity()] {
+        all.push(bits(&mut array.iter().copied()));
+    }
+    let camera = scene.sensor::<Camera>("camera").unwrap();
+    all.push(bits(&mut camera.depth().unwrap().iter().map(|&depth| depth.into())));
+    all.push(bits(&mut camera.color().unwrap().iter().map(|&byte| byte.into())));
+    let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
+    all.push(bits(&mut scanner.distances().iter().copied()));
+    let contacts = scene.sensor::<ContactSensor>("contact_forces").unwrap();
+    all.push(bits(&mut contacts.net_forces_w().iter().copied()));
+    all
+}
+
+fn bundled() -> SceneCfg {
+    SceneCfg::from_file(assets::path("scenes/quadruped.toml").unwrap()).unwrap()
+}
+
+#[test]
+fn a_file_and_rust_declare_the_same_bits() {
+    let mut from_file = InteractiveScene::new(bundled()).unwrap();
+    let mut from_rust = InteractiveScene::new(declared()).unwrap();
+    let expected = says(&mut from_rust, 100);
+    assert_eq!(says(&mut from_file, 100), expected);
+    // The control: a drive that is a little softer is seen in every number that moves.
+    let mut softer = declared();
+    let Some((_, EntityCfg::Robot(robot))) = softer.entities.first_mut() else { panic!("the robot is first") };
+    robot.drive.stiffness = 79.0.into();
+    let found = says(&mut InteractiveScene::new(softer).unwrap(), 100);
+    assert!(found.iter().zip(&expected).filter(|(found, expected)| found != expected).count() >= 6);
+}
+
+#[test]
+fn it_is_the_scene_of_the_tutorial() {
+    let mut scene = InteractiveScene::new(bundled()).unwrap();
+    assert_eq!(scene.keys().collect::<Vec<_>>(), ["robot", "camera", "height_scanner", "contact_forces"]);
+    assert_eq!(scene.num_envs(), 2);
+    let origins = scene.env_origins();
+    assert_eq!(
+        origins.rows().into_iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
+        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+    );
+    scene.update_for(2.5).unwrap();
+    assert!(scene.sim().time().iter().all(|time| (time - 2.5).abs() < 1e-9));
+    let camera = scene.sensor::<Camera>("camera").unwrap();
+    assert_eq!(camera.color().unwrap().shape(), [2, 480, 640, 4]);
+    assert_eq!(camera.depth().unwrap().shape(), [2, 480, 640]);
+    let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
+    assert_eq!(scanner.hits().shape(), [2, 187, 3]);
+    let contacts = scene.sensor::<ContactSensor>("contact_forces").unwrap();
+    let forces = contacts.net_forces_w();
+    assert_eq!(forces.shape(), [2, 4, 3]);
+    // Feet carry what the robot weighs, 52.135 kg. It still sinks a little: a tenth of g would be a fall.
+    for env in 0..2 {
+        let up: f64 = (0..4).map(|foot| forces[(env, foot, 2)]).sum();
+        assert!((up / (52.13485 * 9.81) - 1.0).abs() < 0.1, "{up} N");
+    }
+    // Reset puts one environment back.
+    let start = scene.robot("robot").unwrap().get_default_root_pose();
+    let before = scene.robot("robot").unwrap().get_root_pose();
+    scene.reset(Some(&[EnvId(1)])).unwrap();
+    let after = scene.robot("robot").unwrap().get_root_pose();
+    assert_eq!((after.row(0), after.row(1)), (before.row(0), start.row(1)));
+    assert_ne!(before.row(1), start.row(1));
+}
+
+#[test]
+fn time_is_a_whole_number_of_steps() {
+    let mut scene = InteractiveScene::new(SceneCfg::default()).unwrap();
+    for seconds in [0.005, -0.01, f64::NAN, f64::INFINITY] {
+        let message = scene.update_for(seconds).unwrap_err().to_string();
+        assert!(message.contains("seconds") && message.contains("physics_dt"), "{message}");
+    }
+    assert_eq!(scene.sim().time(), [0.0]);
+    scene.update_for(0.07).unwrap();
+    assert!((scene.sim().time()[0] - 0.07).abs() < 1e-12);
+}
