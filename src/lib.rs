@@ -22,6 +22,6 @@ pub mod prelude {
     pub use sim::{
         BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EnvId, Error, Integrator, JointIndex,
         MaskId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId,
-        SensorId, SimulationManager, SimulationManagerCfg, Still, UrdfCfg,
+        SensorId, SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId, UrdfCfg,
     };
 }

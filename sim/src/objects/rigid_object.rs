@@ -43,6 +43,8 @@ pub struct RigidObjectCfg {
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1.
     pub rgba: [f64; 4],
+    /// What kind of thing it is, for the table of mask ids; `object` where `None`.
+    pub semantic_class: Option<String>,
 }
 
 impl Default for RigidObjectCfg {
@@ -57,6 +59,7 @@ impl Default for RigidObjectCfg {
             friction: None,
             init_pose: Pose::identity(),
             rgba: [0.6, 0.6, 0.6, 1.0],
+            semantic_class: None,
         }
     }
 }
