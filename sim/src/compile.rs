@@ -209,7 +209,8 @@ fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<Free
 
 /// Who every geom belongs to.
 fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[FreeIndex]) -> Identities {
-    let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
+    let ground =
+        || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
     let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
     let mut first = 0;
     for (data, index) in contents.robots.iter().zip(robots) {

@@ -43,10 +43,10 @@ fn compare(cfg: &TerrainCfg, heights: &Array2<f64>) -> (usize, f64, usize) {
     sim.update(1);
     let (scanner, terrain) = (sim.sensor(scanner).unwrap(), sim.terrain(id));
     assert_eq!(scanner.hits().dim().0, 2);
+    let (start, hit) = (scanner.ray_starts(), scanner.hits());
     let (mut hits, mut worst, mut wrong) = (0, 0.0_f64, 0);
     for env in 0..2 {
         for ray in 0..scanner.num_rays() {
-            let (start, hit) = (scanner.ray_starts(), scanner.hits());
             let expected = height(cfg, heights, start[(env, ray, 0)], start[(env, ray, 1)]);
             match (expected, scanner.hit_mask()[(env, ray)]) {
                 (Some(expected), true) => {
@@ -127,6 +127,7 @@ fn a_camera_sees_it_by_its_name() {
             CameraCfg {
                 width: 120,
                 height: 90,
+                intrinsics: Intrinsics::Fovy { radians: 0.6 },
                 extrinsics: Extrinsics {
                     placement: Placement::LookAt { eye: [x, y, 4.2], target: [x, y, 0.0], up: [0.0, 1.0, 0.0] },
                     ..Default::default()

@@ -45,7 +45,9 @@ pub enum TerrainError {
         nearest: f64,
     },
     /// More points than can be drawn.
-    #[error("{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} can be drawn: choose larger cells")]
+    #[error(
+        "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} can be drawn: choose larger cells"
+    )]
     TooMany {
         /// The generator.
         terrain: &'static str,
@@ -55,7 +57,9 @@ pub enum TerrainError {
         rows: f64,
     },
     /// No height of the range is a multiple of the step.
-    #[error("rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two")]
+    #[error(
+        "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two"
+    )]
     NoLevel {
         /// Lowest height \[m\].
         low: f64,
@@ -69,7 +73,11 @@ pub enum TerrainError {
 /// Refuses a number that is not finite and positive.
 fn positive(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
     let fine = value.is_finite() && value > 0.0;
-    if fine { Ok(()) } else { Err(TerrainError::Number { terrain, field, value, expected: "it must be above 0 metres" }) }
+    if fine {
+        Ok(())
+    } else {
+        Err(TerrainError::Number { terrain, field, value, expected: "it must be above 0 metres" })
+    }
 }
 
 /// Refuses a number that is not finite.

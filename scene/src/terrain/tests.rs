@@ -58,9 +58,7 @@ fn stairs_lead_up_to_the_platform() {
 #[test]
 fn what_cannot_be_is_refused() {
     let rough = RoughTerrain::default;
-    let message = |result: Result<ndarray::Array2<f64>, TerrainError>| {
-        result.expect_err("refused").to_string()
-    };
+    let message = |result: Result<ndarray::Array2<f64>, TerrainError>| result.expect_err("refused").to_string();
     for (terrain, says) in [
         (RoughTerrain { cell: 0.0, ..rough() }, "cell is 0"),
         (RoughTerrain { size: [f64::NAN, 1.0], ..rough() }, "size is NaN"),

@@ -234,10 +234,8 @@ impl Writer {
             self.mesh(mesh);
         }
         for field in &mjcf.height_fields {
-            let element = Element::new("hfield")
-                .attr("name", &field.name)
-                .attr("file", &field.file)
-                .numbers("size", &field.size);
+            let element =
+                Element::new("hfield").attr("name", &field.name).attr("file", &field.file).numbers("size", &field.size);
             self.leaf(element, None);
         }
         self.close("asset");
