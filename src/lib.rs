@@ -26,6 +26,6 @@ pub mod prelude {
         BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error,
         GroundCfg, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId, NameCase, NameCaseCfg, ObjectId,
         ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager,
-        SimulationManagerCfg, Still, UrdfCfg,
+        SimulationManagerCfg, Still, TerrainCfg, TerrainId, UrdfCfg,
     };
 }

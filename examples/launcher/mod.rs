@@ -2,8 +2,10 @@
 #![allow(dead_code, reason = "each example uses its part")]
 
 pub(crate) mod arm;
+pub(crate) mod cloud;
 pub(crate) mod panel;
 pub(crate) mod picture;
+pub(crate) mod stage;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};

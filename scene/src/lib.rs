@@ -16,6 +16,7 @@ pub mod random;
 pub mod render_scene;
 pub mod shape;
 pub mod state;
+pub mod terrain;
 
 pub use light::{Haze, Headlight, Hemisphere, Light, LightKind, Sky};
 pub use marker::{Marker, MarkerKind};

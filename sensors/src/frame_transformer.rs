@@ -9,6 +9,7 @@ use ndarray::{ArrayView2, ArrayView3};
 use scene::pose::{from_row, to_wxyz};
 use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Configuration of a [`FrameTransformer`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,6 +59,7 @@ impl FrameTransformerCfg {
 /// Poses of target frames in the world and in the source frame, in all environments. N environments, M targets.
 #[derive(Clone, Debug)]
 pub struct FrameTransformer {
+    source_name: String,
     source: (usize, Pose),
     targets: Vec<(usize, Pose)>,
     names: Vec<String>,
@@ -110,6 +112,7 @@ impl SensorCfg for FrameTransformerCfg {
             Channel::exact("target_quat_source", 4 * m),
         ];
         Ok(FrameTransformer {
+            source_name: context.bodies[source].clone(),
             source: (source, self.source_offset),
             targets,
             names,
@@ -165,6 +168,18 @@ impl Sensor for FrameTransformer {
         let target = |t| axes([0, 1, 2].map(|k| p[(env, t, k)]), [0, 1, 2, 3].map(|k| q[(env, t, k)]));
         markers.extend((0..self.target_frame_names().len()).map(target));
         markers
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for FrameTransformer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Frame transformer")?;
+        writeln!(f, "  environments     : {}", self.sampler.num_envs())?;
+        writeln!(f, "  update period (s): {}", self.sampler.period())?;
+        writeln!(f, "  source body      : {}", self.source_name)?;
+        writeln!(f, "  number of targets: {}", self.names.len())?;
+        write!(f, "  target frames    : {}", self.names.join(", "))
     }
 }
 

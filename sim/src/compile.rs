@@ -143,6 +143,9 @@ pub(crate) fn document(
     for object in &contents.objects {
         scene::add_object(&mut mjcf, object);
     }
+    for (index, terrain) in contents.terrains.iter().enumerate() {
+        scene::add_terrain(&mut mjcf, index, terrain);
+    }
     for pair in excluded {
         if !mjcf.excludes.contains(pair) {
             mjcf.excludes.push(pair.clone());
@@ -168,7 +171,13 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     let run = Purpose::Run { friction_tendons: true };
     let (mjcf, layouts, diagnostics) = document(cfg, contents, excluded, &run, empty)?;
     let text = write::write(&mjcf, mj::TARGET);
-    let compiled = mj::compile(&text.xml, &[]).map_err(|error| match error {
+    let files: Vec<mj::Asset> = contents
+        .terrains
+        .iter()
+        .enumerate()
+        .map(|(index, terrain)| mj::Asset { name: scene::terrain_file(index), bytes: terrain.file() })
+        .collect();
+    let compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
         other => other.into(),
     })?;
@@ -200,7 +209,8 @@ fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<Free
 
 /// Who every geom belongs to.
 fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[FreeIndex]) -> Identities {
-    let ground = || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground", body: None };
+    let ground =
+        || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
     let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
     let mut first = 0;
     for (data, index) in contents.robots.iter().zip(robots) {
@@ -209,7 +219,7 @@ fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objec
                 id: data.mask_id(geom.link),
                 object: data.uid().into(),
                 link: Some(data.description().links[geom.link].name.clone()),
-                class: "robot",
+                class: "robot".into(),
                 body: Some((first + geom.link) as u32),
             };
         }
@@ -219,8 +229,14 @@ fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objec
         if let Some(k) = objects.iter().position(|o| o.body == body as usize) {
             let object = &contents.objects[k];
             let body = Some((first + k) as u32);
-            owners[geom] =
-                Owner { id: object.mask_id(), object: object.uid().into(), link: None, class: "object", body };
+            let class = object.cfg().semantic_class.clone().unwrap_or_else(|| "object".into());
+            owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class, body };
+        }
+    }
+    for terrain in &contents.terrains {
+        if let Some(geom) = model.id(ObjectKind::Geom, terrain.uid()) {
+            let (id, object) = (terrain.mask_id(), terrain.uid().into());
+            owners[geom] = Owner { id, object, link: None, class: "terrain".into(), body: None };
         }
     }
     visible::of_simulation(model, &owners)

@@ -4,22 +4,25 @@ use crate::description::JointKind;
 use crate::error::{Error, Result};
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
+use crate::objects::terrain::Terrain;
 use std::sync::Arc;
 
-/// Robots and objects.
+/// Robots, objects and terrains.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) robots: Vec<Arc<RobotData>>,
     pub(crate) objects: Vec<Arc<RigidObjectData>>,
+    pub(crate) terrains: Vec<Arc<Terrain>>,
 }
 
-/// Mask id of the ground; links and objects come after it.
+/// Mask id of the ground; links, objects and terrains come after it.
 pub(crate) const GROUND_MASK_ID: i32 = 1;
 
 impl Contents {
     /// Checks that nothing is called `uid` yet.
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
-        let mut taken = self.robots.iter().map(|r| r.uid()).chain(self.objects.iter().map(|o| o.uid()));
+        let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
+        let mut taken = self.robots.iter().map(|r| r.uid()).chain(objects);
         if taken.any(|other| other == uid) {
             return Err(Error::DuplicateUid(uid.into()));
         }
@@ -30,7 +33,7 @@ impl Contents {
     /// The first mask id that is not used: ids stay what they are when more is added.
     pub(crate) fn next_mask_id(&self) -> i32 {
         let links: usize = self.robots.iter().map(|r| r.description().links.len()).sum();
-        GROUND_MASK_ID + 1 + (links + self.objects.len()) as i32
+        GROUND_MASK_ID + 1 + (links + self.objects.len() + self.terrains.len()) as i32
     }
 
     /// Names of the bodies in the order in which sensors see them: links of all robots (`uid/link`), then objects.

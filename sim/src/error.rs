@@ -59,6 +59,9 @@ pub enum Error {
         #[source]
         error: Box<PatternError>,
     },
+    /// Heights of a terrain cannot be made.
+    #[error(transparent)]
+    Terrain(#[from] scene::terrain::TerrainError),
     /// Two control parts have the same name.
     #[error("robot {robot:?}: control part {part:?} is given twice; join its patterns in one list")]
     ControlPartRepeated {
@@ -115,7 +118,7 @@ pub enum Error {
     },
     /// A name is used already.
     #[error(
-        "the uid {0:?} is taken; give each robot, object and sensor a uid of its own (for objects, \"world\" and \"ground\" are taken)"
+        "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (for objects and terrains, \"world\" and \"ground\" are taken)"
     )]
     DuplicateUid(String),
     /// A name that cannot be written to MJCF.

@@ -9,7 +9,7 @@ use crate::manager::SimulationManagerCfg;
 use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
 use crate::mjcf::robot::{MeshKey, Purpose, VisualAssets};
-use crate::mjcf::write;
+use crate::mjcf::{scene as world, write};
 use crate::objects::robot::RobotData;
 use crate::urdf::write_urdf;
 use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
@@ -37,6 +37,10 @@ pub(crate) fn dump(
         write_file(&dir.join(format!("{stem}.joints.txt")), &format!("{:#?}\n", robot.plans()))?;
     }
     write_file(&dir.join("run.mjcf.xml"), &simulation.xml)?;
+    for (index, terrain) in contents.terrains.iter().enumerate() {
+        let path = dir.join(world::terrain_file(index));
+        std::fs::write(&path, terrain.file()).map_err(at(&path))?;
+    }
 
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
     let mut left_out = Vec::new();

@@ -11,6 +11,7 @@ use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
+use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::Marker;
@@ -235,6 +236,13 @@ pub struct ObjectId {
     index: usize,
 }
 
+/// Handle of a terrain; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TerrainId {
+    manager: u64,
+    index: usize,
+}
+
 /// Tells managers of one process apart, so that a handle is not used with another one.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 
@@ -319,16 +327,33 @@ impl SimulationManager {
     /// # Errors
     /// The name is taken or a number is out of range.
     pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
-        self.contents.check_uid(&cfg.uid)?;
-        // MuJoCo's world body and our ground are called so.
-        if matches!(cfg.uid.as_str(), "world" | "ground") {
-            return Err(Error::DuplicateUid(cfg.uid));
-        }
+        self.check_world_uid(&cfg.uid)?;
         let object = RigidObjectData::new(cfg, self.contents.next_mask_id())?;
         let mut contents = self.contents.clone();
         contents.objects.push(Arc::new(object));
         self.replace_contents(contents, Vec::new())?;
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
+    }
+
+    /// Adds a terrain to every environment, compiled as [`add_robot`](Self::add_robot) does. It stands fixed, collides with
+    /// robots and objects, and is seen by cameras and ray casters, for which it is called by its uid.
+    ///
+    /// # Errors
+    /// The name is taken, a height is not finite, there are fewer than two rows or columns, or a number is out of range.
+    pub fn add_terrain(&mut self, cfg: TerrainCfg) -> Result<TerrainId> {
+        self.check_world_uid(&cfg.uid)?;
+        let terrain = Terrain::new(cfg, self.contents.next_mask_id())?;
+        let mut contents = self.contents.clone();
+        contents.terrains.push(Arc::new(terrain));
+        self.replace_contents(contents, Vec::new())?;
+        Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
+    }
+
+    /// Checks that nothing in the world is called `uid` yet.
+    fn check_world_uid(&self, uid: &str) -> Result<()> {
+        self.contents.check_uid(uid)?;
+        // MuJoCo's world body and our ground are called so.
+        if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
     /// Compiles `contents` and goes on with them; on an error nothing has changed.
@@ -463,6 +488,15 @@ impl SimulationManager {
     pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
+    }
+
+    /// A terrain.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn terrain(&self, id: TerrainId) -> &Terrain {
+        &self.contents.terrains[self.index_of(id.manager, id.index)]
     }
 
     #[track_caller]

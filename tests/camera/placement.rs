@@ -63,7 +63,7 @@ fn a_cube_seen_from_above_has_its_size_and_distance() {
         assert!((normal[(env, 60, 80, 2)] - 1.0).abs() < 1e-6);
     }
     let ground = sim.mask_ids().iter().find(|id| id.object == "ground").unwrap();
-    assert_eq!((ground.id, ground.class), (mask[(0, 5, 5)], "ground"));
+    assert_eq!((ground.id, ground.class.as_str()), (mask[(0, 5, 5)], "ground"));
 }
 
 /// A camera on a link is a free camera at the composed pose: the same bits.

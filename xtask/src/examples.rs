@@ -61,6 +61,23 @@ const TABLE: &[Run] = &[
     ),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --payload -1"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --robot sr5/SR5.urdf"),
+    run_of("run_ray_caster", &[0], "--headless --steps 300 --out {out}/ray_caster --report {out}/ray_caster.json"),
+    run_of("run_ray_caster", &[2], "--headless --steps 1 --resolution 0"),
+    run_of("run_ray_caster", &[2], "--headless --steps 1 --cell 0.3"),
+    run_of(
+        "run_frame_transformer",
+        &[0],
+        "--headless --num-envs 2 --steps 200 --out {out}/frames --report {out}/frames.json",
+    ),
+    run_of("run_frame_transformer", &[2], "--headless --steps 1 --source no_such_link"),
+    run_of("run_frame_transformer", &[2], "--headless --steps 1 --targets no_such_link.*"),
+    run_of(
+        "run_camera",
+        &[0],
+        "--headless --num-envs 2 --steps 100 --save --draw --camera-id 1 --out {out}/camera --report {out}/camera.json",
+    ),
+    run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
+    run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",

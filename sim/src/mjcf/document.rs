@@ -18,6 +18,8 @@ pub struct Mjcf {
     pub option: PhysicsOption,
     /// Mesh assets.
     pub meshes: Vec<MeshAsset>,
+    /// Height fields.
+    pub height_fields: Vec<HeightFieldAsset>,
     /// Image files of materials.
     pub textures: Vec<TextureAsset>,
     /// Materials.
@@ -121,6 +123,17 @@ pub enum MeshContent {
     },
     /// In a file next to the document.
     File(String),
+}
+
+/// `<hfield>`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightFieldAsset {
+    /// Unique name.
+    pub name: String,
+    /// MuJoCo's binary file next to the document.
+    pub file: String,
+    /// Half length along x, half length along y, height of elevation 1, depth of the floor below elevation 0 \[m\].
+    pub size: [f64; 4],
 }
 
 /// `<texture type="2d">`.
@@ -281,6 +294,8 @@ pub enum Shape {
     Box([f64; 3]),
     /// Name of a mesh.
     Mesh(String),
+    /// Name of a height field.
+    HeightField(String),
 }
 
 /// `<site>`: a named frame.
@@ -383,6 +398,7 @@ impl Mjcf {
             comments: Vec::new(),
             option,
             meshes: Vec::new(),
+            height_fields: Vec::new(),
             textures: Vec::new(),
             materials: Vec::new(),
             bodies: vec![world],

@@ -1,7 +1,8 @@
-//! What is in the world beside robots: the ground, lights.
+//! What is in the world beside robots: the ground, terrain, objects, lights.
 
-use super::document::{Body, Geom, GeomRole, Inertial, Joint, Light, Mjcf, Shape};
+use super::document::{Body, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, Mjcf, Shape};
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
+use crate::objects::terrain::Terrain;
 use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
 
@@ -32,6 +33,34 @@ pub fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
         role: WORLD_CONTACT,
         friction: None,
         rgba: Some([r, g, b, 1.0]),
+        material: None,
+        source: None,
+    });
+}
+
+/// File of terrain number `index`, next to the document.
+pub(crate) fn terrain_file(index: usize) -> String {
+    format!("terrain{index}.bin")
+}
+
+/// Adds a terrain: a height field and a geom of the world, both called by its uid.
+pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
+    let cfg = terrain.cfg();
+    let [x, y] = cfg.size.map(|length| length / 2.0);
+    mjcf.height_fields.push(HeightFieldAsset {
+        name: cfg.uid.clone(),
+        file: terrain_file(index),
+        size: [x, y, terrain.rise(), cfg.thickness],
+    });
+    // MuJoCo's elevation 0 is the lowest point.
+    let lowest = Pose::translation(0.0, 0.0, terrain.height_range()[0]);
+    mjcf.bodies[0].geoms.push(Geom {
+        name: Some(cfg.uid.clone()),
+        shape: Shape::HeightField(cfg.uid.clone()),
+        pose: cfg.init_pose * lowest,
+        role: WORLD_CONTACT,
+        friction: cfg.friction,
+        rgba: Some(cfg.rgba),
         material: None,
         source: None,
     });

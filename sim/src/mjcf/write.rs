@@ -213,7 +213,8 @@ impl Writer {
     }
 
     fn assets(&mut self, mjcf: &Mjcf) {
-        if mjcf.meshes.is_empty() && mjcf.textures.is_empty() && mjcf.materials.is_empty() {
+        let empty = mjcf.meshes.is_empty() && mjcf.height_fields.is_empty();
+        if empty && mjcf.textures.is_empty() && mjcf.materials.is_empty() {
             return;
         }
         self.open(Element::new("asset"), None);
@@ -231,6 +232,11 @@ impl Writer {
         }
         for mesh in &mjcf.meshes {
             self.mesh(mesh);
+        }
+        for field in &mjcf.height_fields {
+            let element =
+                Element::new("hfield").attr("name", &field.name).attr("file", &field.file).numbers("size", &field.size);
+            self.leaf(element, None);
         }
         self.close("asset");
     }
@@ -358,6 +364,7 @@ impl Writer {
             Shape::Cylinder(r, h) => element.attr("type", "cylinder").numbers("size", &[*r, *h]),
             Shape::Box(half) => element.attr("type", "box").numbers("size", half),
             Shape::Mesh(name) => element.attr("type", "mesh").attr("mesh", name),
+            Shape::HeightField(name) => element.attr("type", "hfield").attr("hfield", name),
         };
         element = element.pose(&geom.pose);
         element = match geom.role {

@@ -5,3 +5,4 @@ pub mod rigid_object;
 pub mod robot;
 mod rows;
 pub mod shape;
+pub mod terrain;

@@ -47,6 +47,8 @@ pub struct RigidObjectCfg {
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1.
     pub rgba: [f64; 4],
+    /// What kind of thing it is, for the table of mask ids; `object` where `None`.
+    pub semantic_class: Option<String>,
 }
 
 impl Default for RigidObjectCfg {
@@ -61,6 +63,7 @@ impl Default for RigidObjectCfg {
             friction: None,
             init_pose: Pose::identity(),
             rgba: [0.6, 0.6, 0.6, 1.0],
+            semantic_class: None,
         }
     }
 }

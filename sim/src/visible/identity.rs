@@ -13,8 +13,9 @@ pub struct MaskId {
     pub object: String,
     /// The link, for robots.
     pub link: Option<String>,
-    /// What kind of thing it is: `ground`, `robot`, `object`, or `world` and `body` in a model that was loaded as it is.
-    pub class: &'static str,
+    /// What kind of thing it is: `ground`, `terrain`, `robot`, `object` or the class that the object was given; `world` and
+    /// `body` in a model that was loaded as it is.
+    pub class: String,
     /// MuJoCo's body.
     pub body: String,
     /// MuJoCo's geoms; unnamed ones by number.
@@ -86,7 +87,7 @@ pub(super) fn by_body(model: &Model) -> Identities {
                 id,
                 object,
                 link: (body > 0).then(|| name.clone()),
-                class: if body == 0 { "world" } else { "body" },
+                class: if body == 0 { "world" } else { "body" }.into(),
                 body: name,
                 geoms: vec![geom_name(model, geom)],
             });
@@ -102,7 +103,7 @@ pub(crate) struct Owner {
     pub(crate) id: i32,
     pub(crate) object: String,
     pub(crate) link: Option<String>,
-    pub(crate) class: &'static str,
+    pub(crate) class: String,
     /// On the body axis of sensors; `None` for the world.
     pub(crate) body: Option<u32>,
 }
@@ -115,7 +116,7 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
             id: owner.id,
             object: owner.object.clone(),
             link: owner.link.clone(),
-            class: owner.class,
+            class: owner.class.clone(),
             body: body_name(model, model.geom_bodyid()[geom] as usize),
             geoms: Vec::new(),
         });

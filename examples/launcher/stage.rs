@@ -1,0 +1,34 @@
+//! All environments in one picture, with what sensors show of their measurements.
+
+use super::{Result, picture};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::{Marker, PoseF32};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::visibility::View;
+use std::path::Path;
+
+/// Draws environments side by side, seen from `eye`, and writes them as PNG.
+///
+/// # Errors
+/// There is too much to draw, or the file cannot be written.
+pub(crate) fn write(
+    sim: &mut SimulationManager,
+    markers: &[(EnvId, Marker)],
+    eye: [f64; 3],
+    target: [f64; 3],
+    path: &Path,
+) -> Result {
+    let stage = Still::overview(sim, None, markers)?;
+    let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0])?;
+    let (width, height) = (1280, 720);
+    let pixels = Intrinsics::Fovy { radians: 45f64.to_radians() }.to_pixels(width, height)?;
+    let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
+    let world_from_camera = PoseF32::from(&pose);
+    let view = View { width, height, fx, fy, cx, cy, near: 0.05, far: 500.0, world_from_camera };
+    let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::default() });
+    let mut job = [(stage.shot(&view), frame.as_mut())];
+    let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
+    ParallelRasterizer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
+    let color = frame.color.unwrap_or_default();
+    picture::write_png(path, &picture::color_picture([width, height], &color))
+}

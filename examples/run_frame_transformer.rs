@@ -1,0 +1,176 @@
+//! Where the links of a quadruped are, seen from its base, and a frame of our own on a shank.
+//!
+//! ```text
+//! cargo run --release --example run_frame_transformer -- --headless --steps 500 --out pictures
+//! ```
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::ndarray::{ArrayView3, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_xyz_rpy;
+use launcher::{Launcher, Progress, stage};
+use serde_json::{Value, json};
+use std::f64::consts::FRAC_PI_2;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Follows the frames of a robot, one after the other.
+#[derive(Debug, Parser)]
+#[command(name = "run_frame_transformer")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// URDF of a robot with the links of ANYmal
+    #[arg(long, default_value = "quadruped/quadruped.urdf")]
+    robot: PathBuf,
+    /// The link of the source frame
+    #[arg(long, default_value = "base")]
+    source: String,
+    /// The links of the target frames, a pattern that matches whole names
+    #[arg(long, default_value = ".*")]
+    targets: String,
+}
+
+/// Steps for which a frame is shown, as in the tutorial.
+const FRAME_EVERY: u64 = 50;
+/// Where the foot is on the shank \[m\]: the fixed joint of the URDF.
+const FOOT: [f64; 3] = [0.08795, 0.01305, -0.33797];
+
+fn main() -> ExitCode {
+    launcher::run("run_frame_transformer", || run(&Args::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result {
+    let legged = SimulationManagerCfg::legged();
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        physics_dt: legged.physics_dt,
+        cone: legged.cone,
+        impratio: legged.impratio,
+        arena_space: args.launcher.arena_space.unwrap_or(2.0),
+        ..args.launcher.simulation()?
+    })?;
+    let robot = sim.add_robot(robot_cfg(args)?)?;
+    let frames = sim.add_sensor("frames", frames_cfg(args))?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    if let Some(dir) = &args.launcher.dump {
+        for left_out in sim.dump(dir)? {
+            eprintln!("warning: {left_out}");
+        }
+    }
+    println!("{}", sim.sensor(frames)?);
+    let progress = Progress::new(&args.launcher, 1000);
+    let count = sim.sensor(frames)?.target_frame_names().len();
+    let mut step = 0;
+    let mut shown = 0;
+    while !progress.stop(step) {
+        let end = progress.end_of_block(step, FRAME_EVERY - step % FRAME_EVERY);
+        sim.update((end - step) as u32);
+        step = end;
+        progress.say(&line(&sim, frames, shown % count)?);
+        shown += 1;
+        progress.advance(step);
+    }
+    let rate = progress.env_steps_per_second(step, sim.num_envs());
+    let table = table(&sim, frames)?;
+    let user = apart(&sim, frames, "LF_FOOT_USER")?;
+    let own = apart(&sim, frames, "LF_FOOT_URDF")?;
+    println!("LF_FOOT_URDF is {own:.1e} m from LF_FOOT, LF_FOOT_USER is {user:.6} m");
+    println!("{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
+    if let Some(out) = &args.launcher.out {
+        std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+        let (markers, file) = (sim.markers(), out.join("run_frame_transformer.png"));
+        let reach = sim.env_origins().iter().fold(0.0, |far: f64, x| far.max(x.abs()));
+        let eye = [1.3 + 1.6 * reach, 1.5 + 1.6 * reach, 1.0 + reach];
+        stage::write(&mut sim, &markers, eye, [0.0, 0.0, 0.35], &file)?;
+        println!("Picture written to {}", file.display());
+    }
+    args.launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": sim.num_envs(),
+        "steps": step,
+        "threads": sim.threads(),
+        "time": sim.time(),
+        "source": args.source,
+        "source_pos_w": sim.sensor(frames)?.source_pos_w().rows().into_iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
+        "frames_of_env_0": table,
+        "distance_of_foot_urdf_from_foot": own,
+        "distance_of_foot_user_from_foot": user,
+        "base_height": sim.robot(robot).get_root_pose()[(0, 2)],
+        "env_steps_per_second": rate,
+        "warnings": sim.warning_counts(),
+    }))
+}
+
+/// ANYmal's start: 0.6 m up, knees bent.
+fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
+    let angles = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
+    Ok(RobotCfg {
+        uid: "robot".into(),
+        urdf: UrdfCfg::single(launcher::user_or_asset(&args.robot)?),
+        fix_base: false,
+        init_pose: Pose::translation(0.0, 0.0, 0.6),
+        init_qpos: angles.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
+        drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
+        ..Default::default()
+    })
+}
+
+/// All links; the tutorial's frame on the left front shank, a quarter turn about z against its foot; and the foot itself, as
+/// the URDF has it, which must be where LF_FOOT is.
+fn frames_cfg(args: &Args) -> FrameTransformerCfg {
+    let quarter = from_xyz_rpy([0.0; 3], [0.0, 0.0, -FRAC_PI_2]);
+    let foot = Pose::translation(FOOT[0], FOOT[1], FOOT[2]);
+    let on_shank =
+        |name: &str, offset| TargetFrameCfg { name: Some(name.into()), offset, ..TargetFrameCfg::of("LF_SHANK") };
+    FrameTransformerCfg::from(
+        &args.source,
+        vec![
+            TargetFrameCfg::of(&args.targets),
+            on_shank("LF_FOOT_USER", quarter * foot),
+            on_shank("LF_FOOT_URDF", foot),
+        ],
+    )
+}
+
+/// One frame of environment 0.
+fn line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target: usize) -> launcher::Result<String> {
+    let (frames, time) = (sim.sensor(frames)?, sim.time().first().copied().unwrap_or(0.0));
+    let (p, q) = (frames.target_pos_source(), frames.target_quat_source());
+    let p = [0, 1, 2].map(|k| format!("{:7.4}", p[(0, target, k)])).join(", ");
+    let q = [0, 1, 2, 3].map(|k| format!("{:7.4}", q[(0, target, k)])).join(", ");
+    let name = &frames.target_frame_names()[target];
+    Ok(format!("t = {time:5.2} s: {name:<34} at ({p}) m, turned by ({q}), seen from the source"))
+}
+
+/// Every frame of environment 0.
+fn table(sim: &SimulationManager, frames: SensorId<FrameTransformer>) -> launcher::Result<Vec<Value>> {
+    let frames = sim.sensor(frames)?;
+    let numbers =
+        |values: ArrayView3<'_, f64>, target: usize| values.index_axis(Axis(0), 0).index_axis(Axis(0), target).to_vec();
+    let names = frames.target_frame_names().iter().enumerate();
+    Ok(names
+        .map(|(target, name)| {
+            json!({
+                "name": name,
+                "pos_w": numbers(frames.target_pos_w(), target),
+                "quat_w": numbers(frames.target_quat_w(), target),
+                "pos_source": numbers(frames.target_pos_source(), target),
+                "quat_source": numbers(frames.target_quat_source(), target),
+            })
+        })
+        .collect())
+}
+
+/// The largest distance, over environments, of a frame from the link LF_FOOT \[m\].
+fn apart(sim: &SimulationManager, frames: SensorId<FrameTransformer>, name: &str) -> launcher::Result<f64> {
+    let robot = sim.robot(sim.robot_id("robot")?);
+    let (foot, frames) = (robot.link_pose("LF_FOOT")?, sim.sensor(frames)?);
+    let target = frames.target_frame_names().iter().position(|n| n == name).ok_or("the frame is gone")?;
+    let at = frames.target_pos_w();
+    let distance = |env: usize| (0..3).map(|k| (at[(env, target, k)] - foot[(env, k)]).powi(2)).sum::<f64>().sqrt();
+    Ok((0..sim.num_envs()).map(distance).fold(0.0, f64::max))
+}

@@ -1,0 +1,110 @@
+//! Heights of ground that is not flat: generators of height fields, one per file.
+//!
+//! Each gives an array of heights \[m\] over a regular grid: rows along y, columns along x, the first of both at the negative
+//! end. They hold nothing of MuJoCo; `sim::TerrainCfg` takes what they give.
+
+mod rough;
+mod slope;
+mod stairs;
+
+pub use rough::RoughTerrain;
+pub use slope::Slope;
+pub use stairs::PyramidStairs;
+
+use thiserror::Error;
+
+/// The most points that a height field may have. Drawing takes some 200 bytes for each.
+pub const MAX_POINTS: usize = 1 << 22;
+
+/// What is wrong with a terrain.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum TerrainError {
+    /// A number that cannot be used.
+    #[error("{terrain}: {field} is {value}; {expected}")]
+    Number {
+        /// The generator.
+        terrain: &'static str,
+        /// The field.
+        field: &'static str,
+        /// The value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A side is not a whole number of cells.
+    #[error("{terrain}: a side of {side} m is no whole number of cells of {cell} m; {nearest} m would be")]
+    Cells {
+        /// The generator.
+        terrain: &'static str,
+        /// The side \[m\].
+        side: f64,
+        /// The cell \[m\].
+        cell: f64,
+        /// The nearest side that is one \[m\].
+        nearest: f64,
+    },
+    /// More points than can be drawn.
+    #[error(
+        "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} can be drawn: choose larger cells"
+    )]
+    TooMany {
+        /// The generator.
+        terrain: &'static str,
+        /// Points along x.
+        columns: f64,
+        /// Points along y.
+        rows: f64,
+    },
+    /// No height of the range is a multiple of the step.
+    #[error(
+        "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two"
+    )]
+    NoLevel {
+        /// Lowest height \[m\].
+        low: f64,
+        /// Highest height \[m\].
+        high: f64,
+        /// Step \[m\].
+        step: f64,
+    },
+}
+
+/// Refuses a number that is not finite and positive.
+fn positive(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
+    let fine = value.is_finite() && value > 0.0;
+    if fine {
+        Ok(())
+    } else {
+        Err(TerrainError::Number { terrain, field, value, expected: "it must be above 0 metres" })
+    }
+}
+
+/// Refuses a number that is not finite.
+fn finite(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
+    let error = || TerrainError::Number { terrain, field, value, expected: "it must be finite" };
+    value.is_finite().then_some(()).ok_or_else(error)
+}
+
+/// Points along x and y of a field of `size`.
+fn points(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2], TerrainError> {
+    positive(terrain, "cell", cell)?;
+    for side in size {
+        positive(terrain, "size", side)?;
+    }
+    let cells = size.map(|side| (side / cell).round());
+    let [columns, rows] = cells.map(|n| n + 1.0);
+    if columns * rows > MAX_POINTS as f64 {
+        return Err(TerrainError::TooMany { terrain, columns, rows });
+    }
+    for (side, n) in size.into_iter().zip(cells) {
+        // Sides and cells are decimal numbers: quotients are whole up to a few rounding errors.
+        if n < 1.0 || (side / cell - n).abs() > 1e-6 {
+            return Err(TerrainError::Cells { terrain, side, cell, nearest: n.max(1.0) * cell });
+        }
+    }
+    Ok([columns as usize, rows as usize])
+}
+
+#[cfg(test)]
+mod tests;

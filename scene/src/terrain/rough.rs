@@ -1,0 +1,61 @@
+//! Ground of random heights.
+
+use super::{TerrainError, finite, points, positive};
+use crate::Random;
+use ndarray::Array2;
+
+/// Ground whose points stand at random heights, each independent of its neighbours: every multiple of `step` between the
+/// ends of the range is as likely. Isaac calls it random uniform terrain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoughTerrain {
+    /// Lengths along x and y \[m\].
+    pub size: [f64; 2],
+    /// Distance of neighbouring points \[m\].
+    pub cell: f64,
+    /// Lowest and highest height \[m\].
+    pub range: [f64; 2],
+    /// Heights are multiples of it \[m\].
+    pub step: f64,
+    /// Seed: the same one gives the same heights, bit for bit, on every machine.
+    pub seed: u64,
+}
+
+impl Default for RoughTerrain {
+    /// 8 m by 8 m, points every 0.2 m, 0 to 6 cm high in steps of 2 cm.
+    fn default() -> Self {
+        Self { size: [8.0, 8.0], cell: 0.2, range: [0.0, 0.06], step: 0.02, seed: 0 }
+    }
+}
+
+impl RoughTerrain {
+    /// Heights \[m\], rows along y, columns along x.
+    ///
+    /// # Errors
+    /// A number that is not positive or finite, sides that are no whole number of cells, too many points, a range without a
+    /// multiple of the step.
+    pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
+        const NAME: &str = "rough terrain";
+        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        positive(NAME, "step", self.step)?;
+        let [low, high] = self.range;
+        finite(NAME, "range", low)?;
+        finite(NAME, "range", high)?;
+        // Ends of the range are multiples of the step up to rounding.
+        const ROUNDING: f64 = 1e-9;
+        let first = (low / self.step - ROUNDING).ceil();
+        let levels = (high / self.step + ROUNDING).floor() - first + 1.0;
+        if levels.is_nan() || levels < 1.0 {
+            return Err(TerrainError::NoLevel { low, high, step: self.step });
+        }
+        let mut random = Random::keyed(self.seed, 0, "rough terrain");
+        // Beyond that, neighbouring multiples are the same number.
+        const MOST_LEVELS: f64 = 1e15;
+        if levels > MOST_LEVELS {
+            let expected = "it must not divide the range into more than 1e15 levels";
+            return Err(TerrainError::Number { terrain: NAME, field: "step", value: self.step, expected });
+        }
+        // uniform() is below 1, but its product may round up to the number of levels.
+        let mut level = || first + (random.uniform() * levels).floor().min(levels - 1.0);
+        Ok(Array2::from_shape_simple_fn((rows, columns), || level() * self.step))
+    }
+}

@@ -1,0 +1,40 @@
+//! An inclined plane.
+
+use super::{TerrainError, finite, points};
+use ndarray::Array2;
+
+/// An inclined plane: height 0 in the middle, rising along x and y.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slope {
+    /// Lengths along x and y \[m\].
+    pub size: [f64; 2],
+    /// Distance of neighbouring points \[m\].
+    pub cell: f64,
+    /// Rise per metre along x and y: the tangent of the angle.
+    pub gradient: [f64; 2],
+}
+
+impl Default for Slope {
+    /// 8 m by 8 m, rising by a fifth along x.
+    fn default() -> Self {
+        Self { size: [8.0, 8.0], cell: 0.5, gradient: [0.2, 0.0] }
+    }
+}
+
+impl Slope {
+    /// Heights \[m\], rows along y, columns along x.
+    ///
+    /// # Errors
+    /// A number that is not positive or finite, sides that are no whole number of cells, too many points.
+    pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
+        const NAME: &str = "slope";
+        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        let [gx, gy] = self.gradient;
+        finite(NAME, "gradient", gx)?;
+        finite(NAME, "gradient", gy)?;
+        let at = |k: usize, n: usize, length: f64| length * (k as f64 / (n - 1) as f64 - 0.5);
+        Ok(Array2::from_shape_fn((rows, columns), |(r, c)| {
+            gx * at(c, columns, self.size[0]) + gy * at(r, rows, self.size[1])
+        }))
+    }
+}

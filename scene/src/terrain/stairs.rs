@@ -1,0 +1,57 @@
+//! Stairs around a platform.
+
+use super::{TerrainError, finite, points, positive};
+use ndarray::Array2;
+
+/// Stairs that lead from all four sides up (or down) to a square platform in the middle. A height field has no vertical
+/// walls: each riser leans over one cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PyramidStairs {
+    /// Lengths along x and y \[m\].
+    pub size: [f64; 2],
+    /// Distance of neighbouring points \[m\].
+    pub cell: f64,
+    /// Height of a step \[m\]; negative ones lead down.
+    pub step_height: f64,
+    /// Depth of a tread, its riser included \[m\].
+    pub tread: f64,
+    /// Side of the platform \[m\].
+    pub platform: f64,
+}
+
+impl Default for PyramidStairs {
+    /// 8 m by 8 m, steps of 10 cm every 40 cm, up to a platform of 1.6 m.
+    fn default() -> Self {
+        Self { size: [8.0, 8.0], cell: 0.1, step_height: 0.1, tread: 0.4, platform: 1.6 }
+    }
+}
+
+impl PyramidStairs {
+    /// Heights \[m\], 0 at the rim; rows along y, columns along x.
+    ///
+    /// # Errors
+    /// A number that is not positive or finite, sides that are no whole number of cells, too many points, treads less than
+    /// two cells deep, a platform larger than the field.
+    pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
+        const NAME: &str = "stairs";
+        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        finite(NAME, "step_height", self.step_height)?;
+        positive(NAME, "tread", self.tread)?;
+        positive(NAME, "platform", self.platform)?;
+        let number = |field, value, expected| TerrainError::Number { terrain: NAME, field, value, expected };
+        if self.tread < (2.0 - 1e-6) * self.cell {
+            return Err(number("tread", self.tread, "it must be at least two cells: one for the riser"));
+        }
+        let smaller = self.size[0].min(self.size[1]);
+        if self.platform > smaller {
+            return Err(number("platform", self.platform, "it must fit into the field"));
+        }
+        // A step begins where the distance from the rim is a multiple of the tread, up to the platform.
+        let last = ((0.5 * (smaller - self.platform)) / self.tread + 1e-6).floor();
+        let from_rim = |k: usize, n: usize| k.min(n - 1 - k) as f64 * self.cell;
+        Ok(Array2::from_shape_fn((rows, columns), |(r, c)| {
+            let distance = from_rim(r, rows).min(from_rim(c, columns));
+            (distance / self.tread + 1e-6).floor().min(last) * self.step_height
+        }))
+    }
+}

@@ -1,0 +1,88 @@
+//! Heights of the generators against what they say.
+
+use super::*;
+
+#[test]
+fn rough_heights_are_multiples_of_the_step_and_every_level_is_as_likely() {
+    let terrain = RoughTerrain { size: [20.0, 10.0], cell: 0.1, range: [-0.04, 0.06], step: 0.02, seed: 3 };
+    let heights = terrain.heights().expect("heights");
+    assert_eq!(heights.dim(), (101, 201));
+    let mut counts = [0u32; 6];
+    for &height in &heights {
+        let level = height / 0.02;
+        assert!((level - level.round()).abs() < 1e-9, "{height}");
+        counts[(level.round() + 2.0) as usize] += 1;
+    }
+    // n p each, which scatter by sqrt(n p (1 - p)): six times that.
+    let n = heights.len() as f64;
+    let (mean, sigma) = (n / 6.0, (n * 5.0 / 36.0).sqrt());
+    assert!(counts.iter().all(|&count| (f64::from(count) - mean).abs() < 6.0 * sigma), "{counts:?}, not {mean}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_and_another_one_does_not() {
+    let bits = |seed| {
+        let heights = RoughTerrain { seed, ..RoughTerrain::default() }.heights().expect("heights");
+        heights.iter().map(|h| h.to_bits()).collect::<Vec<u64>>()
+    };
+    assert_eq!(bits(1), bits(1));
+    let (a, b) = (bits(1), bits(2));
+    // Of four levels a quarter agrees by chance.
+    let differing = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+    assert!(differing > a.len() / 2, "{differing} of {}", a.len());
+}
+
+#[test]
+fn a_slope_rises_as_it_says() {
+    let heights = Slope { size: [4.0, 2.0], cell: 0.5, gradient: [0.3, -0.1] }.heights().expect("heights");
+    assert_eq!(heights.dim(), (5, 9));
+    for ((r, c), height) in heights.indexed_iter() {
+        let (x, y) = (0.5 * c as f64 - 2.0, 0.5 * r as f64 - 1.0);
+        assert!((height - (0.3 * x - 0.1 * y)).abs() < 1e-12, "{r} {c}: {height}");
+    }
+}
+
+#[test]
+fn stairs_lead_up_to_the_platform() {
+    let stairs = PyramidStairs { size: [4.0, 4.0], cell: 0.1, step_height: 0.15, tread: 0.3, platform: 1.0 };
+    let heights = stairs.heights().expect("heights");
+    // 1.5 m from the rim to the platform are five treads of 0.3 m; the third point of each is one step higher.
+    let profile: Vec<f64> = heights.row(20).iter().take(21).map(|h| (h / 0.15).round()).collect();
+    let expected: Vec<f64> = (0..21).map(|k| f64::from(k / 3).min(5.0)).collect();
+    assert_eq!(profile, expected);
+    assert!((heights[(20, 20)] - 0.75).abs() < 1e-12);
+    assert_eq!(heights, heights.t(), "the same from both sides");
+    assert_eq!(heights[(0, 20)], 0.0);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let rough = RoughTerrain::default;
+    let message = |result: Result<ndarray::Array2<f64>, TerrainError>| result.expect_err("refused").to_string();
+    for (terrain, says) in [
+        (RoughTerrain { cell: 0.0, ..rough() }, "cell is 0"),
+        (RoughTerrain { size: [f64::NAN, 1.0], ..rough() }, "size is NaN"),
+        (RoughTerrain { size: [1.05, 1.0], ..rough() }, "1 m would be"),
+        (RoughTerrain { size: [0.05, 1.0], ..rough() }, "0.2 m would be"),
+        (RoughTerrain { size: [1e6, 1e6], ..rough() }, "too many"),
+        (RoughTerrain { size: [f64::MAX, 1.0], cell: 1e-300, ..rough() }, "too many"),
+        (RoughTerrain { step: -1.0, ..rough() }, "step is -1"),
+        (RoughTerrain { step: 1e-300, ..rough() }, "step is 1e-300"),
+        (RoughTerrain { range: [0.01, 0.015], ..rough() }, "no multiple of the step"),
+        (RoughTerrain { range: [0.1, 0.0], ..rough() }, "no multiple of the step"),
+        (RoughTerrain { range: [0.0, f64::INFINITY], ..rough() }, "range is inf"),
+    ] {
+        let text = message(terrain.heights());
+        assert!(text.contains(says), "{text}");
+    }
+    let stairs = PyramidStairs::default;
+    for (terrain, says) in [
+        (PyramidStairs { tread: 0.1, ..stairs() }, "two cells"),
+        (PyramidStairs { platform: 9.0, ..stairs() }, "fit into the field"),
+        (PyramidStairs { step_height: f64::NAN, ..stairs() }, "step_height is NaN"),
+    ] {
+        let text = message(terrain.heights());
+        assert!(text.contains(says), "{text}");
+    }
+    assert!(message(Slope { gradient: [f64::NAN, 0.0], ..Slope::default() }.heights()).contains("gradient"));
+}

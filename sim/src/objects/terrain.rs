@@ -1,0 +1,173 @@
+//! Terrain: ground that is not flat.
+
+use crate::error::{Error, Result};
+use crate::objects::robot::check_pose;
+use ::scene::Pose;
+use ::scene::terrain::MAX_POINTS;
+use ndarray::Array2;
+
+/// Configuration of a terrain: a height field that stands fixed in every environment.
+///
+/// [`scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
+/// (`ground: None`) or lay the terrain over it.
+///
+/// ```
+/// use scene::terrain::RoughTerrain;
+/// use sim::{SimulationManager, SimulationManagerCfg, TerrainCfg};
+///
+/// let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
+/// let rough = RoughTerrain { seed: 7, ..RoughTerrain::default() };
+/// let heights = rough.heights()?;
+/// let terrain = sim.add_terrain(TerrainCfg { heights: heights.clone(), size: rough.size, ..Default::default() })?;
+/// // Points are 0.2 m apart; the middle of 41 is number 20.
+/// let height = sim.terrain(terrain).height_at([0.2, -0.4]).unwrap_or(f64::NAN);
+/// assert!((height - heights[(18, 21)]).abs() < 1e-9);
+/// # Ok::<(), sim::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct TerrainCfg {
+    /// Name of the terrain, unique in the simulation.
+    pub uid: String,
+    /// Heights \[m\] over a regular grid, rows along y, columns along x; the first ones at -y and -x. Between the points the
+    /// surface is made of two triangles per cell, which meet in the diagonal from (-x, -y) to (+x, +y). MuJoCo keeps heights in
+    /// single precision, as parts of the range from the lowest to the highest.
+    pub heights: Array2<f64>,
+    /// Lengths along x and y, from the first point to the last \[m\].
+    pub size: [f64; 2],
+    /// How far the ground reaches below its lowest point \[m\]: what falls fast must not fall through.
+    pub thickness: f64,
+    /// Pose of the frame in the environment: in the middle of the field, at height 0.
+    pub init_pose: Pose,
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
+    pub friction: Option<[f64; 3]>,
+    /// Colour and opacity, 0..=1.
+    pub rgba: [f64; 4],
+}
+
+impl Default for TerrainCfg {
+    /// Flat ground of 10 m by 10 m.
+    fn default() -> Self {
+        Self {
+            uid: "terrain".into(),
+            heights: Array2::zeros((2, 2)),
+            size: [10.0; 2],
+            thickness: 1.0,
+            init_pose: Pose::identity(),
+            friction: None,
+            rgba: [0.52, 0.47, 0.4, 1.0],
+        }
+    }
+}
+
+/// A terrain that was added. Nothing of it changes while the simulation runs.
+#[derive(Debug)]
+pub struct Terrain {
+    cfg: TerrainCfg,
+    mask_id: i32,
+    /// Lowest and highest height \[m\].
+    range: [f64; 2],
+}
+
+impl Terrain {
+    /// Checks every number.
+    pub(crate) fn new(cfg: TerrainCfg, mask_id: i32) -> Result<Self> {
+        let fail = |field, value: &dyn std::fmt::Debug, expected| {
+            Err(Error::Config { field, value: format!("{value:?}"), expected })
+        };
+        let (rows, columns) = cfg.heights.dim();
+        if rows < 2 || columns < 2 {
+            return fail("heights", &[rows, columns], "there must be at least 2 rows and 2 columns");
+        }
+        if cfg.heights.len() > MAX_POINTS {
+            return fail("heights", &[rows, columns], "there can be at most 4194304 points");
+        }
+        for ((row, column), &value) in cfg.heights.indexed_iter() {
+            if !value.is_finite() {
+                let of = format!("terrain {:?}", cfg.uid);
+                return Err(Error::NotFinite { argument: "heights", row, column, of, value });
+            }
+        }
+        let range = [
+            cfg.heights.iter().copied().fold(f64::INFINITY, f64::min),
+            cfg.heights.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ];
+        if range.iter().any(|height| height.abs() > 1e6) {
+            return fail("heights", &range, "they must be within 1e6 metres of 0");
+        }
+        let length = |x: &f64| x.is_finite() && (1e-6..=1e6).contains(x);
+        if !cfg.size.iter().all(length) {
+            return fail("size", &cfg.size, "both lengths must be 1e-6 to 1e6 metres");
+        }
+        if !length(&cfg.thickness) {
+            return fail("thickness", &cfg.thickness, "it must be 1e-6 to 1e6 metres");
+        }
+        if let Some(friction) = cfg.friction
+            && !friction.iter().all(|f| f.is_finite() && *f >= 0.0)
+        {
+            return fail("friction", &friction, "the three coefficients must be >= 0");
+        }
+        if !cfg.rgba.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return fail("rgba", &cfg.rgba, "each component must be 0 to 1");
+        }
+        check_pose("init_pose", &cfg.init_pose)?;
+        Ok(Self { cfg, mask_id, range })
+    }
+
+    /// Name of the terrain.
+    pub fn uid(&self) -> &str {
+        &self.cfg.uid
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &TerrainCfg {
+        &self.cfg
+    }
+
+    /// What the mask channel of cameras says of it, the same in every environment.
+    pub fn mask_id(&self) -> i32 {
+        self.mask_id
+    }
+
+    /// Lowest and highest height of its points \[m\], in its frame.
+    pub fn height_range(&self) -> [f64; 2] {
+        self.range
+    }
+
+    /// Height of the surface at (x, y) \[m\], all in the terrain's frame; `None` beside it.
+    pub fn height_at(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        let (rows, columns) = self.cfg.heights.dim();
+        let cell = |at: f64, length: f64, points: usize| {
+            let u = (at / length + 0.5) * (points - 1) as f64;
+            let within = (0.0..=(points - 1) as f64).contains(&u);
+            within.then(|| {
+                let cell = (u as usize).min(points - 2);
+                (cell, u - cell as f64)
+            })
+        };
+        let (c, u) = cell(x, self.cfg.size[0], columns)?;
+        let (r, v) = cell(y, self.cfg.size[1], rows)?;
+        let corner = |dr: usize, dc: usize| self.cfg.heights[(r + dr, c + dc)];
+        let (low, high) = (corner(0, 0), corner(1, 1));
+        Some(if u >= v {
+            low + u * (corner(0, 1) - low) + v * (high - corner(0, 1))
+        } else {
+            low + v * (corner(1, 0) - low) + u * (high - corner(1, 0))
+        })
+    }
+
+    /// How much higher than the lowest point elevation 1 is \[m\]. MuJoCo wants it positive for flat ground too.
+    pub(crate) fn rise(&self) -> f64 {
+        let rise = self.range[1] - self.range[0];
+        if rise > 0.0 { rise } else { 1e-3 }
+    }
+
+    /// MuJoCo's binary file of height fields: numbers of rows and columns, then elevations of 0 to 1, in single precision.
+    pub(crate) fn file(&self) -> Vec<u8> {
+        let (rows, columns) = self.cfg.heights.dim();
+        // At most `MAX_POINTS`.
+        let mut bytes: Vec<u8> = [rows, columns].iter().flat_map(|&n| (n as i32).to_le_bytes()).collect();
+        let elevation = |height: &f64| ((height - self.range[0]) / self.rise()) as f32;
+        bytes.extend(self.cfg.heights.iter().flat_map(|height| elevation(height).to_le_bytes()));
+        bytes
+    }
+}
