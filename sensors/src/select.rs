@@ -66,6 +66,7 @@ mod tests {
         assert_eq!(found(&[".F_FOOT"]), [0, 1, 2]);
         assert_eq!(found(&["b/.*", "a/RF_FOOT"]), [2, 1]);
         assert_eq!(found(&["cube", "x/y"]), [3, 4]);
+        assert_eq!(found(&["{ENV}/b/.*", "{ENV_REGEX_NS}/RF_FOOT"]), [2, 1]);
         assert_eq!(found(&[]), [0_usize; 0]);
         let wrong = |patterns: &[&str]| select(patterns, &names, "body").unwrap_err().to_string();
         assert!(wrong(&["F_FOOT"]).starts_with("there is no body \"F_FOOT\"; known are \"LF_FOOT\""));

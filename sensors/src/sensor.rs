@@ -296,6 +296,8 @@ mod tests {
         let bodies = ["left/base", "left/tip", "right/base", "cube"].map(String::from);
         let context = SensorContext { bodies: bodies.into(), ..SensorContext::default() };
         assert_eq!([context.body("right/base"), context.body("tip"), context.body("cube")], [Ok(2), Ok(1), Ok(3)]);
+        assert_eq!([context.body("{ENV}/tip"), context.body("{ENV_REGEX_NS}/right/base")], [Ok(1), Ok(2)]);
+        assert!(context.body("{ENVS}/tip").is_err());
         let error = context.body("base").unwrap_err();
         assert_eq!(error.to_string(), "body \"base\" may be any of \"left/base\", \"right/base\"; give the full name");
         let error = context.body("tpi").unwrap_err().to_string();

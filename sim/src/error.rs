@@ -156,6 +156,17 @@ pub enum Error {
         /// What it was taken for.
         wanted: String,
     },
+    /// An entity of a scene file cannot be built.
+    #[error("{at}: entity {name:?}: {error}")]
+    Entity {
+        /// Where it is declared.
+        at: Source,
+        /// The entity.
+        name: String,
+        /// What is wrong.
+        #[source]
+        error: Box<Error>,
+    },
     /// A scene file is wrong.
     #[error("{at}: {reason}")]
     SceneFile {

@@ -87,3 +87,28 @@ fn a_file_that_is_not_there_is_named() {
     let message = SceneCfg::from_file("no/such/scene.toml").unwrap_err().to_string();
     assert!(message.starts_with("no/such/scene.toml: "), "{message}");
 }
+
+/// What only building finds out is named with the line of the entity.
+#[test]
+fn what_cannot_be_built_is_named_with_its_line() {
+    for (text, line, parts) in [
+        ("# a ball\n[entities.ball]\ntype = \"rigid_object\"\nmass = 0.0", 2, &["\"ball\"", "mass"][..]),
+        (
+            "[entities.eye]\ntype = \"camera\"\nextrinsics.parent = \"bal\"\n[entities.ball]\ntype = \"rigid_object\"",
+            1,
+            &["\"eye\"", "\"bal\"", "known are \"ball\""],
+        ),
+        ("[entities.eye]\ntype = \"camera\"\n\n[entities.\"{ENV}/arm\"]\ntype = \"robot\"", 4, &["\"arm\""]),
+        ("[entities.arm]\ntype = \"robot\"\nurdf = \"arm.urdf\"", 1, &["\"arm\"", "dir/arm.urdf"]),
+        ("[entities.imu]\ntype = \"imu\"\nsampling.update_period = 0.0101", 1, &["\"imu\""]),
+    ] {
+        let cfg = SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap();
+        let error = InteractiveScene::new(cfg).unwrap_err();
+        assert!(matches!(error, Error::Entity { .. }));
+        let message = error.to_string();
+        assert!(message.starts_with(&format!("dir/scene.toml:{line}: entity ")), "{text}\n{message}");
+        for part in parts {
+            assert!(message.contains(part), "{text}\n{message}: no {part}");
+        }
+    }
+}

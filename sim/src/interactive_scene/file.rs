@@ -107,6 +107,8 @@ impl<'a> Reader<'a> {
                     let (table, _) = self.table(value, "entities")?;
                     for (name, entity) in table {
                         let entity = self.entity(name.get_ref(), entity, name.span())?;
+                        let source = Source::new(self.file, self.line(name.span()));
+                        scene.sources.insert(in_every_env(name.get_ref()).to_owned(), source);
                         scene.entities.push((name.into_inner().into_owned(), entity));
                     }
                 }
@@ -198,8 +200,12 @@ impl<'a> Reader<'a> {
     }
 
     fn at(&self, span: Range<usize>, reason: String) -> Error {
+        Error::SceneFile { at: Source::new(self.file, self.line(span)), reason }
+    }
+
+    /// The line of a place, counted from 1.
+    fn line(&self, span: Range<usize>) -> u32 {
         let before = self.text.as_bytes().iter().take(span.start);
-        let line = 1 + before.filter(|byte| **byte == b'\n').count();
-        Error::SceneFile { at: Source::new(self.file, u32::try_from(line).unwrap_or(u32::MAX)), reason }
+        u32::try_from(1 + before.filter(|byte| **byte == b'\n').count()).unwrap_or(u32::MAX)
     }
 }

@@ -16,9 +16,11 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};
 use crate::pattern::{closest, in_every_env};
 use crate::sensor_list::SensorId;
+use crate::source::Source;
 use entity::{Handle, short_name};
 use ndarray::Array2;
 use sensors::Sensor;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What a scene holds, in the order of its declaration.
@@ -54,12 +56,14 @@ pub struct SceneCfg {
     /// Names and what they are. `{ENV}/` or `{ENV_REGEX_NS}/` before a name changes nothing: every entity is in every
     /// environment.
     pub entities: Vec<(String, EntityCfg)>,
+    /// Where entities were declared, by name: errors say it. A scene of Rust needs none.
+    pub sources: BTreeMap<String, Source>,
 }
 
 impl SceneCfg {
     /// A scene without entities.
     pub fn new(simulation: SimulationManagerCfg) -> Self {
-        Self { simulation, entities: Vec::new() }
+        Self { simulation, ..Self::default() }
     }
 
     /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), or the
@@ -88,7 +92,8 @@ impl InteractiveScene {
     /// they look at; within both, the order is that of the declaration.
     ///
     /// # Errors
-    /// Two entities of one name, and what is wrong with the simulation or with an entity.
+    /// Two entities of one name, what is wrong with the simulation, and what is wrong with an entity: in
+    /// [`Error::Entity`] where it is known where it was declared.
     pub fn new(cfg: SceneCfg) -> Result<Self> {
         let mut taken: Vec<&str> = Vec::new();
         for name in cfg.keys() {
@@ -102,7 +107,12 @@ impl InteractiveScene {
         for sensors in [false, true] {
             for ((name, entity), handle) in cfg.entities.iter().zip(&mut handles) {
                 if matches!(entity, EntityCfg::Sensor(_)) == sensors {
-                    *handle = Some(Handle::add(&mut sim, in_every_env(name), entity)?);
+                    let name = in_every_env(name);
+                    *handle =
+                        Some(Handle::add(&mut sim, name, entity).map_err(|error| match cfg.sources.get(name) {
+                            Some(at) => Error::Entity { at: at.clone(), name: name.into(), error: Box::new(error) },
+                            None => error,
+                        })?);
                 }
             }
         }
