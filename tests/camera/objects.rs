@@ -140,3 +140,14 @@ fn static_objects_stand_and_wrong_numbers_are_errors() {
         assert!(sim.add_rigid_object(cfg).is_err(), "{shown}");
     }
 }
+
+/// The class that an object is given is what the table of mask ids says of it; `object` where it is given none.
+#[test]
+fn classes_are_those_of_the_configuration() {
+    let mut sim = sim();
+    let cup = RigidObjectCfg { uid: "cup".into(), semantic_class: Some("dishes".into()), ..Default::default() };
+    let (cup, cube) = (sim.add_rigid_object(cup).unwrap(), sim.add_rigid_object(RigidObjectCfg::default()).unwrap());
+    let class = |id: i32| sim.mask_ids().iter().find(|entry| entry.id == id).unwrap().class.as_str();
+    assert_eq!(class(sim.rigid_object(cup).mask_id()), "dishes");
+    assert_eq!(class(sim.rigid_object(cube).mask_id()), "object");
+}

@@ -21,7 +21,7 @@ pub const MAX_POINTS: usize = 1 << 22;
 #[non_exhaustive]
 pub enum TerrainError {
     /// A number that cannot be used.
-    #[error("{terrain}: {field} is {value}; {expected}")]
+    #[error("{terrain}: {field} is {value:?}; {expected}")]
     Number {
         /// The generator.
         terrain: &'static str,
