@@ -91,6 +91,9 @@ fn with_camera(mjcf: &str, eye: [f64; 3], target: [f64; 3]) -> String {
     )
 }
 
+/// The colours of a pixel in two pictures.
+type Pair = ([f64; 3], [f64; 3]);
+
 /// How two pictures of one scene agree.
 #[derive(Debug)]
 struct Agreement {
@@ -113,7 +116,7 @@ const DEPTH: f64 = 5e-4;
 fn compare(theirs: &Pictures, ours: &Pictures, mask_of: &[i32]) -> Agreement {
     let [width, height] = SIZE;
     let (mut seen, mut compared, mut same) = (0, 0, 0);
-    let mut pairs = Vec::new();
+    let mut pairs: Vec<Pair> = Vec::new();
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let k = y * width + x;
@@ -145,7 +148,7 @@ fn compare(theirs: &Pictures, ours: &Pictures, mask_of: &[i32]) -> Agreement {
     }
     let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let n = pairs.len() as f64;
-    let mean = |f: &dyn Fn(&([f64; 3], [f64; 3])) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+    let mean = |f: &dyn Fn(&Pair) -> f64| pairs.iter().map(f).sum::<f64>() / n;
     let (a, b) = (mean(&|p| luma(p.0)), mean(&|p| luma(p.1)));
     let covariance = mean(&|p| (luma(p.0) - a) * (luma(p.1) - b));
     let (va, vb) = (mean(&|p| (luma(p.0) - a).powi(2)), mean(&|p| (luma(p.1) - b).powi(2)));

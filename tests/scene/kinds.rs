@@ -96,7 +96,7 @@ fn objects_have_their_shapes() {
         let [(_, EntityCfg::RigidObject(object))] = scene.entities.as_slice() else { panic!("{scene:?}") };
         let expected =
             RigidObjectCfg { uid: "o".into(), shape: expected, body_type: BodyType::Static, ..Default::default() };
-        assert_eq!(*object, expected);
+        assert_eq!(**object, expected);
     }
 }
 

@@ -54,7 +54,7 @@ fn what_is_written_is_read_again() {
             // The uid is the name, whatever stood there.
             let cfg = match cfg.clone() {
                 EntityCfg::Robot(robot) => RobotCfg { uid: name.clone(), ..*robot }.into(),
-                EntityCfg::RigidObject(object) => RigidObjectCfg { uid: name.clone(), ..object }.into(),
+                EntityCfg::RigidObject(object) => RigidObjectCfg { uid: name.clone(), ..*object }.into(),
                 other => other,
             };
             assert_eq!(format!("{read:#?}"), format!("{cfg:#?}"));

@@ -16,7 +16,7 @@ pub enum EntityCfg {
     /// A robot. Its uid is the name of the entity.
     Robot(Box<RobotCfg>),
     /// A rigid object. Its uid is the name of the entity.
-    RigidObject(RigidObjectCfg),
+    RigidObject(Box<RigidObjectCfg>),
     /// A sensor of any kind.
     Sensor(Box<dyn SensorEntity>),
 }
@@ -29,7 +29,7 @@ impl From<RobotCfg> for EntityCfg {
 
 impl From<RigidObjectCfg> for EntityCfg {
     fn from(cfg: RigidObjectCfg) -> Self {
-        Self::RigidObject(cfg)
+        Self::RigidObject(Box::new(cfg))
     }
 }
 
@@ -117,7 +117,7 @@ impl Handle {
         match cfg {
             EntityCfg::Robot(cfg) => sim.add_robot(RobotCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Robot),
             EntityCfg::RigidObject(cfg) => {
-                sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..cfg.clone() }).map(Self::RigidObject)
+                sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::RigidObject)
             }
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
         }

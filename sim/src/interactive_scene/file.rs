@@ -16,8 +16,11 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 /// What a file may hold at its top.
 const SECTIONS: [&str; 2] = ["simulation", "entities"];
 
+/// Makes a set of defaults.
+type Preset = fn() -> SimulationManagerCfg;
+
 /// Sets of defaults by the name that files give them.
-const PRESETS: [(&str, fn() -> SimulationManagerCfg); 3] = [
+const PRESETS: [(&str, Preset); 3] = [
     ("default", SimulationManagerCfg::default),
     ("manipulation", SimulationManagerCfg::manipulation),
     ("legged", SimulationManagerCfg::legged),
