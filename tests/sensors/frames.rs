@@ -22,6 +22,8 @@ fn targets_are_seen_from_the_source_in_the_order_they_were_named() {
     sim.update(50);
     let sensor = sim.sensor(id).unwrap();
     assert_eq!(sensor.target_frame_names(), ["cube", "tool", "arm/link2", "arm/link3"]);
+    let text = sensor.to_string();
+    assert!(text.contains("arm/link2\n") && text.ends_with("cube, tool, arm/link2, arm/link3"), "{text}");
     let robot = sim.robot(arm);
     let pose = |name: &str, env: usize| {
         let rows = robot.link_pose(name).unwrap();

@@ -55,6 +55,27 @@ fn center_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
     sim.rigid_object(ball).get_pose()[(0, 2)]
 }
 
+/// Contact sensors feel it as a part of the world: at rest, its walls together carry the ball's weight.
+#[test]
+fn contact_sensors_feel_the_weight() {
+    let mut sim = empty();
+    sim.add_terrain(pit()).unwrap();
+    sim.add_rigid_object(ball()).unwrap();
+    let feel = ContactSensorCfg { filters: vec!["world".into()], ..ContactSensorCfg::of("ball") };
+    let sensor = sim.add_sensor("contact", feel).unwrap();
+    sim.update(1000);
+    let sensor = sim.sensor(sensor).unwrap();
+    for env in 0..2 {
+        let total = [0, 1, 2].map(|k| sensor.total_forces_w()[(env, 0, k)]);
+        // What is left of the motion, below 1e-3 m/s, is braked at some 0.01 s: below 0.05 N.
+        let weight = [0.0, 0.0, 0.5 * 9.81];
+        assert!(total.iter().zip(weight).all(|(a, b)| (a - b).abs() < 0.05), "{total:?}");
+        let normal = [0, 1, 2].map(|k| sensor.net_forces_w()[(env, 0, k)]);
+        let matrix = [0, 1, 2].map(|k| sensor.force_matrix_w()[(env, 0, 0, k)]);
+        assert!(normal.iter().zip(matrix).all(|(a, b)| (a - b).abs() < 1e-9), "{normal:?} {matrix:?}");
+    }
+}
+
 /// The control: without the pit it falls, g t² / 2.
 #[test]
 fn without_it_the_ball_falls() {

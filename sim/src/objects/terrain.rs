@@ -8,7 +8,7 @@ use ndarray::Array2;
 
 /// Configuration of a terrain: a height field that stands fixed in every environment.
 ///
-/// [`scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
+/// Contact sensors count it as part of the `world`. [`scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
 /// (`ground: None`) or lay the terrain over it.
 ///
 /// ```
