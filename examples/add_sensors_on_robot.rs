@@ -10,12 +10,10 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_wxyz;
-use kinetoscope::scene::{PoseF32, Random};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sensors::ray::pattern::Grid;
-use kinetoscope::sensors::visibility::View;
-use launcher::{Launcher, Progress, picture};
+use launcher::{Launcher, Progress, picture, stage};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -90,6 +88,7 @@ fn run(args: &Args) -> launcher::Result {
     while !progress.stop(step) {
         if args.reset_every > 0 && step % args.reset_every == 0 {
             sim.reset(None)?;
+            totals.seen = [0; 3];
             let offset = Array2::from_shape_fn(standing.dim(), |(env, _)| 0.1 * noise[env].uniform());
             let mut legs = sim.robot_mut(robot);
             legs.write_qpos(&(&standing + &offset), None, None)?;
@@ -309,17 +308,5 @@ fn write_pictures(sim: &mut SimulationManager, camera: SensorId<Camera>, out: &P
         picture::write_png(&file, &picture::color_picture([width, height], &pixels))?;
     }
     let markers = sim.markers();
-    let stage = Still::overview(sim, None, &markers)?;
-    let pose = look_at_pose([3.5, 3.5, 3.5], [0.0; 3], [0.0, 0.0, 1.0])?;
-    let (width, height) = (1280, 720);
-    let pixels = Intrinsics::Fovy { radians: 45f64.to_radians() }.to_pixels(width, height)?;
-    let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
-    let world_from_camera = PoseF32::from(&pose);
-    let view = View { width, height, fx, fy, cx, cy, near: 0.05, far: 200.0, world_from_camera };
-    let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::default() });
-    let cfg = RasterCfg { samples: 4, shadows: true, groups: 0b111, ..RasterCfg::default() };
-    let mut job = [(stage.shot(&view), frame.as_mut())];
-    ParallelRasterizer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
-    let color = frame.color.unwrap_or_default();
-    picture::write_png(&out.join("stage.png"), &picture::color_picture([width, height], &color))
+    stage::write(sim, &markers, [3.5; 3], [0.0; 3], &out.join("stage.png"))
 }

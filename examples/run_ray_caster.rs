@@ -7,7 +7,7 @@
 mod launcher;
 
 use clap::Parser;
-use kinetoscope::ndarray::Array2;
+use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use kinetoscope::scene::terrain::RoughTerrain;
@@ -223,7 +223,8 @@ fn median_ms(mut times: Vec<Duration>) -> f64 {
 /// Where the ball of environment 0 is and what it sees below itself.
 fn summary(sim: &SimulationManager, scene: &Scene) -> launcher::Result<(String, Value)> {
     let (scanner, pose) = (sim.sensor(scene.scanner)?, sim.rigid_object(scene.ball).get_pose());
-    let heights: Vec<f64> = scanner.hits().rows().into_iter().map(|hit| hit[2]).filter(|z| z.is_finite()).collect();
+    let of_first = scanner.hits().index_axis_move(Axis(0), 0);
+    let heights: Vec<f64> = of_first.rows().into_iter().map(|hit| hit[2]).filter(|z| z.is_finite()).collect();
     let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(*z), b.max(*z)));
     let (low, high) = (low.is_finite().then_some(low), high.is_finite().then_some(high));
     let time = sim.time().first().copied().unwrap_or(0.0);

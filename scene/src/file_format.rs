@@ -281,6 +281,10 @@ pub mod or_false {
             T::deserialize(value.into_deserializer()).map(Some)
         }
 
+        fn visit_u64<E: Error>(self, value: u64) -> Result<Self::Value, E> {
+            T::deserialize(value.into_deserializer()).map(Some)
+        }
+
         fn visit_f64<E: Error>(self, value: f64) -> Result<Self::Value, E> {
             T::deserialize(value.into_deserializer()).map(Some)
         }

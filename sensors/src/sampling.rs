@@ -26,7 +26,8 @@ pub struct SamplingCfg {
     pub round_period: bool,
     /// Measurements to remember, the newest included.
     pub history_length: usize,
-    /// Physics steps from the capture of a measurement until it can be read. It keeps the stamp of its capture.
+    /// Physics steps from the capture of a measurement until it can be read. It keeps the stamp of its capture. What somebody
+    /// writes to the state of an environment is seen at once there, by every sensor: nothing stale is ever read.
     pub latency_steps: u32,
     /// Probability that a measurement is lost on the way, 0 to 1: the one before stays.
     pub dropout: f64,
@@ -287,7 +288,10 @@ impl Sampler {
     pub fn due_in(&self, step: &[u64]) -> u64 {
         let due = self.phases.due_in(step.iter().copied());
         let Some(delay) = &self.delay else { return due };
-        let arrivals = (0..).zip(step).filter_map(|(env, &now)| Some(delay.arrival(env)?.saturating_sub(now).max(1)));
+        let arrivals = (0..)
+            .zip(step)
+            .filter(|(_, now)| **now != Phases::STANDS)
+            .filter_map(|(env, &now)| Some(delay.arrival(env)?.saturating_sub(now).max(1)));
         arrivals.fold(due, u64::min)
     }
 

@@ -70,6 +70,10 @@ struct Phase {
 }
 
 impl Phases {
+    /// The step, for [`due_in`](Self::due_in), of an environment that stands still (it was put aside): nothing is due
+    /// there.
+    pub const STANDS: u64 = u64::MAX;
+
     /// The schedule.
     pub fn schedule(&self) -> Schedule {
         self.schedule
@@ -96,7 +100,8 @@ impl Phases {
     pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
         let period = self.schedule.period_steps;
         let wait = |(phase, step): (&Phase, u64)| period - step.saturating_sub(phase.start) % period;
-        self.envs.iter().zip(steps).map(wait).min().unwrap_or(1)
+        let running = self.envs.iter().zip(steps).filter(|(_, step)| *step != Self::STANDS);
+        running.map(wait).min().unwrap_or(period)
     }
 
     /// Starts environment `env` anew: the next measurement falls one period after `step`.

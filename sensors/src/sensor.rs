@@ -64,7 +64,8 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     }
 
     /// Physics steps until the next measurement of any environment, at least 1, when the environments are at `step`: the
-    /// owner may leave out updates before.
+    /// owner may leave out updates before. The step of one that stands still (it was put aside) is
+    /// [`Phases::STANDS`](crate::Phases::STANDS).
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1

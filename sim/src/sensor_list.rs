@@ -2,6 +2,7 @@
 
 use crate::capture::Capture;
 use crate::compile::Simulation;
+use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::manager::EnvId;
@@ -49,6 +50,8 @@ pub(crate) struct SensorList {
     state: SceneState,
     /// Which of them the current steps make due.
     due: Vec<bool>,
+    /// The step of every environment, [`sensors::Phases::STANDS`] for one that is put aside.
+    clocks: Vec<u64>,
     /// MuJoCo steps in a physics step.
     substeps: u32,
 }
@@ -135,8 +138,8 @@ impl SensorList {
     /// Does as many of `steps` physics steps as until a sensor is due, at least 1; those that are due then measure. Gives
     /// the number of steps done.
     pub(crate) fn advance(&mut self, simulation: &mut Simulation, steps: u32) -> u32 {
-        gather::gather_steps(simulation, self.substeps, &mut self.state);
-        let now = &self.state.step;
+        gather::gather_clocks(simulation, self.substeps, &mut self.clocks);
+        let now = &self.clocks;
         let wait = |e: &Entry| e.sensor.due_in(now).max(1);
         let running = self.entries.iter().filter(|e| e.fault.is_none());
         let block = running.map(wait).min().map_or(steps, |due| u32::try_from(due).unwrap_or(u32::MAX).min(steps));
@@ -167,12 +170,15 @@ impl SensorList {
 
     /// After somebody wrote to the state of `env_ids`.
     pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
-        if self.entries.is_empty() || env_ids.is_empty() {
+        // One that is put aside keeps what was measured last.
+        let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
+        let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
+        if self.entries.is_empty() || running.is_empty() {
             return;
         }
-        self.renew(simulation, env_ids);
+        self.renew(simulation, &running);
         for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
-            entry.fault = entry.sensor.refresh(env_ids, &self.state).err();
+            entry.fault = entry.sensor.refresh(&running, &self.state).err();
         }
     }
 

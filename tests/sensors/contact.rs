@@ -229,6 +229,23 @@ fn a_diverged_environment_keeps_its_last_measurement() {
         }
         assert_eq!(sim.diverged().len(), usize::from(blow_up));
         if blow_up {
+            let values = |sim: &SimulationManager| {
+                let (contact, imu) = (sim.sensor(id).unwrap(), sim.sensor(imu).unwrap());
+                let numbers = contact.net_forces_w().index_axis_move(Axis(0), 1).iter().copied().collect::<Vec<f64>>();
+                let imu = [imu.quat_w(), imu.lin_acc_b(), imu.lin_vel_b()];
+                numbers
+                    .into_iter()
+                    .chain(imu.iter().flat_map(|a| a.row(1).to_vec()))
+                    .map(f64::to_bits)
+                    .collect::<Vec<_>>()
+            };
+            let last = values(&sim);
+            assert!(last.iter().all(|bits| f64::from_bits(*bits).is_finite()));
+            // Nor does a write to an environment that is put aside change what is read of it.
+            sim.rigid_object_mut(box_).write_velocity(&array![[0.0; 6]], Some(&[EnvId(1)])).unwrap();
+            assert_eq!(values(&sim), last, "the last measurement stays");
+            let late = sim.add_sensor("late", ImuCfg::on("box")).unwrap();
+            assert!(sim.sensor(late).unwrap().quat_w().iter().all(|q| q.is_finite()), "a sensor that comes later");
             let sensor = sim.sensor(id).unwrap();
             assert!(sensor.sample_counts()[1] < 50 && sensor.sample_counts()[0] == 50);
             sim.reset(Some(&[EnvId(1)])).unwrap();

@@ -69,7 +69,7 @@ impl Lighting {
     }
 }
 
-/// Highlights weaker than this are black: a fortieth of what a screen can show.
+/// Highlights weaker than this are black: a third of the weakest light that is not black on a screen.
 const FAINT: f32 = 1e-4;
 
 /// The numbers whose power is [`FAINT`], by exponent: below them there is no highlight to compute.

@@ -5,10 +5,11 @@ mod motion;
 mod solved;
 
 use crate::compile::Simulation;
+use crate::env::EnvStatus;
 use ndarray::{Array2, Array3};
 use scene::state::Contacts;
 use scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
-use sensors::Requires;
+use sensors::{Phases, Requires};
 
 /// What [`gather`] can fill so far.
 pub(crate) const AVAILABLE: Requires = Requires::POSES
@@ -59,6 +60,15 @@ pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut S
     });
 }
 
+/// The step of every environment, for sensors that say when they are due.
+pub(crate) fn gather_clocks(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
+    clocks.resize(simulation.batch.num_envs(), 0);
+    simulation.batch.for_each(|i, env| {
+        let runs = *env.status() == EnvStatus::Running;
+        clocks[i] = if runs { env.steps() / u64::from(substeps) } else { Phases::STANDS };
+    });
+}
+
 /// Fills the arrays that `requires` names, which must be there.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
@@ -89,8 +99,14 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
             solved::contacts(env.solved(), i, &mut state.contacts);
         }
         if wants(Requires::ACCELERATIONS) {
-            solved::rows(&env.solved().poses, i, &mut state.force_poses);
-            solved::rows(&env.solved().velocities, i, &mut state.force_velocities);
+            if env.solved().poses.is_empty() {
+                // Nothing can be solved for the state as it is, but it is somewhere.
+                motion::poses(bodies, env.data(), i, &mut state.force_poses);
+                motion::velocities(bodies, env.data(), i, &mut state.force_velocities);
+            } else {
+                solved::rows(&env.solved().poses, i, &mut state.force_poses);
+                solved::rows(&env.solved().velocities, i, &mut state.force_velocities);
+            }
             solved::rows(&env.solved().accelerations, i, &mut state.body_accelerations);
         }
         if wants(Requires::JOINT_WRENCHES) {

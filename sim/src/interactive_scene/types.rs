@@ -34,7 +34,7 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Everything built in.
+    /// Robots, rigid objects and the built-in sensors, but for ray-caster cameras.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")

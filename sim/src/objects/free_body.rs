@@ -72,11 +72,13 @@ impl FreeBodyMut<'_> {
         let (qpos, dof) = self.joint()?;
         let rows = self.check(argument, 7, "environments, x y z qw qx qy qz", poses, env_ids)?;
         for (row, (_, pose)) in rows.arrays::<7>().enumerate() {
-            if pose[3..].iter().all(|q| q.abs() < 1e-9) {
+            let norm = pose[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
+            if !(norm > 1e-9 && norm.is_finite()) {
                 return Err(Error::Config {
                     field: argument,
                     value: format!("{:?} in row {row}", &pose[3..]),
-                    expected: "the last four numbers must be a quaternion w, x, y, z other than zero",
+                    expected: "the last four numbers must be a quaternion w, x, y, z of a length that is not zero and not \
+                               beyond all numbers",
                 });
             }
         }

@@ -141,7 +141,7 @@ impl RobotData {
         &self.cfg
     }
 
-    /// The merged robot as its files describe it.
+    /// The merged robot as its files describe it, with its payloads.
     pub fn description(&self) -> &RobotDescription {
         &self.description
     }
@@ -262,7 +262,7 @@ impl<'a> Robot<'a> {
         self.data.uid()
     }
 
-    /// The merged robot as its files describe it.
+    /// The merged robot as its files describe it, with its payloads.
     pub fn description(&self) -> &'a RobotDescription {
         self.data.description()
     }
@@ -385,7 +385,7 @@ impl<'a> Robot<'a> {
         self.gather(|env, joint| joint.drive.map_or(f64::INFINITY, |d| env.drives.gains[d].max_effort))
     }
 
-    /// Sum of the link masses in the files \[kg\].
+    /// Sum of the link masses in the files, and of payloads \[kg\].
     pub fn total_mass(&self) -> f64 {
         self.data.description.total_mass()
     }

@@ -84,7 +84,8 @@ impl Still {
     }
 
     /// Several environments side by side, as [`SimulationManager::env_origins`] places them (all of them where `envs` is
-    /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0.
+    /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0. Everything else is drawn in every environment: terrain that
+    /// is larger than the space between them overlaps.
     ///
     /// # Errors
     /// An environment does not exist, or there are more triangles than can be drawn.

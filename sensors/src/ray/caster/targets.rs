@@ -41,30 +41,38 @@ impl HitTargets {
         parent: Option<usize>,
         context: &SensorContext,
     ) -> Result<Vec<usize>, SensorError> {
+        let in_groups = |instance: &scene::Instance| {
+            instance.visible && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
+        };
         let named = match self {
-            Self::Named(patterns) => Some(names(scene, patterns)?),
+            Self::Named(patterns) => Some(names(scene, patterns, in_groups)?),
             _ => None,
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
         let wanted = |(index, instance): &(usize, &scene::Instance)| {
-            let seen = instance.visible && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
-            seen && match self {
-                Self::StaticOnly => instance.fixed,
-                Self::Named(_) => named.as_ref().is_some_and(|named| named[*index]),
-                Self::Everything { exclude_parent } => {
-                    let body = instance.body.map(|body| carrier(body as usize));
-                    !exclude_parent || parent.is_none() || body != parent.map(carrier)
+            in_groups(instance)
+                && match self {
+                    Self::StaticOnly => instance.fixed,
+                    Self::Named(_) => named.as_ref().is_some_and(|named| named[*index]),
+                    Self::Everything { exclude_parent } => {
+                        let body = instance.body.map(|body| carrier(body as usize));
+                        !exclude_parent || parent.is_none() || body != parent.map(carrier)
+                    }
                 }
-            }
         };
         Ok(scene.instances().iter().enumerate().filter(wanted).map(|(index, _)| index).collect())
     }
 }
 
-/// Which instances the patterns name.
-fn names(scene: &RenderScene, patterns: &[String]) -> Result<Vec<bool>, SensorError> {
-    let mut names: Vec<String> =
-        scene.instances().iter().map(|i| i.name.to_string()).filter(|n| !n.is_empty()).collect();
+/// Which instances the patterns name. Those that can never be hit have no name to match: a pattern for nothing else is an
+/// error, not a ray caster that misses everything.
+fn names(
+    scene: &RenderScene,
+    patterns: &[String],
+    can_be_hit: impl Fn(&scene::Instance) -> bool,
+) -> Result<Vec<bool>, SensorError> {
+    let can_be_hit = scene.instances().iter().filter(|i| can_be_hit(i));
+    let mut names: Vec<String> = can_be_hit.map(|i| i.name.to_string()).filter(|n| !n.is_empty()).collect();
     names.sort();
     names.dedup();
     let mut named = vec![false; names.len()];

@@ -16,7 +16,7 @@ const VERTICAL_DEG: [f64; 32] = [
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bpearl {
-    /// The span of azimuths, about x; the last one is left out \[deg\].
+    /// The span of azimuths, about -x (backward), as in Isaac Lab; the last one is left out \[deg\].
     pub horizontal_fov_deg: f64,
     /// Azimuth between neighbours \[deg\].
     pub horizontal_resolution_deg: f64,
