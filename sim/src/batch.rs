@@ -236,19 +236,25 @@ impl Batch {
                 step(env, &mut |_, values| read.extend_from_slice(values));
             }
         });
-        self.run_chunks(&job);
-        let mut index = 0;
-        for chunk in &self.shared.chunks {
-            let chunk = lock(chunk);
+        let mut copied = vec![false; self.shared.chunks.len()];
+        let mut copy = |first: usize, chunk: &Chunk| {
             let mut values = &chunk.read[..];
-            for _ in &chunk.envs {
+            for index in first..first + chunk.envs.len() {
                 for (out, width) in outs.iter_mut().zip(widths) {
                     let (mine, rest) = values.split_at(width);
                     out[index * width..(index + 1) * width].copy_from_slice(mine);
                     values = rest;
                 }
-                index += 1;
             }
+        };
+        let chunk_size = self.shared.chunk_size;
+        // What this thread read is copied while the others still step.
+        self.run_chunks_then(&job, |first, chunk| {
+            copy(first, chunk);
+            copied[first / chunk_size] = true;
+        });
+        for (c, chunk) in self.shared.chunks.iter().enumerate().filter(|(c, _)| !copied[*c]) {
+            copy(c * chunk_size, &lock(chunk));
         }
     }
 
@@ -266,6 +272,11 @@ impl Batch {
     }
 
     fn run_chunks(&mut self, job: &Job) {
+        self.run_chunks_then(job, |_, _| {});
+    }
+
+    /// As [`run_chunks`](Self::run_chunks); `then` sees the chunks that this thread did, right after them.
+    fn run_chunks_then(&mut self, job: &Job, mut then: impl FnMut(usize, &Chunk)) {
         let shared = &*self.shared;
         for share in &shared.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
@@ -279,7 +290,11 @@ impl Batch {
             drop(slot);
             shared.wake.notify_all();
         }
-        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &**job)));
+        let mut mine = |first: usize, chunk: &mut Chunk| {
+            job(first, chunk);
+            then(first, chunk);
+        };
+        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &mut mine)));
         let mut spins = 0_u32;
         while shared.finished.load(Ordering::Acquire) < self.workers.len() {
             spins += 1;
@@ -329,7 +344,7 @@ impl Batch {
 
 impl Shared {
     /// Does the share of `thread`, then what is left of the shares after it.
-    fn take_chunks(&self, thread: usize, job: &(dyn Fn(usize, &mut Chunk) + Send + Sync)) {
+    fn take_chunks(&self, thread: usize, job: &mut dyn FnMut(usize, &mut Chunk)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
@@ -362,7 +377,11 @@ fn work(shared: &Shared, thread: usize) {
     let mut seen = 0;
     while let Some((epoch, job)) = shared.wait_for_job(seen) {
         seen = epoch;
-        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(thread, &*job))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| {
+            shared.take_chunks(thread, &mut |first, chunk: &mut Chunk| job(first, chunk))
+        }))
+        .is_err()
+        {
             shared.panicked.store(true, Ordering::Relaxed);
         }
         drop(job);
