@@ -182,6 +182,15 @@ mod tests {
         assert_eq!(due, expected);
     }
 
+    /// One that stands a step before its turn would otherwise make every block one step long, for ever.
+    #[test]
+    fn an_environment_that_stands_still_hurries_nobody() {
+        let phases = Schedule::new(0.1, 0.005, false).unwrap().phases(2);
+        assert_eq!(phases.due_in([19, 5]), 1, "running, it is due in a step");
+        assert_eq!(phases.due_in([Phases::STANDS, 5]), 15);
+        assert_eq!(phases.due_in([Phases::STANDS; 2]), 20, "nothing is due where nothing runs");
+    }
+
     #[test]
     fn each_environment_counts_from_its_own_reset() {
         let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(2);

@@ -617,7 +617,7 @@ impl fmt::Display for Camera {
 }
 
 /// Values for `count` environments: one each, or one for all.
-fn one_each<'a, T>(
+pub(crate) fn one_each<'a, T>(
     what: &'static str,
     values: &'a [T],
     count: usize,

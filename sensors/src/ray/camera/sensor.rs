@@ -1,7 +1,8 @@
 //! The camera made of rays as a sensor.
 
 use super::cfg::RayCasterCameraCfg;
-use crate::camera::{CameraConvention, CameraError, DepthMiss, PixelIntrinsics, Poses};
+use crate::camera::sensor::one_each;
+use crate::camera::{CameraConvention, DepthMiss, PixelIntrinsics, Poses};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::ray::caster::scan::{Scan, View};
@@ -205,11 +206,7 @@ impl RayCasterCamera {
         let all: Vec<usize> = (0..self.stamps.len()).collect();
         let env_ids = env_ids.unwrap_or(&all);
         self.expected.check_envs(env_ids)?;
-        if poses.len() != 1 && poses.len() != env_ids.len() {
-            let (what, expected, found) = ("poses", env_ids.len(), poses.len());
-            return Err(CameraError::Count { what, expected, found }.into());
-        }
-        for (&env, pose) in env_ids.iter().zip(poses.iter().cycle()) {
+        for (&env, pose) in env_ids.iter().zip(one_each("poses", &poses, env_ids.len())?) {
             self.parent_from_camera[env] = convention.to_optical(pose);
         }
         Ok(())

@@ -321,6 +321,10 @@ fn mistakes_are_typed_errors() {
     let error = |cfg: RayCasterCfg| cfg.build(&context(1, 1)).unwrap_err().to_string();
     assert!(error(RayCasterCfg { parent: Some("bsae".into()), ..scanner() }).contains("dog/base"));
     assert!(error(RayCasterCfg { targets: HitTargets::Named(vec!["gruond".into()]), ..scanner() }).contains("ground"));
+    // A thing that is there, in a group that is not hit.
+    let ground = || HitTargets::Named(vec!["ground".into()]);
+    assert!(RayCasterCfg { targets: ground(), ..scanner() }.build(&context(1, 1)).is_ok());
+    assert!(error(RayCasterCfg { targets: ground(), groups: 1 << 5, ..scanner() }).contains("\"ground\""));
     assert!(
         error(RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() })
             .contains("resolution")
