@@ -418,10 +418,21 @@ mod tests {
 
     #[test]
     fn what_is_read_with_a_step_is_what_is_there_after_it() {
+        // The calling thread dawdles, or it would do all of this alone.
+        let caller = std::thread::current().id();
         for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
             let mut batch = pendulums(envs, threads);
             let (mut qpos, mut qvel) = (vec![f64::NAN; envs], vec![f64::NAN; envs]);
-            batch.step_and_read(7, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel]);
+            batch.step_and_read(
+                7,
+                move |env| {
+                    if std::thread::current().id() == caller {
+                        std::thread::sleep(std::time::Duration::from_millis(1));
+                    }
+                    [env.data().qpos(), env.data().qvel()]
+                },
+                [&mut qpos, &mut qvel],
+            );
             let mut other = pendulums(envs, 1);
             other.step(7);
             for b in [&batch, &other] {
