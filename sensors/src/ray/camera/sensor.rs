@@ -195,7 +195,8 @@ impl RayCasterCamera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`], [`CameraError::Count`], an environment that does not exist; nothing is changed then.
+    /// [`CameraError::Pose`](crate::CameraError::Pose), [`CameraError::Count`](crate::CameraError::Count), an environment that does
+    /// not exist; nothing is changed then.
     pub fn set_local_pose(
         &mut self,
         poses: &(impl Poses + ?Sized),
