@@ -1,7 +1,7 @@
 //! Everything that can be seen, without the poses.
 
 use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
-use crate::material::Material;
+use crate::material::{Material, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
 
@@ -46,6 +46,22 @@ impl Instance {
         Self { body: Some(body), ..self }
     }
 
+    /// Texture coordinates per metre along the axes of its frame, for a shape without its own: a cube texture is on a box
+    /// around the shape, others are projected along z as MuJoCo projects 2D textures, once over the shape's size or once a
+    /// metre.
+    fn texture_scale(&self) -> [f32; 3] {
+        let material = &self.material;
+        let [lo, hi] = self.shape.aabb();
+        let size = [0, 1, 2].map(|k| hi[k] - lo[k]);
+        if material.texture.as_deref().is_some_and(|t| t.kind() == TextureKind::Cube) {
+            return size.map(|x| if x > 0.0 && x.is_finite() { 2.0 / x } else { 1.0 });
+        }
+        let endless = matches!(&self.shape, Shape::Plane(plane) if plane.half[0] == 0.0 || plane.half[1] == 0.0);
+        let per_metre = |k: usize| material.tex_uniform || endless || !size[k].is_finite();
+        let along = |k: usize| material.tex_repeat[k] / if per_metre(k) { 1.0 } else { size[k] };
+        [along(0), along(1), 0.0]
+    }
+
     /// The same instance, welded to the world.
     #[must_use]
     pub fn fixed(self) -> Self {
@@ -60,6 +76,7 @@ pub struct RenderScene {
     instances: Vec<Instance>,
     first_ids: Vec<u32>,
     linear_colors: Vec<[f32; 3]>,
+    texture_scales: Vec<[f32; 3]>,
     /// The lamps.
     pub lights: Vec<Light>,
     /// The lamp on every camera.
@@ -135,7 +152,8 @@ impl RenderScene {
             [r, g, b].map(crate::material::decode_srgb)
         };
         let linear_colors = instances.iter().map(linear).collect();
-        Ok(Self { linear_colors, instances, first_ids, ..Self::empty() })
+        let texture_scales = instances.iter().map(Instance::texture_scale).collect();
+        Ok(Self { linear_colors, texture_scales, instances, first_ids, ..Self::empty() })
     }
 
     /// Other things in the same light.
@@ -152,6 +170,7 @@ impl RenderScene {
     pub fn empty() -> Self {
         Self {
             linear_colors: Vec::new(),
+            texture_scales: Vec::new(),
             instances: Vec::new(),
             first_ids: vec![0],
             lights: vec![Light::default()],
@@ -175,6 +194,12 @@ impl RenderScene {
     /// The colour of each instance's material in linear light.
     pub fn linear_colors(&self) -> &[[f32; 3]] {
         &self.linear_colors
+    }
+
+    /// Texture coordinates per metre along the axes of each instance's frame, for shapes without their own: of a cube
+    /// texture, those of a cube of half length 1; of others, u and v.
+    pub fn texture_scales(&self) -> &[[f32; 3]] {
+        &self.texture_scales
     }
 
     /// Number of triangles of all meshes.

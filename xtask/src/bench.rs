@@ -22,6 +22,9 @@ const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
 pub(crate) struct BenchArgs {
     /// Only this benchmark
     name: Option<String>,
+    /// With a name: replace its tables on the page of results, and leave the others as they are
+    #[arg(long, requires = "name")]
+    update: bool,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -64,12 +67,40 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     }
     let tables = tables(&rows)?;
     println!("\n{tables}");
-    if args.name.is_none() {
-        let path = repo.root.join(RESULTS);
-        write(&path, &format!("{}\n{tables}", heading(&machine())))?;
-        println!("written to {RESULTS}");
+    if args.name.is_some() && !args.update {
+        return Ok(());
     }
+    let path = repo.root.join(RESULTS);
+    let page = if args.update {
+        let old = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        replaced(&old, &heading(&machine()), &tables)?
+    } else {
+        format!("{}\n{tables}", heading(&machine()))
+    };
+    write(&path, &page)?;
+    println!("written to {RESULTS}");
     Ok(())
+}
+
+/// A page whose tables are replaced by those of the same name; new ones come last. Not for a page of another machine: what
+/// stays must have been measured on the same one.
+fn replaced(page: &str, heading: &str, tables: &str) -> Outcome<String> {
+    let split = |text: &str| -> Vec<String> {
+        let parts = text.split("\n## ").filter(|part| !part.trim().is_empty());
+        parts.map(|part| part.trim_start_matches("## ").trim_end().to_string()).collect()
+    };
+    let Some(old) = page.strip_prefix(heading) else {
+        return Err(Failure::new(format!("{RESULTS} is of another machine: run all benchmarks, without a name")));
+    };
+    let mut sections = split(old);
+    let name = |section: &str| section.lines().next().map(str::to_string);
+    for table in split(tables) {
+        match sections.iter_mut().find(|section| name(section) == name(&table)) {
+            Some(section) => *section = table,
+            None => sections.push(table),
+        }
+    }
+    Ok(format!("{heading}\n## {}\n", sections.join("\n\n## ")))
 }
 
 fn write(path: &Path, text: &str) -> Outcome {
@@ -175,6 +206,26 @@ mod tests {
         );
         assert!(page.contains("| 4.0.0 | 251000 | - | mj_step | - |"), "{page}");
         assert!(page.find("4.0.0") < page.find("## camera"), "{page}");
+    }
+
+    #[test]
+    fn tables_of_one_benchmark_replace_only_theirs() {
+        let page = |step: f64, camera: f64| {
+            let rows =
+                [row("step", "2.2.2", json!(step), json!(1.0)), row("camera", "2.2.2", json!(camera), json!(2.0))];
+            tables(&rows).expect("complete rows")
+        };
+        let heading = heading("a machine");
+        let old = format!("{heading}\n{}", page(100.0, 200.0));
+        let new = tables(&[row("camera", "2.2.2", json!(300.0), json!(2.0))]).expect("complete");
+        assert_eq!(
+            replaced(&old, &heading, &new).expect("the same machine"),
+            format!("{heading}\n{}", page(100.0, 300.0))
+        );
+        let more = tables(&[row("rays", "2.2.2", json!(1.0), json!(2.0))]).expect("complete");
+        let page = replaced(&old, &heading, &more).expect("the same machine");
+        assert!(page.starts_with(old.trim_end()) && page.contains("## rays"), "{page}");
+        assert!(replaced(&old, &super::heading("another machine"), &more).is_err());
     }
 
     #[test]

@@ -134,6 +134,13 @@ pub(crate) fn load_u<S: Simd>(s: S, x: &[u32]) -> U<S> {
     U::new(s, s.load_u(first(x)))
 }
 
+/// The lower and the upper halves of sixteen pairs.
+#[inline(always)]
+pub(crate) fn halves<S: Simd>(s: S, pairs: &[u64; LANES]) -> [I<S>; 2] {
+    let [lower, upper] = s.halves(pairs);
+    [I::new(s, lower), I::new(s, upper)]
+}
+
 /// Writes sixteen numbers.
 #[inline(always)]
 pub(crate) fn store<S: Simd>(x: F<S>, to: &mut [f32]) {

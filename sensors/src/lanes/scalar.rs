@@ -56,6 +56,9 @@ impl Simd for Scalar {
     fn bits(m: Self::M) -> u64 {
         (0..LANES).fold(0, |bits, k| bits | u64::from(m[k]) << k)
     }
+    fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2] {
+        [pairs.map(|x| x as i32), pairs.map(|x| (x >> 32) as i32)]
+    }
     fn add(a: Self::F, b: Self::F) -> Self::F {
         pairs(&a, &b, |a, b| a + b)
     }

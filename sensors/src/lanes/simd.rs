@@ -1,7 +1,7 @@
 //! The operations of an instruction set, and numbers that have operators.
 
 use super::LANES;
-use fearless_simd::{SimdBase, SimdFloat, SimdInt, SimdMask};
+use fearless_simd::{Bytes, SimdBase, SimdFloat, SimdInt, SimdMask};
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
 /// Operations on the numbers of an instruction set, by pairs of operands or of an operand and nothing.
@@ -30,6 +30,8 @@ macro_rules! operations {
             fn array_i(x: Self::I) -> [i32; LANES];
             fn array_u(x: Self::U) -> [u32; LANES];
             fn bits(m: Self::M) -> u64;
+            /// The lower and the upper halves of sixteen pairs.
+            fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2];
             $(fn $name($($arg: Self::$A),*) -> Self::$R;)*
         }
 
@@ -82,6 +84,14 @@ macro_rules! operations {
             #[inline(always)]
             fn bits(m: Self::M) -> u64 {
                 SimdMask::to_bitmask(m)
+            }
+            #[inline(always)]
+            fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2] {
+                let (a, b) = pairs.split_at(LANES / 2);
+                let a: fearless_simd::u64x8<T> = SimdBase::from_slice(self, a);
+                let b: fearless_simd::u64x8<T> = SimdBase::from_slice(self, b);
+                let (a, b) = (Bytes::bitcast(a), Bytes::bitcast(b));
+                [self.unzip_low_i32x16(a, b), self.unzip_high_i32x16(a, b)]
             }
             $(#[inline(always)]
             fn $name($($arg: Self::$A),*) -> Self::$R {

@@ -44,6 +44,7 @@ impl<'a> Context<'a> {
             placed: &self.placed[index],
             first_id: self.scene.first_ids()[index],
             color: self.scene.linear_colors()[index],
+            texture_scale: self.scene.texture_scales()[index],
         }
     }
 }

@@ -2,16 +2,27 @@
 
 use super::group::{At, Colors, Context, resolve};
 use crate::lanes::{LANES, Simd, load, load_u, splat_u, store};
-use crate::visibility::raster::tile::{NOTHING, SAMPLES, Tile};
+use crate::visibility::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
 
-/// A colour to compute: the pixel in the group, how many samples it stands for, where and of which id.
+/// Requests that are resolved together, at most.
+const CAPACITY: usize = 1024;
+
+/// A colour to compute: for which pixel of which group, how many of its samples it stands for, where and of which id.
 #[derive(Clone, Copy, Debug)]
 struct Request {
+    group: u32,
     lane: u8,
     weight: u8,
     id: u32,
     u: f32,
     v: f32,
+}
+
+/// Colours that pixels on edges still need. They are collected over many groups: there are few in each, and sixteen are
+/// computed at a time.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Edges {
+    requests: Vec<Request>,
 }
 
 /// Whether two ids of one pixel look different enough to need a colour each.
@@ -36,81 +47,98 @@ fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut us
     cosine < 0.97 || (qa - qb).abs() > 0.02 * qa
 }
 
-/// Replaces the colours of the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge.
-#[inline(always)]
-pub(crate) fn smooth<S: Simd>(
-    s: S,
-    context: &Context<'_>,
-    tile: &Tile,
-    block: usize,
-    row: usize,
-    corner: [f32; 2],
-    colors: &mut Colors,
-) {
-    let at = |plane: usize| tile.samples(block, plane) + row * LANES;
-    let center = load_u(s, &tile.id[at(0)..]);
-    let mut same = center.simd_eq(load_u(s, &tile.id[at(1)..]));
-    for plane in 2..SAMPLES.len() {
-        same &= center.simd_eq(load_u(s, &tile.id[at(plane)..]));
+impl Edges {
+    pub(crate) fn bytes(&self) -> usize {
+        self.requests.capacity() * size_of::<Request>()
     }
-    let mut left = (!same).to_bitmask();
-    if left == 0 {
-        return;
-    }
-    let mut requests = [Request { lane: 0, weight: 0, id: 0, u: 0.0, v: 0.0 }; 4 * LANES];
-    let mut count = 0;
-    let (mut edges, mut last) = (0u32, 0);
-    while left != 0 {
-        let lane = left.trailing_zeros() as usize;
-        left &= left - 1;
-        let sample = |plane: usize| (tile.id[at(plane) + lane], tile.nearness[at(plane) + lane]);
-        let (c, qc) = sample(0);
-        if !(1..5).any(|plane| differ(context, c, sample(plane).0, qc, sample(plane).1, &mut last)) {
-            continue;
+
+    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their centre sees
+    /// keeps its share of the colour; the rest is added by [`resolve`](Self::resolve).
+    #[inline(always)]
+    pub(crate) fn collect<S: Simd>(
+        &mut self,
+        s: S,
+        context: &Context<'_>,
+        tile: &Tile,
+        [block, row]: [usize; 2],
+        corner: [f32; 2],
+        colors: &mut [Colors],
+    ) {
+        let at = |plane: usize| tile.samples(block, plane) + row * LANES;
+        let center = load_u(s, &tile.id[at(0)..]);
+        let mut same = center.simd_eq(load_u(s, &tile.id[at(1)..]));
+        for plane in 2..SAMPLES.len() {
+            same &= center.simd_eq(load_u(s, &tile.id[at(plane)..]));
         }
-        edges |= 1 << lane;
-        let begin = count;
-        for (plane, offset) in SAMPLES.iter().enumerate().skip(1) {
-            let (id, q) = sample(plane);
-            let known = requests[begin..count].iter_mut().find(|r| {
-                let other = (1..5).find(|&p| sample(p).0 == r.id).map_or(q, |p| sample(p).1);
-                !differ(context, r.id, id, other, q, &mut last)
-            });
-            if let Some(known) = known {
-                known.weight += 1;
-                continue;
+        let mut left = (!same).to_bitmask();
+        if left == 0 {
+            return;
+        }
+        // All of it at once: later pictures have more edges.
+        self.requests.reserve_exact(CAPACITY - self.requests.len());
+        if self.requests.len() + 4 * LANES > CAPACITY {
+            self.resolve(s, context, colors);
+        }
+        let group = block * (BLOCK / 2) + row;
+        let mut last = 0;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let sample = |plane: usize| (tile.id[at(plane) + lane], tile.nearness[at(plane) + lane]);
+            let (center, nearness) = sample(0);
+            let (mut own, begin) = (0u8, self.requests.len());
+            let mut seen = [0.0f32; SAMPLES.len()];
+            for (plane, offset) in SAMPLES.iter().enumerate().skip(1) {
+                let (id, q) = sample(plane);
+                if !differ(context, center, id, nearness, q, &mut last) {
+                    own += 1;
+                    continue;
+                }
+                let mut others = self.requests[begin..].iter_mut().zip(&seen);
+                if let Some((other, _)) =
+                    others.find(|(other, seen)| !differ(context, other.id, id, **seen, q, &mut last))
+                {
+                    other.weight += 1;
+                    continue;
+                }
+                seen[self.requests.len() - begin] = q;
+                self.requests.push(Request {
+                    group: group as u32,
+                    lane: lane as u8,
+                    weight: 1,
+                    id,
+                    u: corner[0] + (lane % 8) as f32 + 0.5 + offset[0] as f32 / 256.0,
+                    v: corner[1] + (2 * row + lane / 8) as f32 + 0.5 + offset[1] as f32 / 256.0,
+                });
             }
-            requests[count] = Request {
-                lane: lane as u8,
-                weight: 1,
-                id,
-                u: corner[0] + (lane % 8) as f32 + 0.5 + offset[0] as f32 / 256.0,
-                v: corner[1] + (2 * row + lane / 8) as f32 + 0.5 + offset[1] as f32 / 256.0,
-            };
-            count += 1;
-        }
-    }
-    if edges == 0 {
-        return;
-    }
-    for lane in (0..LANES).filter(|lane| edges >> lane & 1 == 1) {
-        for channel in colors.iter_mut() {
-            channel[lane] = 0.0;
-        }
-    }
-    for batch in requests[..count].chunks(LANES) {
-        let (mut u, mut v, mut id) = ([corner[0]; LANES], [corner[1]; LANES], [NOTHING; LANES]);
-        for (k, request) in batch.iter().enumerate() {
-            (u[k], v[k], id[k]) = (request.u, request.v, request.id);
-        }
-        let mut out: Colors = [[0.0; LANES]; 3];
-        resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut out));
-        for (k, request) in batch.iter().enumerate() {
-            let weight = f32::from(request.weight) * 0.25;
-            for (to, from) in colors.iter_mut().zip(&out) {
-                to[usize::from(request.lane)] += from[k] * weight;
+            if own < 4 {
+                for channel in &mut colors[group] {
+                    channel[lane] *= f32::from(own) * 0.25;
+                }
             }
         }
+    }
+
+    /// Computes what was collected, and adds it to the pixels.
+    #[inline(always)]
+    pub(crate) fn resolve<S: Simd>(&mut self, s: S, context: &Context<'_>, colors: &mut [Colors]) {
+        // By id: the same surfaces together. The rest makes the order one of a kind.
+        self.requests.sort_unstable_by_key(|r| (r.id, r.group, r.lane));
+        for batch in self.requests.chunks(LANES) {
+            let (mut u, mut v, mut id) = ([batch[0].u; LANES], [batch[0].v; LANES], [NOTHING; LANES]);
+            for (k, request) in batch.iter().enumerate() {
+                (u[k], v[k], id[k]) = (request.u, request.v, request.id);
+            }
+            let mut out: Colors = [[0.0; LANES]; 3];
+            resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut out));
+            for (k, request) in batch.iter().enumerate() {
+                let weight = f32::from(request.weight) * 0.25;
+                for (to, from) in colors[request.group as usize].iter_mut().zip(&out) {
+                    to[usize::from(request.lane)] += from[k] * weight;
+                }
+            }
+        }
+        self.requests.clear();
     }
 }
 

@@ -1,9 +1,9 @@
 //! How much light of which colour a surface sends to the camera.
 
 use super::shadow::ShadowMap;
-use super::surface::{Source, Surface, planar_uv};
+use super::surface::{Source, Surface};
 use super::{texture, tone};
-use crate::lanes::{F, LANES, M, Simd, V3, abs, load, max, min, root, select, splat};
+use crate::lanes::{F, M, Simd, V3, abs, max, min, root, select, splat};
 use scene::{Light, LightKind, Material, RenderScene};
 
 /// The largest number of lamps that are drawn.
@@ -44,6 +44,45 @@ fn cos_deg(deg: f32) -> f32 {
         sum += term;
     }
     sum as f32
+}
+
+impl Lamp {
+    /// The direction to the lamp (unit) and how much of its light reaches points, without shadows; `None` where it lights
+    /// none of them.
+    #[inline(always)]
+    fn reaches<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
+        let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
+        if light.kind == LightKind::Directional {
+            let [x, y, z] = self.along;
+            return Some((V3::splat(s, [-x, -y, -z]), one));
+        }
+        let to = V3::splat(s, light.position).sub(position);
+        let square = to.dot(to);
+        let axis = -to.dot(V3::splat(s, self.along));
+        let is_spot = matches!(light.kind, LightKind::Spot { .. });
+        // Most of a floor is outside of a cone, and needs no root to know it. A little more than the cone, so that what a
+        // point gets does not depend on the points beside it.
+        if is_spot && self.cutoff_cos > 0.0 {
+            let least = square * (self.cutoff_cos * self.cutoff_cos * 0.9999);
+            if !(lanes & axis.simd_gt(zero) & (axis * axis).simd_ge(least)).any_true() {
+                return None;
+            }
+        }
+        let distance = square.sqrt();
+        let inverse = 1.0 / select(distance.simd_gt(zero), distance, one);
+        let [constant, linear, quadratic] = light.attenuation;
+        let mut strength = if linear == 0.0 && quadratic == 0.0 {
+            splat(s, 1.0 / constant.max(1e-6))
+        } else {
+            1.0 / max(square * quadratic + distance * linear + constant, splat(s, 1e-6))
+        };
+        if is_spot {
+            let cosine = axis * inverse;
+            let inside = cosine.simd_ge(splat(s, self.cutoff_cos));
+            strength = select(inside, strength * power(s, max(cosine, zero), self.exponent), zero);
+        }
+        Some((to.scale(inverse), strength))
+    }
 }
 
 impl Lighting {
@@ -190,22 +229,7 @@ pub(crate) fn shade<S: Simd>(
     }
     for lamp in &lighting.lamps {
         let light = &lamp.light;
-        let (to, strength) = if light.kind == LightKind::Directional {
-            (V3::splat(s, lamp.along.map(|x| -x)), splat(s, 1.0))
-        } else {
-            let to = V3::splat(s, light.position).sub(at.position);
-            let d = to.dot(to).sqrt();
-            let a = light.attenuation;
-            let fall = d * d * a[2] + d * a[1] + a[0];
-            let mut strength = 1.0 / max(fall, splat(s, 1e-6));
-            let to = to.unit(s);
-            if let LightKind::Spot { .. } = light.kind {
-                let axis = -to.dot(V3::splat(s, lamp.along));
-                let inside = axis.simd_ge(splat(s, lamp.cutoff_cos));
-                strength = select(inside, strength * power(s, max(axis, zero), lamp.exponent), zero);
-            }
-            (to, strength)
-        };
+        let Some((to, strength)) = lamp.reaches(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
         let mut lit = strength;
         if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
@@ -261,40 +285,25 @@ fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixe
     // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
     let width = at.depth * pixel / root(s, slant);
-    let mut out = [[0.0f32; LANES]; 3];
-    let bits = lanes.to_bitmask();
-    let lanes_seen = || (0..LANES).filter(|lane| bits >> lane & 1 == 1);
-    let mut put = |lane: usize, c: [f32; 4]| (out[0][lane], out[1][lane], out[2][lane]) = (c[0], c[1], c[2]);
-    if texture::is_cube(image) {
-        let [lo, hi] = instance.shape.aabb();
-        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
-        let scale = half.map(|h| if h > 0.0 && h.is_finite() { 1.0 / h } else { 1.0 });
-        let d = [(at.local.x * scale[0]).array(), (at.local.y * scale[1]).array(), (at.local.z * scale[2]).array()];
+    let scale = source.texture_scale;
+    let bytes = if texture::is_cube(image) {
+        let direction = V3 { x: at.local.x * scale[0], y: at.local.y * scale[1], z: at.local.z * scale[2] };
         let largest = scale.iter().copied().fold(0.0, f32::max);
-        let width: [f32; LANES] = (width * largest).array();
-        for lane in lanes_seen() {
-            let d = [d[0][lane], d[1][lane], d[2][lane]];
-            put(lane, texture::sample_cube(image, d, width[lane]));
-        }
+        texture::sample_cube(s, image, direction, width * largest, lanes)
     } else {
         let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
         let (uv, density) = if has_uvs {
             (at.uv, at.uv_density)
         } else {
-            let (uv, scale) = planar_uv(instance, at.local);
+            let uv = [at.local.x * scale[0], at.local.y * scale[1]];
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
-        let bytes = texture::sample(s, image, uv[0], uv[1], width * density, lanes);
-        return V3 {
-            x: tone::decode_bytes(bytes[0]) * flat[0],
-            y: tone::decode_bytes(bytes[1]) * flat[1],
-            z: tone::decode_bytes(bytes[2]) * flat[2],
-        };
-    }
+        texture::sample(s, image, uv[0], uv[1], width * density, lanes)
+    };
     // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
     V3 {
-        x: tone::decode_bytes(load(s, &out[0])) * flat[0],
-        y: tone::decode_bytes(load(s, &out[1])) * flat[1],
-        z: tone::decode_bytes(load(s, &out[2])) * flat[2],
+        x: tone::decode_bytes(bytes[0]) * flat[0],
+        y: tone::decode_bytes(bytes[1]) * flat[1],
+        z: tone::decode_bytes(bytes[2]) * flat[2],
     }
 }

@@ -14,8 +14,8 @@ pub(crate) struct ShadowMap {
     projection: Projection,
     /// What the lamp sees.
     list: DrawList,
-    /// Texels along a side.
-    side: usize,
+    /// Rotation from the world's axes to the lamp's.
+    lamp_from_world: [[f32; 3]; 3],
     /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
     texel: f32,
     /// Nearness of what the lamp sees at each texel, row by row: the taps of a point are together in four rows.
@@ -65,14 +65,22 @@ impl ShadowMap {
             far: 1.0,
             world_from_camera: PoseF32::IDENTITY,
         };
-        Self { projection, list: DrawList::default(), side: 0, texel: 1.0, nearness: Vec::new(), range: Vec::new() }
+        Self {
+            projection,
+            list: DrawList::default(),
+            lamp_from_world: PoseF32::IDENTITY.rotation,
+            texel: 1.0,
+            nearness: Vec::new(),
+            range: Vec::new(),
+        }
     }
 
     pub(crate) fn bytes(&self) -> usize {
         self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
     }
 
-    /// Finds what the lamp sees, on `side` by `side` texels, without drawing it. `false` where it casts no shadow.
+    /// Finds what the lamp sees, on the part of `side` by `side` texels that it covers, without drawing it. `false` where it
+    /// casts no shadow.
     pub(crate) fn prepare(
         &mut self,
         light: &Light,
@@ -95,25 +103,59 @@ impl ShadowMap {
             return false;
         };
         self.texel = 1.0 / projection.fx;
+        self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
-        self.side = side;
         self.list.build(&projection, scene, poses, cfg.lod, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        if !self.crop() {
+            return false;
+        }
+        let Projection { width, height, .. } = self.projection;
+        // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
+        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
+        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
         // All of it is written when it is drawn.
-        self.nearness.resize(side * side, 0.0);
-        self.range.resize((side / BLOCK) * (side / BLOCK), [0.0; 2]);
+        self.nearness.resize(width * height, 0.0);
+        self.range.resize((width / BLOCK) * (height / BLOCK), [0.0; 2]);
         true
     }
 
-    /// Texels along a side.
-    pub(crate) fn side(&self) -> usize {
-        self.side
+    /// Cuts the map to what is seen, and a block more on each side for the texels around a point: everything else is lit.
+    /// `false` where nothing is seen.
+    fn crop(&mut self) -> bool {
+        let Self { projection, list, .. } = self;
+        let (mut lo, mut hi) = ([u16::MAX; 2], [0u16; 2]);
+        for item in &list.opaque {
+            let [x0, y0, x1, y1] = item.rect;
+            (lo, hi) = ([lo[0].min(x0), lo[1].min(y0)], [hi[0].max(x1), hi[1].max(y1)]);
+        }
+        if lo[0] > hi[0] {
+            return false;
+        }
+        let last = [projection.width, projection.height].map(|size| (size / BLOCK - 1) as u16);
+        let lo = lo.map(|x| x.saturating_sub(1));
+        let hi = [0, 1].map(|k| (hi[k] + 1).min(last[k]));
+        for item in &mut list.opaque {
+            let [x0, y0, x1, y1] = item.rect;
+            item.rect = [x0 - lo[0], y0 - lo[1], x1 - lo[0], y1 - lo[1]];
+        }
+        [projection.width, projection.height] = [0, 1].map(|k| usize::from(hi[k] - lo[k] + 1) * BLOCK);
+        // Whole texels, so that the map does not crawl over the surfaces with the cut.
+        projection.cx -= (usize::from(lo[0]) * BLOCK) as f32;
+        projection.cy -= (usize::from(lo[1]) * BLOCK) as f32;
+        true
+    }
+
+    /// Texels in a row, and rows.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.projection.width, self.projection.height]
     }
 
     /// The map in parts that can be drawn one by one, each of `rows` rows of blocks.
     pub(crate) fn bands(&mut self, rows: usize) -> impl Iterator<Item = ShadowBand<'_>> {
-        let Self { projection, list, side, nearness, range, .. } = self;
+        let Self { projection, list, nearness, range, .. } = self;
         let (projection, list) = (&*projection, &*list);
-        let parts = nearness.chunks_mut(rows * BLOCK * *side).zip(range.chunks_mut(rows * (*side / BLOCK)));
+        let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
+        let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
         parts.enumerate().map(move |(k, (nearness, range))| ShadowBand {
             projection,
             list,
@@ -129,20 +171,20 @@ impl ShadowMap {
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
         let p = &self.projection;
-        let camera = &p.world_from_camera;
-        let inverse = [0, 1, 2].map(|j| [0, 1, 2].map(|i| camera.rotation[i][j]));
-        let to_lamp = |v: V3<S>| v.sub(V3::splat(s, camera.translation)).rotate(&inverse);
-        let mut c = to_lamp(position);
+        let mut c = position.sub(V3::splat(s, p.world_from_camera.translation)).rotate(&self.lamp_from_world);
         let width = if p.parallel { splat(s, self.texel) } else { c.z * self.texel };
-        c = c.add(normal.rotate(&inverse).scale(width * 1.8 + (error + self.list.error)));
-        let (x, y) = if p.parallel { (c.x * p.fx, c.y * p.fy) } else { (c.x * p.fx / c.z, c.y * p.fy / c.z) };
+        c = c.add(normal.rotate(&self.lamp_from_world).scale(width * 1.8 + (error + self.list.error)));
+        let (x, y, nearness) = if p.parallel {
+            (c.x * p.fx, c.y * p.fy, p.nearness_lanes(c.z - width * 0.3))
+        } else {
+            let inverse = 1.0 / c.z;
+            (c.x * inverse * p.fx, c.y * inverse * p.fy, inverse * (1.0 / (1.0 - self.texel * 0.3)))
+        };
         let (x, y) = (x + (p.cx - 0.5), y + (p.cy - 0.5));
-        let nearness = p.nearness_lanes(c.z - width * 0.3);
-        let side = self.side as f32;
         let inside = x.simd_gt(splat(s, 2.0))
             & y.simd_gt(splat(s, 2.0))
-            & x.simd_lt(splat(s, side - 3.0))
-            & y.simd_lt(splat(s, side - 3.0))
+            & x.simd_lt(splat(s, p.width as f32 - 3.0))
+            & y.simd_lt(splat(s, p.height as f32 - 3.0))
             & c.z.simd_gt(splat(s, p.near));
         let wanted = inside & lanes;
         let bits = wanted.to_bitmask();
@@ -158,13 +200,13 @@ impl ShadowMap {
         for (&x, &y) in columns.iter().zip(&rows) {
             (lo, hi) = ([lo[0].min(x), lo[1].min(y)], [hi[0].max(x), hi[1].max(y)]);
         }
-        let [x0, y0] = lo.map(|i| (i as usize - 1) / BLOCK);
-        let [x1, y1] = hi.map(|i| (i as usize + 2) / BLOCK);
+        let [x0, y0] = [(lo[0] as usize - 1) / BLOCK, (lo[1] as usize - 1) / BLOCK];
+        let [x1, y1] = [(hi[0] as usize + 2) / BLOCK, (hi[1] as usize + 2) / BLOCK];
         // Pixels far apart on the map would look at too many blocks.
         if (x1 + 1 - x0) * (y1 + 1 - y0) <= 12 {
             let (mut low, mut high) = (f32::MAX, f32::MIN);
             for row in y0..=y1 {
-                let first = row * (self.side / BLOCK);
+                let first = row * (p.width / BLOCK);
                 for &[l, h] in &self.range[first + x0..=first + x1] {
                     (low, high) = (if l < low { l } else { low }, if h > high { h } else { high });
                 }
@@ -186,22 +228,20 @@ impl ShadowMap {
         load(s, &lit)
     }
 
-    /// Sixteen texels around a point.
+    /// Sixteen texels around a point. Exactly 1 where none of them is nearer, as if they had not been looked at.
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
-        let (wx, wy) = ([1.0 - fx, 1.0, 1.0, fx], [1.0 - fy, 1.0, 1.0, fy]);
-        let mut sum = 0.0;
-        for (k, wy) in wy.iter().enumerate() {
-            let first = (row + k - 1) * self.side + column - 1;
-            let Some(&[a, b, c, d]) = self.nearness[first..].first_chunk::<4>() else { continue };
-            // Spelled out: `map` of an array stays a call.
-            let a = if a > q { 0.0 } else { wx[0] };
-            let b = if b > q { 0.0 } else { wx[1] };
-            let c = if c > q { 0.0 } else { wx[2] };
-            let d = if d > q { 0.0 } else { wx[3] };
-            sum += (a + b + c + d) * wy;
+        let width = self.projection.width;
+        let mut lit = [0.0f32; 4];
+        for (k, weight) in [1.0 - fy, 1.0, 1.0, fy].into_iter().enumerate() {
+            let first = (row + k - 1) * width + column - 1;
+            let Some(texels) = self.nearness[first..].first_chunk::<4>() else { continue };
+            for (lit, texel) in lit.iter_mut().zip(texels) {
+                *lit += if *texel > q { 0.0 } else { weight };
+            }
         }
-        sum * (1.0 / 9.0)
+        let sum = lit[0] * (1.0 - fx) + lit[1] + lit[2] + lit[3] * fx;
+        if sum > 8.9999 { 1.0 } else { sum * (1.0 / 9.0) }
     }
 }
 
@@ -240,8 +280,11 @@ fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2
             for (&l, &h) in lows.iter().zip(&highs) {
                 *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
             }
-            for (row, from) in block.chunks_exact(BLOCK).enumerate() {
-                lines[row * side + bx * BLOCK..][..BLOCK].copy_from_slice(from);
+            // Arrays: slices of a length that is not known are copied by a call.
+            for (row, from) in block.as_chunks::<BLOCK>().0.iter().enumerate() {
+                if let Some(to) = lines[row * side + bx * BLOCK..].first_chunk_mut() {
+                    *to = *from;
+                }
             }
         }
     }

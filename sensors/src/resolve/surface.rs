@@ -32,6 +32,8 @@ pub(crate) struct Source<'a> {
     pub(crate) first_id: u32,
     /// Linear colour of the material.
     pub(crate) color: [f32; 3],
+    /// Texture coordinates per metre, see [`scene::RenderScene::texture_scales`].
+    pub(crate) texture_scale: [f32; 3],
 }
 
 /// The surface at the points (u, v) of the picture where `lanes` says that this instance is seen, with the ids that the
@@ -50,7 +52,8 @@ pub(crate) fn surface<S: Simd>(
     let zero = splat(s, 0.0);
     let (depth, normal, shading, uv, uv_density);
     if let Some(mesh) = source.placed.mesh(source.instance) {
-        let axis = source.placed.local.instance_from_camera.rotation.map(|r| r[2]);
+        let [x, y, z] = &source.placed.local.instance_from_camera.rotation;
+        let axis = [x[2], y[2], z[2]];
         let hit = triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
         (depth, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
     } else {
@@ -163,17 +166,4 @@ fn triangles<S: Simd>(
         uv_density = (max(square, -square) * area.sqrt() * inverse).sqrt();
     }
     TriangleHit { t: depth, normal: normal.unit(s), shading, uv, uv_density }
-}
-
-/// Texture coordinates of a shape without its own: x and y over its size, as MuJoCo projects 2D textures.
-#[inline(always)]
-pub(crate) fn planar_uv<S: Simd>(instance: &Instance, local: V3<S>) -> ([F<S>; 2], [f32; 2]) {
-    let material = &instance.material;
-    let [lo, hi] = instance.shape.aabb();
-    let endless = matches!(&instance.shape, Shape::Plane(plane) if plane.half[0] == 0.0 || plane.half[1] == 0.0);
-    let scale = [0, 1].map(|k| {
-        let size = hi[k] - lo[k];
-        material.tex_repeat[k] / if material.tex_uniform || endless || !size.is_finite() { 1.0 } else { size }
-    });
-    ([local.x * scale[0], local.y * scale[1]], scale)
 }

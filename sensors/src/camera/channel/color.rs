@@ -1,6 +1,6 @@
 //! Colour (sRGB, see the tone curve) and opacity (always 255).
 
-use super::{Channel, PixelGroup, Stage};
+use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix4;
 
 /// Colour (sRGB, see the tone curve) and opacity (always 255).
@@ -22,6 +22,6 @@ impl Channel for Color {
 
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [u8]) {
-        out.copy_from_slice(&group.color.as_flattened()[4 * first..4 * first + out.len()]);
+        copy_row::<32, _>(&group.color.as_flattened()[4 * first..], out);
     }
 }

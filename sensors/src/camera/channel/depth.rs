@@ -1,6 +1,6 @@
 //! Depth along the optical axis \[m\].
 
-use super::{Channel, PixelGroup, Stage};
+use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
 /// Depth along the optical axis \[m\].
@@ -22,7 +22,7 @@ impl Channel for Depth {
 
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [f32]) {
-        out.copy_from_slice(&group.depth[first..first + out.len()]);
+        copy_row::<8, _>(&group.depth[first..], out);
     }
 
     fn replace_misses(numbers: &mut [f32], value: f32) {

@@ -1,6 +1,6 @@
 //! Distance from the camera \[m\].
 
-use super::{Channel, PixelGroup, Stage};
+use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
 /// Distance from the camera \[m\].
@@ -22,7 +22,7 @@ impl Channel for Distance {
 
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [f32]) {
-        out.copy_from_slice(&group.distance[first..first + out.len()]);
+        copy_row::<8, _>(&group.distance[first..], out);
     }
 
     fn replace_misses(numbers: &mut [f32], value: f32) {

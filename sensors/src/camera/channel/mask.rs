@@ -1,6 +1,6 @@
 //! Which instance is seen.
 
-use super::{Channel, PixelGroup, Stage};
+use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
 /// Which instance is seen.
@@ -22,6 +22,6 @@ impl Channel for Mask {
 
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [i32]) {
-        out.copy_from_slice(&group.mask[first..first + out.len()]);
+        copy_row::<8, _>(&group.mask[first..], out);
     }
 }

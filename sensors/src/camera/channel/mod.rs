@@ -324,6 +324,15 @@ fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: u
     Some(first)
 }
 
+/// Copies the numbers of a row of pixels, of which there are N in a whole one: that many are copied without a call.
+#[inline(always)]
+fn copy_row<const N: usize, T: Copy>(from: &[T], out: &mut [T]) {
+    match (<&mut [T; N]>::try_from(&mut *out), from.first_chunk()) {
+        (Ok(out), Some(from)) => *out = *from,
+        _ => out.copy_from_slice(&from[..out.len()]),
+    }
+}
+
 #[inline(always)]
 fn put<C: Channel>(buffer: &mut [C::Number], group: &PixelGroup, [x, y]: [usize; 2], [width, height]: [usize; 2]) {
     let columns = 8.min(width - x);

@@ -208,8 +208,25 @@ impl Field {
         }
     }
 
+    /// A ray straight down from above the surface, as height scanners cast them: it crosses one cell, and nothing else must
+    /// be known of it. `None` for other rays, and where it misses the footprint.
+    #[inline(always)]
+    fn plumb(&self, ray: &Ray) -> Option<Touch> {
+        let (o, d) = (ray.origin, ray.direction);
+        if d[0] != 0.0 || d[1] != 0.0 || d[2] >= 0.0 || o[0].abs() > self.half[0] || o[1].abs() > self.half[1] {
+            return None;
+        }
+        let [h, hx, hy] = self.surface(o[0], o[1]);
+        let t = (o[2] - h) / -d[2];
+        let normal = unit([-hx * self.per_metre[0], -hy * self.per_metre[1], 1.0])?;
+        (t >= 0.0).then_some(Touch { t, normal })
+    }
+
     #[inline(always)]
     fn touch(&self, ray: &Ray, limit: f64) -> Option<Touch> {
+        if let Some(touch) = self.plumb(ray) {
+            return (touch.t <= limit).then_some(touch);
+        }
         let (o, d) = (ray.origin, ray.direction);
         let [lo, hi] = [[-self.half[0], -self.half[1], self.floor], [self.half[0], self.half[1], self.top]];
         // Through which side of the box around everything the ray comes and goes.
@@ -249,7 +266,7 @@ impl Field {
             Some(2) => {}
             came => {
                 let [x, y, z] = along(o, from, d);
-                let gap = z - self.height(x, y);
+                let gap = z - self.surface(x, y)[0];
                 if gap < 0.0 {
                     match came {
                         Some(axis) => return wall(from, axis),
@@ -265,14 +282,14 @@ impl Field {
         (walk.side < 0.0 || leave.1 == 2 && d[2] < 0.0).then(|| wall(to, leave.1)).flatten()
     }
 
-    /// Height of the surface over a point of the footprint \[m\].
+    /// Height of the surface over a point of the footprint \[m\], and its slopes (per cell).
     #[inline(always)]
-    fn height(&self, x: f64, y: f64) -> f64 {
+    fn surface(&self, x: f64, y: f64) -> [f64; 3] {
         let at = [(x + self.half[0]) * self.per_metre[0], (y + self.half[1]) * self.per_metre[1]];
         let cell = [0, 1].map(|k| (at[k].max(0.0) as usize).min(self.cells[k] - 1));
         let [x, y] = [0, 1].map(|k| at[k] - cell[k] as f64);
         let [h, hx, hy] = Self::plane(self.corners(cell), x >= y);
-        h + hx * x + hy * y
+        [h + hx * x + hy * y, hx, hy]
     }
 }
 

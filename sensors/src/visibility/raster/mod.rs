@@ -102,18 +102,17 @@ fn draw_primitive<S: Simd>(
                 for row in 0..BLOCK / 2 {
                     let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
                     let (o, d) = projection.rays(s, &placed.local, u, v);
-                    let hit = primitive::intersect(s, shape, o, d, projection.near);
-                    if !hit.hit.any_true() {
+                    let (hit, q, face) = primitive::nearness(s, shape, projection, o, d);
+                    if !hit.any_true() {
                         continue;
                     }
-                    let q = projection.nearness_lanes(hit.t);
                     let here = samples + row * 16;
                     let old = load(s, &tile.nearness[here..]);
-                    let m = hit.hit & q.simd_gt(old);
+                    let m = hit & q.simd_gt(old);
                     if m.any_true() {
                         store(select(m, q, old), &mut tile.nearness[here..]);
                         let old = load_u(s, &tile.id[here..]);
-                        store_u(select_u(m, hit.face + splat_u(s, first_id), old), &mut tile.id[here..]);
+                        store_u(select_u(m, face + splat_u(s, first_id), old), &mut tile.id[here..]);
                         drawn = true;
                     }
                 }
