@@ -3,7 +3,6 @@
 //! All solids are convex: a ray is inside one over an interval. The nearest surface in front of `near` is where the
 //! interval begins, or where it ends if the camera is inside.
 
-use super::Projection;
 use crate::lanes::{F, M, Simd, U, V3, abs, max, min, select, select_u, splat, splat_u};
 use scene::Shape;
 
@@ -89,31 +88,6 @@ fn slab<S: Simd>(s: S, o: F<S>, d: F<S>, h: f32) -> Interval<S> {
 #[inline(always)]
 fn sign<S: Simd>(s: S, x: F<S>) -> F<S> {
     select(x.simd_lt(splat(s, 0.0)), splat(s, -1.0), splat(s, 1.0))
-}
-
-/// Where rays through the picture hit a shape with a closed form, how near, and which face; in its own frame.
-#[inline(always)]
-pub(crate) fn nearness<S: Simd>(
-    s: S,
-    shape: &Shape,
-    projection: &Projection,
-    o: V3<S>,
-    d: V3<S>,
-) -> (M<S>, F<S>, U<S>) {
-    match shape {
-        // Seen through a pinhole, the nearness 1/z = -d.z / o.z of a plane is linear in the picture: nothing to divide.
-        // `o` is the same for all rays.
-        Shape::Plane(plane) if plane.half == [0.0; 2] && !projection.parallel => {
-            let inverse = -1.0 / o.z;
-            let q = d.z * inverse;
-            let hit = d.z.simd_lt(splat(s, 0.0)) & q.simd_gt(splat(s, 0.0)) & q.simd_le(splat(s, projection.nearest()));
-            (hit, q, splat_u(s, 0))
-        }
-        _ => {
-            let hit = intersect(s, shape, o, d, projection.near);
-            (hit.hit, projection.nearness_lanes(hit.t), hit.face)
-        }
-    }
 }
 
 /// Where rays hit a shape with a closed form, in its own frame. Shapes made of triangles are never hit.

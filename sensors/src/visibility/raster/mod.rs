@@ -11,11 +11,12 @@ pub(crate) mod tile;
 mod triangle;
 
 use super::{Projection, primitive};
-use crate::lanes::{COLUMN, ROW, Simd, load, load_u, select, select_u, splat_u, store, store_u};
+use crate::lanes::{COLUMN, F, LANES, M, ROW, Simd, U};
+use crate::lanes::{load, load_u, select, select_u, splat, splat_u, store, store_u};
 use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
 pub(crate) use draw_list::{DrawList, Item, Layer, Placed};
-use scene::RenderScene;
+use scene::{RenderScene, Shape};
 use tile::{BLOCK, SAMPLES, Tile};
 
 /// Draws things into a visibility buffer.
@@ -67,12 +68,80 @@ impl Painter {
                     );
                 }
             }
+            _ if is_floor(&instance.shape, projection) => s.vectorize(
+                #[inline(always)]
+                || draw_floor(s, tile, projection, placed, first_id, area),
+            ),
             _ => s.vectorize(
                 #[inline(always)]
                 || draw_primitive(s, tile, projection, &instance.shape, placed, item, first_id, area),
             ),
         }
     }
+}
+
+/// Whether something is an endless plane seen through a pinhole.
+#[inline(always)]
+fn is_floor(shape: &Shape, projection: &Projection) -> bool {
+    matches!(shape, Shape::Plane(plane) if plane.half == [0.0; 2]) && !projection.parallel
+}
+
+/// An endless plane, whose nearness is linear in the picture: 1/z = -d.z / o.z, where a ray d from the camera o goes down
+/// in the plane's frame. Most pictures are full of one.
+#[inline(always)]
+fn draw_floor<S: Simd>(
+    s: S,
+    tile: &mut Tile,
+    projection: &Projection,
+    placed: &Placed,
+    first_id: u32,
+    area: [usize; 4],
+) {
+    let camera = &placed.local;
+    let ([right, down, forward], height) =
+        (camera.instance_from_camera.rotation[2], camera.instance_from_camera.translation[2]);
+    // Seen from above only.
+    if height <= 0.0 {
+        return;
+    }
+    let [right, down, forward] = [right, down, forward].map(|x| -x / height);
+    let (nearest, zero, id) = (splat(s, projection.nearest()), splat(s, 0.0), splat_u(s, first_id));
+    for by in area[1]..=area[3] {
+        for bx in area[0]..=area[2] {
+            let block = tile.block(bx, by);
+            let mut drawn = false;
+            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                let [x, y] = [
+                    (bx * BLOCK) as f32 + 0.5 + offset[0] as f32 / 256.0 - projection.cx,
+                    (by * BLOCK) as f32 + 0.5 + offset[1] as f32 / 256.0 - projection.cy,
+                ];
+                let across = (load(s, &COLUMN) + x) * (camera.inverse_f[0] * right);
+                let samples = tile.samples(block, plane);
+                for row in 0..BLOCK / 2 {
+                    let q = across + (load(s, &ROW) + (y + (2 * row) as f32)) * (camera.inverse_f[1] * down) + forward;
+                    let hit = q.simd_gt(zero) & q.simd_le(nearest);
+                    drawn |= keep(s, tile, samples + row * LANES, hit, q, id);
+                }
+            }
+            if drawn {
+                tile.touch(block);
+            }
+        }
+    }
+}
+
+/// Keeps the samples that are hit nearer than what is there. Whether there are any.
+#[inline(always)]
+fn keep<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
+    let old = load(s, &tile.nearness[at..]);
+    let nearer = hit & nearness.simd_gt(old);
+    if !nearer.any_true() {
+        return false;
+    }
+    store(select(nearer, nearness, old), &mut tile.nearness[at..]);
+    let old = load_u(s, &tile.id[at..]);
+    store_u(select_u(nearer, id, old), &mut tile.id[at..]);
+    true
 }
 
 /// Casts the rays of all samples in an area of blocks.
@@ -82,7 +151,7 @@ fn draw_primitive<S: Simd>(
     s: S,
     tile: &mut Tile,
     projection: &Projection,
-    shape: &scene::Shape,
+    shape: &Shape,
     placed: &Placed,
     item: &Item,
     first_id: u32,
@@ -102,19 +171,12 @@ fn draw_primitive<S: Simd>(
                 for row in 0..BLOCK / 2 {
                     let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
                     let (o, d) = projection.rays(s, &placed.local, u, v);
-                    let (hit, q, face) = primitive::nearness(s, shape, projection, o, d);
-                    if !hit.any_true() {
+                    let hit = primitive::intersect(s, shape, o, d, projection.near);
+                    if !hit.hit.any_true() {
                         continue;
                     }
-                    let here = samples + row * 16;
-                    let old = load(s, &tile.nearness[here..]);
-                    let m = hit & q.simd_gt(old);
-                    if m.any_true() {
-                        store(select(m, q, old), &mut tile.nearness[here..]);
-                        let old = load_u(s, &tile.id[here..]);
-                        store_u(select_u(m, face + splat_u(s, first_id), old), &mut tile.id[here..]);
-                        drawn = true;
-                    }
+                    let q = projection.nearness_lanes(hit.t);
+                    drawn |= keep(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
                 }
             }
             if drawn {
