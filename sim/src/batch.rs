@@ -17,6 +17,9 @@ use std::thread::JoinHandle;
 /// What is done with an environment, given its index.
 pub type EnvJob = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
 
+/// What is done with a chunk, given the index of its first environment.
+type ChunkJob = Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>;
+
 /// What is done with a chunk. Steps are plain data: stepping allocates nothing.
 #[derive(Clone)]
 enum Job {
@@ -24,8 +27,8 @@ enum Job {
     Step(u32, Option<Capture>),
     /// Anything else with every environment.
     Envs(EnvJob),
-    /// Anything else, given the index of the first environment.
-    Chunks(Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>),
+    /// Anything else with every chunk.
+    Chunks(ChunkJob),
 }
 
 /// Environments that one thread takes together.

@@ -74,7 +74,7 @@ struct Task<V> {
     fixed: Vec<Arc<FixedWorld>>,
     /// Environments and their views.
     views: Vec<(usize, V)>,
-    /// Where the instances of the scene are, view after view.
+    /// Where the targets are that may move, view after view.
     poses: Vec<PoseF64>,
 }
 
@@ -138,7 +138,7 @@ impl<R: Rays> Scan<R> {
             if self.slots[env] == NOWHERE {
                 self.slots[env] = task.views.len();
                 task.views.push((env, view(env)));
-                task.poses.extend_from_slice(row(poses, env));
+                task.poses.extend(self.round.targets.moving_poses(row(poses, env)));
             }
         }
         let count = task.views.len() * self.round.rays.count();
@@ -170,7 +170,7 @@ impl<R: Rays> Work for Round<R> {
         let task = read(&self.task);
         let mut desk = lock(&self.desks[desk]);
         let Desk { world, rays } = &mut *desk;
-        let (per_view, width) = (self.per_view(), task.poses.len() / task.views.len().max(1));
+        let (per_view, moving) = (self.per_view(), self.targets.moving_count());
         let mut placed = NOWHERE;
         loop {
             let part = self.next.fetch_add(1, Ordering::Relaxed);
@@ -180,7 +180,7 @@ impl<R: Rays> Work for Round<R> {
             let (at, first) = (part / per_view, part % per_view * PART);
             let (env, view) = &task.views[at];
             if placed != at {
-                world.place_with(&task.fixed[*env], &task.poses[at * width..(at + 1) * width]);
+                world.place_with(&task.fixed[*env], &task.poses[at * moving..(at + 1) * moving]);
                 placed = at;
             }
             let mut hits = lock(&self.parts[part]);
