@@ -110,6 +110,16 @@ pub enum SensorError {
         /// The filter.
         filter: String,
     },
+    /// A contact sensor that is to tell counterparts apart, without any.
+    #[error(
+        "{field} tells forces apart by filter, and there are no filters; name counterparts in `filters` (the sum over all of them is {always}, which is always there)"
+    )]
+    NoFilters {
+        /// What was asked for.
+        field: &'static str,
+        /// What says the same of all counterparts together.
+        always: &'static str,
+    },
     /// A link that fixed joints fuse to another one: no joint holds it alone.
     #[error("the link {link:?} is fused to {carrier:?} by fixed joints; measure the joint of {carrier:?} instead")]
     FusedLink {

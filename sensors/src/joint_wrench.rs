@@ -1,11 +1,13 @@
 //! Six-axis force and torque in joints.
 
 use crate::error::SensorError;
+use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::select;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use nalgebra::Vector3;
 use ndarray::ArrayView3;
-use scene::SceneState;
+use scene::{Pose, SceneState};
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`JointWrench`] sensor.
@@ -15,6 +17,10 @@ pub struct JointWrenchCfg {
     /// The links whose joints are measured, by patterns of their names (`uid/link`, or `link` alone), in the order they are
     /// reported. Links that fixed joints fuse to others have no joint that could be measured.
     pub links: Vec<String>,
+    /// Frames to measure in, by patterns of the names of links, reported after `links`: the wrench of the joint that moves
+    /// the named link (where it is fused to another one, that of the other one), about the origin and in the axes of the
+    /// named link. The mount of a real force and torque sensor is such a link.
+    pub frames: Vec<String>,
     /// Rate, history, latency and noise; the channels are `forces` and `torques`.
     pub sampling: SamplingCfg,
 }
@@ -23,22 +29,35 @@ pub struct JointWrenchCfg {
 /// carries and drives it. N environments, B links.
 ///
 /// Both are in the axes of the link, and about its origin: the frame of the joint on the side of the child, as URDF defines
-/// it. The sign is that of what acts **on the link**: a load that hangs from its joint reads a force of its weight, upwards.
+/// it. For [`JointWrenchCfg::frames`] the same wrench is moved to the origin of the frame and turned into its axes: with the
+/// force `F` and the torque `T` about the origin of the link, and the frame at `p` with the rotation `R` in the link, the
+/// force is `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, whatever is on which side of the frame.
+///
+/// The sign is that of what acts **on the link**: a load that hangs from its joint reads a force of its weight, upwards.
 /// Gravity and contacts of the link are not part of it, what they need to be held is; the drive's effort is part of it,
 /// along the axis of the joint. For the root of a fixed robot it is what the world holds the robot with; it is 0 for what
 /// floats freely.
 #[derive(Clone, Debug)]
 pub struct JointWrench {
-    links: Vec<usize>,
+    measured: Vec<Measured>,
     names: Vec<String>,
     sampler: Sampler,
+}
+
+/// One wrench.
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    /// The link whose joint is measured.
+    link: usize,
+    /// The link whose frame it is measured in, where that is another one.
+    frame: Option<usize>,
 }
 
 impl SensorCfg for JointWrenchCfg {
     type Sensor = JointWrench;
 
     fn requires(&self) -> Requires {
-        Requires::JOINT_WRENCHES
+        if self.frames.is_empty() { Requires::JOINT_WRENCHES } else { Requires::JOINT_WRENCHES | Requires::POSES }
     }
 
     /// # Errors
@@ -53,33 +72,56 @@ impl SensorCfg for JointWrenchCfg {
                 return Err(SensorError::FusedLink { link, carrier });
             }
         }
-        let channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * links.len()));
+        let frames = select(&self.frames, &context.bodies, "link")?;
+        let names = links.iter().chain(&frames).map(|&link| context.bodies[link].clone()).collect();
+        let in_frame = |frame: usize| {
+            let link = context.carriers.get(frame).copied().unwrap_or(frame);
+            Measured { link, frame: (link != frame).then_some(frame) }
+        };
+        let in_links = links.into_iter().map(|link| Measured { link, frame: None });
+        let measured: Vec<Measured> = in_links.chain(frames.into_iter().map(in_frame)).collect();
+        let channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len()));
         Ok(JointWrench {
-            names: links.iter().map(|&link| context.bodies[link].clone()).collect(),
-            links,
+            names,
+            measured,
             sampler: Sampler::new("joint wrench", self.requires(), context, &self.sampling, &channels)?,
         })
     }
 }
 
 /// Writes what the sensor measures in environment `env` to `row`.
-fn read(links: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
+fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(wrenches) = &state.joint_wrenches else { return };
-    let part = |first| links.iter().flat_map(move |&link| (first..first + 3).map(move |k| wrenches[(env, link, k)]));
-    row.iter_mut().zip(part(0).chain(part(3))).for_each(|(number, value)| *number = value);
+    let (mut forces, mut torques) = row.split_at_mut(3 * measured.len());
+    for Measured { link, frame } in measured {
+        let (mut force, mut torque) = (vector(wrenches, env, *link, 0), vector(wrenches, env, *link, 3));
+        if let (Some(frame), Some(poses)) = (frame, &state.body_poses) {
+            // Both are on one body: where they are to each other never changes.
+            (force, torque) = moved(&(pose(poses, env, *link).inverse() * pose(poses, env, *frame)), force, torque);
+        }
+        forces = put(forces, force.as_slice());
+        torques = put(torques, torque.as_slice());
+    }
+}
+
+/// A force, and a torque about the origin of a link, in a frame of the link.
+fn moved(link_from_frame: &Pose, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let Pose { translation, rotation } = link_from_frame;
+    let torque = torque - translation.vector.cross(&force);
+    (rotation.inverse_transform_vector(&force), rotation.inverse_transform_vector(&torque))
 }
 
 impl Sensor for JointWrench {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.update(state, |env, row| read(&self.links, state, env, row))
+        self.sampler.update(state, |env, row| read(&self.measured, state, env, row))
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.reset(env_ids, state, |env, row| read(&self.links, state, env, row))
+        self.sampler.reset(env_ids, state, |env, row| read(&self.measured, state, env, row))
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.refresh(env_ids, state, |env, row| read(&self.links, state, env, row))
+        self.sampler.refresh(env_ids, state, |env, row| read(&self.measured, state, env, row))
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
@@ -94,18 +136,19 @@ impl Sampled for JointWrench {
 }
 
 impl JointWrench {
-    /// Names of the links, in the order of the axis B.
+    /// Names of the links, then of those that are frames, in the order of the axis B.
     pub fn link_names(&self) -> &[String] {
         &self.names
     }
 
-    /// Forces on the links through their joints \[N\], in the axes of each link, shape (N, B, 3).
+    /// Forces on the links through their joints \[N\], in the axes of each link or frame, shape (N, B, 3).
     pub fn forces(&self) -> ArrayView3<'_, f64> {
-        self.sampler.values_as("forces", (self.sampler.num_envs(), self.links.len(), 3))
+        self.sampler.values_as("forces", (self.sampler.num_envs(), self.measured.len(), 3))
     }
 
-    /// Torques on the links through their joints \[N m\], about the origin and in the axes of each link, shape (N, B, 3).
+    /// Torques on the links through their joints \[N m\], about the origin and in the axes of each link or frame, shape
+    /// (N, B, 3).
     pub fn torques(&self) -> ArrayView3<'_, f64> {
-        self.sampler.values_as("torques", (self.sampler.num_envs(), self.links.len(), 3))
+        self.sampler.values_as("torques", (self.sampler.num_envs(), self.measured.len(), 3))
     }
 }

@@ -11,6 +11,7 @@
 
 pub mod camera;
 pub mod contact_sensor;
+pub mod crew;
 mod delay;
 pub mod error;
 pub mod expected;
@@ -34,6 +35,7 @@ pub mod visibility;
 
 pub use camera::{Camera, CameraCfg, CameraError};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
+pub use crew::Crew;
 pub use error::SensorError;
 pub use expected::Expected;
 pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};

@@ -1,5 +1,6 @@
 //! The contract of every sensor.
 
+use crate::crew::Crew;
 use crate::error::SensorError;
 use crate::ray::RayAssets;
 use nalgebra::Vector3;
@@ -100,6 +101,8 @@ pub struct SensorContext {
     pub ray_assets: RayAssets,
     /// How many threads a sensor may use; 0 counts as 1.
     pub threads: usize,
+    /// The threads that sensors share.
+    pub crew: Crew,
 }
 
 impl SensorContext {

@@ -39,6 +39,7 @@ fn no_sensor_allocates_when_it_measures() {
         track_pose: true,
         track_air_time: true,
         track_contact_points: true,
+        track_friction_forces: true,
         sampling: sampling.clone(),
         ..ContactSensorCfg::of(".*")
     };
@@ -47,12 +48,13 @@ fn no_sensor_allocates_when_it_measures() {
         sampling: sampling.clone(),
         ..FrameTransformerCfg::from("a", vec![TargetFrameCfg::of(".*")])
     };
-    let wrench = JointWrenchCfg { links: vec![".*".into()], sampling };
+    let wrench = JointWrenchCfg { links: vec!["[ab]".into()], frames: vec!["c".into()], sampling };
     let mut sensors: Vec<Box<dyn Sensor>> = vec![
         Box::new(contact.build(&context).expect("good")),
         Box::new(imu.build(&context).expect("good")),
         Box::new(frames.build(&context).expect("good")),
-        Box::new(wrench.build(&context).expect("good")),
+        // For this one, the third body is fused to the second.
+        Box::new(wrench.build(&SensorContext { carriers: [0, 1, 1].into(), ..context }).expect("good")),
     ];
     let mut state = state();
     for sensor in &mut sensors {

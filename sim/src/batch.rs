@@ -18,7 +18,18 @@ use std::thread::JoinHandle;
 pub type EnvJob = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
 
 /// What is done with a chunk, given the index of its first environment.
-type Job = Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>;
+type ChunkJob = Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>;
+
+/// What is done with a chunk. Steps are plain data: stepping allocates nothing.
+#[derive(Clone)]
+enum Job {
+    /// Steps, and what of the last one is kept in the environments.
+    Step(u32, Option<Capture>),
+    /// Anything else with every environment.
+    Envs(EnvJob),
+    /// Anything else with every chunk.
+    Chunks(ChunkJob),
+}
 
 /// Environments that one thread takes together.
 struct Chunk {
@@ -171,12 +182,12 @@ impl Batch {
 
     /// Does `count` steps in every environment.
     pub fn step(&mut self, count: u32) {
-        self.run(Arc::new(move |_, env: &mut Env| env.step(count)));
+        self.run_chunks(&Job::Step(count, None));
     }
 
     /// As [`step`](Self::step); of the last step, `capture` is kept in the environments.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: Capture) {
-        self.run(Arc::new(move |_, env: &mut Env| env.step_and_capture(count, Some(&capture))));
+        self.run_chunks(&Job::Step(count, Some(capture)));
     }
 
     /// Captures in the environments `chosen` what MuJoCo solves for their present state.
@@ -229,13 +240,13 @@ impl Batch {
             }
             return;
         }
-        let job: Job = Arc::new(move |_, chunk: &mut Chunk| {
+        let job = Job::Chunks(Arc::new(move |_, chunk: &mut Chunk| {
             let Chunk { envs, read } = chunk;
             read.clear();
             for env in envs {
                 step(env, &mut |_, values| read.extend_from_slice(values));
             }
-        });
+        }));
         let mut copied = vec![false; self.shared.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
             let mut values = &chunk.read[..];
@@ -263,12 +274,7 @@ impl Batch {
     /// # Panics
     /// `job` panicked.
     pub fn run(&mut self, job: EnvJob) {
-        let job: Job = Arc::new(move |first, chunk: &mut Chunk| {
-            for (i, env) in chunk.envs.iter_mut().enumerate() {
-                job(first + i, env);
-            }
-        });
-        self.run_chunks(&job);
+        self.run_chunks(&Job::Envs(job));
     }
 
     fn run_chunks(&mut self, job: &Job) {
@@ -285,13 +291,13 @@ impl Batch {
         if !self.workers.is_empty() {
             let mut slot = lock(&shared.job);
             slot.epoch += 1;
-            slot.job = Some(Arc::clone(job));
+            slot.job = Some(job.clone());
             shared.epoch.store(slot.epoch, Ordering::Release);
             drop(slot);
             shared.wake.notify_all();
         }
         let mut mine = |first: usize, chunk: &mut Chunk| {
-            job(first, chunk);
+            job.act(first, chunk);
             then(first, chunk);
         };
         let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &mut mine)));
@@ -342,6 +348,19 @@ impl Batch {
     }
 }
 
+impl Job {
+    /// Does it with a chunk, given the index of its first environment.
+    fn act(&self, first: usize, chunk: &mut Chunk) {
+        match self {
+            Self::Step(count, capture) => {
+                chunk.envs.iter_mut().for_each(|env| env.step_and_capture(*count, capture.as_ref()));
+            }
+            Self::Envs(job) => chunk.envs.iter_mut().enumerate().for_each(|(i, env)| job(first + i, env)),
+            Self::Chunks(job) => job(first, chunk),
+        }
+    }
+}
+
 impl Shared {
     /// Does the share of `thread`, then what is left of the shares after it.
     fn take_chunks(&self, thread: usize, job: &mut dyn FnMut(usize, &mut Chunk)) {
@@ -378,7 +397,7 @@ fn work(shared: &Shared, thread: usize) {
     while let Some((epoch, job)) = shared.wait_for_job(seen) {
         seen = epoch;
         if catch_unwind(AssertUnwindSafe(|| {
-            shared.take_chunks(thread, &mut |first, chunk: &mut Chunk| job(first, chunk))
+            shared.take_chunks(thread, &mut |first, chunk: &mut Chunk| job.act(first, chunk))
         }))
         .is_err()
         {

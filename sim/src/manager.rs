@@ -18,7 +18,7 @@ use ::scene::Marker;
 use nalgebra::Vector3;
 use ndarray::Array2;
 use sensors::ray::RayAssets;
-use sensors::{Requires, Sensor, SensorCfg, SensorContext};
+use sensors::{Crew, Requires, Sensor, SensorCfg, SensorContext};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -255,6 +255,8 @@ pub struct SimulationManager {
     visuals: VisualCache,
     /// What ray casters have built.
     ray_assets: RayAssets,
+    /// Threads of the sensors.
+    crew: Crew,
     diagnostics: Vec<Diagnostic>,
     simulation: Simulation,
     sensors: SensorList,
@@ -283,6 +285,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
+            crew: Crew::default(),
             diagnostics: Vec::new(),
             simulation,
             sensors,
@@ -433,6 +436,7 @@ impl SimulationManager {
             scene,
             ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
+            crew: self.crew.clone(),
         }
     }
 

@@ -7,7 +7,7 @@ use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
 use kinetoscope::sensors::ray::pattern::{Grid, Lidar};
 
 /// A box that tumbles over a static wall and a ball, elsewhere in every environment.
-fn tumbling(num_envs: usize, threads: usize) -> (SimulationManager, ObjectId) {
+pub(crate) fn tumbling(num_envs: usize, threads: usize) -> (SimulationManager, ObjectId) {
     let cfg = SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();
     let object = |uid: &str, shape, body_type, init_pose| RigidObjectCfg {

@@ -6,3 +6,4 @@ mod kinds;
 mod look_up;
 mod quadruped;
 mod round_trip;
+mod terrain;

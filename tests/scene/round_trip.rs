@@ -1,6 +1,7 @@
 //! A scene that is written and read again is the same scene.
 
 use crate::quadruped::{declared, says};
+use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::RayCasterCfg;
 use kinetoscope::sensors::ray::pattern::Lidar;
@@ -27,6 +28,8 @@ fn every_kind() -> SceneCfg {
         )
         .with("joints", JointStateCfg { joints: Some(vec!["LF.*".into()]), ..Default::default() })
         .with("wrench", JointWrenchCfg { links: vec!["LF_SHANK".into()], ..Default::default() })
+        .with("hills", TerrainCfg { heights: array![[third, -0.0], [1e-300, 0.1]], ..Default::default() })
+        .with("eye", RayCasterCameraCfg { max_distance: third, ..Default::default() })
         .with(
             "lidar",
             RayCasterCfg {
@@ -55,6 +58,7 @@ fn what_is_written_is_read_again() {
             let cfg = match cfg.clone() {
                 EntityCfg::Robot(robot) => RobotCfg { uid: name.clone(), ..*robot }.into(),
                 EntityCfg::RigidObject(object) => RigidObjectCfg { uid: name.clone(), ..*object }.into(),
+                EntityCfg::Terrain(terrain) => TerrainCfg { uid: name.clone(), ..*terrain }.into(),
                 other => other,
             };
             assert_eq!(format!("{read:#?}"), format!("{cfg:#?}"));

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod contact;
+mod contact_pairs;
 mod frames;
 mod imu;
 mod same_bits;

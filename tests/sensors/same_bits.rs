@@ -43,7 +43,7 @@ fn add_sensors(sim: &mut SimulationManager, with_arm: bool, period: f64) -> Ids 
     let sampling = SamplingCfg { noise: noise("net_forces_w"), ..late.clone() };
     let contact = ContactSensorCfg { filters: vec!["ground".into()], sampling, ..ContactSensorCfg::of("box.*") };
     let imu = ImuCfg { sampling: SamplingCfg { noise: noise("lin_acc_b"), ..late.clone() }, ..ImuCfg::on("box0.4") };
-    let wrench = JointWrenchCfg { links: vec!["link[36]".into()], sampling: late };
+    let wrench = JointWrenchCfg { links: vec!["link[36]".into()], sampling: late, ..Default::default() };
     Ids {
         contact: sim.add_sensor("contact", contact).unwrap(),
         imu: sim.add_sensor("imu", imu).unwrap(),

@@ -129,6 +129,54 @@ fn a_joint_exerts_what_all_links_beyond_it_need() {
     assert!(fastest > 1.0, "it moved: {fastest} rad/s");
 }
 
+/// A load that hangs beside a vertical axis, measured by a mount that is tilted, below the axis: the force is the weight,
+/// the torque the weight times the arm from the mount to the centre of mass, both in the axes of the mount.
+#[test]
+fn a_mount_measures_a_hanging_load_in_its_own_frame() {
+    let files = tempfile::tempdir().unwrap();
+    let (of_arm, of_mount, of_load) = (1.0, 0.5, 3.0);
+    let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("arm", of_arm, 0.01, [0.0, 0.0, -0.1], "");
+    content += &joint("turn", "continuous", "arm", [0.0, 0.0, 2.0], "0 0 1");
+    content += &(link("mount", of_mount, 0.01, [0.0; 3], "") + &link("load", of_load, 0.01, [0.0, 0.1, 0.0], ""));
+    let fixed = |name: &str, xyz: &str, rpy: &str| {
+        format!(
+            r#"<joint name="fix_{name}" type="fixed"><parent link="arm"/><child link="{name}"/>
+            <origin xyz="{xyz}" rpy="{rpy}"/></joint>"#
+        )
+    };
+    content += &(fixed("mount", "0.1 0.2 -0.3", "0.4 -0.2 0.7") + &fixed("load", "0.3 0 -0.5", "0 0 0"));
+    let mut sim = SimulationManager::new(cfg(2)).unwrap();
+    let crane = sim.add_robot(robot(files.path(), "crane", &content, true)).unwrap();
+    let (links, frames) = (vec!["arm".into()], vec!["mount".into(), "arm".into()]);
+    let id = sim.add_sensor("wrench", JointWrenchCfg { links, frames, ..Default::default() }).unwrap();
+    // Turned about the vertical, it hangs as it did.
+    sim.robot_mut(crane).write_qpos(&array![[0.0], [1.2]], None, None).unwrap();
+    let mount = kinetoscope::scene::pose::from_xyz_rpy([0.1, 0.2, -0.3], [0.4, -0.2, 0.7]);
+    let up = |mass: f64| Vector3::new(0.0, 0.0, mass * G);
+    let loads = [(of_arm, [0.0, 0.0, -0.1]), (of_mount, [0.1, 0.2, -0.3]), (of_load, [0.3, 0.1, -0.5])];
+    let about = |p: Vector3<f64>| {
+        loads.iter().fold(Vector3::zeros(), |sum, (mass, com)| sum + (Vector3::from(*com) - p).cross(&up(*mass)))
+    };
+    let weight = up(of_arm + of_mount + of_load);
+    let into = mount.rotation.inverse();
+    for _ in 0..3 {
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.link_names(), ["crane/arm", "crane/mount", "crane/arm"]);
+        let (forces, torques) = (sensor.forces(), sensor.torques());
+        for env in 0..2 {
+            let row = |a: &kinetoscope::ndarray::ArrayView3<'_, f64>, b| [0, 1, 2].map(|k| a[(env, b, k)]);
+            assert_near(row(&forces, 1), (into * weight).as_slice(), EXACT);
+            assert_near(row(&torques, 1), (into * about(mount.translation.vector)).as_slice(), EXACT);
+            assert_near(row(&forces, 0), weight.as_slice(), EXACT);
+            assert_near(row(&torques, 0), about(Vector3::zeros()).as_slice(), EXACT);
+            assert_eq!((row(&forces, 0), row(&torques, 0)), (row(&forces, 2), row(&torques, 2)), "its own frame");
+        }
+        let apart = about(mount.translation.vector) - about(Vector3::zeros());
+        assert!(apart.norm() > 1.0, "the control: the mount is not where the joint is");
+        sim.update(20);
+    }
+}
+
 #[test]
 fn fused_links_have_no_joint_to_measure() {
     let mut sim = SimulationManager::new(cfg(1)).unwrap();

@@ -3,10 +3,12 @@
 //! Each gives an array of heights \[m\] over a regular grid: rows along y, columns along x, the first of both at the negative
 //! end. They hold nothing of MuJoCo; `sim::TerrainCfg` takes what they give.
 
+mod generator;
 mod rough;
 mod slope;
 mod stairs;
 
+pub use generator::TerrainGenerator;
 pub use rough::RoughTerrain;
 pub use slope::Slope;
 pub use stairs::PyramidStairs;

@@ -3,10 +3,12 @@
 use super::{TerrainError, finite, points, positive};
 use crate::Random;
 use ndarray::Array2;
+use serde::{Deserialize, Serialize};
 
 /// Ground whose points stand at random heights, each independent of its neighbours: every multiple of `step` between the
 /// ends of the range is as likely. Isaac calls it random uniform terrain.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RoughTerrain {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],

@@ -2,9 +2,11 @@
 
 use super::{TerrainError, finite, points};
 use ndarray::Array2;
+use serde::{Deserialize, Serialize};
 
 /// An inclined plane: height 0 in the middle, rising along x and y.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Slope {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],

@@ -2,10 +2,12 @@
 
 use super::{TerrainError, finite, points, positive};
 use ndarray::Array2;
+use serde::{Deserialize, Serialize};
 
 /// Stairs that lead from all four sides up (or down) to a square platform in the middle. A height field has no vertical
 /// walls: each riser leans over one cell.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct PyramidStairs {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],

@@ -6,6 +6,7 @@ pub mod colormap;
 pub mod error;
 pub mod extrinsics;
 pub mod intrinsics;
+pub(crate) mod mounts;
 pub mod parallel;
 pub mod point_cloud;
 pub mod rasterizer;

@@ -3,8 +3,9 @@
 use super::cfg::{CameraCfg, DepthMiss};
 use super::channel::{Channels, Listed, PictureView, Pictures};
 use super::error::CameraError;
-use super::extrinsics::{CameraConvention, Poses, look_at_pose};
+use super::extrinsics::{CameraConvention, Poses};
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::mounts::{Mount, Mounts, chosen_rows};
 use super::parallel::ParallelRasterizer;
 use super::rasterizer::Shot;
 use crate::error::SensorError;
@@ -38,8 +39,7 @@ pub struct Camera {
     num_bodies: usize,
     /// Index of the body it hangs on.
     parent: Option<usize>,
-    configured: Mount,
-    mounts: Vec<Mount>,
+    mounts: Mounts,
     channels: Channels,
     depth_miss: DepthMiss,
     lazy: bool,
@@ -59,14 +59,6 @@ pub(super) struct Lens {
     height: usize,
     near: f32,
     far: f32,
-}
-
-/// How one camera is placed, and its lens.
-#[derive(Clone, Copy, Debug)]
-struct Mount {
-    /// Of the optical frame.
-    parent_from_camera: Pose,
-    pixels: PixelIntrinsics,
 }
 
 /// What there was to see.
@@ -176,7 +168,6 @@ impl Camera {
         for (row, &env) in env_ids.iter().enumerate() {
             row_of_env[env] = Some(row);
         }
-        let configured = Mount { parent_from_camera, pixels };
         let captures = Captures {
             poses: Array2::from_elem((rows, scene.instances().len()), PoseF32::IDENTITY),
             lights: Array2::from_elem((rows, scene.lights.len()), Light::default()),
@@ -190,8 +181,7 @@ impl Camera {
             row_of_env,
             num_bodies: context.bodies.len(),
             parent,
-            configured,
-            mounts: vec![configured; rows],
+            mounts: Mounts::new(Mount { parent_from_camera, pixels }, rows),
             channels: cfg.channels,
             depth_miss: cfg.depth_miss,
             lazy: cfg.lazy,
@@ -279,25 +269,20 @@ impl Camera {
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts[row].pixels.matrix()[(i, j)])
+        Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts.row(row).pixels.matrix()[(i, j)])
     }
 
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
     /// attached camera has captured nothing yet.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        self.pose_rows(|row| self.world_from_camera(row).map(|pose| convention.of_optical(&pose)))
+        let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.of_optical(&pose)));
+        Array2::from((0..self.mounts.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>())
     }
 
     /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
     /// shape (N, 7).
     pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.pose_rows(|row| Some(convention.of_optical(&self.mounts[row].parent_from_camera)))
-    }
-
-    fn pose_rows(&self, pose: impl Fn(usize) -> Option<Pose>) -> Array2<f64> {
-        let rows: Vec<[f64; 7]> =
-            (0..self.mounts.len()).map(|k| pose(k).map_or([f64::NAN; 7], |p| to_row(&p))).collect();
-        Array2::from(rows)
+        self.mounts.local_pose(convention)
     }
 
     /// The view of environment `env` at the captured instant: what a renderer draws.
@@ -308,7 +293,7 @@ impl Camera {
     pub fn view(&self, env: usize) -> Result<View, SensorError> {
         let row = self.row(env)?;
         let pose = self.world_from_camera(row).ok_or(CameraError::NothingCaptured { env })?;
-        Ok(self.lens.view(&self.mounts[row].pixels, PoseF32::from(&pose)))
+        Ok(self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose)))
     }
 
     /// Places cameras in the frame of their parent (of the environment, for free ones), from now on.
@@ -326,7 +311,10 @@ impl Camera {
         env_ids: Option<&[usize]>,
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
-        self.place(&poses.to_poses()?, env_ids, |_, _, pose| Ok(convention.to_optical(pose)))
+        let rows = self.chosen_rows(env_ids)?;
+        self.mounts.set_local(&rows, poses, convention)?;
+        self.outdate(&rows);
+        Ok(())
     }
 
     /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local
@@ -342,39 +330,20 @@ impl Camera {
         env_ids: Option<&[usize]>,
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
-        self.place(&poses.to_poses()?, env_ids, |camera, row, pose| {
-            let optical = convention.to_optical(pose);
-            match (camera.parent, camera.captures.world_from_parent[row]) {
-                (None, _) => Ok(optical),
-                (Some(_), Some(world_from_parent)) => Ok(world_from_parent.inverse() * optical),
-                (Some(_), None) => Err(CameraError::NothingCaptured { env: camera.env_ids[row] }),
-            }
-        })
-    }
-
-    /// Gives the cameras of `env_ids` the local poses that `local` makes of `poses`, one each or one for all; on an error
-    /// nothing has changed.
-    fn place(
-        &mut self,
-        poses: &[Pose],
-        env_ids: Option<&[usize]>,
-        local: impl Fn(&Self, usize, &Pose) -> Result<Pose, CameraError>,
-    ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let each = one_each("poses", poses, rows.len())?;
-        let placed: Vec<Pose> =
-            rows.iter().zip(each).map(|(&row, pose)| local(self, row, pose)).collect::<Result<_, _>>()?;
-        // The pose of a parent may be no good.
-        for (&row, pose) in rows.iter().zip(placed.to_poses()?) {
-            self.mounts[row].parent_from_camera = pose;
-        }
+        let Self { mounts, parent, captures, env_ids, .. } = self;
+        mounts.set_world(&rows, poses, convention, |row| match (*parent, captures.world_from_parent[row]) {
+            (None, _) => Ok(None),
+            (Some(_), Some(world_from_parent)) => Ok(Some(world_from_parent)),
+            (Some(_), None) => Err(CameraError::NothingCaptured { env: env_ids[row] }),
+        })?;
         self.outdate(&rows);
         Ok(())
     }
 
     /// Turns cameras to something: places each at `eye`, looking at `target`, in the frame of its parent (of the
-    /// environment, for free ones). See [`look_at_pose`] for `up`; what one environment gets never depends on another. To
-    /// look from an attached camera at a point of the environment, give [`look_at_pose`] to
+    /// environment, for free ones). See [`look_at_pose`](super::look_at_pose) for `up`; what one environment gets never depends on another. To
+    /// look from an attached camera at a point of the environment, give [`look_at_pose`](super::look_at_pose) to
     /// [`set_world_poses`](Self::set_world_poses).
     ///
     /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
@@ -391,12 +360,7 @@ impl Camera {
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let n = rows.len();
-        let points = one_each("eyes", eye, n)?.zip(one_each("targets", target, n)?).zip(one_each("ups", up, n)?);
-        let poses: Result<Vec<Pose>, _> = points.map(|((eye, target), up)| look_at_pose(*eye, *target, *up)).collect();
-        for (&row, pose) in rows.iter().zip(poses?) {
-            self.mounts[row].parent_from_camera = pose;
-        }
+        self.mounts.look_at(&rows, eye, target, up)?;
         self.outdate(&rows);
         Ok(())
     }
@@ -408,16 +372,11 @@ impl Camera {
     /// [`CameraError::Lens`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
     /// or that is named twice; nothing is changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let (width, height) = (self.lens.width, self.lens.height);
-        let pixels: Result<Vec<_>, _> = intrinsics.iter().map(|lens| lens.to_pixels(width, height)).collect();
-        let pixels = pixels?;
-        for pixels in &pixels {
-            self.lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
-        }
         let rows = self.chosen_rows(env_ids)?;
-        for (&row, pixels) in rows.iter().zip(one_each("intrinsics", &pixels, rows.len())?) {
-            self.mounts[row].pixels = *pixels;
-        }
+        let Self { mounts, lens, .. } = self;
+        mounts.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
+            lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
+        })?;
         self.outdate(&rows);
         Ok(())
     }
@@ -429,9 +388,7 @@ impl Camera {
     /// An environment that the camera does not see or that is named twice; nothing is changed then.
     pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        for &row in &rows {
-            self.mounts[row] = self.configured;
-        }
+        self.mounts.restore(&rows);
         self.outdate(&rows);
         Ok(())
     }
@@ -446,17 +403,7 @@ impl Camera {
 
     /// The rows of the environments that somebody chose.
     fn chosen_rows(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
-        let Some(env_ids) = env_ids else { return Ok((0..self.env_ids.len()).collect()) };
-        let mut taken = vec![false; self.env_ids.len()];
-        let mut rows = Vec::with_capacity(env_ids.len());
-        for &env in env_ids {
-            let row = self.row(env)?;
-            if std::mem::replace(&mut taken[row], true) {
-                return Err(CameraError::DuplicateEnvironment { env }.into());
-            }
-            rows.push(row);
-        }
-        Ok(rows)
+        chosen_rows(self.env_ids.len(), env_ids, |env| self.row(env))
     }
 
     /// The rows of those of the environments that the camera sees; the simulation speaks of all.
@@ -479,7 +426,7 @@ impl Camera {
 
     /// Where the optical frame is at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
-        let local = self.mounts[row].parent_from_camera;
+        let local = self.mounts.row(row).parent_from_camera;
         match self.parent {
             None => Some(local),
             Some(_) => self.captures.world_from_parent[row].map(|world_from_parent| world_from_parent * local),
@@ -589,7 +536,7 @@ impl Camera {
     /// The view of a row that was captured.
     pub(super) fn view_of(&self, row: usize) -> View {
         let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
-        self.lens.view(&self.mounts[row].pixels, PoseF32::from(&pose))
+        self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose))
     }
 }
 
@@ -613,19 +560,6 @@ impl fmt::Display for Camera {
         writeln!(f, "  update period steps: {}", self.phases.schedule().period_steps())?;
         writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
         write!(f, "  channels           : {}", self.channels.names().join(", "))
-    }
-}
-
-/// Values for `count` environments: one each, or one for all.
-pub(crate) fn one_each<'a, T>(
-    what: &'static str,
-    values: &'a [T],
-    count: usize,
-) -> Result<impl Iterator<Item = &'a T> + use<'a, T>, CameraError> {
-    match values.len() {
-        1 => Ok(values.iter().cycle().take(count)),
-        found if found == count => Ok(values.iter().cycle().take(count)),
-        found => Err(CameraError::Count { what, expected: count, found }),
     }
 }
 

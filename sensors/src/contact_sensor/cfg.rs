@@ -23,12 +23,16 @@ pub struct ContactSensorCfg {
     pub track_pose: bool,
     /// Report since when bodies touch or do not. Contact is then looked at in every physics step, whatever the period.
     pub track_air_time: bool,
-    /// Report where bodies are touched.
+    /// Report where bodies are touched, and where by the bodies of each filter.
     pub track_contact_points: bool,
+    /// Report friction forces by filter, for [`ContactSensor::friction_matrix_w`]. Their sum over all counterparts is always
+    /// there.
+    pub track_friction_forces: bool,
     /// A body counts as touched where its net normal force is above this \[N\].
     pub force_threshold: f64,
     /// Rate, history, latency and noise. Channels that can have noise: `net_forces_w`, `friction_forces_w`,
-    /// `total_forces_w`, `force_matrix_w`, and `contact_points_w` and `pos_w` where they are tracked.
+    /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
+    /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
 }
 
@@ -41,6 +45,7 @@ impl Default for ContactSensorCfg {
             track_pose: false,
             track_air_time: false,
             track_contact_points: false,
+            track_friction_forces: false,
             force_threshold: 1.0,
             sampling: SamplingCfg::default(),
         }
@@ -64,7 +69,7 @@ impl SensorCfg for ContactSensorCfg {
     /// # Errors
     ///
     /// No body to watch, a pattern that matches nothing or what another one matches, a filter that can see nothing but the
-    /// body itself, a threshold that is negative, and what is wrong with the sampling.
+    /// body itself, friction by filter without filters, a threshold that is negative, and what is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
         let bodies = select(&self.bodies, &context.bodies, "body")?;
         if bodies.is_empty() {
@@ -75,12 +80,16 @@ impl SensorCfg for ContactSensorCfg {
             let (field, value) = ("force_threshold".into(), self.force_threshold);
             return Err(SensorError::OutOfRange { field, value, expected: "it must be 0 N or more" });
         }
+        if self.track_friction_forces && self.filters.is_empty() {
+            return Err(SensorError::NoFilters { field: "track_friction_forces", always: "friction_forces_w" });
+        }
         let groups =
             self.filters.iter().map(|filter| group(filter, &bodies, context)).collect::<Result<Vec<_>, _>>()?;
         let (b, m) = (bodies.len(), groups.len());
         let layout = Layout {
             bodies: b,
             groups: m,
+            friction: self.track_friction_forces,
             points: self.track_contact_points,
             poses: self.track_pose,
             air: self.track_air_time,
@@ -88,8 +97,14 @@ impl SensorCfg for ContactSensorCfg {
         let mut channels =
             ["net_forces_w", "friction_forces_w", "total_forces_w"].map(|c| Channel::new(c, 3 * b)).to_vec();
         channels.push(Channel::new("force_matrix_w", 3 * b * m));
+        if layout.friction {
+            channels.push(Channel::new("friction_matrix_w", 3 * b * m));
+        }
         if layout.points {
             channels.extend([Channel::new("contact_points_w", 3 * b), Channel::exact("contact_counts", b)]);
+            let by_filter =
+                [Channel::new("contact_point_matrix_w", 3 * b * m), Channel::exact("contact_count_matrix", b * m)];
+            channels.extend(by_filter);
         }
         if layout.poses {
             channels.extend([Channel::new("pos_w", 3 * b), Channel::exact("quat_w", 4 * b)]);

@@ -9,6 +9,9 @@ use scene::state::Contact;
 pub(super) struct Layout {
     pub bodies: usize,
     pub groups: usize,
+    /// Friction by group.
+    pub friction: bool,
+    /// Points of each body, and by group.
     pub points: bool,
     pub poses: bool,
     pub air: bool,
@@ -18,7 +21,8 @@ pub(super) struct Layout {
 pub(super) fn count(layout: &Layout) -> usize {
     let per_body = 9
         + 3 * layout.groups
-        + if layout.points { 4 } else { 0 }
+        + if layout.friction { 3 * layout.groups } else { 0 }
+        + if layout.points { 4 * (1 + layout.groups) } else { 0 }
         + if layout.poses { 7 } else { 0 }
         + if layout.air { super::air_time::AirTimes::CHANNELS.len() } else { 0 };
     layout.bodies * per_body
@@ -67,12 +71,16 @@ impl Pairs {
     /// Writes forces, points and poses of environment `env` to `row`, which is zero before; gives what is left of the row.
     pub(super) fn read<'r>(&self, state: &SceneState, env: usize, row: &'r mut [f64]) -> &'r mut [f64] {
         let Layout { bodies: b, groups: m, .. } = self.layout;
+        let tracked = |tracked: bool, numbers: usize| if tracked { numbers } else { 0 };
         let (net, row) = row.split_at_mut(3 * b);
         let (friction, row) = row.split_at_mut(3 * b);
         let (total, row) = row.split_at_mut(3 * b);
         let (matrix, row) = row.split_at_mut(3 * b * m);
-        let (points, row) = row.split_at_mut(if self.layout.points { 3 * b } else { 0 });
-        let (counts, row) = row.split_at_mut(if self.layout.points { b } else { 0 });
+        let (friction_matrix, row) = row.split_at_mut(tracked(self.layout.friction, 3 * b * m));
+        let (points, row) = row.split_at_mut(tracked(self.layout.points, 3 * b));
+        let (counts, row) = row.split_at_mut(tracked(self.layout.points, b));
+        let (point_matrix, row) = row.split_at_mut(tracked(self.layout.points, 3 * b * m));
+        let (count_matrix, row) = row.split_at_mut(tracked(self.layout.points, b * m));
         for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
             let sliding: [f64; 3] =
                 std::array::from_fn(|k| contact.force[k] - contact.normal_force * contact.normal[k]);
@@ -80,19 +88,24 @@ impl Pairs {
                 add(net, slot, sign * contact.normal_force, &contact.normal);
                 add(friction, slot, sign, &sliding);
                 add(total, slot, sign, &contact.force);
-                for &group in &self.groups[other] {
-                    add(matrix, slot * m + group, sign * contact.normal_force, &contact.normal);
-                }
                 if self.layout.points {
                     add(points, slot, 1.0, &contact.point);
                     counts[slot] += 1.0;
                 }
+                for pair in self.groups[other].iter().map(|group| slot * m + group) {
+                    add(matrix, pair, sign * contact.normal_force, &contact.normal);
+                    if self.layout.friction {
+                        add(friction_matrix, pair, sign, &sliding);
+                    }
+                    if self.layout.points {
+                        add(point_matrix, pair, 1.0, &contact.point);
+                        count_matrix[pair] += 1.0;
+                    }
+                }
             }
         }
-        for (point, count) in points.chunks_exact_mut(3).zip(&*counts) {
-            // 0 / 0 is NaN: a body that nothing touches is touched nowhere.
-            point.iter_mut().for_each(|x| *x /= count);
-        }
+        divide(points, counts);
+        divide(point_matrix, count_matrix);
         if !self.layout.poses {
             return row;
         }
@@ -113,5 +126,12 @@ impl Pairs {
 fn add(list: &mut [f64], index: usize, factor: f64, vector: &[f64; 3]) {
     for (sum, component) in list[3 * index..3 * index + 3].iter_mut().zip(vector) {
         *sum += factor * component;
+    }
+}
+
+/// Makes means of the sums of a list of vectors; one of nothing stays 0.
+fn divide(list: &mut [f64], counts: &[f64]) {
+    for (sum, count) in list.chunks_exact_mut(3).zip(counts).filter(|(_, count)| **count > 0.0) {
+        sum.iter_mut().for_each(|x| *x /= count);
     }
 }

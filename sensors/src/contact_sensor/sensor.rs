@@ -157,20 +157,41 @@ impl ContactSensor {
         self.past_vectors("total_forces_w")
     }
 
+    fn pairs(&self, channel: &str) -> ArrayView4<'_, f64> {
+        self.sampler.values_as(channel, (self.sampler.num_envs(), self.names.len(), self.filters.len(), 3))
+    }
+
+    fn past_pairs(&self, channel: &str) -> ArrayView5<'_, f64> {
+        let (n, t) = (self.sampler.num_envs(), self.sampler.history_length());
+        self.sampler.history_as(channel, (n, t, self.names.len(), self.filters.len(), 3))
+    }
+
     /// Sum of the normal forces that the bodies of each filter exert on each body \[N\], shape (N, B, M, 3).
     pub fn force_matrix_w(&self) -> ArrayView4<'_, f64> {
-        let shape = (self.sampler.num_envs(), self.names.len(), self.filters.len(), 3);
-        self.sampler.values_as("force_matrix_w", shape)
+        self.pairs("force_matrix_w")
     }
 
     /// Past [`force_matrix_w`](Self::force_matrix_w) \[N\], shape (N, T, B, M, 3); 0 where not filled yet.
     pub fn force_matrix_w_history(&self) -> ArrayView5<'_, f64> {
-        let (n, t) = (self.sampler.num_envs(), self.sampler.history_length());
-        self.sampler.history_as("force_matrix_w", (n, t, self.names.len(), self.filters.len(), 3))
+        self.past_pairs("force_matrix_w")
     }
 
-    /// Mean of the points where each body is touched \[m\], shape (N, B, 3), NaN where nothing touches it; `None` unless
-    /// tracked.
+    /// Sum of the friction forces that the bodies of each filter exert on each body \[N\], shape (N, B, M, 3): what their
+    /// contacts exert across their normals; `None` unless tracked. With [`force_matrix_w`](Self::force_matrix_w) it is the
+    /// whole force.
+    pub fn friction_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
+        self.sampler.has("friction_matrix_w").then(|| self.pairs("friction_matrix_w"))
+    }
+
+    /// Past [`friction_matrix_w`](Self::friction_matrix_w) \[N\], shape (N, T, B, M, 3), 0 where not filled yet; `None`
+    /// unless tracked.
+    pub fn friction_matrix_w_history(&self) -> Option<ArrayView5<'_, f64>> {
+        self.sampler.has("friction_matrix_w").then(|| self.past_pairs("friction_matrix_w"))
+    }
+
+    /// Mean of the points where each body is touched, each of the same weight \[m\], shape (N, B, 3), in the environment;
+    /// `None` unless tracked. Where nothing touches, [`contact_counts`](Self::contact_counts) is 0, and the point says
+    /// nothing: it is 0, plus the noise of the channel. Isaac Lab has NaN there.
     pub fn contact_points_w(&self) -> Option<ArrayView3<'_, f64>> {
         self.sampler.has("contact_points_w").then(|| self.vectors("contact_points_w"))
     }
@@ -178,6 +199,22 @@ impl ContactSensor {
     /// Number of contact points of each body, shape (N, B), whole numbers; `None` unless points are tracked.
     pub fn contact_counts(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional("contact_counts")
+    }
+
+    /// Mean of the points where the bodies of each filter touch each body, each of the same weight \[m\], shape
+    /// (N, B, M, 3), in the environment; `None` unless points are tracked. Where they do not touch,
+    /// [`contact_count_matrix`](Self::contact_count_matrix) is 0, and the point says nothing, as in
+    /// [`contact_points_w`](Self::contact_points_w).
+    pub fn contact_point_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
+        self.sampler.has("contact_point_matrix_w").then(|| self.pairs("contact_point_matrix_w"))
+    }
+
+    /// Number of points where the bodies of each filter touch each body, shape (N, B, M), whole numbers; `None` unless
+    /// points are tracked.
+    pub fn contact_count_matrix(&self) -> Option<ArrayView3<'_, f64>> {
+        let shape = (self.sampler.num_envs(), self.names.len(), self.filters.len());
+        let counts = "contact_count_matrix";
+        self.sampler.has(counts).then(|| self.sampler.values_as(counts, shape))
     }
 
     /// Positions of the bodies \[m\], shape (N, B, 3); `None` unless tracked. They are of [`Sampled::stamps`], forces of

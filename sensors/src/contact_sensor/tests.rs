@@ -52,6 +52,7 @@ fn cfg() -> ContactSensorCfg {
     ContactSensorCfg {
         filters: vec!["ground".into(), "cube".into(), ".*".into()],
         track_contact_points: true,
+        track_friction_forces: true,
         track_pose: true,
         track_air_time: true,
         ..ContactSensorCfg::of(".*_FOOT")
@@ -75,9 +76,22 @@ fn forces_act_on_the_body_whichever_side_it_is_on() {
     let left = [0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0];
     let right = [0.0, 0.0, 0.0, 0.0, 0.0, -4.0, 0.0, 0.0, -4.0];
     assert_eq!(flat(sensor.force_matrix_w().into_dyn()), [&left[..], &right, &zeros(18)].concat());
+    // Of friction, the same pairs: 2 - 1 N from the ground, and from the cube what is -0.5 N for the right foot.
+    let left = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    let right = [0.0, 0.0, 0.0, -0.5, 0.0, 0.0, -0.5, 0.0, 0.0];
+    let friction = sensor.friction_matrix_w().unwrap();
+    assert_eq!(flat(friction.into_dyn()), [&left[..], &right, &zeros(18)].concat());
+    assert_eq!(sensor.friction_matrix_w_history().unwrap().dim(), (2, 0, 2, 3, 3));
     let points = sensor.contact_points_w().unwrap();
     assert_eq!((points[(0, 0, 0)], points[(0, 1, 0)]), (1.5, 7.0));
-    assert!(points.index_axis(ndarray::Axis(0), 1).iter().all(|x| x.is_nan()));
+    assert!(points.index_axis(ndarray::Axis(0), 1).iter().all(|x| *x == 0.0), "0 with a count of 0");
+    let points = sensor.contact_point_matrix_w().unwrap();
+    assert_eq!(
+        points.index_axis(ndarray::Axis(0), 0).index_axis(ndarray::Axis(2), 0),
+        array![[1.5, 0.0, 1.5], [0.0, 7.0, 7.0]]
+    );
+    let counts = sensor.contact_count_matrix().unwrap();
+    assert_eq!(counts, array![[[2.0, 0.0, 2.0], [0.0, 1.0, 1.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]]);
     assert_eq!(sensor.contact_counts().unwrap(), array![[2.0, 1.0], [0.0, 0.0]]);
     assert_eq!(
         sensor.pos_w().unwrap(),
@@ -95,6 +109,8 @@ fn what_is_not_tracked_is_not_there() {
     let sensor = ContactSensorCfg::of("cube").build(&context(2)).unwrap();
     assert!(sensor.pos_w().is_none() && sensor.quat_w().is_none());
     assert!(sensor.contact_points_w().is_none() && sensor.contact_counts().is_none());
+    assert!(sensor.contact_point_matrix_w().is_none() && sensor.contact_count_matrix().is_none());
+    assert!(sensor.friction_matrix_w().is_none() && sensor.friction_matrix_w_history().is_none());
     assert!(sensor.current_air_time().is_none() && sensor.first_contact().is_none() && sensor.first_air().is_none());
     assert_eq!(sensor.force_matrix_w().dim(), (2, 1, 0, 3));
     assert_eq!(sensor.net_forces_w_history().dim(), (2, 0, 1, 3));
@@ -136,6 +152,9 @@ fn mistakes_are_typed_errors() {
     assert!(matches!(wrong(own), SensorError::OwnFilter { .. }));
     let several = ContactSensorCfg { filters: vec!["LF_FOOT".into()], ..ContactSensorCfg::of(".*_FOOT") };
     assert!(several.build(&context(2)).is_ok(), "the other foot may touch it");
+    let friction = ContactSensorCfg { track_friction_forces: true, ..ContactSensorCfg::of("cube") };
+    let text = wrong(friction).to_string();
+    assert!(text.contains("`filters`") && text.contains("friction_forces_w"), "{text}");
     let filter = ContactSensorCfg { filters: vec!["grond".into()], ..ContactSensorCfg::of("cube") };
     let text = wrong(filter).to_string();
     assert!(text.contains("\"ground\""), "{text}");

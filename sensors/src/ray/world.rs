@@ -135,10 +135,23 @@ impl RayTargets {
         self.fixed.len()
     }
 
-    /// A target where it is; `None` where its pose is no pose: it cannot be hit there.
-    fn place(&self, index: u32, poses: &[PoseF64]) -> Option<Placed> {
+    /// How many of them may move.
+    pub(crate) fn moving_count(&self) -> usize {
+        self.moving.len()
+    }
+
+    /// The poses of those that may move, from those of all instances.
+    pub(crate) fn moving_poses(&self, poses: &[PoseF64]) -> impl Iterator<Item = PoseF64> {
+        self.moving.iter().map(|&index| self.pose_of(index, poses))
+    }
+
+    fn pose_of(&self, index: u32, poses: &[PoseF64]) -> PoseF64 {
+        poses[self.targets[index as usize].instance as usize]
+    }
+
+    /// A target at a pose; `None` where that is no pose: it cannot be hit there.
+    fn place(&self, index: u32, pose: PoseF64) -> Option<Placed> {
         let target = &self.targets[index as usize];
-        let pose = poses[target.instance as usize];
         if !pose.is_finite() {
             return None;
         }
@@ -149,7 +162,8 @@ impl RayTargets {
 
 impl FixedWorld {
     pub(crate) fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
-        let placed: Vec<Placed> = targets.fixed.iter().filter_map(|&t| targets.place(t, poses)).collect();
+        let placed: Vec<Placed> =
+            targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();
         let (mut in_tree, mut one_by_one): (Vec<u32>, Vec<u32>) =
             (0..placed.len() as u32).partition(|&k| placed[k as usize].radius < f64::from(f32::MAX));
         if in_tree.len() <= FEW {
@@ -165,7 +179,7 @@ impl FixedWorld {
     /// Whether targets that do not move are where they were when this was built.
     pub(crate) fn is_at(&self, targets: &RayTargets, poses: &[PoseF64]) -> bool {
         let mut placed = self.placed.iter();
-        let same = targets.fixed.iter().all(|&t| match targets.place(t, poses) {
+        let same = targets.fixed.iter().all(|&t| match targets.place(t, targets.pose_of(t, poses)) {
             None => true,
             Some(here) => {
                 placed.next().is_some_and(|p| p.target == here.target && p.world_from_target == here.world_from_target)
@@ -224,21 +238,22 @@ impl RayWorld {
         if !self.fixed.is_at(&self.targets, poses) {
             self.fixed = Arc::new(FixedWorld::new(&self.targets, poses));
         }
-        self.place_moving(poses);
+        let targets = Arc::clone(&self.targets);
+        self.place_moving(targets.moving_poses(poses));
     }
 
-    /// The same, with what does not move already prepared.
-    pub(crate) fn place_with(&mut self, fixed: &Arc<FixedWorld>, poses: &[PoseF64]) {
+    /// The same, with what does not move already prepared, and the poses of what may move: [`RayTargets::moving_poses`].
+    pub(crate) fn place_with(&mut self, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
         if !Arc::ptr_eq(&self.fixed, fixed) {
             self.fixed = Arc::clone(fixed);
         }
-        self.place_moving(poses);
+        self.place_moving(moving.iter().copied());
     }
 
-    fn place_moving(&mut self, poses: &[PoseF64]) {
+    fn place_moving(&mut self, poses: impl Iterator<Item = PoseF64>) {
         let targets = &self.targets;
         self.moving.clear();
-        self.moving.extend(targets.moving.iter().filter_map(|&t| targets.place(t, poses)));
+        self.moving.extend(targets.moving.iter().zip(poses).filter_map(|(&t, pose)| targets.place(t, pose)));
     }
 
     /// The nearest hit of every ray, at a distance from 0 to `max_distance` \[m\]. Of two that are as near, the instance

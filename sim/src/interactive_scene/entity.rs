@@ -1,9 +1,10 @@
-//! What a scene can hold: robots, rigid objects, and sensors of any crate.
+//! What a scene can hold: robots, rigid objects, terrain, and sensors of any crate.
 
 use crate::error::{Error, Result};
-use crate::manager::{ObjectId, RobotId, SimulationManager};
+use crate::manager::{ObjectId, RobotId, SimulationManager, TerrainId};
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
+use crate::objects::terrain::TerrainCfg;
 use crate::sensor_list::SensorId;
 use sensors::{Sensor, SensorCfg};
 use std::any::Any;
@@ -17,6 +18,8 @@ pub enum EntityCfg {
     Robot(Box<RobotCfg>),
     /// A rigid object. Its uid is the name of the entity.
     RigidObject(Box<RigidObjectCfg>),
+    /// A terrain. Its uid is the name of the entity.
+    Terrain(Box<TerrainCfg>),
     /// A sensor of any kind.
     Sensor(Box<dyn SensorEntity>),
 }
@@ -30,6 +33,12 @@ impl From<RobotCfg> for EntityCfg {
 impl From<RigidObjectCfg> for EntityCfg {
     fn from(cfg: RigidObjectCfg) -> Self {
         Self::RigidObject(Box::new(cfg))
+    }
+}
+
+impl From<TerrainCfg> for EntityCfg {
+    fn from(cfg: TerrainCfg) -> Self {
+        Self::Terrain(Box::new(cfg))
     }
 }
 
@@ -108,6 +117,7 @@ pub(super) fn short_name<T>() -> &'static str {
 pub(super) enum Handle {
     Robot(RobotId),
     RigidObject(ObjectId),
+    Terrain(TerrainId),
     Sensor(SensorHandle),
 }
 
@@ -119,6 +129,9 @@ impl Handle {
             EntityCfg::RigidObject(cfg) => {
                 sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::RigidObject)
             }
+            EntityCfg::Terrain(cfg) => {
+                sim.add_terrain(TerrainCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Terrain)
+            }
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
         }
     }
@@ -128,6 +141,7 @@ impl Handle {
         let found = match self {
             Self::Robot(_) => "robot".into(),
             Self::RigidObject(_) => "rigid object".into(),
+            Self::Terrain(_) => "terrain".into(),
             Self::Sensor(handle) => format!("sensor of type {}", handle.type_name),
         };
         Error::EntityType { name: name.into(), found, wanted }

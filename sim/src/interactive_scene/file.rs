@@ -49,7 +49,7 @@ impl SceneCfg {
     ///
     /// # Errors
     /// [`Error::SceneFile`] with file and line: no TOML, a key or a type that nobody knows (with those there are), a value of
-    /// another form. Numbers and names are checked when the scene is built.
+    /// another form, a terrain that its generator refuses. All other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         Reader { text, file: file.as_ref(), types }.scene()
     }
@@ -89,7 +89,7 @@ impl SceneCfg {
 
 /// Whether a field of an entity is its name, which files give as the key of its table.
 fn has_name(entity: &EntityCfg, field: &str) -> bool {
-    field == "uid" && matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_))
+    field == "uid" && matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_) | EntityCfg::Terrain(_))
 }
 
 /// One file that is being read.
@@ -180,6 +180,7 @@ impl<'a> Reader<'a> {
                 }
             }
             EntityCfg::RigidObject(object) => object.uid = uid,
+            EntityCfg::Terrain(terrain) => terrain.uid = uid,
             EntityCfg::Sensor(_) => {}
         }
     }

@@ -11,9 +11,10 @@ pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg};
+use crate::manager::{EnvId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};
+use crate::objects::terrain::Terrain;
 use crate::pattern::{closest, in_every_env};
 use crate::sensor_list::SensorId;
 use crate::source::Source;
@@ -66,8 +67,8 @@ impl SceneCfg {
         Self { simulation, ..Self::default() }
     }
 
-    /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), or the
-    /// configuration of any sensor.
+    /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), a
+    /// [`TerrainCfg`](crate::TerrainCfg), or the configuration of any sensor.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
         self.entities.push((name.into(), cfg.into()));
@@ -88,8 +89,8 @@ pub struct InteractiveScene {
 }
 
 impl InteractiveScene {
-    /// Builds everything that `cfg` declares. Robots and objects come first, so that sensors may be declared before what
-    /// they look at; within both, the order is that of the declaration.
+    /// Builds everything that `cfg` declares. Robots, objects and terrain come first, so that sensors may be declared before
+    /// what they look at; within both, the order is that of the declaration.
     ///
     /// # Errors
     /// Two entities of one name, what is wrong with the simulation, and what is wrong with an entity: in
@@ -209,6 +210,25 @@ impl InteractiveScene {
     pub fn rigid_object_mut(&mut self, name: &str) -> Result<RigidObjectMut<'_>> {
         let id = self.rigid_object_id(name)?;
         Ok(self.sim.rigid_object_mut(id))
+    }
+
+    /// The handle of a terrain.
+    ///
+    /// # Errors
+    /// There is no such entity, or it is no terrain.
+    pub fn terrain_id(&self, name: &str) -> Result<TerrainId> {
+        match self.find(name)? {
+            Handle::Terrain(id) => Ok(*id),
+            other => Err(other.is_no(name, "terrain".into())),
+        }
+    }
+
+    /// A terrain.
+    ///
+    /// # Errors
+    /// As [`terrain_id`](Self::terrain_id).
+    pub fn terrain(&self, name: &str) -> Result<&Terrain> {
+        Ok(self.sim.terrain(self.terrain_id(name)?))
     }
 
     /// The handle of a sensor of type `S`, such as `Camera`.

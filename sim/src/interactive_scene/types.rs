@@ -3,7 +3,11 @@
 use super::entity::{EntityCfg, SensorEntity};
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
-use sensors::{CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, RayCasterCfg};
+use crate::objects::terrain::TerrainCfg;
+use sensors::{
+    CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, RayCasterCameraCfg,
+    RayCasterCfg,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
 use std::any::Any;
@@ -34,13 +38,15 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, rigid objects and the built-in sensors, but for ray-caster cameras.
+    /// Robots, rigid objects, terrain and the built-in sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
             .with::<RigidObjectCfg>("rigid_object")
+            .with::<TerrainCfg>("terrain")
             .with_sensor::<CameraCfg>("camera")
             .with_sensor::<RayCasterCfg>("ray_caster")
+            .with_sensor::<RayCasterCameraCfg>("ray_caster_camera")
             .with_sensor::<ContactSensorCfg>("contact_sensor")
             .with_sensor::<ImuCfg>("imu")
             .with_sensor::<FrameTransformerCfg>("frame_transformer")
@@ -106,6 +112,14 @@ impl Kind for RigidObjectCfg {
 
     fn of(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::RigidObject(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for TerrainCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Terrain(cfg) = entity { Some(cfg) } else { None }
     }
 }
 

@@ -6,3 +6,4 @@ pub mod robot;
 mod rows;
 pub mod shape;
 pub mod terrain;
+mod terrain_file;

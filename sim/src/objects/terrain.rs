@@ -2,9 +2,11 @@
 
 use crate::error::{Error, Result};
 use crate::objects::robot::check_pose;
+use crate::objects::terrain_file::{TerrainFile, rows};
 use ::scene::Pose;
-use ::scene::terrain::MAX_POINTS;
+use ::scene::terrain::{MAX_POINTS, TerrainGenerator};
 use ndarray::Array2;
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a terrain: a height field that stands fixed in every environment.
 ///
@@ -24,19 +26,25 @@ use ndarray::Array2;
 /// assert!((height - heights[(18, 21)]).abs() < 1e-9);
 /// # Ok::<(), sim::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+///
+/// In a file, `heights` is a list of rows with `size` beside it, or a generator: `heights.rough = { seed = 7 }`. What is
+/// written is always rows, each number with all its digits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "TerrainFile")]
 pub struct TerrainCfg {
     /// Name of the terrain, unique in the simulation.
     pub uid: String,
     /// Heights \[m\] over a regular grid, rows along y, columns along x; the first ones at -y and -x. Between the points the
     /// surface is made of two triangles per cell, which meet in the diagonal from (-x, -y) to (+x, +y). MuJoCo keeps heights in
     /// single precision, as parts of the range from the lowest to the highest.
+    #[serde(serialize_with = "rows")]
     pub heights: Array2<f64>,
     /// Lengths along x and y, from the first point to the last \[m\].
     pub size: [f64; 2],
     /// How far the ground reaches below its lowest point \[m\]: what falls fast must not fall through.
     pub thickness: f64,
     /// Pose of the frame in the environment: in the middle of the field, at height 0.
+    #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
     pub friction: Option<[f64; 3]>,
@@ -56,6 +64,18 @@ impl Default for TerrainCfg {
             friction: None,
             rgba: [0.52, 0.47, 0.4, 1.0],
         }
+    }
+}
+
+impl TerrainCfg {
+    /// The ground that a generator makes, called `uid`.
+    ///
+    /// # Errors
+    /// [`Error::Terrain`]: those of the generator.
+    pub fn generated(uid: impl Into<String>, generator: impl Into<TerrainGenerator>) -> Result<Self> {
+        let generator = generator.into();
+        let (heights, size) = (generator.heights()?, generator.size());
+        Ok(Self { uid: uid.into(), heights, size, ..Self::default() })
     }
 }
 

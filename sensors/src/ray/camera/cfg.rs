@@ -1,12 +1,16 @@
 //! What a camera made of rays is, before it exists.
 
-use super::sensor::{Lens, RayCasterCamera};
+use super::pixels::Pixels;
+use super::sensor::RayCasterCamera;
+use crate::camera::mounts::{Mount, Mounts};
 use crate::camera::{DepthMiss, Extrinsics, Intrinsics};
 use crate::error::SensorError;
 use crate::ray::caster::scan::Scan;
-use crate::ray::{HitTargets, Ray, RayError, RayPattern, RayTargets};
+use crate::ray::{HitTargets, RayError, RayPattern, RayTargets};
+use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
+use serde::{Deserialize, Serialize};
 
 /// The most memory that the pictures may take \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
@@ -15,7 +19,8 @@ const MAX_BYTES: u64 = 64 << 30;
 ///
 /// Against [`CameraCfg`](crate::CameraCfg) it measures only geometry, sees only what it is told to, and every number is
 /// that of an exact ray. Where all of a scene is to be seen, the rasterizer is faster.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RayCasterCameraCfg {
     /// Pixels per row.
     pub width: usize,
@@ -33,10 +38,10 @@ pub struct RayCasterCameraCfg {
     pub targets: HitTargets,
     /// Geom groups that are hit: bit k is group k.
     pub groups: u32,
-    /// Time between pictures \[s\]; 0 is every physics step.
-    pub update_period: f64,
-    /// Take the nearest whole number of physics steps where the period is none, instead of an error.
-    pub round_period: bool,
+    /// Rate, history, latency and noise. The channel that may have noise is `distances`: the distance along the ray of each
+    /// pixel \[m\], from which depth and points follow. Normals, masks and misses are exact. The numbers of the history and of
+    /// pictures on their way are in double precision: 40 bytes for each pixel and picture.
+    pub sampling: SamplingCfg,
 }
 
 impl Default for RayCasterCameraCfg {
@@ -51,8 +56,7 @@ impl Default for RayCasterCameraCfg {
             depth_miss: DepthMiss::Inf,
             targets: HitTargets::default(),
             groups: 0b111,
-            update_period: 0.0,
-            round_period: false,
+            sampling: SamplingCfg::default(),
         }
     }
 }
@@ -68,10 +72,10 @@ impl SensorCfg for RayCasterCameraCfg {
     /// # Errors
     ///
     /// Sizes, lens, distance or placement that are no good; an unknown parent or target; a period that is no whole number
-    /// of steps; pictures that do not fit into memory.
+    /// of steps and what else is wrong with the sampling; pictures that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCasterCamera, SensorError> {
         let scene = context.scene.as_ref().ok_or(RayError::NoScene)?;
-        let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
+        let schedule = Schedule::new(self.sampling.update_period, context.dt, self.sampling.round_period)?;
         let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
         if !(self.max_distance > 0.0 && self.max_distance < f64::from(f32::MAX)) {
             let (what, of, value) = ("max_distance", "ray caster camera", self.max_distance);
@@ -85,33 +89,31 @@ impl SensorCfg for RayCasterCameraCfg {
             return Err(RayError::Count { pattern: "pixel", count, limit: RayPattern::MAX_RAYS }.into());
         };
         check_memory(context.num_envs, pixels)?;
-        let lens = self.intrinsics.to_pixels(self.width, self.height)?;
-        let parent_from_camera = self.extrinsics.parent_from_camera()?;
-        let ray = |k: usize| {
-            let (u, v) = ((k % self.width) as f64 + 0.5, (k / self.width) as f64 + 0.5);
-            let d = nalgebra::Vector3::new((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0).normalize();
-            Ray { origin: [0.0; 3], direction: d.into() }
+        let mount = Mount {
+            parent_from_camera: self.extrinsics.parent_from_camera()?,
+            pixels: self.intrinsics.to_pixels(self.width, self.height)?,
         };
-        let rays = (0..pixels).map(ray).collect();
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
-        let scan = Scan::new(RayTargets::new(scene, wanted, &context.ray_assets), context.num_envs, context.threads);
-        let lens = Lens { width: self.width, height: self.height, pixels: lens };
-        Ok(RayCasterCamera::new(
-            self,
-            context,
-            parent,
-            (parent_from_camera, lens),
-            rays,
-            scan,
-            schedule.phases(context.num_envs),
-        ))
+        let targets = RayTargets::new(scene, wanted, &context.ray_assets);
+        let channels = [
+            Channel::new("distances", pixels),
+            Channel::exact("normals", 3 * pixels),
+            Channel::exact("ids", pixels),
+            Channel::exact("poses", 7),
+            Channel::exact("lenses", 4),
+        ];
+        let sampler = Sampler::new("ray caster camera", self.requires(), context, &self.sampling, &channels)?;
+        let rays = Pixels { width: self.width, height: self.height };
+        let scan = Scan::new(targets, rays, self.max_distance, context);
+        let mounts = Mounts::new(mount, context.num_envs);
+        Ok(RayCasterCamera::new(self, context, parent, mounts, scan, schedule.phases(context.num_envs), sampler))
     }
 }
 
 /// Refuses what would end the process: an allocation that fails.
 fn check_memory(envs: usize, rays: usize) -> Result<(), RayError> {
-    // A hit of 40 bytes; depth, distance, normal and mask.
-    const BYTES_PER_RAY: usize = 40 + 24;
+    // A hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
+    const BYTES_PER_RAY: usize = 40 + 40 + 24;
     let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(BYTES_PER_RAY)).filter(|&b| b as u64 <= MAX_BYTES);
     let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
     if granted { Ok(()) } else { Err(RayError::Memory { envs, rays, limit: MAX_BYTES }) }

@@ -1,56 +1,67 @@
 //! The camera made of rays as a sensor.
 
 use super::cfg::RayCasterCameraCfg;
-use crate::camera::sensor::one_each;
-use crate::camera::{CameraConvention, DepthMiss, PixelIntrinsics, Poses};
+use super::pixels::Pixels;
+use crate::camera::mounts::Mounts;
+use crate::camera::{CameraConvention, DepthMiss, PixelIntrinsics};
 use crate::error::SensorError;
 use crate::expected::Expected;
-use crate::ray::caster::scan::{Scan, View};
-use crate::ray::{Ray, RayHit};
-use crate::schedule::{Phases, Schedule};
+use crate::ray::caster::scan::Scan;
+use crate::sampling::{Sampled, Sampler};
+use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use ndarray::{Array1, Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4};
+use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
 use scene::pose::{from_row, to_row};
 use scene::{Pose, PoseF64, SceneState};
 
-/// A camera in every environment that casts one ray per pixel.
+/// A camera in every environment that casts one ray per pixel; [`Sampled`] has the stamps and counts of its pictures.
 ///
 /// Pictures are made when they are due. The first axis is the environment; the frame is that of the environment, units are
 /// metres. Nothing is ever NaN.
+///
+/// What is measured is the distance along the ray of each pixel: noise of the channel `distances` is added to it, and depth
+/// and points follow, so that all three stay on the ray. Normals, masks, poses and lenses are exact.
+///
+/// Setters ([`set_local_pose`](Self::set_local_pose), [`look_at`](Self::look_at),
+/// [`set_intrinsics`](Self::set_intrinsics)...) act from the next picture on, and stay over a reset until
+/// [`restore`](Self::restore). Poses, intrinsics and points that are read are those of the pictures that are read, however
+/// late these come.
 #[derive(Clone, Debug)]
 pub struct RayCasterCamera {
-    lens: Lens,
     parent: Option<usize>,
-    /// Of the optical frame, in each environment.
-    parent_from_camera: Vec<Pose>,
-    /// In the optical frame.
-    rays: Vec<Ray>,
-    max_distance: f64,
+    pub(super) mounts: Mounts,
     /// What depth and distance say of a miss.
     miss: f32,
-    scan: Scan,
-    expected: Expected,
+    scan: Scan<Pixels>,
+    sampler: Sampler,
+    /// The sampler's own, to know before it asks which environments are due.
     phases: Phases,
+    pub(super) expected: Expected,
     due: Vec<usize>,
-    /// Pictures that are made now: their environments, frames and hits.
-    views: Vec<View>,
-    taken: Vec<bool>,
-    hits: Vec<RayHit>,
-    world_from_camera: Vec<Pose>,
-    stamps: Array1<f64>,
-    frame_counts: Array1<u64>,
+    /// Where the parents were when rays were cast last; `None` before.
+    pub(super) world_from_parent: Vec<Option<Pose>>,
+    /// From where, and through which lens, rays were cast last.
+    taken: Vec<Taken>,
+    shown: Shown,
+}
+
+/// From where a picture is taken, and through which lens.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taken {
+    pub(super) world_from_camera: Pose,
+    pub(super) lens: PixelIntrinsics,
+}
+
+/// The pictures of the current values.
+#[derive(Clone, Debug)]
+struct Shown {
+    /// Measurements that they were made of.
+    counts: Vec<u64>,
+    taken: Vec<Taken>,
     depth: Array3<f32>,
     distance: Array3<f32>,
     normal: Array4<f32>,
     mask: Array3<i32>,
-}
-
-/// What all pictures have in common.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lens {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) pixels: PixelIntrinsics,
 }
 
 impl RayCasterCamera {
@@ -58,159 +69,188 @@ impl RayCasterCamera {
         cfg: &RayCasterCameraCfg,
         context: &SensorContext,
         parent: Option<usize>,
-        (parent_from_camera, lens): (Pose, Lens),
-        rays: Vec<Ray>,
-        scan: Scan,
+        mounts: Mounts,
+        scan: Scan<Pixels>,
         phases: Phases,
+        sampler: Sampler,
     ) -> Self {
         let n = context.num_envs;
-        let shape = (n, lens.height, lens.width);
+        let shape = (n, cfg.height, cfg.width);
         let miss = match cfg.depth_miss {
             DepthMiss::Inf => f32::INFINITY,
             DepthMiss::Far => cfg.max_distance as f32,
             DepthMiss::Zero => 0.0,
         };
+        let mount = |env| {
+            let mount = mounts.row(env);
+            Taken { world_from_camera: mount.parent_from_camera, lens: mount.pixels }
+        };
+        let taken: Vec<Taken> = (0..n).map(mount).collect();
         Self {
-            lens,
             parent,
-            parent_from_camera: vec![parent_from_camera; n],
-            max_distance: cfg.max_distance,
+            mounts,
             miss,
             scan,
-            expected: Expected::new("ray caster camera", cfg.requires(), context),
+            sampler,
             phases,
+            expected: Expected::new("ray caster camera", cfg.requires(), context),
             due: Vec::with_capacity(n),
-            views: Vec::with_capacity(n),
-            taken: vec![false; n],
-            hits: vec![RayHit::MISS; n * rays.len()],
-            world_from_camera: vec![parent_from_camera; n],
-            stamps: Array1::zeros(n),
-            frame_counts: Array1::zeros(n),
-            depth: Array3::from_elem(shape, miss),
-            distance: Array3::from_elem(shape, miss),
-            normal: Array4::zeros((n, lens.height, lens.width, 3)),
-            mask: Array3::zeros(shape),
-            rays,
+            world_from_parent: vec![None; n],
+            shown: Shown {
+                counts: vec![0; n],
+                taken: taken.clone(),
+                depth: Array3::from_elem(shape, miss),
+                distance: Array3::from_elem(shape, miss),
+                normal: Array4::zeros((n, cfg.height, cfg.width, 3)),
+                mask: Array3::zeros(shape),
+            },
+            taken,
         }
     }
 
-    /// Makes the pictures of some environments; `state` was checked. An environment that is named twice is drawn once.
-    fn shoot(&mut self, envs: &[usize], state: &SceneState) {
+    /// Casts the rays of some environments; `state` was checked.
+    fn cast(&mut self, envs: &[usize], state: &SceneState) {
         let Some(poses) = &state.instance_poses else { return };
-        self.views.clear();
-        self.taken.fill(false);
-        for &env in envs {
-            if std::mem::replace(&mut self.taken[env], true) {
-                continue;
-            }
-            let parent = self.parent.zip(state.body_poses.as_ref());
-            let local = self.parent_from_camera[env];
-            let pose =
-                parent.map_or(local, |(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])) * local);
-            self.world_from_camera[env] = pose;
-            self.stamps[env] = state.time[env];
-            self.views.push(View { env, world_from_rays: PoseF64::from(&pose) });
-        }
-        let count = self.rays.len();
-        let hits = &mut self.hits[..self.views.len() * count];
-        self.scan.cast(&self.rays, self.max_distance, &self.views, poses, hits);
-        for (view, hits) in self.views.iter().zip(hits.chunks(count)) {
-            for (k, (hit, ray)) in hits.iter().zip(&self.rays).enumerate() {
-                let at = (view.env, k / self.lens.width, k % self.lens.width);
-                let (depth, distance) = match hit.is_hit() {
-                    true => ((hit.distance * ray.direction[2]) as f32, hit.distance as f32),
-                    false => (self.miss, self.miss),
-                };
-                (self.depth[at], self.distance[at], self.mask[at]) = (depth, distance, hit.mask_id);
-                for (axis, x) in hit.normal.into_iter().enumerate() {
-                    self.normal[(at.0, at.1, at.2, axis)] = x as f32;
-                }
+        let Self { parent, mounts, scan, world_from_parent, taken, .. } = self;
+        let parent = parent.zip(state.body_poses.as_ref());
+        scan.cast(envs, poses, |env| {
+            let mount = mounts.row(env);
+            let parent = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
+            let world_from_camera = parent.map_or(mount.parent_from_camera, |pose| pose * mount.parent_from_camera);
+            world_from_parent[env] = parent;
+            taken[env] = Taken { world_from_camera, lens: mount.pixels };
+            (PoseF64::from(&world_from_camera), mount.pixels)
+        });
+    }
+
+    /// The same, after somebody may have moved what does not move by itself.
+    fn cast_anew(&mut self, envs: &[usize], state: &SceneState) {
+        let Some(poses) = &state.instance_poses else { return };
+        envs.iter().for_each(|&env| self.scan.settle(env, poses));
+        self.cast(envs, state);
+    }
+
+    /// The sampler, and what was cast last.
+    fn sampled(&mut self) -> (&mut Sampler, Cast<'_>) {
+        let Self { sampler, scan, taken, .. } = self;
+        (sampler, Cast { scan, taken })
+    }
+
+    /// Makes the pictures of the current values of an environment.
+    fn show(&mut self, env: usize) {
+        let count = self.sample_counts()[env];
+        let Self { sampler, scan, shown, miss, .. } = self;
+        shown.counts[env] = count;
+        let [distances, normals, ids, poses, lenses] =
+            ["distances", "normals", "ids", "poses", "lenses"].map(|channel| sampler.values(channel));
+        let lens =
+            PixelIntrinsics { fx: lenses[(env, 0)], fy: lenses[(env, 1)], cx: lenses[(env, 2)], cy: lenses[(env, 3)] };
+        let world_from_camera = from_row(&std::array::from_fn(|k| poses[(env, k)]));
+        shown.taken[env] = Taken { world_from_camera, lens };
+        let pixels = scan.rays();
+        for k in 0..pixels.width * pixels.height {
+            let at = (env, k / pixels.width, k % pixels.width);
+            let id = ids[(env, k)] as i32;
+            let (depth, distance) = if id == 0 {
+                (*miss, *miss)
+            } else {
+                let distance = distances[(env, k)];
+                ((distance * pixels.direction(&lens, k)[2]) as f32, distance as f32)
+            };
+            (shown.depth[at], shown.distance[at], shown.mask[at]) = (depth, distance, id);
+            for axis in 0..3 {
+                shown.normal[(at.0, at.1, at.2, axis)] = normals[(env, 3 * k + axis)] as f32;
             }
         }
     }
 
-    fn shoot_anew(&mut self, env_ids: &[usize], state: &SceneState) {
-        if let Some(poses) = &state.instance_poses {
-            env_ids.iter().for_each(|&env| self.scan.settle(env, poses));
-        }
-        self.shoot(env_ids, state);
-    }
-
-    /// When it measures.
-    pub fn schedule(&self) -> Schedule {
-        self.phases.schedule()
+    /// Whether it hangs on a body.
+    pub fn is_attached(&self) -> bool {
+        self.parent.is_some()
     }
 
     /// Rows and pixels per row: (H, W).
     pub fn image_shape(&self) -> (usize, usize) {
-        (self.lens.height, self.lens.width)
+        (self.scan.rays().height, self.scan.rays().width)
     }
 
     /// Distance along the optical axis, shape (N, H, W) \[m\]; for a miss what the configuration says.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
-        self.depth.view()
+        self.shown.depth.view()
     }
 
     /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; for a miss what the configuration says.
     pub fn distance(&self) -> ArrayView3<'_, f32> {
-        self.distance.view()
+        self.shown.distance.view()
+    }
+
+    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where not
+    /// filled yet.
+    pub fn distance_history(&self) -> ArrayView3<'_, f64> {
+        self.sampler.history("distances")
     }
 
     /// Unit normals of faces, turned to the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
     pub fn normal(&self) -> ArrayView4<'_, f32> {
-        self.normal.view()
+        self.shown.normal.view()
     }
 
     /// Mask ids, shape (N, H, W); 0 for a miss.
     pub fn mask(&self) -> ArrayView3<'_, i32> {
-        self.mask.view()
+        self.shown.mask.view()
     }
 
-    /// Time of the instant that pictures show \[s\] since the last reset of the environment, shape (N).
-    pub fn stamps(&self) -> ArrayView1<'_, f64> {
-        self.stamps.view()
-    }
-
-    /// Pictures since the last reset, shape (N); the refresh of a reset is none.
+    /// Pictures that arrived since the last reset, shape (N); the refresh of a reset is none.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
-        self.frame_counts.view()
+        self.sample_counts()
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the pictures \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        let matrix = self.lens.pixels.matrix();
-        Array3::from_shape_fn((self.stamps.len(), 3, 3), |(_, i, j)| matrix[(i, j)])
+        let taken = &self.shown.taken;
+        Array3::from_shape_fn((taken.len(), 3, 3), |(env, i, j)| taken[env].lens.matrix()[(i, j)])
     }
 
     /// Poses in the environment at the instant of the pictures, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        let rows: Vec<[f64; 7]> = self.world_from_camera.iter().map(|p| to_row(&convention.of_optical(p))).collect();
-        Array2::from(rows)
+        let row = |taken: &Taken| to_row(&convention.of_optical(&taken.world_from_camera));
+        Array2::from(self.shown.taken.iter().map(row).collect::<Vec<[f64; 7]>>())
     }
 
-    /// Places cameras in the frame of their parent (of the environment, for free ones), from the next picture on.
-    ///
-    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]`: one for each of `env_ids` (`None` is all environments), or one
-    /// for all. `convention` says what their axes mean.
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::Pose`](crate::CameraError::Pose), [`CameraError::Count`](crate::CameraError::Count), an environment that does
-    /// not exist; nothing is changed then.
-    pub fn set_local_pose(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let poses = poses.to_poses()?;
-        let all: Vec<usize> = (0..self.stamps.len()).collect();
-        let env_ids = env_ids.unwrap_or(&all);
-        self.expected.check_envs(env_ids)?;
-        for (&env, pose) in env_ids.iter().zip(one_each("poses", &poses, env_ids.len())?) {
-            self.parent_from_camera[env] = convention.to_optical(pose);
-        }
-        Ok(())
+    /// From where the picture of an environment was taken, through which lens.
+    pub(super) fn taken(&self, env: usize) -> &Taken {
+        &self.shown.taken[env]
+    }
+
+    /// The depths of the pixels of an environment, row by row; `None` for a miss.
+    pub(super) fn depths(&self, env: usize) -> impl Iterator<Item = Option<f32>> {
+        let (depth, mask) = (self.shown.depth.index_axis(Axis(0), env), self.shown.mask.index_axis(Axis(0), env));
+        depth.into_iter().zip(mask).map(|(depth, id)| (*id != 0).then_some(*depth))
+    }
+}
+
+/// What was cast, for the sampler.
+struct Cast<'a> {
+    scan: &'a Scan<Pixels>,
+    taken: &'a [Taken],
+}
+
+impl Cast<'_> {
+    /// Writes the values of an environment that was cast to a row of the sampler.
+    fn write(&self, env: usize, row: &mut [f64]) {
+        let pixels = self.scan.rays().width * self.scan.rays().height;
+        let (distances, row) = row.split_at_mut(pixels);
+        let (normals, row) = row.split_at_mut(3 * pixels);
+        let (ids, row) = row.split_at_mut(pixels);
+        self.scan.each_hit(env, |k, hit| {
+            distances[k] = hit.distance;
+            normals[3 * k..3 * k + 3].copy_from_slice(&hit.normal);
+            ids[k] = hit.mask_id.into();
+        });
+        let (pose, lens) = row.split_at_mut(7);
+        let Taken { world_from_camera, lens: PixelIntrinsics { fx, fy, cx, cy } } = self.taken[env];
+        pose.copy_from_slice(&to_row(&world_from_camera));
+        lens.copy_from_slice(&[fx, fy, cx, cy]);
     }
 }
 
@@ -220,9 +260,15 @@ impl Sensor for RayCasterCamera {
         let mut due = std::mem::take(&mut self.due);
         due.clear();
         due.extend((0..state.num_envs()).filter(|&env| self.phases.is_due(env, state.step[env])));
-        due.iter().for_each(|&env| self.frame_counts[env] += 1);
-        self.shoot(&due, state);
+        self.cast(&due, state);
         self.due = due;
+        let (sampler, cast) = self.sampled();
+        sampler.update(state, |env, row| cast.write(env, row))?;
+        for env in 0..state.num_envs() {
+            if self.sample_counts()[env] != self.shown.counts[env] {
+                self.show(env);
+            }
+        }
         Ok(())
     }
 
@@ -231,20 +277,31 @@ impl Sensor for RayCasterCamera {
         self.expected.check_envs(env_ids)?;
         for &env in env_ids {
             self.phases.reset(env, state.step[env]);
-            self.frame_counts[env] = 0;
         }
-        self.shoot_anew(env_ids, state);
+        self.cast_anew(env_ids, state);
+        let (sampler, cast) = self.sampled();
+        sampler.reset(env_ids, state, |env, row| cast.write(env, row))?;
+        env_ids.iter().for_each(|&env| self.show(env));
         Ok(())
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.expected.check(state)?;
         self.expected.check_envs(env_ids)?;
-        self.shoot_anew(env_ids, state);
+        self.cast_anew(env_ids, state);
+        let (sampler, cast) = self.sampled();
+        sampler.refresh(env_ids, state, |env, row| cast.write(env, row))?;
+        env_ids.iter().for_each(|&env| self.show(env));
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        self.phases.due_in(step.iter().copied())
+        self.sampler.due_in(step)
+    }
+}
+
+impl Sampled for RayCasterCamera {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
     }
 }

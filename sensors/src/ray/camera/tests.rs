@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use super::{RayCasterCamera, RayCasterCameraCfg};
-use crate::SensorError;
-use crate::camera::{CameraConvention, DepthMiss, Extrinsics, Intrinsics, Placement};
+use crate::camera::{CameraConvention, DepthMiss, Extrinsics, Intrinsics, Placement, PointFrame};
+use crate::noise::NoiseCfg;
+use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use crate::{CameraError, SensorError};
 use ndarray::{Array2, Array3, array};
 use scene::pose::{from_row, from_xyz_rpy, to_row};
 use scene::shape::{Plane, Sphere};
@@ -117,7 +119,7 @@ fn misses_are_what_the_configuration_says() {
 #[test]
 fn it_hangs_on_a_body_keeps_its_schedule_and_can_be_moved() {
     let extrinsics = Extrinsics { parent: Some("ball".into()), ..cfg().extrinsics };
-    let mut camera = built(&RayCasterCameraCfg { extrinsics, update_period: 0.02, ..cfg() }, 2);
+    let mut camera = built(&RayCasterCameraCfg { extrinsics, sampling: SamplingCfg::every(0.02), ..cfg() }, 2);
     assert!(camera.mask().iter().all(|id| *id != BALL), "it does not see what it hangs on");
     let z = |camera: &RayCasterCamera, env| camera.pose_w(CameraConvention::Ros)[(env, 2)];
     assert!((z(&camera, 1) - z(&camera, 0) - 0.1).abs() < 1e-12);
@@ -148,4 +150,193 @@ fn mistakes_are_typed_errors() {
     let two = [Pose::identity(), Pose::identity()];
     assert!(matches!(camera.set_local_pose(&two, None, CameraConvention::Ros), Err(SensorError::Camera(_))));
     assert!(camera.set_local_pose(&two[0], Some(&[1]), CameraConvention::Ros).is_err());
+    let twice = camera.set_local_pose(&two[0], Some(&[0, 0]), CameraConvention::Ros);
+    assert_eq!(twice, Err(CameraError::DuplicateEnvironment { env: 0 }.into()));
+    let z = [[0.0, 0.0, 1.0]];
+    assert!(matches!(camera.look_at(&z, &z, &z, None), Err(SensorError::Camera(CameraError::LookAt { .. }))));
+    let flat = Intrinsics::Pixels { fx: 0.0, fy: 1.0, cx: 0.0, cy: 0.0 };
+    assert!(matches!(camera.set_intrinsics(&[flat], None), Err(SensorError::Camera(CameraError::Lens { .. }))));
+    assert!(camera.restore(Some(&[1])).is_err() && camera.point_map(1, PointFrame::World).is_err());
+    // Of an attached camera it must be known where its parent is.
+    let extrinsics = Extrinsics { parent: Some("ball".into()), ..cfg().extrinsics };
+    let mut attached = RayCasterCameraCfg { extrinsics, ..cfg() }.build(&context(1)).unwrap();
+    let early = attached.set_world_poses(&two[0], None, CameraConvention::Ros);
+    assert_eq!(early, Err(CameraError::NothingCaptured { env: 0 }.into()));
+    let noise = [("depth".to_string(), NoiseCfg::white(0.1))].into();
+    let sampling = SamplingCfg { noise, ..SamplingCfg::default() };
+    assert!(error(RayCasterCameraCfg { sampling, ..cfg() }).contains("\"distances\""));
+}
+
+/// Straight down at the floor from `z` metres above the point (x, y), the top of the picture along +y.
+fn down(x: f64, y: f64, z: f64) -> [[[f64; 3]; 1]; 3] {
+    [[[x, y, z]], [[x, y, 0.0]], [[0.0, 1.0, 0.0]]]
+}
+
+/// Only the floor.
+fn floor_only() -> RayCasterCameraCfg {
+    RayCasterCameraCfg { targets: crate::ray::HitTargets::StaticOnly, ..cfg() }
+}
+
+/// From 2 m and from 1.5 m above the floor, through two lenses: depths, distances and points of every pixel in closed form.
+#[test]
+fn a_floor_below_is_as_far_as_it_is_through_every_lens() {
+    let mut camera = built(&floor_only(), 2);
+    let [eye, target, up] = down(0.25, -0.5, 2.0);
+    camera.look_at(&eye, &target, &up, Some(&[0])).unwrap();
+    let [eye, target, up] = down(-0.125, 0.5, 1.5);
+    camera.look_at(&eye, &target, &up, Some(&[1])).unwrap();
+    let wide = Intrinsics::Pixels { fx: 40.0, fy: 45.0, cx: 20.0, cy: 30.0 };
+    camera.set_intrinsics(&[wide], Some(&[1])).unwrap();
+    assert_eq!(camera.intrinsic_matrices()[(1, 0, 0)], 50.0, "of the picture that is there");
+    camera.update(&state(&[1, 1])).unwrap();
+    let (camera_points, world) = (camera.points(PointFrame::Camera), camera.points(PointFrame::World));
+    assert_eq!(world.dim(), (2, 64 * 48, 3));
+    let lenses = [(50.0, 60.0, 30.5, 20.25), (40.0, 45.0, 20.0, 30.0)];
+    for (env, ((fx, fy, cx, cy), (x, y, z))) in
+        lenses.into_iter().zip([(0.25, -0.5, 2.0), (-0.125, 0.5, 1.5)]).enumerate()
+    {
+        assert_eq!(
+            camera.intrinsic_matrices().index_axis(ndarray::Axis(0), env),
+            array![[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+        );
+        for k in 0..64 * 48 {
+            let (u, v) = (k % 64, k / 64);
+            let (right, below) = ((u as f64 + 0.5 - cx) / fx, (v as f64 + 0.5 - cy) / fy);
+            // Single precision: 3 m times 6e-8, for each of three roundings.
+            let near =
+                |found: f32, expected: f64| assert!((f64::from(found) - expected).abs() < 6e-7, "{found} {expected}");
+            near(camera.depth()[(env, v, u)], z);
+            near(camera.distance()[(env, v, u)], z * (1.0 + right * right + below * below).sqrt());
+            for (axis, expected) in [right * z, below * z, z].into_iter().enumerate() {
+                near(camera_points[(env, k, axis)], expected);
+            }
+            for (axis, expected) in [x + right * z, y - below * z, 0.0].into_iter().enumerate() {
+                near(world[(env, k, axis)], expected);
+            }
+        }
+        let map = camera.point_map(env, PointFrame::World).unwrap();
+        assert!(map.iter().eq(world.index_axis(ndarray::Axis(0), env).iter()));
+        assert_eq!(camera.point_cloud(env, PointFrame::World).unwrap().dim(), (64 * 48, 3));
+    }
+    assert!(camera.distance()[(0, 0, 0)] != camera.distance()[(1, 0, 0)], "the control: lenses differ");
+    camera.restore(None).unwrap();
+    camera.update(&state(&[2, 2])).unwrap();
+    assert_eq!(camera.depth(), built(&floor_only(), 2).depth(), "as configured");
+}
+
+/// Points lie on what was hit; those of misses are infinite, in the map only.
+#[test]
+fn points_are_on_the_ball_or_on_the_floor() {
+    let camera = built(&cfg(), 2);
+    for env in 0..2 {
+        let map = camera.point_map(env, PointFrame::World).unwrap();
+        let mut hits = 0;
+        for ((v, u), id) in camera.mask().index_axis(ndarray::Axis(0), env).indexed_iter() {
+            let p = nalgebra::Vector3::from_fn(|k, _| f64::from(map[(v, u, k)]));
+            let ball = nalgebra::Vector3::new(0.2, 0.0, 0.5 + 0.1 * env as f64);
+            hits += usize::from(*id != 0);
+            match *id {
+                0 => assert!(p.iter().all(|x| *x == f64::INFINITY)),
+                // Single precision, as above.
+                BALL => assert!(((p - ball).norm() - 0.5).abs() < 2e-6),
+                _ => assert!(p.z.abs() < 2e-6),
+            }
+        }
+        assert_eq!(camera.point_cloud(env, PointFrame::World).unwrap().nrows(), hits);
+        assert!(hits > 500 && hits < 64 * 48, "{hits}");
+    }
+}
+
+#[test]
+fn an_attached_camera_is_placed_in_the_world() {
+    let extrinsics = Extrinsics { parent: Some("ball".into()), ..cfg().extrinsics };
+    let mut camera = built(&RayCasterCameraCfg { extrinsics, ..cfg() }, 2);
+    assert!(camera.is_attached());
+    let place = from_xyz_rpy([0.3, -0.2, 1.0], [2.0, 0.1, 0.4]);
+    camera.set_world_poses(&place, None, CameraConvention::OpenGl).unwrap();
+    camera.update(&state(&[1, 1])).unwrap();
+    let poses = camera.pose_w(CameraConvention::OpenGl);
+    for env in 0..2 {
+        for k in 0..7 {
+            assert!((poses[(env, k)] - to_row(&place)[k]).abs() < 1e-12, "{poses}");
+        }
+    }
+    let local = camera.local_pose(CameraConvention::OpenGl);
+    assert!((local[(0, 2)] - 0.5).abs() < 1e-12 && (local[(1, 2)] - 0.4).abs() < 1e-12, "{local}");
+}
+
+/// Noise is along the rays: depth and points follow, normals, masks and misses do not.
+#[test]
+fn noise_moves_points_along_their_rays() {
+    let noise = [("distances".to_string(), NoiseCfg::white(0.05))].into();
+    let sampling = SamplingCfg { noise, ..SamplingCfg::default() };
+    let (noisy, exact) = (built(&RayCasterCameraCfg { sampling, ..cfg() }, 1), built(&cfg(), 1));
+    assert_eq!((noisy.mask(), noisy.normal()), (exact.mask(), exact.normal()));
+    let eye = nalgebra::Vector3::from_fn(|k, _| exact.pose_w(CameraConvention::Ros)[(0, k)]);
+    let (a, b) = (noisy.points(PointFrame::World), exact.points(PointFrame::World));
+    let (mut sum, mut hits) = (0.0, 0);
+    for (k, (at, id)) in exact.mask().indexed_iter().enumerate() {
+        let (before, after) = (f64::from(exact.distance()[at]), f64::from(noisy.distance()[at]));
+        if *id == 0 {
+            assert!(after == f64::INFINITY && noisy.depth()[at] == f32::INFINITY);
+            continue;
+        }
+        hits += 1;
+        sum += (after - before).powi(2);
+        let ratio = f64::from(noisy.depth()[at]) / f64::from(exact.depth()[at]);
+        assert!((ratio - after / before).abs() < 1e-6, "depth and distance are of one measurement");
+        let [a, b] = [&a, &b].map(|p| nalgebra::Vector3::from_fn(|axis, _| f64::from(p[(0, k, axis)])) - eye);
+        assert!((a - b * (after / before)).norm() < 1e-5, "the point stays on its ray");
+    }
+    let spread = (sum / f64::from(hits)).sqrt();
+    // Five sigma of the deviation of so many normal numbers.
+    assert!((spread - 0.05).abs() < 5.0 * 0.05 / (2.0 * f64::from(hits)).sqrt(), "{spread} of {hits}");
+}
+
+/// A picture that is late keeps its stamp, its pose and its lens.
+#[test]
+fn late_pictures_keep_where_they_were_taken() {
+    let sampling = SamplingCfg { history_length: 2, latency_steps: 2, ..SamplingCfg::every(0.01) };
+    let mut camera = built(&RayCasterCameraCfg { sampling, ..floor_only() }, 1);
+    let first = camera.depth().to_owned();
+    let [eye, target, up] = down(0.0, 0.0, 2.0);
+    let wide = Intrinsics::Pixels { fx: 40.0, fy: 45.0, cx: 20.0, cy: 30.0 };
+    camera.update(&state(&[1])).unwrap();
+    camera.look_at(&eye, &target, &up, None).unwrap();
+    camera.set_intrinsics(&[wide], None).unwrap();
+    let mut told = Vec::new();
+    for step in 2..=4 {
+        camera.update(&state(&[step])).unwrap();
+        told.push((camera.stamps()[0], camera.frame_counts()[0], camera.intrinsic_matrices()[(0, 0, 0)]));
+        // Points are on the floor all the time: depths, pose and lens belong together.
+        let points = camera.point_cloud(0, PointFrame::World).unwrap();
+        assert!(points.nrows() > 1000 && points.column(2).iter().all(|z| z.abs() < 2e-6), "step {step}");
+        assert_eq!(camera.depth() == first, step < 4, "step {step}");
+    }
+    assert_eq!(told, [(0.0, 0, 50.0), (0.01, 1, 50.0), (0.02, 2, 40.0)]);
+    assert_eq!(camera.distance_history().dim(), (1, 2, 64 * 48));
+    assert_eq!(camera.due_in(&[4]), 1);
+}
+
+/// One ray per pixel in 3 environments of 3072 rays: enough for two threads.
+#[test]
+fn threads_change_no_bit_and_nothing_is_allocated() {
+    let taken = |threads| {
+        let context = SensorContext { threads, ..context(3) };
+        let mut camera = cfg().build(&context).unwrap();
+        let lens = |k: f64| Intrinsics::Pixels { fx: 50.0 + k, fy: 60.0, cx: 30.0, cy: 20.0 };
+        camera.set_intrinsics(&[0.0, 1.0, 2.0].map(lens), None).unwrap();
+        camera.reset(&[0, 1, 2], &state(&[0; 3])).unwrap();
+        let states: Vec<SceneState> = (1..5).map(|step| state(&[step; 3])).collect();
+        camera.update(&states[0]).unwrap();
+        let count =
+            allocation_counter::measure(|| states[1..].iter().for_each(|s| camera.update(s).unwrap())).count_total;
+        assert_eq!(count, 0, "{threads} threads");
+        let depth: Vec<u32> = camera.depth().iter().map(|x| x.to_bits()).collect();
+        (depth, camera.normal().to_owned(), camera.mask().to_owned())
+    };
+    let one = taken(1);
+    for threads in [2, 4] {
+        assert_eq!(taken(threads), one, "{threads} threads");
+    }
 }

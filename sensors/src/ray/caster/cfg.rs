@@ -124,8 +124,8 @@ impl SensorCfg for RayCasterCfg {
             Channel::exact("quat_w", 4),
         ];
         let sampler = Sampler::new("ray caster", self.requires(), context, &self.sampling, &channels)?;
-        let scan = Scan::new(targets, context.num_envs, context.threads);
-        Ok(RayCaster::new(self, context, parent, rays, scan, schedule.phases(context.num_envs), sampler))
+        let scan = Scan::new(targets, rays, self.max_distance, context);
+        Ok(RayCaster::new(self, context, parent, scan, schedule.phases(context.num_envs), sampler))
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::RayAlignment;
 use super::cfg::RayCasterCfg;
-use super::scan::{Scan, View};
+use super::scan::Scan;
 use crate::error::SensorError;
 use crate::expected::Expected;
-use crate::ray::{Ray, RayHit, RayTargets};
+use crate::ray::{Ray, RayTargets};
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -24,21 +24,16 @@ pub struct RayCaster {
     pattern: &'static str,
     parent: Option<usize>,
     alignment: RayAlignment,
-    /// In the frame that [`RayAlignment::align`] gives: the pattern, with its offset.
-    rays: Vec<Ray>,
-    max_distance: f64,
-    scan: Scan,
+    /// The rays are in the frame that [`RayAlignment::align`] gives: the pattern, with its offset.
+    scan: Scan<Vec<Ray>>,
     sampler: Sampler,
     /// The sampler's own, to know before it asks which environments are due.
     phases: Phases,
     drift: Drift,
     expected: Expected,
     due: Vec<usize>,
-    /// Rays that were cast last: their environments, frames and hits, and where each environment is among them.
-    views: Vec<View>,
+    /// Where the sensor was when its rays were cast last, in each environment.
     sensor_rows: Vec<[f64; 7]>,
-    hits: Vec<RayHit>,
-    slots: Vec<usize>,
     shown: Shown,
 }
 
@@ -65,12 +60,11 @@ impl RayCaster {
         cfg: &RayCasterCfg,
         context: &SensorContext,
         parent: Option<usize>,
-        rays: Vec<Ray>,
-        scan: Scan,
+        scan: Scan<Vec<Ray>>,
         phases: Phases,
         sampler: Sampler,
     ) -> Self {
-        let (n, b) = (context.num_envs, rays.len());
+        let (n, b) = (context.num_envs, scan.rays().len());
         let random =
             |env| Random::keyed(context.seed, (context.first_env + env) as u64, &format!("{}/drift", context.name));
         Self {
@@ -78,50 +72,36 @@ impl RayCaster {
             pattern: cfg.pattern.name(),
             expected: Expected::new("ray caster", cfg.requires(), context),
             due: Vec::with_capacity(n),
-            slots: vec![usize::MAX; n],
             parent,
             alignment: cfg.alignment,
-            max_distance: cfg.max_distance,
             scan,
             sampler,
             phases,
             drift: Drift { range: cfg.drift, randoms: (0..n).map(random).collect(), now: vec![[0.0; 3]; n] },
-            views: Vec::with_capacity(n),
-            sensor_rows: Vec::with_capacity(n),
-            hits: vec![RayHit::MISS; n * b],
+            sensor_rows: vec![[0.0; 7]; n],
             shown: Shown {
                 counts: vec![0; n],
                 points: Array3::from_elem((n, b, 3), f64::INFINITY),
                 ids: Array2::zeros((n, b)),
                 mask: Array2::from_elem((n, b), false),
             },
-            rays,
         }
     }
 
     /// Casts the rays of some environments; `state` was checked. An environment that is named twice is cast once.
     fn cast(&mut self, envs: &[usize], state: &SceneState) {
         let Some(poses) = &state.instance_poses else { return };
-        for view in self.views.drain(..) {
-            self.slots[view.env] = usize::MAX;
-        }
-        self.sensor_rows.clear();
-        for &env in envs {
-            if self.slots[env] != usize::MAX {
-                continue;
-            }
-            let parent = self.parent.zip(state.body_poses.as_ref());
+        let Self { parent, alignment, drift, sensor_rows, scan, .. } = self;
+        let parent = parent.zip(state.body_poses.as_ref());
+        scan.cast(envs, poses, |env| {
             let mut row = parent.map_or_else(
                 || to_row(&Pose::identity()),
                 |(body, poses)| std::array::from_fn(|k| poses[(env, body, k)]),
             );
-            row.iter_mut().zip(self.drift.now[env]).for_each(|(x, drift)| *x += drift);
-            self.slots[env] = self.views.len();
-            self.views.push(View { env, world_from_rays: self.alignment.align(&from_row(&row)) });
-            self.sensor_rows.push(row);
-        }
-        let hits = &mut self.hits[..self.views.len() * self.rays.len()];
-        self.scan.cast(&self.rays, self.max_distance, &self.views, poses, hits);
+            row.iter_mut().zip(drift.now[env]).for_each(|(x, drift)| *x += drift);
+            sensor_rows[env] = row;
+            alignment.align(&from_row(&row))
+        });
     }
 
     /// The same, after somebody may have moved what does not move by itself.
@@ -133,17 +113,17 @@ impl RayCaster {
 
     /// The sampler, and what was cast last.
     fn sampled(&mut self) -> (&mut Sampler, Cast<'_>) {
-        let Self { sampler, slots, sensor_rows, hits, rays, .. } = self;
-        (sampler, Cast { slots, sensors: sensor_rows, hits, rays: rays.len() })
+        let Self { sampler, sensor_rows, scan, .. } = self;
+        (sampler, Cast { sensors: sensor_rows, scan })
     }
 
     /// Makes points, ids and masks of the current values of an environment.
     fn show(&mut self, env: usize) {
         let (frame, count) = (self.frame(env), self.sample_counts()[env]);
-        let Self { sampler, shown, rays, .. } = self;
+        let Self { sampler, shown, scan, .. } = self;
         shown.counts[env] = count;
         let (distances, ids) = (sampler.values("distances"), sampler.values("ids"));
-        for (k, ray) in rays.iter().enumerate() {
+        for (k, ray) in scan.rays().iter().enumerate() {
             let (distance, id) = (distances[(env, k)], ids[(env, k)] as i32);
             let is_hit = id != 0;
             let point = if is_hit { ray.mapped_by(&frame).at(distance) } else { [f64::INFINITY; 3] };
@@ -164,25 +144,23 @@ impl RayCaster {
 
 /// What was cast, for the sampler.
 struct Cast<'a> {
-    slots: &'a [usize],
     sensors: &'a [[f64; 7]],
-    hits: &'a [RayHit],
-    rays: usize,
+    scan: &'a Scan<Vec<Ray>>,
 }
 
 impl Cast<'_> {
     /// Writes the values of an environment that was cast to a row of the sampler.
     fn write(&self, env: usize, row: &mut [f64]) {
-        let (at, rays) = (self.slots[env], self.rays);
+        let rays = self.scan.rays().len();
         let (distances, row) = row.split_at_mut(rays);
         let (normals, row) = row.split_at_mut(3 * rays);
         let (ids, sensor) = row.split_at_mut(rays);
-        for (k, hit) in self.hits[at * rays..(at + 1) * rays].iter().enumerate() {
+        self.scan.each_hit(env, |k, hit| {
             distances[k] = hit.distance;
             normals[3 * k..3 * k + 3].copy_from_slice(&hit.normal);
             ids[k] = hit.mask_id.into();
-        }
-        sensor.copy_from_slice(&self.sensors[at]);
+        });
+        sensor.copy_from_slice(&self.sensors[env]);
     }
 }
 
@@ -261,7 +239,7 @@ impl Drift {
 impl RayCaster {
     /// Number of rays in an environment: the second axis of what is measured.
     pub fn num_rays(&self) -> usize {
-        self.rays.len()
+        self.scan.rays().len()
     }
 
     /// Where rays hit, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
@@ -286,7 +264,7 @@ impl RayCaster {
 
     /// Unit normals of the surfaces, turned to where the ray comes from, shape (N, B, 3); 0 for a miss.
     pub fn normals(&self) -> ArrayView3<'_, f64> {
-        self.sampler.values_as("normals", (self.shown.counts.len(), self.rays.len(), 3))
+        self.sampler.values_as("normals", (self.shown.counts.len(), self.num_rays(), 3))
     }
 
     /// Where rays begin, shape (N, B, 3) \[m\]; made when asked.
@@ -304,7 +282,7 @@ impl RayCaster {
         let mut out = Array3::zeros((n, b, 3));
         for env in 0..n {
             let frame = self.frame(env);
-            for (k, ray) in self.rays.iter().enumerate() {
+            for (k, ray) in self.scan.rays().iter().enumerate() {
                 let values = what(&ray.mapped_by(&frame));
                 values.into_iter().enumerate().for_each(|(axis, x)| out[(env, k, axis)] = x);
             }

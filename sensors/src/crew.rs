@@ -1,0 +1,245 @@
+//! Threads that wait for work: started once, shared by the sensors of a simulation.
+//!
+//! Scoped threads, as cameras use them, cost some 0.05 ms and a few allocations each time. These cost a wake-up. Safe code
+//! cannot lend them what the caller borrows: what they work on is shared with them, behind locks that nobody contends for.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+/// Something that several threads do together.
+pub(crate) trait Work: Send + Sync {
+    /// Does one thing after the other until none is left. `desk` is a number below that of the threads, and nobody else's
+    /// meanwhile.
+    fn work(&self, desk: usize);
+}
+
+/// Threads that wait for work. They start when a sensor first has enough to do for several, sleep in between, and end with
+/// the last clone, which are all the same crew.
+#[derive(Clone, Default)]
+pub struct Crew(Arc<Owner>);
+
+#[derive(Default)]
+struct Owner {
+    shared: Arc<Shared>,
+    threads: Mutex<Vec<JoinHandle<()>>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    board: Mutex<Board>,
+    wake: Condvar,
+    done: Condvar,
+}
+
+/// What is to be done now.
+#[derive(Default)]
+struct Board {
+    work: Option<Arc<dyn Work>>,
+    /// The next desk to take, and how many there are.
+    desk: usize,
+    desks: usize,
+    /// Threads that are at a desk, but for the calling one.
+    helping: usize,
+    panicked: bool,
+    stop: bool,
+}
+
+/// What panics is raised again by who called, and then no lock is of use any more.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Crew {
+    /// Works on `work` with up to `threads` threads, the calling one included, which has desk 0. Where the crew is busy with
+    /// something else, or the system gives no thread, the calling one works alone.
+    ///
+    /// # Panics
+    ///
+    /// `work` panicked.
+    pub(crate) fn run<W: Work + 'static>(&self, threads: usize, work: &Arc<W>) {
+        if threads < 2 || !self.0.call(threads, work) {
+            return work.work(0);
+        }
+        let mine = catch_unwind(AssertUnwindSafe(|| work.work(0)));
+        let panicked = self.0.shared.dismiss();
+        if let Err(panic) = mine {
+            resume_unwind(panic);
+        }
+        assert!(!panicked, "work of a sensor panicked on another thread");
+    }
+}
+
+impl fmt::Debug for Crew {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Crew").field("threads", &lock(&self.0.threads).len()).finish()
+    }
+}
+
+impl Owner {
+    /// Calls for helpers; `false` where there are none.
+    fn call<W: Work + 'static>(&self, threads: usize, work: &Arc<W>) -> bool {
+        let helpers = self.helpers(threads - 1);
+        let mut board = lock(&self.shared.board);
+        if helpers == 0 || board.work.is_some() || board.helping > 0 {
+            return false;
+        }
+        let work: Arc<dyn Work> = Arc::<W>::clone(work);
+        (board.work, board.desk, board.desks) = (Some(work), 1, 1 + helpers);
+        drop(board);
+        for _ in 0..helpers {
+            self.shared.wake.notify_one();
+        }
+        true
+    }
+
+    /// Starts threads until there are `wanted`; gives how many can help.
+    fn helpers(&self, wanted: usize) -> usize {
+        let mut threads = lock(&self.threads);
+        while threads.len() < wanted {
+            let shared = Arc::clone(&self.shared);
+            let name = format!("kinetoscope-sensors-{}", threads.len() + 1);
+            match std::thread::Builder::new().name(name).spawn(move || shared.help()) {
+                Ok(thread) => threads.push(thread),
+                Err(_) => break,
+            }
+        }
+        wanted.min(threads.len())
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        lock(&self.shared.board).stop = true;
+        self.shared.wake.notify_all();
+        for thread in lock(&self.threads).drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    /// Takes the work from the board and waits for those who are at it; gives whether one of them panicked. Who has not
+    /// woken up by now is not waited for.
+    fn dismiss(&self) -> bool {
+        let mut board = lock(&self.board);
+        board.work = None;
+        while board.helping > 0 {
+            board = self.done.wait(board).unwrap_or_else(PoisonError::into_inner);
+        }
+        std::mem::take(&mut board.panicked)
+    }
+
+    /// The life of a thread.
+    fn help(&self) {
+        let mut board = lock(&self.board);
+        while !board.stop {
+            let free = board.desk < board.desks;
+            let Some(work) = board.work.as_ref().filter(|_| free).map(Arc::clone) else {
+                board = self.wake.wait(board).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            let desk = board.desk;
+            board.desk += 1;
+            board.helping += 1;
+            drop(board);
+            let done = catch_unwind(AssertUnwindSafe(|| work.work(desk)));
+            // Before the others go on: the last one to hold it would free it.
+            drop(work);
+            board = lock(&self.board);
+            board.panicked |= done.is_err();
+            board.helping -= 1;
+            if board.helping == 0 {
+                self.done.notify_all();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::thread::ThreadId;
+
+    /// Takes numbers up to `count`, slowly; fails at `fail`.
+    #[derive(Default)]
+    struct Numbers {
+        next: AtomicUsize,
+        count: usize,
+        fail: Option<usize>,
+        taken: Mutex<Vec<(usize, usize, ThreadId)>>,
+    }
+
+    impl Work for Numbers {
+        fn work(&self, desk: usize) {
+            loop {
+                let number = self.next.fetch_add(1, Ordering::Relaxed);
+                if number >= self.count {
+                    return;
+                }
+                assert!(self.fail != Some(number), "told to fail");
+                lock(&self.taken).push((number, desk, std::thread::current().id()));
+                std::thread::sleep(std::time::Duration::from_millis(2));
+            }
+        }
+    }
+
+    #[test]
+    fn everything_is_done_once_by_threads_that_stay() {
+        let crew = Crew::default();
+        let mut threads = BTreeSet::new();
+        for round in 0..20 {
+            let work = Arc::new(Numbers { count: 10, ..Numbers::default() });
+            crew.run(3, &work);
+            let taken = lock(&work.taken);
+            let mut numbers: Vec<usize> = taken.iter().map(|(number, ..)| *number).collect();
+            numbers.sort_unstable();
+            assert!(numbers.iter().copied().eq(0..10), "round {round}: {numbers:?}");
+            assert!(taken.iter().all(|(_, desk, thread)| *desk < 3 && (*desk == 0) == (*thread == me())));
+            threads.extend(taken.iter().map(|(_, _, thread)| format!("{thread:?}")));
+        }
+        assert!((2..=3).contains(&threads.len()), "{threads:?}");
+        assert_eq!(format!("{crew:?}"), "Crew { threads: 2 }");
+    }
+
+    fn me() -> ThreadId {
+        std::thread::current().id()
+    }
+
+    #[test]
+    fn one_thread_and_a_busy_crew_work_alone() {
+        let crew = Crew::default();
+        let work = Arc::new(Numbers { count: 5, ..Numbers::default() });
+        crew.run(1, &work);
+        assert_eq!((lock(&work.taken).len(), format!("{crew:?}").as_str()), (5, "Crew { threads: 0 }"));
+        // While the crew does one thing, somebody else asks it to do another.
+        let long = Arc::new(Numbers { count: 40, ..Numbers::default() });
+        std::thread::scope(|scope| {
+            scope.spawn(|| crew.run(2, &long));
+            while lock(&long.taken).is_empty() {
+                std::thread::yield_now();
+            }
+            let short = Arc::new(Numbers { count: 5, ..Numbers::default() });
+            crew.run(2, &short);
+            assert!(lock(&short.taken).iter().all(|(_, desk, thread)| *desk == 0 && *thread == me()));
+            assert_eq!(lock(&short.taken).len(), 5);
+        });
+        assert_eq!(lock(&long.taken).len(), 40);
+    }
+
+    /// A panic reaches the caller, whichever thread it was on, and the crew goes on.
+    #[test]
+    fn panics_reach_the_caller() {
+        let crew = Crew::default();
+        for fail in 0..6 {
+            let work = Arc::new(Numbers { count: 10, fail: Some(fail), ..Numbers::default() });
+            assert!(catch_unwind(AssertUnwindSafe(|| crew.run(3, &work))).is_err(), "{fail}");
+        }
+        let work = Arc::new(Numbers { count: 10, ..Numbers::default() });
+        crew.run(3, &work);
+        assert_eq!(lock(&work.taken).len(), 10);
+    }
+}

@@ -1,0 +1,38 @@
+//! The rays of a camera: one through the centre of every pixel.
+
+use crate::camera::PixelIntrinsics;
+use crate::ray::Ray;
+use crate::ray::caster::scan::Rays;
+use nalgebra::Vector3;
+use scene::PoseF64;
+use std::ops::Range;
+
+/// The pixels of a picture, row by row. Rays are made when they are cast: every environment may have a lens of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pixels {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+}
+
+impl Pixels {
+    /// The direction of pixel number `k` in the optical frame, of length 1.
+    #[inline]
+    pub(crate) fn direction(&self, lens: &PixelIntrinsics, k: usize) -> [f64; 3] {
+        let (u, v) = ((k % self.width) as f64 + 0.5, (k / self.width) as f64 + 0.5);
+        Vector3::new((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0).normalize().into()
+    }
+}
+
+impl Rays for Pixels {
+    /// World from the optical frame, and the lens.
+    type View = (PoseF64, PixelIntrinsics);
+
+    fn count(&self) -> usize {
+        self.width * self.height
+    }
+
+    fn add(&self, (world_from_camera, lens): &Self::View, range: Range<usize>, out: &mut Vec<Ray>) {
+        let ray = |k| Ray { origin: [0.0; 3], direction: self.direction(lens, k) };
+        out.extend(range.map(|k| ray(k).mapped_by(world_from_camera)));
+    }
+}

@@ -1,0 +1,55 @@
+//! Points of cameras of rays: as with [`Camera`](crate::Camera), by the same code.
+
+use super::sensor::RayCasterCamera;
+use crate::camera::PointFrame;
+use crate::camera::point_cloud::{seen, unproject};
+use crate::error::SensorError;
+use ndarray::{Array2, Array3};
+use scene::Pose;
+
+impl RayCasterCamera {
+    /// The points of all pixels \[m\], shape (N, H * W, 3), row by row from the top left: the depth along the ray through the
+    /// pixel's centre, noise included. (+inf, +inf, +inf) where nothing was hit, which the mask says too.
+    pub fn points(&self, frame: PointFrame) -> Array3<f32> {
+        let (height, width) = self.image_shape();
+        let count = self.mounts.len();
+        let mut points = Array3::from_elem((count, height * width, 3), f32::INFINITY);
+        if let Some(flat) = points.as_slice_mut() {
+            flat.chunks_exact_mut(3 * height * width)
+                .enumerate()
+                .for_each(|(env, flat)| self.unproject(env, frame, flat));
+        }
+        points
+    }
+
+    /// The point at every pixel of environment `env` \[m\], shape (H, W, 3), as [`points`](Self::points) has them.
+    ///
+    /// # Errors
+    ///
+    /// An environment that does not exist.
+    pub fn point_map(&self, env: usize, frame: PointFrame) -> Result<Array3<f32>, SensorError> {
+        self.expected.check_envs(&[env])?;
+        let (height, width) = self.image_shape();
+        let mut points = Array3::from_elem((height, width, 3), f32::INFINITY);
+        if let Some(flat) = points.as_slice_mut() {
+            self.unproject(env, frame, flat);
+        }
+        Ok(points)
+    }
+
+    /// The points that environment `env` shows \[m\], shape (points, 3): those of [`point_map`](Self::point_map) where
+    /// something was hit, row by row from the top left.
+    ///
+    /// # Errors
+    ///
+    /// As [`point_map`](Self::point_map).
+    pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
+        Ok(seen(self.point_map(env, frame)?.view()))
+    }
+
+    fn unproject(&self, env: usize, frame: PointFrame, points: &mut [f32]) {
+        let taken = self.taken(env);
+        let pose = if frame == PointFrame::World { taken.world_from_camera } else { Pose::identity() };
+        unproject(&taken.lens, &pose, self.image_shape().1, self.depths(env), points);
+    }
+}

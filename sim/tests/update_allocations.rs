@@ -1,0 +1,49 @@
+//! After the first steps, stepping and measuring allocates nothing on the calling thread.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use sensors::ray::pattern::Grid;
+use sensors::{ContactSensorCfg, ImuCfg, RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg};
+use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+
+/// Four environments with a box that lies and a ball that stands a little off the ground.
+fn world(threads: usize) -> SimulationManager {
+    let mut sim =
+        SimulationManager::new(SimulationManagerCfg { num_envs: 4, threads: Some(threads), ..Default::default() })
+            .unwrap();
+    let at = |x: f64, z: f64| scene::Pose::translation(x, 0.0, z);
+    let box_ = RigidObjectCfg { uid: "box".into(), init_pose: at(0.0, 0.05), ..Default::default() };
+    let shape = ObjectShape::Sphere { radius: 0.1 };
+    let ball = RigidObjectCfg { uid: "ball".into(), init_pose: at(0.5, 0.1), shape, ..Default::default() };
+    sim.add_rigid_object(box_).unwrap();
+    sim.add_rigid_object(ball).unwrap();
+    sim
+}
+
+fn allocations(sim: &mut SimulationManager) -> u64 {
+    sim.update(30);
+    allocation_counter::measure(|| (0..10).for_each(|_| sim.update(1))).count_total
+}
+
+#[test]
+fn updates_allocate_nothing() {
+    for threads in [1, 3] {
+        let mut sim = world(threads);
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, no sensors");
+        let contact =
+            ContactSensorCfg { filters: vec!["ground".into()], track_air_time: true, ..ContactSensorCfg::of("box") };
+        sim.add_sensor("contact", contact).unwrap();
+        let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
+        sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, sensors of numbers");
+        // 10201 rays in each environment, and a camera of 3072: enough for all threads.
+        let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
+        let offset = scene::Pose::translation(0.0, 0.0, 2.0);
+        let scanner = RayCasterCfg { offset, pattern: grid.into(), ..RayCasterCfg::default() };
+        assert!(scanner.requires().contains(Requires::INSTANCES));
+        sim.add_sensor("scanner", scanner).unwrap();
+        sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, rays");
+    }
+    let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
+    assert_eq!(control, 1, "the control: the counter counts");
+}
