@@ -1,7 +1,8 @@
-//! What a scene can hold: robots, rigid objects, and sensors of any crate.
+//! What a scene can hold: robots, rigid objects, MJCF files, and sensors of any crate.
 
 use crate::error::{Error, Result};
-use crate::manager::{ObjectId, RobotId, SimulationManager};
+use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager};
+use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::sensor_list::SensorId;
@@ -17,6 +18,8 @@ pub enum EntityCfg {
     Robot(Box<RobotCfg>),
     /// A rigid object. Its uid is the name of the entity.
     RigidObject(Box<RigidObjectCfg>),
+    /// An MJCF file. Its uid is the name of the entity.
+    Mjcf(Box<MjcfCfg>),
     /// A sensor of any kind.
     Sensor(Box<dyn SensorEntity>),
 }
@@ -30,6 +33,12 @@ impl From<RobotCfg> for EntityCfg {
 impl From<RigidObjectCfg> for EntityCfg {
     fn from(cfg: RigidObjectCfg) -> Self {
         Self::RigidObject(Box::new(cfg))
+    }
+}
+
+impl From<MjcfCfg> for EntityCfg {
+    fn from(cfg: MjcfCfg) -> Self {
+        Self::Mjcf(Box::new(cfg))
     }
 }
 
@@ -108,6 +117,7 @@ pub(super) fn short_name<T>() -> &'static str {
 pub(super) enum Handle {
     Robot(RobotId),
     RigidObject(ObjectId),
+    Mjcf(MjcfId),
     Sensor(SensorHandle),
 }
 
@@ -119,6 +129,7 @@ impl Handle {
             EntityCfg::RigidObject(cfg) => {
                 sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::RigidObject)
             }
+            EntityCfg::Mjcf(cfg) => sim.add_mjcf(MjcfCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Mjcf),
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
         }
     }
@@ -128,6 +139,7 @@ impl Handle {
         let found = match self {
             Self::Robot(_) => "robot".into(),
             Self::RigidObject(_) => "rigid object".into(),
+            Self::Mjcf(_) => "MJCF part".into(),
             Self::Sensor(handle) => format!("sensor of type {}", handle.type_name),
         };
         Error::EntityType { name: name.into(), found, wanted }

@@ -89,7 +89,7 @@ impl SceneCfg {
 
 /// Whether a field of an entity is its name, which files give as the key of its table.
 fn has_name(entity: &EntityCfg, field: &str) -> bool {
-    field == "uid" && matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_))
+    field == "uid" && matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_) | EntityCfg::Mjcf(_))
 }
 
 /// One file that is being read.
@@ -180,6 +180,10 @@ impl<'a> Reader<'a> {
                 }
             }
             EntityCfg::RigidObject(object) => object.uid = uid,
+            EntityCfg::Mjcf(part) => {
+                part.uid = uid;
+                part.place_beside(|path| self.beside(path));
+            }
             EntityCfg::Sensor(_) => {}
         }
     }

@@ -1,9 +1,13 @@
 //! The kinds of entities that a scene file can name: one line each.
 
 use super::entity::{EntityCfg, SensorEntity};
+use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
-use sensors::{CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, RayCasterCfg};
+use sensors::{
+    CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
+    RayCasterCfg,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
 use std::any::Any;
@@ -34,11 +38,12 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, rigid objects and the built-in sensors, but for ray-caster cameras.
+    /// Robots, rigid objects, MJCF files and the built-in sensors, but for ray-caster cameras.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
             .with::<RigidObjectCfg>("rigid_object")
+            .with::<MjcfCfg>("mjcf")
             .with_sensor::<CameraCfg>("camera")
             .with_sensor::<RayCasterCfg>("ray_caster")
             .with_sensor::<ContactSensorCfg>("contact_sensor")
@@ -46,6 +51,7 @@ impl Default for EntityTypes {
             .with_sensor::<FrameTransformerCfg>("frame_transformer")
             .with_sensor::<JointStateCfg>("joint_state")
             .with_sensor::<JointWrenchCfg>("joint_wrench")
+            .with_sensor::<MujocoSensorCfg>("mujoco_sensor")
     }
 }
 
@@ -106,6 +112,14 @@ impl Kind for RigidObjectCfg {
 
     fn of(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::RigidObject(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for MjcfCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Mjcf(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
