@@ -52,6 +52,10 @@ fn sites_are_where_mujoco_has_them() {
                 for k in 0..3 {
                     assert!((at[(env, k)] - position[k]).abs() < 1e-12, "the camera stands on the site");
                 }
+                // Without a placement of its own it looks along the site's z axis.
+                let axes = sim.sensor(camera).unwrap().pose_w(CameraConvention::Ros);
+                let axes = from_row(&std::array::from_fn(|k| axes[(env, k)])).rotation.to_rotation_matrix();
+                assert!((axes.into_inner() - rotation).norm() < 1e-12, "and is turned as the site");
                 let handle = sim.mjcf_part(part).site_pose("palm").unwrap();
                 assert!((0..3).all(|k| (handle[(env, k)] - position[k]).abs() < 1e-12));
             }

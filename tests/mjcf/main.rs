@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod carry_over;
+mod dump;
 mod frames;
 mod handle;
+mod meshes;
 mod mujoco_sensors;
 mod refused;
 mod samples;

@@ -2,7 +2,7 @@
 
 use super::{empty, machine};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::{DiagnosticKind, mj};
 
 fn refused(cfg: MjcfCfg) -> String {
     let mut sim = empty(1);
@@ -63,6 +63,36 @@ fn names_are_unique_in_the_scene() {
     assert!(matches!(sim.add_rigid_object(object).unwrap_err(), Error::DuplicateUid(_)));
     let error = sim.mjcf_id("n").unwrap_err().to_string();
     assert!(error.contains("known are \"m\""), "{error}");
+}
+
+/// What only 4.x has and nobody writes back is refused by name, never left out.
+#[test]
+fn what_cannot_be_written_back_is_refused() {
+    let part = |inside: &str, after: &str| {
+        let text = format!(
+            "<mujoco><worldbody><body name=\"b\"><joint name=\"j\" {inside}/><geom name=\"g\" size=\"1\"/><site name=\"s\"/></body>\
+             </worldbody>{after}</mujoco>"
+        );
+        let mut sim = empty(1);
+        sim.add_mjcf(MjcfCfg::text("part", text)).map(|_| ())
+    };
+    part("stiffness=\"1\"", "").unwrap();
+    let own = "<sensor><user name=\"u\" objtype=\"site\" objname=\"s\" datatype=\"real\" needstage=\"pos\" dim=\"1\"/></sensor>";
+    let mut cases = vec![("", own, ["sensor \"u\"", "user"])];
+    if mj::TARGET == mj::Target::V4 {
+        let delayed = "<actuator><motor name=\"a\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/></actuator>";
+        let contact = "<sensor><contact name=\"c\" geom1=\"g\"/></sensor>";
+        cases.push(("stiffness=\"1 2 3\"", "", ["joint \"j\"", "stiffness of higher order"]));
+        cases.push(("damping=\"1 -2 0\"", "", ["joint \"j\"", "damping of higher order"]));
+        cases.push(("", delayed, ["actuator \"a\"", "delay"]));
+        cases.push(("", contact, ["sensor \"c\"", "contact"]));
+    }
+    for (inside, after, parts) in cases {
+        let error = part(inside, after).unwrap_err();
+        assert!(matches!(error, Error::MjcfPart { .. }), "{error}");
+        let text = error.to_string();
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+    }
 }
 
 /// Settings of the whole model are the scene's: each that differs is said, with both values and where it was stated.

@@ -56,8 +56,8 @@ impl Model {
             ("sensor", array!(sensor_interval), self.nsensor(), "interval"),
         ];
         for (element, values, count, what) in numbers {
-            // Some of these are infinite or -1 where they are not used.
-            if let Some(at) = values.iter().position(|x| *x > 0.0 && x.is_finite()) {
+            // Infinite yields are none.
+            if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
                 return Some(Beyond { element, index: at / (values.len() / count.max(1)).max(1), what });
             }
         }

@@ -213,6 +213,30 @@ pub fn sensor(code: i32) -> Option<SensorWord> {
     })
 }
 
+/// MJCF's word for a type of sensor that [`sensor`] does not give.
+pub fn other_sensor(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjSENS_USER, "user"),
+        #[cfg(mj4)]
+        (mj::mjSENS_CAMPROJECTION, "camprojection"),
+        #[cfg(mj4)]
+        (mj::mjSENS_INSIDESITE, "insidesite"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMDIST, "distance"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMNORMAL, "normal"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMFROMTO, "fromto"),
+        #[cfg(mj4)]
+        (mj::mjSENS_CONTACT, "contact"),
+        #[cfg(mj4)]
+        (mj::mjSENS_TACTILE, "tactile"),
+        #[cfg(mj4)]
+        (mj::mjSENS_PLUGIN, "plugin"),
+    ];
+    word(&list, code)
+}
+
 /// Whether a sensor's value is of what MuJoCo solves for a step (`mjSTAGE_ACC`), not of positions and velocities.
 pub fn is_solved(stage: i32) -> bool {
     stage == mj::mjSTAGE_ACC as i32

@@ -11,8 +11,11 @@ impl Writing<'_> {
 
     fn sensor(&self, s: usize) -> Result<String, PartError> {
         let m = self.model;
-        let word = words::sensor(m.sensor_type()[s])
-            .ok_or_else(|| self.beyond("sensor", s, format!("the type {}", m.sensor_type()[s])))?;
+        let code = m.sensor_type()[s];
+        let word = words::sensor(code).ok_or_else(|| {
+            let word = words::other_sensor(code).map_or_else(|| code.to_string(), String::from);
+            self.beyond("sensor", s, format!("the type {word}"))
+        })?;
         let id = some(m.sensor_objid()[s]).unwrap_or(0);
         let of_the_world = match word.word {
             "subtreecom" | "subtreelinvel" | "subtreeangmom" => id == 0,
