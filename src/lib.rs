@@ -20,12 +20,12 @@ pub mod prelude {
     };
     pub use sensors::{
         ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu, ImuCfg, JointState, JointStateCfg,
-        JointWrench, JointWrenchCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
+        JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error,
-        GroundCfg, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId, NameCase, NameCaseCfg, ObjectId,
-        ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager,
-        SimulationManagerCfg, Still, TerrainCfg, TerrainId, UrdfCfg,
+        ActuatorIndex, BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes,
+        EnvId, Error, GroundCfg, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId, MjcfCfg, MjcfId, NameCase,
+        NameCaseCfg, ObjectId, ObjectShape, PerJoint, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId,
+        SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId, UrdfCfg,
     };
 }

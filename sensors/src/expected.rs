@@ -14,6 +14,7 @@ pub struct Expected {
     bodies: usize,
     joints: usize,
     instances: usize,
+    engine_values: usize,
 }
 
 impl Expected {
@@ -21,7 +22,8 @@ impl Expected {
     pub fn new(sensor: &'static str, requires: Requires, context: &SensorContext) -> Self {
         let (num_envs, bodies, joints) = (context.num_envs, context.bodies.len(), context.joints.len());
         let instances = context.scene.as_ref().map_or(0, |scene| scene.instances().len());
-        Self { sensor, requires, num_envs, bodies, joints, instances }
+        let engine_values = context.engine_sensors.iter().map(|s| s.first + s.width).max().unwrap_or(0);
+        Self { sensor, requires, num_envs, bodies, joints, instances, engine_values }
     }
 
     /// Number of environments.
@@ -62,6 +64,8 @@ impl Expected {
         ] {
             self.rows(field, array.as_ref().map(Array2::shape), "joints", self.joints)?;
         }
+        let sensordata = state.sensordata.as_ref().map(Array2::shape);
+        self.rows(Requires::SENSORDATA, sensordata, "values of the engine's sensors", self.engine_values)?;
         self.rows(Requires::INSTANCES, state.instance_poses.as_ref().map(Array2::shape), "instances", self.instances)
     }
 

@@ -95,6 +95,8 @@ pub struct SensorContext {
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
+    /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
+    pub engine_sensors: Arc<[EngineSensor]>,
     /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
     /// What ray casters have built for the assets of the scene, shared by all of them.
@@ -145,6 +147,26 @@ fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
     }
     found.dedup();
     found.into_iter().take(MAX_CANDIDATES).cloned().collect()
+}
+
+/// A sensor that the physics engine evaluates itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EngineSensor {
+    /// `uid/sensor`.
+    pub name: String,
+    /// The engine's word for its type.
+    pub kind: Arc<str>,
+    /// Unit of its values; `None` where nobody knows.
+    pub unit: Option<Arc<str>>,
+    /// Its first value in [`SceneState::sensordata`].
+    pub first: usize,
+    /// Number of its values.
+    pub width: usize,
+    /// Whether it measures what the engine solves for (accelerations, forces), at [`SceneState::force_time`]; else it measures
+    /// positions and velocities, at [`SceneState::time`].
+    pub solved: bool,
+    /// Whether its values are a quaternion, w x y z.
+    pub quaternion: bool,
 }
 
 /// What a sensor needs of a [`SceneState`]: a set of fields.

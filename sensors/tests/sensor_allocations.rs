@@ -1,11 +1,11 @@
 //! Sensors of numbers allocate nothing after they were built.
 
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use scene::SceneState;
 use scene::state::{Contact, Contacts};
 use sensors::{
-    ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointWrenchCfg, SamplingCfg, Sensor, SensorCfg, SensorContext,
-    TargetFrameCfg,
+    ContactSensorCfg, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, SamplingCfg, Sensor,
+    SensorCfg, SensorContext, TargetFrameCfg,
 };
 
 fn state() -> SceneState {
@@ -25,6 +25,7 @@ fn state() -> SceneState {
         force_velocities: rows(6),
         body_accelerations: rows(6),
         joint_wrenches: rows(6),
+        sensordata: Some(Array2::from_elem((2, 3), 0.5)),
         ..SceneState::new(2)
     }
 }
@@ -32,7 +33,9 @@ fn state() -> SceneState {
 #[test]
 fn no_sensor_allocates_when_it_measures() {
     let bodies = ["a", "b", "c"].map(String::from);
-    let context = SensorContext { num_envs: 2, dt: 0.01, bodies: bodies.into(), ..SensorContext::default() };
+    let engine_sensors = [EngineSensor { name: "a/own".into(), width: 3, ..EngineSensor::default() }].into();
+    let context =
+        SensorContext { num_envs: 2, dt: 0.01, bodies: bodies.into(), engine_sensors, ..SensorContext::default() };
     let sampling = SamplingCfg { history_length: 3, latency_steps: 4, ..SamplingCfg::every(0.02) };
     let contact = ContactSensorCfg {
         filters: vec!["ground".into(), ".*".into()],
@@ -48,11 +51,13 @@ fn no_sensor_allocates_when_it_measures() {
         sampling: sampling.clone(),
         ..FrameTransformerCfg::from("a", vec![TargetFrameCfg::of(".*")])
     };
-    let wrench = JointWrenchCfg { links: vec!["[ab]".into()], frames: vec!["c".into()], sampling };
+    let wrench = JointWrenchCfg { links: vec!["[ab]".into()], frames: vec!["c".into()], sampling: sampling.clone() };
+    let own = MujocoSensorCfg { sensors: Some(vec!["own".into()]), sampling };
     let mut sensors: Vec<Box<dyn Sensor>> = vec![
         Box::new(contact.build(&context).expect("good")),
         Box::new(imu.build(&context).expect("good")),
         Box::new(frames.build(&context).expect("good")),
+        Box::new(own.build(&context).expect("good")),
         // For this one, the third body is fused to the second.
         Box::new(wrench.build(&SensorContext { carriers: [0, 1, 1].into(), ..context }).expect("good")),
     ];

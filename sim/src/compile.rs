@@ -13,6 +13,7 @@ use crate::mj::{self, ObjectKind};
 use crate::mjcf::document::Mjcf;
 use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
+use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use ::scene::Pose;
@@ -25,6 +26,7 @@ pub(crate) struct Simulation {
     pub(crate) batch: Batch,
     pub(crate) robots: Vec<RobotIndex>,
     pub(crate) objects: Vec<FreeIndex>,
+    pub(crate) parts: Vec<PartIndex>,
     pub(crate) identities: Identities,
     /// Where sensors find bodies and contacts.
     pub(crate) plan: Arc<Plan>,
@@ -76,6 +78,29 @@ pub(crate) struct JointIndexing {
     pub dof: usize,
     /// Index in the drive table.
     pub drive: Option<usize>,
+}
+
+/// Where the numbers of a part that was an MJCF file are in MuJoCo's arrays.
+#[derive(Clone, Debug)]
+pub(crate) struct PartIndex {
+    /// Each of the file's bodies; the first is the one that what stands in the file's world belongs to.
+    pub bodies: Vec<usize>,
+    /// Each of the file's geoms.
+    pub geoms: Vec<usize>,
+    /// Each position of the file.
+    pub qpos: Vec<usize>,
+    /// Each degree of freedom of the file.
+    pub dofs: Vec<usize>,
+    /// Each actuator of the file.
+    pub actuators: Vec<usize>,
+    /// The control of each actuator of the file.
+    pub controls: Vec<usize>,
+    /// Each activation of the file's actuators.
+    pub activations: Vec<usize>,
+    /// Bodies of the file that are moved by hand.
+    pub mocaps: Vec<usize>,
+    /// Bodies and sites as sensors see them.
+    pub frames: Vec<(usize, Pose)>,
 }
 
 /// The initial state, as far as it differs from the model's `qpos0`.
@@ -146,6 +171,7 @@ pub(crate) fn document(
     for (index, terrain) in contents.terrains.iter().enumerate() {
         scene::add_terrain(&mut mjcf, index, terrain);
     }
+    mjcf.parts.extend(contents.parts.iter().map(|part| Arc::clone(part.document())));
     for pair in excluded {
         if !mjcf.excludes.contains(pair) {
             mjcf.excludes.push(pair.clone());
@@ -159,6 +185,7 @@ struct Built {
     table: Arc<DriveTable>,
     robots: Vec<RobotIndex>,
     objects: Vec<FreeIndex>,
+    parts: Vec<PartIndex>,
     identities: Identities,
     plan: Arc<Plan>,
     start: Arc<Start>,
@@ -176,6 +203,7 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
         .iter()
         .enumerate()
         .map(|(index, terrain)| mj::Asset { name: scene::terrain_file(index), bytes: terrain.file() })
+        .chain(contents.parts.iter().flat_map(|part| part.files().iter().cloned()))
         .collect();
     let compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
@@ -183,10 +211,11 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     })?;
     let objects = find_objects(&compiled, contents)?;
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
-    let identities = identify(&model, contents, &robots, &objects);
-    let plan = Arc::new(Plan::new(&model, &robots, &objects, &contents.carriers()));
+    let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
+    let identities = identify(&model, contents, &robots, &objects, &parts);
+    let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    Ok(Built { model, table, robots, objects, identities, plan, start, xml: text.xml, diagnostics })
+    Ok(Built { model, table, robots, objects, parts, identities, plan, start, xml: text.xml, diagnostics })
 }
 
 /// Threads for those who do not say how many.
@@ -207,8 +236,55 @@ fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<Free
     contents.objects.iter().map(|object| find(object)).collect()
 }
 
+/// Finds everything of a part in the compiled model, by its names.
+fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
+    let (file, names) = (part.model(), part.names());
+    let find = |kind, what, name: &str| model.id(kind, name).ok_or_else(|| missing(what, name));
+    let all = |kind, what, names: &[String]| -> Result<Vec<usize>> {
+        names.iter().map(|name| find(kind, what, &part.full(name))).collect()
+    };
+    let mut bodies = vec![find(ObjectKind::Body, "body", part.uid())?];
+    bodies.extend(all(ObjectKind::Body, "body", &names.bodies[1..])?);
+    let actuators = all(ObjectKind::Actuator, "actuator", &names.actuators)?;
+    let (mut qpos, mut dofs) = (Vec::new(), Vec::new());
+    // In the file's own order: joint by joint, as their numbers stand there.
+    for (joint, here) in all(ObjectKind::Joint, "joint", &names.joints)?.into_iter().enumerate() {
+        let (nq, nv) = joint_widths(file.jnt_type()[joint]);
+        qpos.extend((0..nq).map(|k| model.jnt_qposadr()[here] as usize + k));
+        dofs.extend((0..nv).map(|k| model.jnt_dofadr()[here] as usize + k));
+    }
+    let frames = part.frames().iter().map(|frame| (bodies[frame.body], frame.body_from_frame)).collect();
+    let mocaps = (0..file.nbody()).filter(|&body| file.body_mocapid()[body] >= 0).map(|body| bodies[body]).collect();
+    Ok(PartIndex {
+        geoms: all(ObjectKind::Geom, "geom", &names.geoms)?,
+        qpos,
+        dofs,
+        controls: actuators.iter().map(|&actuator| model.actuator_control(actuator)).collect(),
+        activations: actuators.iter().flat_map(|&actuator| model.actuator_activation(actuator)).collect(),
+        actuators,
+        mocaps,
+        frames,
+        bodies,
+    })
+}
+
+/// How many positions and degrees of freedom a joint of a type has.
+fn joint_widths(kind: i32) -> (usize, usize) {
+    match kind as u32 {
+        mj::mjJNT_FREE => (7, 6),
+        mj::mjJNT_BALL => (4, 3),
+        _ => (1, 1),
+    }
+}
+
 /// Who every geom belongs to.
-fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objects: &[FreeIndex]) -> Identities {
+fn identify(
+    model: &mj::Model,
+    contents: &Contents,
+    robots: &[RobotIndex],
+    objects: &[FreeIndex],
+    parts: &[PartIndex],
+) -> Identities {
     let ground =
         || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
     let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
@@ -232,6 +308,21 @@ fn identify(model: &mj::Model, contents: &Contents, robots: &[RobotIndex], objec
             let class = object.cfg().semantic_class.clone().unwrap_or_else(|| "object".into());
             owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class, body };
         }
+    }
+    first += objects.len();
+    for (data, index) in contents.parts.iter().zip(parts) {
+        for (geom, &here) in index.geoms.iter().enumerate() {
+            let of = data.model().geom_bodyid()[geom] as usize;
+            owners[here] = Owner {
+                id: data.mask_id(of),
+                object: data.uid().into(),
+                link: (of > 0).then(|| data.names().bodies[of].clone()),
+                class: data.cfg().semantic_class.clone().unwrap_or_else(|| "mjcf".into()),
+                // Frames begin with the bodies but the world.
+                body: of.checked_sub(1).map(|frame| (first + frame) as u32),
+            };
+        }
+        first += index.frames.len();
     }
     for terrain in &contents.terrains {
         if let Some(geom) = model.id(ObjectKind::Geom, terrain.uid()) {
@@ -334,6 +425,7 @@ impl Built {
             batch,
             robots: self.robots,
             objects: self.objects,
+            parts: self.parts,
             identities: self.identities,
             plan: self.plan,
             visible: None,
@@ -416,11 +508,7 @@ impl Simulation {
             else {
                 continue;
             };
-            let (nq, nv) = match old_model.jnt_type()[joint] as u32 {
-                mj::mjJNT_FREE => (7, 6),
-                mj::mjJNT_BALL => (4, 3),
-                _ => (1, 1),
-            };
+            let (nq, nv) = joint_widths(old_model.jnt_type()[joint]);
             let at = |m: &mj::Model, j: usize| (m.jnt_qposadr()[j] as usize, m.jnt_dofadr()[j] as usize);
             let ((from_q, from_v), (to_q, to_v)) = (at(old_model, joint), at(model, new));
             qpos.extend((0..nq).map(|k| (from_q + k, to_q + k)));
@@ -433,7 +521,9 @@ impl Simulation {
             .flat_map(|(old, new)| old.joints.iter().zip(&new.joints))
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
+        let parts = PartTransfer::new(old, self);
         for i in 0..self.batch.num_envs() {
+            let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
                 old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
             self.batch.write(i, |env| {
@@ -451,10 +541,63 @@ impl Simulation {
                         data.qvel_mut()[to] = state.qvel[from];
                         data.qacc_warmstart_mut()[to] = state.warmstart[from];
                     }
+                    parts.write(&part_state, data);
                     data.set_time(time);
                 });
                 env.take_history(&history);
             });
+        }
+    }
+}
+
+/// What parts that were MJCF files have beside joints, from an old simulation to a new one: pairs of places.
+struct PartTransfer {
+    controls: Vec<(usize, usize)>,
+    activations: Vec<(usize, usize)>,
+    mocaps: Vec<(usize, usize)>,
+}
+
+/// The values of a [`PartTransfer`] in one environment.
+struct PartState {
+    controls: Vec<f64>,
+    activations: Vec<f64>,
+    mocaps: Vec<([f64; 3], [f64; 4])>,
+}
+
+impl PartTransfer {
+    fn new(old: &Simulation, new: &Simulation) -> Self {
+        let pairs = |of: fn(&PartIndex) -> &Vec<usize>| {
+            let parts = old.parts.iter().zip(&new.parts);
+            parts.flat_map(|(old, new)| of(old).iter().copied().zip(of(new).iter().copied())).collect::<Vec<_>>()
+        };
+        let number = |model: &mj::Model, body: usize| usize::try_from(model.body_mocapid()[body]).unwrap_or(0);
+        let mocaps = pairs(|part| &part.mocaps).into_iter();
+        Self {
+            controls: pairs(|part| &part.controls),
+            activations: pairs(|part| &part.activations),
+            mocaps: mocaps.map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to))).collect(),
+        }
+    }
+
+    fn read(&self, data: &mj::Data) -> PartState {
+        let mocap = |k: usize| (data.mocap_pos().as_chunks::<3>().0[k], data.mocap_quat().as_chunks::<4>().0[k]);
+        PartState {
+            controls: self.controls.iter().map(|&(from, _)| data.ctrl()[from]).collect(),
+            activations: self.activations.iter().map(|&(from, _)| data.act()[from]).collect(),
+            mocaps: self.mocaps.iter().map(|&(from, _)| mocap(from)).collect(),
+        }
+    }
+
+    fn write(&self, state: &PartState, data: &mut mj::Data) {
+        for (&(_, to), value) in self.controls.iter().zip(&state.controls) {
+            data.ctrl_mut()[to] = *value;
+        }
+        for (&(_, to), value) in self.activations.iter().zip(&state.activations) {
+            data.act_mut()[to] = *value;
+        }
+        for (&(_, to), (position, quaternion)) in self.mocaps.iter().zip(&state.mocaps) {
+            data.mocap_pos_mut().as_chunks_mut::<3>().0[to] = *position;
+            data.mocap_quat_mut().as_chunks_mut::<4>().0[to] = *quaternion;
         }
     }
 }

@@ -44,6 +44,8 @@ pub enum DiagnosticKind {
     AxisNormalized,
     /// A colour was outside 0..1 and was clamped.
     ColorClamped,
+    /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
+    SettingIgnored,
 }
 
 impl DiagnosticKind {
@@ -68,6 +70,7 @@ impl DiagnosticKind {
             Self::MimicPositionIgnored => "mimic-position-ignored",
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",
+            Self::SettingIgnored => "setting-ignored",
         }
     }
 }

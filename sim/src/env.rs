@@ -123,6 +123,12 @@ impl Env {
         self.refresh(&good);
     }
 
+    /// Sets controls, which are no state: what was computed of the state stays right.
+    pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
+        change(self.data.ctrl_mut());
+        self.seldom.inputs.save(&self.data);
+    }
+
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.data.reset();

@@ -3,6 +3,7 @@
 use crate::batch::BatchError;
 use crate::drive::plan::PlanError;
 use crate::mj::{CompileError, EngineError, LoadError, VersionError};
+use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::pattern::PatternError;
 use crate::source::Source;
@@ -76,6 +77,37 @@ pub enum Error {
     /// MuJoCo refuses the model.
     #[error(transparent)]
     Compile(#[from] CompileError),
+    /// MuJoCo refuses an MJCF file; its words name element and line.
+    #[error("part {part:?}: {file}: {error}")]
+    MjcfFile {
+        /// The part.
+        part: String,
+        /// The file.
+        file: String,
+        /// What is wrong.
+        #[source]
+        error: Box<CompileError>,
+    },
+    /// Something of an MJCF file cannot be in a scene.
+    #[error("part {part:?}: {file}: {error}")]
+    MjcfPart {
+        /// The part.
+        part: String,
+        /// The file.
+        file: String,
+        /// What it is.
+        #[source]
+        error: Box<PartError>,
+    },
+    /// Patterns of names of a part match nothing, or are none.
+    #[error("part {part:?}: {error}")]
+    MjcfNames {
+        /// The part.
+        part: String,
+        /// What is wrong.
+        #[source]
+        error: Box<PatternError>,
+    },
     /// The MuJoCo library is not of the version of the headers.
     #[error(transparent)]
     MujocoVersion(#[from] VersionError),

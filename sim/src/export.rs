@@ -41,6 +41,10 @@ pub(crate) fn dump(
         let path = dir.join(world::terrain_file(index));
         std::fs::write(&path, terrain.file()).map_err(at(&path))?;
     }
+    for file in contents.parts.iter().flat_map(|part| part.files()) {
+        let path = dir.join(&file.name);
+        std::fs::write(&path, &file.bytes).map_err(at(&path))?;
+    }
 
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
     let mut left_out = Vec::new();

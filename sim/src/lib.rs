@@ -38,8 +38,11 @@ pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};
 pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
-pub use manager::{EnvId, GroundCfg, LightCfg, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
+pub use manager::{
+    EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
+};
 pub use mjcf::document::{Cone, Integrator};
+pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::shape::ObjectShape;

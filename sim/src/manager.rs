@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
+use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
@@ -236,6 +237,13 @@ pub struct ObjectId {
     index: usize,
 }
 
+/// Handle of an MJCF file that is a part of the scene; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MjcfId {
+    manager: u64,
+    index: usize,
+}
+
 /// Handle of a terrain; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TerrainId {
@@ -352,6 +360,28 @@ impl SimulationManager {
         Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
     }
 
+    /// Adds an MJCF file to every environment, compiled as [`add_robot`](Self::add_robot) does: its bodies, joints, contacts,
+    /// couplings, tendons, actuators and sensors, every name with `uid/` before it. Its bodies and named sites are frames that
+    /// cameras and sensors can be attached to. Its geoms collide by the bits that the file gives them; the ground, objects and
+    /// robots collide with every geom whose `contype` is not 0.
+    ///
+    /// Settings of the file for its whole model, keyframes and skins are not taken over:
+    /// [`diagnostics`](Self::diagnostics) names each.
+    ///
+    /// # Errors
+    /// The name is taken, MuJoCo refuses the file (with its words, which name element and line), or the file has something
+    /// that a part cannot have, such as flexible bodies and plugins of 4.x.
+    pub fn add_mjcf(&mut self, cfg: MjcfCfg) -> Result<MjcfId> {
+        self.check_world_uid(&cfg.uid)?;
+        let mut diagnostics = Vec::new();
+        let (index, scene) = (self.contents.parts.len(), self.simulation.batch.model());
+        let part = MjcfData::load(cfg, index, self.contents.next_mask_id(), scene, &mut diagnostics)?;
+        let mut contents = self.contents.clone();
+        contents.parts.push(Arc::new(part));
+        self.replace_contents(contents, diagnostics)?;
+        Ok(MjcfId { manager: self.serial, index })
+    }
+
     /// Checks that nothing in the world is called `uid` yet.
     fn check_world_uid(&self, uid: &str) -> Result<()> {
         self.contents.check_uid(uid)?;
@@ -433,6 +463,7 @@ impl SimulationManager {
             bodies: self.contents.body_names(),
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),
+            engine_sensors: self.contents.engine_sensors(),
             scene,
             ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
@@ -494,6 +525,26 @@ impl SimulationManager {
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
     }
 
+    /// An MJCF file that is a part of the scene, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn mjcf_part(&self, id: MjcfId) -> MjcfPart<'_> {
+        let index = self.index_of(id.manager, id.index);
+        MjcfPart::new(&self.contents.parts[index], &self.simulation, index)
+    }
+
+    /// An MJCF file that is a part of the scene, to command and to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn mjcf_part_mut(&mut self, id: MjcfId) -> MjcfPartMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        MjcfPartMut::new(&self.contents.parts[index], &mut self.simulation, &mut self.sensors, index)
+    }
+
     /// A terrain.
     ///
     /// # Panics
@@ -532,6 +583,19 @@ impl SimulationManager {
             what: "rigid object",
             name: uid.into(),
             candidates: self.contents.objects.iter().map(|o| o.uid().to_string()).collect(),
+        })
+    }
+
+    /// The MJCF file that is a part called `uid`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn mjcf_id(&self, uid: &str) -> Result<MjcfId> {
+        let index = self.contents.parts.iter().position(|p| p.uid() == uid);
+        index.map(|index| MjcfId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
+            what: "MJCF part",
+            name: uid.into(),
+            candidates: self.contents.parts.iter().map(|p| p.uid().to_string()).collect(),
         })
     }
 

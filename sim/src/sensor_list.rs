@@ -232,7 +232,9 @@ fn capture(simulation: &Simulation, requires: Requires) -> Option<Capture> {
 
 /// Solves and captures the present state of `envs`, where somebody requires what is solved.
 fn solve(simulation: &mut Simulation, requires: Requires, envs: &[usize]) {
-    if let Some(capture) = capture(simulation, requires) {
-        simulation.batch.capture_present(envs, capture);
+    let fields = requires.intersection(Requires::SOLVED);
+    // MuJoCo's own sensors of what is solved are evaluated where it is solved.
+    if !fields.is_empty() || requires.contains(Requires::SENSORDATA) {
+        simulation.batch.capture_present(envs, Capture { plan: Arc::clone(&simulation.plan), fields });
     }
 }

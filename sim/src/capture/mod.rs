@@ -7,7 +7,7 @@
 mod contacts;
 mod motion;
 
-use crate::compile::{FreeIndex, RobotIndex};
+use crate::compile::{FreeIndex, PartIndex, RobotIndex};
 use crate::mj::{Data, EngineError, Model};
 use ::scene::Pose;
 use ::scene::state::Contact;
@@ -52,10 +52,18 @@ pub(crate) struct Solved {
 
 impl Plan {
     /// The plan of a compiled scene; `carriers` is as in [`sensors::SensorContext`].
-    pub(crate) fn new(model: &Model, robots: &[RobotIndex], objects: &[FreeIndex], carriers: &[usize]) -> Self {
+    pub(crate) fn new(
+        model: &Model,
+        robots: &[RobotIndex],
+        objects: &[FreeIndex],
+        parts: &[PartIndex],
+        carriers: &[usize],
+    ) -> Self {
         let links = robots.iter().flat_map(|robot| robot.links.iter().copied());
-        let bodies: Vec<(usize, Pose)> =
-            links.chain(objects.iter().map(|object| (object.body, Pose::identity()))).collect();
+        let bodies: Vec<(usize, Pose)> = links
+            .chain(objects.iter().map(|object| (object.body, Pose::identity())))
+            .chain(parts.iter().flat_map(|part| part.frames.iter().copied()))
+            .collect();
         let mut owners = vec![None; model.ngeom()];
         let mut first = 0;
         for robot in robots {
@@ -68,6 +76,16 @@ impl Plan {
             if let Some(k) = objects.iter().position(|object| object.body == body as usize) {
                 owners[geom] = Some((first + k) as u32);
             }
+        }
+        first += objects.len();
+        for part in parts {
+            for &geom in &part.geoms {
+                let body = model.geom_bodyid()[geom] as usize;
+                // The first body is the file's world, which is part of the world; frame k is body k + 1.
+                let frame = part.bodies[1..].iter().position(|other| *other == body);
+                owners[geom] = frame.map(|frame| (first + frame) as u32);
+            }
+            first += part.frames.len();
         }
         let carries = carriers.iter().enumerate().map(|(body, &carrier)| body == carrier).collect();
         Self { owners, bodies, carries }

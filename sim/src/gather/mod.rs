@@ -16,11 +16,13 @@ pub(crate) const AVAILABLE: Requires = Requires::POSES
     .union(Requires::VELOCITIES)
     .union(Requires::JOINT_STATE)
     .union(Requires::JOINT_EFFORTS)
+    .union(Requires::SENSORDATA)
     .union(Requires::VISIBLE)
     .union(Requires::INSTANCES)
     .union(Requires::SOLVED);
 
-/// A state with room for what `requires` names. The body axis has the links of all robots, then objects; the joint axis the
+/// A state with room for what `requires` names. The body axis has the links of all robots, then objects, then frames of
+/// parts; the joint axis the
 /// movable joints of all robots.
 pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneState {
     let n = simulation.batch.num_envs();
@@ -40,6 +42,9 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
         joint_positions: per_joint(Requires::JOINT_STATE),
         joint_velocities: per_joint(Requires::JOINT_STATE),
         joint_efforts: per_joint(Requires::JOINT_EFFORTS),
+        sensordata: requires
+            .contains(Requires::SENSORDATA)
+            .then(|| Array2::zeros((n, simulation.batch.model().nsensordata()))),
         contacts: requires.contains(Requires::CONTACTS).then(|| Contacts { first: vec![0; n + 1], list: Vec::new() }),
         visible: visible.map(|visible| VisibleState {
             instance_poses: Array2::from_elem((n, visible.scene().instances().len()), PoseF32::IDENTITY),
@@ -94,6 +99,12 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
         if wants(Requires::JOINT_EFFORTS) {
             let effort = |drive| env.drives.effort[drive];
             joints::fill(&mut state.joint_efforts, i, robots, |joint| joint.drive.map_or(0.0, effort));
+        }
+        if wants(Requires::SENSORDATA)
+            && let Some(mut row) = state.sensordata.as_mut().map(|values| values.row_mut(i))
+        {
+            // After a step, values of what was solved are still those of the step (see `capture`).
+            row.iter_mut().zip(env.data().sensordata()).for_each(|(to, from)| *to = *from);
         }
         if wants(Requires::CONTACTS) {
             solved::contacts(env.solved(), i, &mut state.contacts);

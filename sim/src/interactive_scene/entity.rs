@@ -1,7 +1,8 @@
-//! What a scene can hold: robots, rigid objects, terrain, and sensors of any crate.
+//! What a scene can hold: robots, rigid objects, terrain, MJCF files, and sensors of any crate.
 
 use crate::error::{Error, Result};
-use crate::manager::{ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
@@ -20,6 +21,8 @@ pub enum EntityCfg {
     RigidObject(Box<RigidObjectCfg>),
     /// A terrain. Its uid is the name of the entity.
     Terrain(Box<TerrainCfg>),
+    /// An MJCF file. Its uid is the name of the entity.
+    Mjcf(Box<MjcfCfg>),
     /// A sensor of any kind.
     Sensor(Box<dyn SensorEntity>),
 }
@@ -39,6 +42,12 @@ impl From<RigidObjectCfg> for EntityCfg {
 impl From<TerrainCfg> for EntityCfg {
     fn from(cfg: TerrainCfg) -> Self {
         Self::Terrain(Box::new(cfg))
+    }
+}
+
+impl From<MjcfCfg> for EntityCfg {
+    fn from(cfg: MjcfCfg) -> Self {
+        Self::Mjcf(Box::new(cfg))
     }
 }
 
@@ -118,6 +127,7 @@ pub(super) enum Handle {
     Robot(RobotId),
     RigidObject(ObjectId),
     Terrain(TerrainId),
+    Mjcf(MjcfId),
     Sensor(SensorHandle),
 }
 
@@ -132,6 +142,7 @@ impl Handle {
             EntityCfg::Terrain(cfg) => {
                 sim.add_terrain(TerrainCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Terrain)
             }
+            EntityCfg::Mjcf(cfg) => sim.add_mjcf(MjcfCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Mjcf),
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
         }
     }
@@ -142,6 +153,7 @@ impl Handle {
             Self::Robot(_) => "robot".into(),
             Self::RigidObject(_) => "rigid object".into(),
             Self::Terrain(_) => "terrain".into(),
+            Self::Mjcf(_) => "MJCF part".into(),
             Self::Sensor(handle) => format!("sensor of type {}", handle.type_name),
         };
         Error::EntityType { name: name.into(), found, wanted }

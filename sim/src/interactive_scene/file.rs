@@ -89,7 +89,9 @@ impl SceneCfg {
 
 /// Whether a field of an entity is its name, which files give as the key of its table.
 fn has_name(entity: &EntityCfg, field: &str) -> bool {
-    field == "uid" && matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_) | EntityCfg::Terrain(_))
+    let named =
+        matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_) | EntityCfg::Terrain(_) | EntityCfg::Mjcf(_));
+    field == "uid" && named
 }
 
 /// One file that is being read.
@@ -181,6 +183,10 @@ impl<'a> Reader<'a> {
             }
             EntityCfg::RigidObject(object) => object.uid = uid,
             EntityCfg::Terrain(terrain) => terrain.uid = uid,
+            EntityCfg::Mjcf(part) => {
+                part.uid = uid;
+                part.place_beside(|path| self.beside(path));
+            }
             EntityCfg::Sensor(_) => {}
         }
     }

@@ -11,7 +11,8 @@ pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
+use crate::manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
+use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::terrain::Terrain;
@@ -229,6 +230,34 @@ impl InteractiveScene {
     /// As [`terrain_id`](Self::terrain_id).
     pub fn terrain(&self, name: &str) -> Result<&Terrain> {
         Ok(self.sim.terrain(self.terrain_id(name)?))
+    }
+
+    /// The handle of an MJCF file that is a part of the scene.
+    ///
+    /// # Errors
+    /// There is no such entity, or it is no MJCF file.
+    pub fn mjcf_id(&self, name: &str) -> Result<MjcfId> {
+        match self.find(name)? {
+            Handle::Mjcf(id) => Ok(*id),
+            other => Err(other.is_no(name, "MJCF part".into())),
+        }
+    }
+
+    /// An MJCF file that is a part of the scene, to read.
+    ///
+    /// # Errors
+    /// As [`mjcf_id`](Self::mjcf_id).
+    pub fn mjcf_part(&self, name: &str) -> Result<MjcfPart<'_>> {
+        Ok(self.sim.mjcf_part(self.mjcf_id(name)?))
+    }
+
+    /// An MJCF file that is a part of the scene, to command and to write.
+    ///
+    /// # Errors
+    /// As [`mjcf_id`](Self::mjcf_id).
+    pub fn mjcf_part_mut(&mut self, name: &str) -> Result<MjcfPartMut<'_>> {
+        let id = self.mjcf_id(name)?;
+        Ok(self.sim.mjcf_part_mut(id))
     }
 
     /// The handle of a sensor of type `S`, such as `Camera`.

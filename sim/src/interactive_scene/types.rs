@@ -1,12 +1,13 @@
 //! The kinds of entities that a scene file can name: one line each.
 
 use super::entity::{EntityCfg, SensorEntity};
+use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use sensors::{
-    CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, RayCasterCameraCfg,
-    RayCasterCfg,
+    CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
+    RayCasterCameraCfg, RayCasterCfg,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
@@ -38,12 +39,13 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, rigid objects, terrain and the built-in sensors.
+    /// Robots, rigid objects, terrain, MJCF files and the built-in sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
             .with::<RigidObjectCfg>("rigid_object")
             .with::<TerrainCfg>("terrain")
+            .with::<MjcfCfg>("mjcf")
             .with_sensor::<CameraCfg>("camera")
             .with_sensor::<RayCasterCfg>("ray_caster")
             .with_sensor::<RayCasterCameraCfg>("ray_caster_camera")
@@ -52,6 +54,7 @@ impl Default for EntityTypes {
             .with_sensor::<FrameTransformerCfg>("frame_transformer")
             .with_sensor::<JointStateCfg>("joint_state")
             .with_sensor::<JointWrenchCfg>("joint_wrench")
+            .with_sensor::<MujocoSensorCfg>("mujoco_sensor")
     }
 }
 
@@ -120,6 +123,14 @@ impl Kind for TerrainCfg {
 
     fn of(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Terrain(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for MjcfCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Mjcf(cfg) = entity { Some(cfg) } else { None }
     }
 }
 

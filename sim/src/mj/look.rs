@@ -1,6 +1,6 @@
 //! How a model looks: meshes, height fields, textures, materials, lights, cameras, the same for both MuJoCo lines.
 
-use super::arrays::Flag;
+use super::arrays::is_set;
 use super::model::Model;
 use mujoco_sys as mj;
 use mujoco_sys::fields::model as fields;
@@ -129,16 +129,6 @@ pub struct HeadlightValues {
     pub diffuse: [f32; 3],
     /// Colour of highlights.
     pub specular: [f32; 3],
-}
-
-/// A flag of either line.
-#[cfg(not(mj4))]
-fn is_set(flag: Flag) -> bool {
-    flag != 0
-}
-#[cfg(mj4)]
-fn is_set(flag: Flag) -> bool {
-    flag
 }
 
 /// The model's array `name`.

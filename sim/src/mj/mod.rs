@@ -12,6 +12,8 @@
 #![allow(unsafe_code, reason = "the wall to MuJoCo")]
 
 mod arrays;
+mod beyond;
+mod control;
 mod data;
 mod error;
 mod guard;
@@ -19,11 +21,14 @@ mod look;
 mod memory;
 mod model;
 mod name;
+mod options;
 mod ray;
 mod state;
 mod version;
 mod vfs;
+pub mod words;
 
+pub use beyond::Beyond;
 pub use data::{Data, Overflow, Warning, WarningCounts};
 pub use error::{CompileError, EngineError};
 pub use look::{
@@ -32,6 +37,7 @@ pub use look::{
 pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
+pub use options::OptionDifference;
 pub use ray::RayHit;
 pub use state::{Inputs, Motion, RawQuats};
 pub use version::{TARGET, Target, VersionError, check_version, version_string};

@@ -191,6 +191,46 @@ impl Model {
         self.header().ntendon as usize
     }
 
+    /// Number of activations.
+    pub fn na(&self) -> usize {
+        self.header().na as usize
+    }
+
+    /// Number of sites.
+    pub fn nsite(&self) -> usize {
+        self.header().nsite as usize
+    }
+
+    /// Number of equalities.
+    pub fn neq(&self) -> usize {
+        self.header().neq as usize
+    }
+
+    /// Number of pairs of geoms with contact parameters of their own.
+    pub fn npair(&self) -> usize {
+        self.header().npair as usize
+    }
+
+    /// Number of MuJoCo's own sensors.
+    pub fn nsensor(&self) -> usize {
+        self.header().nsensor as usize
+    }
+
+    /// Number of values of MuJoCo's own sensors.
+    pub fn nsensordata(&self) -> usize {
+        self.header().nsensordata as usize
+    }
+
+    /// Number of keyframes.
+    pub fn nkey(&self) -> usize {
+        self.header().nkey as usize
+    }
+
+    /// Number of skins.
+    pub fn nskin(&self) -> usize {
+        self.header().nskin as usize
+    }
+
     /// Physics step \[s\].
     pub fn timestep(&self) -> f64 {
         self.header().opt.timestep

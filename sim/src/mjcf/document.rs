@@ -2,10 +2,12 @@
 //!
 //! Only what both MuJoCo lines have in common; [`super::write`](mod@super::write) knows the differences.
 
+use super::part::MjcfPart;
 use crate::source::Source;
 use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// A whole document.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +40,8 @@ pub struct Mjcf {
     pub actuators: Vec<Actuator>,
     /// Named positions of all joints.
     pub keyframes: Vec<Keyframe>,
+    /// MJCF files that are parts of the scene.
+    pub parts: Vec<Arc<MjcfPart>>,
 }
 
 /// `<option>`.
@@ -408,6 +412,7 @@ impl Mjcf {
             friction_tendons: Vec::new(),
             actuators: Vec::new(),
             keyframes: Vec::new(),
+            parts: Vec::new(),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! From a robot description to the MJCF that MuJoCo compiles.
 //!
-//! [`document`] mirrors MJCF as plain data, [`robot`] and [`scene`] fill it, [`write`](mod@write) turns it into text
-//! for one of the two MuJoCo lines and remembers which line came from which element of the user's file.
+//! [`document`] mirrors MJCF as plain data, [`robot`] and [`scene`] fill it, [`part`] adds files that are MJCF already,
+//! [`write`](mod@write) turns it into text for one of the two MuJoCo lines and remembers which line came from which element
+//! of the user's file.
 
 pub mod document;
+pub mod part;
 pub mod robot;
 pub mod scene;
 pub mod write;

@@ -5,6 +5,7 @@
 use super::document::{
     Actuator, Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf, Shape,
 };
+use super::part::PartLines;
 use crate::mj::{CompileError, Target};
 use crate::source::Source;
 use scene::Pose;
@@ -64,21 +65,21 @@ struct Writer {
 }
 
 /// One element under construction.
-struct Element {
+pub(super) struct Element {
     text: String,
 }
 
 impl Element {
-    fn new(tag: &str) -> Self {
+    pub(super) fn new(tag: &str) -> Self {
         Self { text: format!("<{tag}") }
     }
 
-    fn attr(mut self, name: &str, value: impl std::fmt::Display) -> Self {
+    pub(super) fn attr(mut self, name: &str, value: impl std::fmt::Display) -> Self {
         let _ = write!(self.text, " {name}=\"{}\"", escape(&value.to_string()));
         self
     }
 
-    fn numbers(self, name: &str, values: &[f64]) -> Self {
+    pub(super) fn numbers(self, name: &str, values: &[f64]) -> Self {
         self.attr(name, joined(values))
     }
 
@@ -95,16 +96,26 @@ impl Element {
         out
     }
 
-    fn opt(self, name: &str, value: Option<impl std::fmt::Display>) -> Self {
+    pub(super) fn opt(self, name: &str, value: Option<impl std::fmt::Display>) -> Self {
         match value {
             Some(value) => self.attr(name, value),
             None => self,
         }
     }
+
+    /// The text of an element without content.
+    pub(super) fn leaf(self) -> String {
+        self.text + "/>"
+    }
+
+    /// The text that opens an element.
+    pub(super) fn open(self) -> String {
+        self.text + ">"
+    }
 }
 
 /// Shortest text that reads back as the same number; -0 is 0.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let value = value + 0.0;
     if value != 0.0 && !(1e-4..1e9).contains(&value.abs()) { format!("{value:e}") } else { format!("{value}") }
 }
@@ -140,11 +151,11 @@ impl Writer {
     }
 
     fn leaf(&mut self, element: Element, source: Option<&Source>) {
-        self.line(&(element.text + "/>"), source);
+        self.line(&element.leaf(), source);
     }
 
     fn open(&mut self, element: Element, source: Option<&Source>) {
-        self.line(&(element.text + ">"), source);
+        self.line(&element.open(), source);
         self.depth += 1;
     }
 
@@ -180,6 +191,10 @@ impl Writer {
             }
             self.close("actuator");
         }
+        self.parts(mjcf, "actuator", |part| &part.actuators);
+        // 2.2.2 wants those with an activation behind all others.
+        self.parts(mjcf, "actuator", |part| &part.actuators_with_state);
+        self.parts(mjcf, "sensor", |part| &part.sensors);
         if !mjcf.keyframes.is_empty() {
             self.open(Element::new("keyframe"), None);
             for key in &mjcf.keyframes {
@@ -212,7 +227,34 @@ impl Writer {
         }
     }
 
+    /// What the parts that were MJCF files bring to a section of the document.
+    fn parts(&mut self, mjcf: &Mjcf, section: &str, lines: impl Fn(&PartLines) -> &Vec<String>) {
+        let target = self.target;
+        if mjcf.parts.iter().all(|part| lines(part.lines(target)).is_empty()) {
+            return;
+        }
+        self.open(Element::new(section), None);
+        self.part_lines(mjcf, lines);
+        self.close(section);
+    }
+
+    /// As [`parts`](Self::parts), in a section that is open.
+    fn part_lines(&mut self, mjcf: &Mjcf, lines: impl Fn(&PartLines) -> &Vec<String>) {
+        let target = self.target;
+        for part in &mjcf.parts {
+            let part = part.lines(target);
+            for line in lines(part) {
+                self.line(line, Some(&part.source));
+            }
+        }
+    }
+
     fn assets(&mut self, mjcf: &Mjcf) {
+        self.own_assets(mjcf);
+        self.parts(mjcf, "asset", |part| &part.assets);
+    }
+
+    fn own_assets(&mut self, mjcf: &Mjcf) {
         let empty = mjcf.meshes.is_empty() && mjcf.height_fields.is_empty();
         if empty && mjcf.textures.is_empty() && mjcf.materials.is_empty() {
             return;
@@ -295,6 +337,7 @@ impl Writer {
                 Visit::Leave => self.close("body"),
             }
         }
+        self.part_lines(mjcf, |part| &part.bodies);
         self.close("worldbody");
     }
 
@@ -421,6 +464,9 @@ impl Writer {
             }
             self.close("tendon");
         }
+        self.parts(mjcf, "contact", |part| &part.contacts);
+        self.parts(mjcf, "equality", |part| &part.equalities);
+        self.parts(mjcf, "tendon", |part| &part.tendons);
     }
 
     fn actuator(&mut self, a: &Actuator) {

@@ -1,0 +1,246 @@
+//! The physics engine's own sensors, as its models declare them: MuJoCo's `<sensor>` elements.
+
+use crate::error::SensorError;
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::select::select;
+use crate::sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
+use ndarray::{ArrayView2, ArrayView3, Axis, Slice};
+use scene::SceneState;
+use scene::pattern::closest;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Configuration of a [`MujocoSensor`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MujocoSensorCfg {
+    /// The sensors to read, by patterns of their names (`uid/sensor`, or `sensor` alone), in the order they are reported;
+    /// `None` is all of them.
+    pub sensors: Option<Vec<String>>,
+    /// Rate, history, latency and noise; the channel is `values`, which takes noise where no sensor is a quaternion.
+    pub sampling: SamplingCfg,
+}
+
+/// Values of MuJoCo's own sensors in all environments: N environments, D values, sensor after sensor.
+///
+/// They are MuJoCo's numbers, bit for bit. Two instants meet in them, as in every state here: sensors of positions and
+/// velocities are of [`Sampled::stamps`], sensors of accelerations and forces ([`EngineSensor::solved`]) of
+/// [`Sampled::force_stamps`], one step earlier. After a reset, and after somebody wrote to the state, both are of the state as
+/// it is.
+#[derive(Clone, Debug)]
+pub struct MujocoSensor {
+    sensors: Vec<EngineSensor>,
+    names: Vec<String>,
+    columns: Vec<Range<usize>>,
+    sampler: Sampler,
+}
+
+impl SensorCfg for MujocoSensorCfg {
+    type Sensor = MujocoSensor;
+
+    fn requires(&self) -> Requires {
+        Requires::SENSORDATA
+    }
+
+    /// # Errors
+    ///
+    /// A pattern that matches nothing or a sensor that two match, and what is wrong with the sampling: noise of quaternions
+    /// too.
+    fn build(&self, context: &SensorContext) -> Result<MujocoSensor, SensorError> {
+        let known: Vec<String> = context.engine_sensors.iter().map(|s| s.name.clone()).collect();
+        let chosen = match &self.sensors {
+            Some(patterns) => select(patterns, &known, "MuJoCo sensor")?,
+            None => (0..known.len()).collect(),
+        };
+        let sensors: Vec<EngineSensor> = chosen.iter().map(|&s| context.engine_sensors[s].clone()).collect();
+        let mut columns = Vec::with_capacity(sensors.len());
+        let mut width = 0;
+        for sensor in &sensors {
+            columns.push(width..width + sensor.width);
+            width += sensor.width;
+        }
+        let noisy = !sensors.iter().any(|s| s.quaternion);
+        let channels = [Channel { name: "values", width, noisy }];
+        Ok(MujocoSensor {
+            names: sensors.iter().map(|s| s.name.clone()).collect(),
+            sensors,
+            columns,
+            sampler: Sampler::new("MuJoCo", self.requires(), context, &self.sampling, &channels)?,
+        })
+    }
+}
+
+/// Writes what the sensors measure in environment `env` to `row`.
+fn read(sensors: &[EngineSensor], state: &SceneState, env: usize, row: &mut [f64]) {
+    let Some(values) = &state.sensordata else { return };
+    let values = sensors.iter().flat_map(|s| (s.first..s.first + s.width).map(|k| values[(env, k)]));
+    row.iter_mut().zip(values).for_each(|(number, value)| *number = value);
+}
+
+impl Sensor for MujocoSensor {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| read(&self.sensors, state, env, row))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| read(&self.sensors, state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| read(&self.sensors, state, env, row))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+impl Sampled for MujocoSensor {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl MujocoSensor {
+    /// The sensors in the order of their columns: name, type, unit, instant.
+    pub fn sensors(&self) -> &[EngineSensor] {
+        &self.sensors
+    }
+
+    /// Their names, `uid/sensor`.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Number of values of each.
+    pub fn dims(&self) -> Vec<usize> {
+        self.columns.iter().map(ExactSizeIterator::len).collect()
+    }
+
+    /// Unit of each; `None` where it depends on what the sensor observes and nobody knows.
+    pub fn units(&self) -> Vec<Option<&str>> {
+        self.sensors.iter().map(|s| s.unit.as_deref()).collect()
+    }
+
+    /// Columns of the sensor called `name`: the full name, or the part behind the first slash.
+    ///
+    /// # Errors
+    ///
+    /// There is no such sensor among those that are read, or there are several; the error lists them.
+    pub fn columns(&self, name: &str) -> Result<Range<usize>, SensorError> {
+        let bare = |full: &str| full.split_once('/').is_some_and(|(_, rest)| rest == name);
+        let exact = self.names.iter().position(|full| full == name);
+        let matches: Vec<usize> = match exact {
+            Some(index) => vec![index],
+            None => (0..self.names.len()).filter(|&i| bare(&self.names[i])).collect(),
+        };
+        match matches.as_slice() {
+            [index] => Ok(self.columns[*index].clone()),
+            [] => Err(SensorError::UnknownName {
+                what: "MuJoCo sensor",
+                name: name.into(),
+                candidates: closest(name, self.names.iter().map(String::as_str)).into_iter().map(Into::into).collect(),
+            }),
+            several => Err(SensorError::AmbiguousName {
+                what: "MuJoCo sensor",
+                name: name.into(),
+                candidates: several.iter().map(|&i| self.names[i].clone()).collect(),
+            }),
+        }
+    }
+
+    /// Values of all sensors, shape (N, D).
+    pub fn values(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("values")
+    }
+
+    /// Values of the sensor called `name`, shape (N, its number of values).
+    ///
+    /// # Errors
+    ///
+    /// As [`columns`](Self::columns).
+    pub fn value(&self, name: &str) -> Result<ArrayView2<'_, f64>, SensorError> {
+        let columns = self.columns(name)?;
+        let mut values = self.values();
+        values.slice_axis_inplace(Axis(1), Slice::from(columns));
+        Ok(values)
+    }
+
+    /// Past values, newest first, shape \[num_envs, history_length, D\]; 0 where not filled yet.
+    pub fn value_history(&self) -> ArrayView3<'_, f64> {
+        self.sampler.history("values")
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use crate::noise::NoiseCfg;
+    use ndarray::{Array2, array};
+    use std::collections::BTreeMap;
+
+    fn context() -> SensorContext {
+        let sensor = |name: &str, kind: &str, first, width, solved| EngineSensor {
+            name: name.into(),
+            kind: kind.into(),
+            unit: Some("m".into()),
+            first,
+            width,
+            solved,
+            quaternion: kind == "framequat",
+        };
+        let engine_sensors = [
+            sensor("a/pos", "framepos", 0, 3, false),
+            sensor("a/quat", "framequat", 3, 4, false),
+            sensor("b/pos", "framepos", 7, 3, false),
+            sensor("b/touch", "touch", 10, 1, true),
+        ];
+        SensorContext { num_envs: 2, dt: 0.01, engine_sensors: engine_sensors.into(), ..SensorContext::default() }
+    }
+
+    fn state() -> SceneState {
+        let values = Array2::from_shape_fn((2, 11), |(env, k)| 100.0 * env as f64 + k as f64);
+        SceneState { sensordata: Some(values), ..SceneState::new(2) }
+    }
+
+    fn cfg(patterns: &[&str]) -> MujocoSensorCfg {
+        let sensors = Some(patterns.iter().map(|p| (*p).into()).collect());
+        MujocoSensorCfg { sensors, ..Default::default() }
+    }
+
+    #[test]
+    fn values_stand_in_the_order_of_the_patterns() {
+        let mut sensor = cfg(&["b/touch", "pos"]).build(&context()).unwrap();
+        sensor.reset(&[0, 1], &state()).unwrap();
+        assert_eq!(sensor.names(), ["b/touch", "a/pos", "b/pos"]);
+        assert_eq!(sensor.dims(), [1, 3, 3]);
+        assert_eq!(sensor.units(), [Some("m"); 3]);
+        assert_eq!(sensor.values().row(1).to_vec(), [110.0, 100.0, 101.0, 102.0, 107.0, 108.0, 109.0]);
+        assert_eq!(sensor.value("touch").unwrap(), array![[10.0], [110.0]]);
+        assert_eq!(sensor.value("b/pos").unwrap(), array![[7.0, 8.0, 9.0], [107.0, 108.0, 109.0]]);
+        let error = sensor.value("pos").unwrap_err().to_string();
+        assert!(error.contains("\"a/pos\", \"b/pos\""), "{error}");
+        let error = sensor.value("b/tuch").unwrap_err().to_string();
+        assert!(error.starts_with("there is no MuJoCo sensor \"b/tuch\"; known are \"b/touch\""), "{error}");
+    }
+
+    #[test]
+    fn mistakes_are_errors() {
+        let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
+        assert!(wrong(cfg(&["pso"])).starts_with("there is no MuJoCo sensor \"pso\"; known are \"pos\""));
+        assert!(wrong(cfg(&["a/.*", "pos"])).contains("matched by both"));
+        let noise = BTreeMap::from([("values".to_string(), NoiseCfg::default())]);
+        let noisy = |patterns| MujocoSensorCfg {
+            sampling: SamplingCfg { noise: noise.clone(), ..SamplingCfg::default() },
+            ..cfg(patterns)
+        };
+        assert!(noisy(&["pos"]).build(&context()).is_ok());
+        assert!(noisy(&["quat"]).build(&context()).is_err(), "noise would make it no rotation");
+        // A state of another scene.
+        let mut sensor = MujocoSensorCfg::default().build(&context()).unwrap();
+        let short = SceneState { sensordata: Some(Array2::zeros((2, 10))), ..SceneState::new(2) };
+        assert!(sensor.update(&short).unwrap_err().to_string().contains("values of the engine's sensors"));
+        assert!(sensor.update(&SceneState::new(2)).unwrap_err().to_string().contains("sensordata"));
+    }
+}

@@ -1,0 +1,175 @@
+//! What a model of 4.x may have that is not written back as MJCF.
+
+use super::model::Model;
+
+/// Something of a model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Beyond {
+    /// The kind of element, as MJCF calls it.
+    pub element: &'static str,
+    /// Its index among those of its kind.
+    pub index: usize,
+    /// What of it.
+    pub what: &'static str,
+}
+
+impl Model {
+    /// The first thing that 2.2.2 does not know and that nobody here writes back as MJCF.
+    #[cfg(not(mj4))]
+    pub fn beyond(&self) -> Option<Beyond> {
+        None
+    }
+
+    /// The first thing that 2.2.2 does not know and that nobody here writes back as MJCF.
+    #[cfg(mj4)]
+    pub fn beyond(&self) -> Option<Beyond> {
+        use super::arrays::is_set;
+        use mujoco_sys::fields::model as fields;
+        /// An array of this model.
+        macro_rules! array {
+            ($name:ident) => {{
+                // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+                unsafe { fields::$name(self.raw()) }
+            }};
+        }
+        let header = self.header();
+        let whole = [("flex", header.nflex), ("plugin", header.nplugin)];
+        if let Some((element, _)) = whole.into_iter().find(|(_, count)| *count > 0) {
+            return Some(Beyond { element, index: 0, what: "the element" });
+        }
+        let numbers = [
+            ("joint", array!(jnt_stiffnesspoly), self.njnt(), "a stiffness of higher order"),
+            ("joint", array!(dof_dampingpoly), self.nv(), "a damping of higher order"),
+            ("joint", array!(jnt_springyield), self.njnt(), "springyield"),
+            ("geom", array!(geom_surfacevel), self.ngeom(), "surfacevel"),
+            ("geom", array!(geom_adhesion), self.ngeom(), "adhesion"),
+            ("pair", array!(pair_adhesion), self.npair(), "adhesion"),
+            ("pair", array!(pair_solreffriction), self.npair(), "solreffriction"),
+            ("tendon", array!(tendon_stiffnesspoly), self.ntendon(), "a stiffness of higher order"),
+            ("tendon", array!(tendon_dampingpoly), self.ntendon(), "a damping of higher order"),
+            ("tendon", array!(tendon_springyield), self.ntendon(), "springyield"),
+            ("actuator", array!(actuator_delay), self.nactuator(), "delay"),
+            ("actuator", array!(actuator_damping), self.nactuator(), "damping"),
+            ("actuator", array!(actuator_dampingpoly), self.nactuator(), "a damping of higher order"),
+            ("actuator", array!(actuator_armature), self.nactuator(), "armature"),
+            ("sensor", array!(sensor_delay), self.nsensor(), "delay"),
+            ("sensor", array!(sensor_interval), self.nsensor(), "interval"),
+        ];
+        for (element, values, count, what) in numbers {
+            // Infinite yields are none.
+            if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
+                return Some(Beyond { element, index: at / (values.len() / count.max(1)).max(1), what });
+            }
+        }
+        let counts = [
+            ("actuator", array!(actuator_ctrlnum), 1, "a number of controls other than 1"),
+            ("actuator", array!(actuator_outnum), 1, "a number of outputs other than 1"),
+        ];
+        for (element, values, one, what) in counts {
+            if let Some(index) = values.iter().position(|n| *n != one) {
+                return Some(Beyond { element, index, what });
+            }
+        }
+        // One activation at most: `actdim` is not written.
+        if let Some(index) = array!(actuator_actnum).iter().position(|n| *n > 1) {
+            return Some(Beyond { element: "actuator", index, what: "several activations" });
+        }
+        let histories = [("actuator", array!(actuator_history)), ("sensor", array!(sensor_history))];
+        for (element, values) in histories {
+            if let Some(at) = values.iter().step_by(2).position(|n| *n > 0) {
+                return Some(Beyond { element, index: at, what: "nsample" });
+            }
+        }
+        let flags = [
+            ("joint", array!(jnt_actgravcomp), "actuatorgravcomp"),
+            ("actuator", array!(actuator_actearly), "actearly"),
+        ];
+        for (element, values, what) in flags {
+            if let Some(index) = values.iter().position(|flag| is_set(*flag)) {
+                return Some(Beyond { element, index, what });
+            }
+        }
+        // A rangefinder of 4.x may give more than a distance.
+        let several = (0..self.nsensor()).find(|&s| {
+            super::words::sensor(self.sensor_type()[s])
+                .is_some_and(|word| word.word == "rangefinder" && self.sensor_dim()[s] != 1)
+        });
+        several.map(|index| Beyond { element: "sensor", index, what: "rangefinder data other than a distance" })
+    }
+
+    /// Gravity compensation of a body, 0..=1 and more (4.x).
+    ///
+    /// # Panics
+    /// There is no such body.
+    pub fn body_gravity_compensation(&self, body: usize) -> f64 {
+        #[cfg(mj4)]
+        {
+            // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+            let values = unsafe { mujoco_sys::fields::model::body_gravcomp(self.raw()) };
+            values[body]
+        }
+        #[cfg(not(mj4))]
+        {
+            assert!(body < self.nbody(), "body {body} of {}", self.nbody());
+            0.0
+        }
+    }
+
+    /// Largest forces of actuators on a joint \[N m or N\], where they are limited (4.x).
+    ///
+    /// # Panics
+    /// There is no such joint.
+    pub fn joint_actuator_force(&self, joint: usize) -> Option<[f64; 2]> {
+        #[cfg(mj4)]
+        {
+            // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+            let limited = unsafe { mujoco_sys::fields::model::jnt_actfrclimited(self.raw()) };
+            // SAFETY: as above.
+            let range = unsafe { mujoco_sys::fields::model::jnt_actfrcrange(self.raw()) };
+            super::arrays::is_set(limited[joint]).then(|| [range[2 * joint], range[2 * joint + 1]])
+        }
+        #[cfg(not(mj4))]
+        {
+            assert!(joint < self.njnt(), "joint {joint} of {}", self.njnt());
+            None
+        }
+    }
+
+    /// Largest forces of actuators on a tendon \[N\], where they are limited (4.x).
+    ///
+    /// # Panics
+    /// There is no such tendon.
+    pub fn tendon_actuator_force(&self, tendon: usize) -> Option<[f64; 2]> {
+        #[cfg(mj4)]
+        {
+            // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+            let limited = unsafe { mujoco_sys::fields::model::tendon_actfrclimited(self.raw()) };
+            // SAFETY: as above.
+            let range = unsafe { mujoco_sys::fields::model::tendon_actfrcrange(self.raw()) };
+            super::arrays::is_set(limited[tendon]).then(|| [range[2 * tendon], range[2 * tendon + 1]])
+        }
+        #[cfg(not(mj4))]
+        {
+            assert!(tendon < self.ntendon(), "tendon {tendon} of {}", self.ntendon());
+            None
+        }
+    }
+
+    /// Inertia of a tendon \[kg\] (4.x).
+    ///
+    /// # Panics
+    /// There is no such tendon.
+    pub fn tendon_inertia(&self, tendon: usize) -> f64 {
+        #[cfg(mj4)]
+        {
+            // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+            let values = unsafe { mujoco_sys::fields::model::tendon_armature(self.raw()) };
+            values[tendon]
+        }
+        #[cfg(not(mj4))]
+        {
+            assert!(tendon < self.ntendon(), "tendon {tendon} of {}", self.ntendon());
+            0.0
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! MuJoCo's codes as the words that MJCF has for them; `None` for what is not written back as MJCF.
+
+use mujoco_sys as mj;
+
+/// The word of a code in a list of both.
+fn word(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
+    list.iter().find(|(known, _)| *known as i32 == code).map(|(_, word)| *word)
+}
+
+/// Type of a joint.
+pub fn joint(code: i32) -> Option<&'static str> {
+    let list =
+        [(mj::mjJNT_FREE, "free"), (mj::mjJNT_BALL, "ball"), (mj::mjJNT_SLIDE, "slide"), (mj::mjJNT_HINGE, "hinge")];
+    word(&list, code)
+}
+
+/// Type of a geom or a site, and how many sizes it has.
+pub fn geom(code: i32) -> Option<(&'static str, usize)> {
+    let list = [
+        (mj::mjGEOM_PLANE, "plane", 3),
+        (mj::mjGEOM_HFIELD, "hfield", 0),
+        (mj::mjGEOM_SPHERE, "sphere", 1),
+        (mj::mjGEOM_CAPSULE, "capsule", 2),
+        (mj::mjGEOM_ELLIPSOID, "ellipsoid", 3),
+        (mj::mjGEOM_CYLINDER, "cylinder", 2),
+        (mj::mjGEOM_BOX, "box", 3),
+        (mj::mjGEOM_MESH, "mesh", 0),
+    ];
+    list.into_iter().find(|(known, _, _)| *known as i32 == code).map(|(_, word, sizes)| (word, sizes))
+}
+
+/// How a camera or a light follows.
+pub fn follow(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjCAMLIGHT_FIXED, "fixed"),
+        (mj::mjCAMLIGHT_TRACK, "track"),
+        (mj::mjCAMLIGHT_TRACKCOM, "trackcom"),
+        (mj::mjCAMLIGHT_TARGETBODY, "targetbody"),
+        (mj::mjCAMLIGHT_TARGETBODYCOM, "targetbodycom"),
+    ];
+    word(&list, code)
+}
+
+/// What an equality couples.
+pub fn equality(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjEQ_CONNECT, "connect"),
+        (mj::mjEQ_WELD, "weld"),
+        (mj::mjEQ_JOINT, "joint"),
+        (mj::mjEQ_TENDON, "tendon"),
+    ];
+    word(&list, code)
+}
+
+/// A point of a tendon's path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathPoint {
+    /// A joint, with a coefficient.
+    Joint,
+    /// A pulley, with a divisor.
+    Pulley,
+    /// A site.
+    Site,
+    /// A geom that the tendon goes around, with a site or -1.
+    Geom,
+}
+
+/// Kind of a point of a tendon's path.
+pub fn path_point(code: i32) -> Option<PathPoint> {
+    let list = [
+        (mj::mjWRAP_JOINT, PathPoint::Joint),
+        (mj::mjWRAP_PULLEY, PathPoint::Pulley),
+        (mj::mjWRAP_SITE, PathPoint::Site),
+        (mj::mjWRAP_SPHERE, PathPoint::Geom),
+        (mj::mjWRAP_CYLINDER, PathPoint::Geom),
+    ];
+    list.into_iter().find(|(known, _)| *known as i32 == code).map(|(_, point)| point)
+}
+
+/// What an actuator acts on: the attribute that names it.
+pub fn transmission(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjTRN_JOINT, "joint"),
+        (mj::mjTRN_JOINTINPARENT, "jointinparent"),
+        (mj::mjTRN_SLIDERCRANK, "cranksite"),
+        (mj::mjTRN_TENDON, "tendon"),
+        (mj::mjTRN_SITE, "site"),
+        (mj::mjTRN_BODY, "body"),
+    ];
+    word(&list, code)
+}
+
+/// Activation dynamics of an actuator.
+pub fn dynamics(code: i32) -> Option<&'static str> {
+    #[cfg(mj4)]
+    if code == mj::mjDYN_FILTEREXACT as i32 {
+        return Some("filterexact");
+    }
+    let list = [
+        (mj::mjDYN_NONE, "none"),
+        (mj::mjDYN_INTEGRATOR, "integrator"),
+        (mj::mjDYN_FILTER, "filter"),
+        (mj::mjDYN_MUSCLE, "muscle"),
+    ];
+    word(&list, code)
+}
+
+/// Gain of an actuator.
+pub fn gain(code: i32) -> Option<&'static str> {
+    let list = [(mj::mjGAIN_FIXED, "fixed"), (mj::mjGAIN_AFFINE, "affine"), (mj::mjGAIN_MUSCLE, "muscle")];
+    word(&list, code)
+}
+
+/// Bias of an actuator.
+pub fn bias(code: i32) -> Option<&'static str> {
+    let list = [(mj::mjBIAS_NONE, "none"), (mj::mjBIAS_AFFINE, "affine"), (mj::mjBIAS_MUSCLE, "muscle")];
+    word(&list, code)
+}
+
+/// Kind of an object that a sensor observes: MuJoCo's `body` is the frame in the centre of mass, `xbody` the body's own.
+pub fn observed(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjOBJ_BODY, "body"),
+        (mj::mjOBJ_XBODY, "xbody"),
+        (mj::mjOBJ_GEOM, "geom"),
+        (mj::mjOBJ_SITE, "site"),
+        (mj::mjOBJ_CAMERA, "camera"),
+        (mj::mjOBJ_JOINT, "joint"),
+        (mj::mjOBJ_TENDON, "tendon"),
+        (mj::mjOBJ_ACTUATOR, "actuator"),
+    ];
+    word(&list, code)
+}
+
+/// How MJCF says what a sensor observes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensorObjects {
+    /// Nothing.
+    None,
+    /// An attribute called as the kind of the object.
+    Named,
+    /// `objtype` and `objname`, perhaps `reftype` and `refname`.
+    Frame,
+}
+
+/// A type of MuJoCo's own sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SensorWord {
+    /// MJCF's word.
+    pub word: &'static str,
+    /// How MJCF says what it observes.
+    pub objects: SensorObjects,
+    /// Unit; `None` where it depends on what is observed.
+    pub unit: Option<&'static str>,
+    /// Whether the values are a quaternion.
+    pub quaternion: bool,
+}
+
+/// A type of MuJoCo's own sensors.
+pub fn sensor(code: i32) -> Option<SensorWord> {
+    use SensorObjects::{Frame, Named, None as Nothing};
+    let list = [
+        (mj::mjSENS_TOUCH, "touch", Named, "N"),
+        (mj::mjSENS_ACCELEROMETER, "accelerometer", Named, "m/s²"),
+        (mj::mjSENS_VELOCIMETER, "velocimeter", Named, "m/s"),
+        (mj::mjSENS_GYRO, "gyro", Named, "rad/s"),
+        (mj::mjSENS_FORCE, "force", Named, "N"),
+        (mj::mjSENS_TORQUE, "torque", Named, "N m"),
+        (mj::mjSENS_MAGNETOMETER, "magnetometer", Named, "T"),
+        (mj::mjSENS_RANGEFINDER, "rangefinder", Named, "m"),
+        (mj::mjSENS_JOINTPOS, "jointpos", Named, ""),
+        (mj::mjSENS_JOINTVEL, "jointvel", Named, ""),
+        (mj::mjSENS_TENDONPOS, "tendonpos", Named, ""),
+        (mj::mjSENS_TENDONVEL, "tendonvel", Named, ""),
+        (mj::mjSENS_ACTUATORPOS, "actuatorpos", Named, ""),
+        (mj::mjSENS_ACTUATORVEL, "actuatorvel", Named, ""),
+        (mj::mjSENS_ACTUATORFRC, "actuatorfrc", Named, ""),
+        (mj::mjSENS_BALLQUAT, "ballquat", Named, "1"),
+        (mj::mjSENS_BALLANGVEL, "ballangvel", Named, "rad/s"),
+        (mj::mjSENS_JOINTLIMITPOS, "jointlimitpos", Named, ""),
+        (mj::mjSENS_JOINTLIMITVEL, "jointlimitvel", Named, ""),
+        (mj::mjSENS_JOINTLIMITFRC, "jointlimitfrc", Named, ""),
+        (mj::mjSENS_TENDONLIMITPOS, "tendonlimitpos", Named, ""),
+        (mj::mjSENS_TENDONLIMITVEL, "tendonlimitvel", Named, ""),
+        (mj::mjSENS_TENDONLIMITFRC, "tendonlimitfrc", Named, ""),
+        (mj::mjSENS_FRAMEPOS, "framepos", Frame, "m"),
+        (mj::mjSENS_FRAMEQUAT, "framequat", Frame, "1"),
+        (mj::mjSENS_FRAMEXAXIS, "framexaxis", Frame, "1"),
+        (mj::mjSENS_FRAMEYAXIS, "frameyaxis", Frame, "1"),
+        (mj::mjSENS_FRAMEZAXIS, "framezaxis", Frame, "1"),
+        (mj::mjSENS_FRAMELINVEL, "framelinvel", Frame, "m/s"),
+        (mj::mjSENS_FRAMEANGVEL, "frameangvel", Frame, "rad/s"),
+        (mj::mjSENS_FRAMELINACC, "framelinacc", Frame, "m/s²"),
+        (mj::mjSENS_FRAMEANGACC, "frameangacc", Frame, "rad/s²"),
+        (mj::mjSENS_SUBTREECOM, "subtreecom", Named, "m"),
+        (mj::mjSENS_SUBTREELINVEL, "subtreelinvel", Named, "m/s"),
+        (mj::mjSENS_SUBTREEANGMOM, "subtreeangmom", Named, "kg m²/s"),
+        (mj::mjSENS_CLOCK, "clock", Nothing, "s"),
+        #[cfg(mj4)]
+        (mj::mjSENS_JOINTACTFRC, "jointactuatorfrc", Named, ""),
+        #[cfg(mj4)]
+        (mj::mjSENS_TENDONACTFRC, "tendonactuatorfrc", Named, ""),
+        #[cfg(mj4)]
+        (mj::mjSENS_E_POTENTIAL, "e_potential", Nothing, "J"),
+        #[cfg(mj4)]
+        (mj::mjSENS_E_KINETIC, "e_kinetic", Nothing, "J"),
+    ];
+    list.into_iter().find(|(known, ..)| *known as i32 == code).map(|(_, word, objects, unit)| SensorWord {
+        word,
+        objects,
+        unit: (!unit.is_empty()).then_some(unit),
+        quaternion: word.ends_with("quat"),
+    })
+}
+
+/// MJCF's word for a type of sensor that [`sensor`] does not give.
+pub fn other_sensor(code: i32) -> Option<&'static str> {
+    let list = [
+        (mj::mjSENS_USER, "user"),
+        #[cfg(mj4)]
+        (mj::mjSENS_CAMPROJECTION, "camprojection"),
+        #[cfg(mj4)]
+        (mj::mjSENS_INSIDESITE, "insidesite"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMDIST, "distance"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMNORMAL, "normal"),
+        #[cfg(mj4)]
+        (mj::mjSENS_GEOMFROMTO, "fromto"),
+        #[cfg(mj4)]
+        (mj::mjSENS_CONTACT, "contact"),
+        #[cfg(mj4)]
+        (mj::mjSENS_TACTILE, "tactile"),
+        #[cfg(mj4)]
+        (mj::mjSENS_PLUGIN, "plugin"),
+    ];
+    word(&list, code)
+}
+
+/// Whether a sensor's value is of what MuJoCo solves for a step (`mjSTAGE_ACC`), not of positions and velocities.
+pub fn is_solved(stage: i32) -> bool {
+    stage == mj::mjSTAGE_ACC as i32
+}

@@ -1,0 +1,70 @@
+//! Actuators, all as MuJoCo's general one: its shortcuts only choose parameters.
+
+use super::super::write::{Element, number};
+use super::{PartError, Writing, row, row_of, some};
+use crate::mj::words;
+
+impl Writing<'_> {
+    /// Actuators without and with an activation.
+    pub(super) fn actuators(&self) -> Result<[Vec<String>; 2], PartError> {
+        let mut lists = [Vec::new(), Vec::new()];
+        for actuator in 0..self.model.nactuator() {
+            let with_state = usize::from(!self.model.actuator_activation(actuator).is_empty());
+            lists[with_state].push(self.actuator(actuator)?);
+        }
+        Ok(lists)
+    }
+
+    fn actuator(&self, a: usize) -> Result<String, PartError> {
+        let m = self.model;
+        let count = m.nactuator();
+        let beyond = |what: &str| self.beyond("actuator", a, what);
+        let transmission = words::transmission(m.actuator_trntype()[a]).ok_or_else(|| beyond("a transmission"))?;
+        let dynamics = words::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
+        let gain = words::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
+        let bias = words::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
+        let ids = row(m.actuator_trnid(), 2, a);
+        let site = |id: usize| self.full(&self.names.sites[id]);
+        let names = &self.names;
+        let first = some(ids[0]).map(|id| match transmission {
+            "joint" | "jointinparent" => self.full(&names.joints[id]),
+            "tendon" => self.full(&names.tendons[id]),
+            "body" => self.body(id),
+            _ => site(id),
+        });
+        let mut element = Element::new("general").attr("name", self.full(&names.actuators[a])).opt(transmission, first);
+        element = match transmission {
+            "cranksite" => element
+                .opt("slidersite", some(ids[1]).map(site))
+                .attr("cranklength", number(m.actuator_cranklength()[a])),
+            "site" => element.opt("refsite", some(ids[1]).map(site)),
+            _ => element,
+        };
+        let control = m.actuator_control(a);
+        let ranges = [
+            ("ctrl", m.actuator_ctrllimited(control), row(m.actuator_ctrlrange(), 2, control)),
+            ("force", m.actuator_forcelimited(a), row(m.actuator_forcerange(), 2, a)),
+            ("act", m.actuator_actlimited(a), row(m.actuator_actrange(), 2, a)),
+        ];
+        for (what, limited, range) in ranges {
+            element = element.attr(&format!("{what}limited"), limited);
+            if limited {
+                element = element.numbers(&format!("{what}range"), range);
+            }
+        }
+        let lengths = row(m.actuator_lengthrange(), 2, a);
+        if lengths[0] < lengths[1] {
+            element = element.numbers("lengthrange", lengths);
+        }
+        let element = element
+            .numbers("gear", row(m.actuator_gear(), 6, a))
+            .attr("dyntype", dynamics)
+            .attr("gaintype", gain)
+            .attr("biastype", bias)
+            .numbers("dynprm", row_of(m.actuator_dynprm(), count, a))
+            .numbers("gainprm", row_of(m.actuator_gainprm(), count, a))
+            .numbers("biasprm", row_of(m.actuator_biasprm(), count, a))
+            .attr("group", m.actuator_group()[a]);
+        Ok(element.leaf())
+    }
+}

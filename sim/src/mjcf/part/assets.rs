@@ -1,0 +1,157 @@
+//! Meshes, height fields, textures and materials, as MuJoCo keeps them.
+
+use super::super::write::Element;
+use super::{PartError, Writing, row, singles};
+use crate::mj::{Asset, MeshArrays, Target, TextureType, words};
+use image::{ExtendedColorType, ImageEncoder};
+use std::collections::HashMap;
+
+/// Order in which MuJoCo stacks the squares of a cube.
+const CUBE: &str = "RLUDFB";
+
+impl Writing<'_> {
+    pub(super) fn assets(&self) -> Vec<String> {
+        let m = self.model;
+        let textures = (0..m.ntex()).filter_map(|t| self.texture(t));
+        let materials = (0..m.nmat()).map(|material| self.material(material));
+        let meshes = (0..m.nmesh()).map(|mesh| self.mesh(mesh));
+        let fields = (0..m.nhfield()).map(|field| {
+            Element::new("hfield")
+                .attr("name", self.full(&self.names.height_fields[field]))
+                .attr("file", self.height_field_file(field))
+                .numbers("size", row(m.hfield_size(), 4, field))
+                .leaf()
+        });
+        textures.chain(materials).chain(meshes).chain(fields).collect()
+    }
+
+    /// Whether a texture belongs to the part: a sky is around everything, and pixels may not be in the model.
+    fn is_written(&self, texture: usize) -> bool {
+        self.model.texture(texture).is_some_and(|t| t.kind != TextureType::Skybox && color(t.channels).is_some())
+    }
+
+    fn texture_file(&self, texture: usize) -> String {
+        format!("{}texture{texture}.png", self.stem)
+    }
+
+    fn height_field_file(&self, field: usize) -> String {
+        format!("{}hfield{field}.bin", self.stem)
+    }
+
+    fn texture(&self, texture: usize) -> Option<String> {
+        let arrays = self.model.texture(texture).filter(|_| self.is_written(texture))?;
+        let mut element = Element::new("texture")
+            .attr("name", self.full(&self.names.textures[texture]))
+            .attr("type", if arrays.kind == TextureType::Cube { "cube" } else { "2d" })
+            .attr("file", self.texture_file(texture));
+        if arrays.kind == TextureType::Cube && arrays.height == 6 * arrays.width {
+            element = element.attr("gridsize", "6 1").attr("gridlayout", CUBE);
+        }
+        if arrays.channels == 4 && self.target == Target::V4 {
+            element = element.attr("nchannel", 4);
+        }
+        Some(element.leaf())
+    }
+
+    fn material(&self, material: usize) -> String {
+        let values = self.model.material(material);
+        let texture = values.texture.filter(|t| self.is_written(*t)).map(|t| self.full(&self.names.textures[t]));
+        Element::new("material")
+            .attr("name", self.full(&self.names.materials[material]))
+            .opt("texture", texture)
+            .attr("texrepeat", singles(&values.tex_repeat))
+            .attr("texuniform", values.tex_uniform)
+            .attr("emission", values.emission)
+            .attr("specular", values.specular)
+            .attr("shininess", values.shininess)
+            .attr("reflectance", values.reflectance)
+            .attr("rgba", singles(&values.rgba))
+            .leaf()
+    }
+
+    fn mesh(&self, mesh: usize) -> String {
+        let Corners { positions, texcoords, triangles } = corners(&self.model.mesh(mesh));
+        let mut element = Element::new("mesh").attr("name", self.full(&self.names.meshes[mesh]));
+        if self.target == Target::V4 && !self.collides(mesh) {
+            // As for visuals of robots: what is only seen may be flat or open.
+            element = element.attr("inertia", "shell");
+        }
+        if let Some(texcoords) = texcoords {
+            element = element.attr("texcoord", singles(texcoords.as_flattened()));
+        }
+        let triangles: Vec<String> = triangles.as_flattened().iter().map(ToString::to_string).collect();
+        element.attr("vertex", singles(positions.as_flattened())).attr("face", triangles.join(" ")).leaf()
+    }
+
+    fn collides(&self, mesh: usize) -> bool {
+        let m = self.model;
+        let touches = |geom: usize| m.geom_contype()[geom] != 0 || m.geom_conaffinity()[geom] != 0;
+        let paired = |geom: usize| m.pair_geom1().iter().chain(m.pair_geom2()).any(|g| *g as usize == geom);
+        (0..m.ngeom()).any(|geom| {
+            m.geom_dataid()[geom] == mesh as i32
+                && words::geom(m.geom_type()[geom]).is_some_and(|(word, _)| word == "mesh")
+                && (touches(geom) || paired(geom))
+        })
+    }
+
+    /// The files that the assets name.
+    pub(super) fn files(&self) -> Result<Vec<Asset>, PartError> {
+        let m = self.model;
+        let mut files = Vec::new();
+        for texture in (0..m.ntex()).filter(|&t| self.is_written(t)) {
+            let Some(arrays) = m.texture(texture) else { continue };
+            let Some(color) = color(arrays.channels) else { continue };
+            let mut bytes = Vec::new();
+            let (width, height) = (arrays.width as u32, arrays.height as u32);
+            image::codecs::png::PngEncoder::new(&mut bytes)
+                .write_image(arrays.pixels, width, height, color)
+                .map_err(|error| self.beyond("texture", texture, error.to_string()))?;
+            files.push(Asset { name: self.texture_file(texture), bytes });
+        }
+        for field in 0..m.nhfield() {
+            let arrays = m.height_field(field);
+            let sizes = [arrays.rows as i32, arrays.columns as i32];
+            let mut bytes: Vec<u8> = sizes.iter().flat_map(|n| n.to_le_bytes()).collect();
+            bytes.extend(arrays.elevation.iter().flat_map(|height| height.to_le_bytes()));
+            files.push(Asset { name: self.height_field_file(field), bytes });
+        }
+        Ok(files)
+    }
+}
+
+/// What a number of bytes per pixel means.
+fn color(channels: usize) -> Option<ExtendedColorType> {
+    match channels {
+        1 => Some(ExtendedColorType::L8),
+        3 => Some(ExtendedColorType::Rgb8),
+        4 => Some(ExtendedColorType::Rgba8),
+        _ => None,
+    }
+}
+
+/// Triangles with one index for position and texture coordinate, as MJCF has them.
+struct Corners {
+    positions: Vec<[f32; 3]>,
+    texcoords: Option<Vec<[f32; 2]>>,
+    triangles: Vec<[i32; 3]>,
+}
+
+fn corners(mesh: &MeshArrays<'_>) -> Corners {
+    let Some(texcoords) = mesh.texcoords else {
+        return Corners { positions: mesh.positions.to_vec(), texcoords: None, triangles: mesh.faces.to_vec() };
+    };
+    let mut known: HashMap<[i32; 2], i32> = HashMap::new();
+    let (mut positions, mut coordinates) = (Vec::new(), Vec::new());
+    let corner = |pair: [i32; 2]| {
+        let next = known.len() as i32;
+        *known.entry(pair).or_insert_with(|| {
+            positions.push(mesh.positions.get(pair[0] as usize).copied().unwrap_or_default());
+            coordinates.push(texcoords.get(pair[1] as usize).copied().unwrap_or_default());
+            next
+        })
+    };
+    let pairs = mesh.faces.iter().zip(mesh.face_texcoords);
+    let corners: Vec<i32> =
+        pairs.flat_map(|(face, texture)| (0..3).map(|k| [face[k], texture[k]])).map(corner).collect();
+    Corners { positions, texcoords: Some(coordinates), triangles: corners.as_chunks::<3>().0.to_vec() }
+}

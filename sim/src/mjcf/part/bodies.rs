@@ -1,0 +1,290 @@
+//! Bodies with what is in them: mass, joints, geoms, sites, cameras, lights.
+
+use super::super::write::{Element, number};
+use super::{PartError, Writing, row, row_of, singles, some};
+use crate::mj::{LightType, Target, words};
+use scene::Pose;
+use scene::pose::{from_row, to_row};
+
+/// MuJoCo's grey of geoms that say nothing: a material's colour shows through.
+const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+
+/// What each body of the file has of a kind, by the bodies of that kind.
+fn by_body(bodies: usize, of: &[i32]) -> Vec<Vec<usize>> {
+    let mut lists = vec![Vec::new(); bodies];
+    for (index, body) in of.iter().enumerate() {
+        if let Some(body) = some(*body) {
+            lists[body].push(index);
+        }
+    }
+    lists
+}
+
+/// A tree of elements as indented lines.
+struct Tree {
+    lines: Vec<String>,
+    depth: usize,
+}
+
+impl Tree {
+    fn push(&mut self, text: &str) {
+        self.lines.push("  ".repeat(self.depth) + text);
+    }
+}
+
+impl Writing<'_> {
+    /// The bodies of the world, depth first with a stack of our own, as the document's writer goes.
+    pub(super) fn bodies(&self) -> Result<Vec<String>, PartError> {
+        enum Visit {
+            Enter(usize),
+            Leave,
+        }
+        let m = self.model;
+        let count = m.nbody();
+        let mut children = vec![Vec::new(); count];
+        for body in 1..count {
+            children[m.body_parentid()[body] as usize].push(body);
+        }
+        let contents = Contents {
+            joints: by_body(count, m.jnt_bodyid()),
+            geoms: by_body(count, m.geom_bodyid()),
+            sites: by_body(count, m.site_bodyid()),
+            cameras: by_body(count, m.cam_bodyid()),
+            lights: by_body(count, m.light_bodyid()),
+        };
+        let mut tree = Tree { lines: Vec::new(), depth: 0 };
+        tree.push(&pose(Element::new("body").attr("name", self.uid), &to_row(self.pose)).open());
+        tree.depth += 1;
+        self.cameras_and_lights(0, &contents, &mut tree)?;
+        tree.depth -= 1;
+        tree.push("</body>");
+        // In the world itself: 2.2.2 finds the contacts of planes in other bodies twice.
+        self.shapes(0, &contents, &mut tree)?;
+        let mut stack: Vec<Visit> = children[0].iter().rev().map(|&b| Visit::Enter(b)).collect();
+        while let Some(visit) = stack.pop() {
+            match visit {
+                Visit::Enter(body) => {
+                    tree.push(&self.body_element(body).open());
+                    tree.depth += 1;
+                    self.content(body, &contents, &mut tree)?;
+                    stack.push(Visit::Leave);
+                    stack.extend(children[body].iter().rev().map(|&b| Visit::Enter(b)));
+                }
+                Visit::Leave => {
+                    tree.depth -= 1;
+                    tree.push("</body>");
+                }
+            }
+        }
+        Ok(tree.lines)
+    }
+
+    fn body_element(&self, body: usize) -> Element {
+        let m = self.model;
+        let place = place(row(m.body_pos(), 3, body), row(m.body_quat(), 4, body));
+        let place = self.in_body(m.body_parentid()[body], place);
+        let mut element = pose(Element::new("body").attr("name", self.body(body)), &place);
+        if m.body_mocapid()[body] >= 0 {
+            element = element.attr("mocap", "true");
+        }
+        let lifted = m.body_gravity_compensation(body);
+        if lifted != 0.0 { element.attr("gravcomp", number(lifted)) } else { element }
+    }
+
+    fn content(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
+        let m = self.model;
+        if body > 0 && (m.body_mass()[body] > 0.0 || row(m.body_inertia(), 3, body).iter().any(|x| *x > 0.0)) {
+            let element = Element::new("inertial")
+                .numbers("pos", row(m.body_ipos(), 3, body))
+                .numbers("quat", row(m.body_iquat(), 4, body))
+                .attr("mass", number(m.body_mass()[body]))
+                .numbers("diaginertia", row(m.body_inertia(), 3, body));
+            tree.push(&element.leaf());
+        }
+        for &joint in &contents.joints[body] {
+            tree.push(&self.joint(joint)?.leaf());
+        }
+        self.shapes(body, contents, tree)?;
+        self.cameras_and_lights(body, contents, tree)
+    }
+
+    fn shapes(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
+        for &geom in &contents.geoms[body] {
+            tree.push(&self.geom(geom)?.leaf());
+        }
+        for &site in &contents.sites[body] {
+            tree.push(&self.site(site)?.leaf());
+        }
+        Ok(())
+    }
+
+    /// A pose in a body of the file as one in the same body of the scene, where the file's world stands at the part's pose.
+    fn in_body(&self, body: i32, place: [f64; 7]) -> [f64; 7] {
+        let moved = body == 0 && *self.pose != Pose::identity();
+        if moved { to_row(&(self.pose * from_row(&place))) } else { place }
+    }
+
+    fn cameras_and_lights(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
+        for &camera in &contents.cameras[body] {
+            tree.push(&self.camera(camera)?.leaf());
+        }
+        for &light in &contents.lights[body] {
+            if let Some(element) = self.light(light)? {
+                tree.push(&element.leaf());
+            }
+        }
+        Ok(())
+    }
+
+    fn joint(&self, joint: usize) -> Result<Element, PartError> {
+        let m = self.model;
+        let kind = words::joint(m.jnt_type()[joint]).ok_or_else(|| self.beyond("joint", joint, "an unknown type"))?;
+        let (qpos, dof) = (m.jnt_qposadr()[joint] as usize, m.jnt_dofadr()[joint] as usize);
+        let mut element = Element::new("joint").attr("name", self.full(&self.names.joints[joint])).attr("type", kind);
+        if matches!(kind, "hinge" | "slide") {
+            element = element
+                .numbers("axis", row(m.jnt_axis(), 3, joint))
+                .attr("ref", number(m.qpos0()[qpos]))
+                .attr("springref", number(m.qpos_spring()[qpos]));
+        }
+        if kind != "free" {
+            element = element.numbers("pos", row(m.jnt_pos(), 3, joint));
+        }
+        element = match m.jnt_limited(joint) {
+            true => element.attr("limited", "true").numbers("range", row(m.jnt_range(), 2, joint)),
+            false => element.attr("limited", "false"),
+        };
+        if let Some(range) = m.joint_actuator_force(joint) {
+            element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
+        }
+        Ok(element
+            .attr("margin", number(m.jnt_margin()[joint]))
+            .attr("stiffness", number(m.jnt_stiffness()[joint]))
+            .attr("damping", number(m.dof_damping()[dof]))
+            .attr("armature", number(m.dof_armature()[dof]))
+            .attr("frictionloss", number(m.dof_frictionloss()[dof]))
+            .numbers("solreflimit", row_of(m.jnt_solref(), m.njnt(), joint))
+            .numbers("solimplimit", row_of(m.jnt_solimp(), m.njnt(), joint))
+            .numbers("solreffriction", row_of(m.dof_solref(), m.nv(), dof))
+            .numbers("solimpfriction", row_of(m.dof_solimp(), m.nv(), dof))
+            .attr("group", m.jnt_group()[joint]))
+    }
+
+    fn geom(&self, geom: usize) -> Result<Element, PartError> {
+        let m = self.model;
+        let (kind, sizes) = words::geom(m.geom_type()[geom])
+            .ok_or_else(|| self.beyond("geom", geom, "a type that is no plane, hfield, primitive or mesh"))?;
+        let place = place(row(m.geom_pos(), 3, geom), row(m.geom_quat(), 4, geom));
+        let place = self.in_body(m.geom_bodyid()[geom], place);
+        let mut element = Element::new("geom").attr("name", self.full(&self.names.geoms[geom])).attr("type", kind);
+        if sizes > 0 {
+            element = element.numbers("size", &row(m.geom_size(), 3, geom)[..sizes]);
+        }
+        if let Some(data) = some(m.geom_dataid()[geom]) {
+            element = match kind {
+                "mesh" => element.attr("mesh", self.full(&self.names.meshes[data])),
+                "hfield" => element.attr("hfield", self.full(&self.names.height_fields[data])),
+                // A primitive that was fitted to a mesh has its size already.
+                _ => element,
+            };
+        }
+        element = pose(element, &place)
+            .attr("contype", m.geom_contype()[geom])
+            .attr("conaffinity", m.geom_conaffinity()[geom])
+            .attr("condim", m.geom_condim()[geom])
+            .attr("priority", m.geom_priority()[geom])
+            .attr("group", m.geom_group()[geom])
+            .numbers("friction", row(m.geom_friction(), 3, geom))
+            .attr("solmix", number(m.geom_solmix()[geom]))
+            .numbers("solref", row_of(m.geom_solref(), m.ngeom(), geom))
+            .numbers("solimp", row_of(m.geom_solimp(), m.ngeom(), geom))
+            .attr("margin", number(m.geom_margin()[geom]))
+            .attr("gap", number(m.geom_gap()[geom]));
+        // The first number says whether the others are used; those after the five coefficients come from the size.
+        let fluid = row_of(m.geom_fluid(), m.ngeom(), geom);
+        if let Some(coefficients) = fluid.get(1..6).filter(|_| fluid[0] > 0.0) {
+            element = element.attr("fluidshape", "ellipsoid").numbers("fluidcoef", coefficients);
+        }
+        Ok(self.look(element, m.geom_matid()[geom], row(m.geom_rgba(), 4, geom)))
+    }
+
+    fn look(&self, element: Element, material: i32, rgba: &[f32]) -> Element {
+        let element = element.opt("material", some(material).map(|id| self.full(&self.names.materials[id])));
+        if rgba == UNSET { element } else { element.attr("rgba", singles(rgba)) }
+    }
+
+    fn site(&self, site: usize) -> Result<Element, PartError> {
+        let m = self.model;
+        let (kind, sizes) = words::geom(m.site_type()[site])
+            .filter(|(_, sizes)| *sizes > 0)
+            .ok_or_else(|| self.beyond("site", site, "a type that is no primitive"))?;
+        let place = place(row(m.site_pos(), 3, site), row(m.site_quat(), 4, site));
+        let place = self.in_body(m.site_bodyid()[site], place);
+        let element = Element::new("site")
+            .attr("name", self.full(&self.names.sites[site]))
+            .attr("type", kind)
+            .numbers("size", &row(m.site_size(), 3, site)[..sizes])
+            .attr("group", m.site_group()[site]);
+        Ok(self.look(pose(element, &place), m.site_matid()[site], row(m.site_rgba(), 4, site)))
+    }
+
+    fn camera(&self, camera: usize) -> Result<Element, PartError> {
+        let m = self.model;
+        let mode = words::follow(m.cam_mode()[camera]).ok_or_else(|| self.beyond("camera", camera, "a mode"))?;
+        let place = place(row(m.cam_pos(), 3, camera), row(m.cam_quat(), 4, camera));
+        let element = Element::new("camera")
+            .attr("name", self.full(&self.names.cameras[camera]))
+            .attr("mode", mode)
+            .opt("target", some(m.cam_targetbodyid()[camera]).map(|body| self.body(body)))
+            .attr("fovy", number(m.cam_fovy()[camera]))
+            .attr("ipd", number(m.cam_ipd()[camera]));
+        Ok(pose(element, &place))
+    }
+
+    /// A light; none where it is a picture all around, which lights whole scenes.
+    fn light(&self, light: usize) -> Result<Option<Element>, PartError> {
+        let m = self.model;
+        let mode = words::follow(m.light_mode()[light]).ok_or_else(|| self.beyond("light", light, "a mode"))?;
+        let values = m.light(light);
+        let element = Element::new("light")
+            .attr("name", self.full(&self.names.lights[light]))
+            .attr("mode", mode)
+            .opt("target", some(m.light_targetbodyid()[light]).map(|body| self.body(body)));
+        let element = match (values.kind, self.target) {
+            (LightType::Image, _) => return Ok(None),
+            (LightType::Point, Target::V4) => element.attr("type", "point"),
+            (kind, _) => element.attr("directional", kind == LightType::Directional),
+        };
+        let element = element
+            .attr("active", values.active)
+            .attr("castshadow", values.cast_shadow)
+            .numbers("pos", row(m.light_pos(), 3, light))
+            .numbers("dir", row(m.light_dir(), 3, light))
+            .attr("attenuation", singles(&values.attenuation))
+            .attr("cutoff", values.cutoff_deg)
+            .attr("exponent", values.exponent)
+            .attr("ambient", singles(&values.ambient))
+            .attr("diffuse", singles(&values.diffuse))
+            .attr("specular", singles(&values.specular));
+        Ok(Some(element))
+    }
+}
+
+/// What the bodies of the file have.
+struct Contents {
+    joints: Vec<Vec<usize>>,
+    geoms: Vec<Vec<usize>>,
+    sites: Vec<Vec<usize>>,
+    cameras: Vec<Vec<usize>>,
+    lights: Vec<Vec<usize>>,
+}
+
+fn place(position: &[f64], quat: &[f64]) -> [f64; 7] {
+    [position[0], position[1], position[2], quat[0], quat[1], quat[2], quat[3]]
+}
+
+/// Numbers as they are: nobody normalises them again.
+fn pose(element: Element, place: &[f64; 7]) -> Element {
+    let element = if place[..3] == [0.0; 3] { element } else { element.numbers("pos", &place[..3]) };
+    if place[3..] == [1.0, 0.0, 0.0, 0.0] { element } else { element.numbers("quat", &place[3..]) }
+}

@@ -1,0 +1,144 @@
+//! What couples bodies: contact pairs, equalities, tendons.
+
+use super::super::write::{Element, number};
+use super::{PartError, Writing, row, row_of, singles, some};
+use crate::mj::words::{self, PathPoint};
+use crate::mj::{TARGET, Target};
+
+impl Writing<'_> {
+    /// Pairs of geoms with parameters of their own, and pairs of bodies that never collide.
+    pub(super) fn contacts(&self) -> Vec<String> {
+        let m = self.model;
+        let geom = |id: i32| some(id).map(|id| self.full(&self.names.geoms[id]));
+        let pair = |p: usize| {
+            Element::new("pair")
+                .opt("geom1", geom(m.pair_geom1()[p]))
+                .opt("geom2", geom(m.pair_geom2()[p]))
+                .attr("condim", m.pair_dim()[p])
+                .numbers("friction", row(m.pair_friction(), 5, p))
+                .numbers("solref", row_of(m.pair_solref(), m.npair(), p))
+                .numbers("solimp", row_of(m.pair_solimp(), m.npair(), p))
+                .attr("margin", number(m.pair_margin()[p]))
+                .attr("gap", number(m.pair_gap()[p]))
+                .leaf()
+        };
+        // Shapes of the file's world are in the scene's.
+        let body = |body: usize| if body == 0 { "world".into() } else { self.body(body) };
+        let exclude = |[first, second]: [usize; 2]| {
+            Element::new("exclude").attr("body1", body(first)).attr("body2", body(second)).leaf()
+        };
+        (0..m.npair()).map(pair).chain(m.excluded_bodies().map(exclude)).collect()
+    }
+
+    pub(super) fn equalities(&self) -> Result<Vec<String>, PartError> {
+        (0..self.model.neq()).map(|e| self.equality(e)).collect()
+    }
+
+    fn equality(&self, e: usize) -> Result<String, PartError> {
+        let m = self.model;
+        let kind = words::equality(m.eq_type()[e])
+            .ok_or_else(|| self.beyond("equality", e, "a type that is not connect, weld, joint or tendon"))?;
+        let (first, second) = (some(m.eq_obj1id()[e]), some(m.eq_obj2id()[e]));
+        let data = row_of(m.eq_data(), m.neq(), e);
+        let element = Element::new(kind).attr("name", self.full(&self.names.equalities[e]));
+        let between_sites = m.equality_is_between_sites(e);
+        let site = |id: usize| self.full(&self.names.sites[id]);
+        let element = match kind {
+            "joint" => element
+                .opt("joint1", first.map(|id| self.full(&self.names.joints[id])))
+                .opt("joint2", second.map(|id| self.full(&self.names.joints[id])))
+                .numbers("polycoef", &data[..5]),
+            "tendon" => element
+                .opt("tendon1", first.map(|id| self.full(&self.names.tendons[id])))
+                .opt("tendon2", second.map(|id| self.full(&self.names.tendons[id])))
+                .numbers("polycoef", &data[..5]),
+            _ if between_sites => element.opt("site1", first.map(site)).opt("site2", second.map(site)),
+            _ => element
+                .opt("body1", first.map(|id| self.body(id)))
+                .opt("body2", second.map(|id| self.body(id)))
+                .numbers("anchor", &data[..3]),
+        };
+        let element = match kind {
+            "weld" if between_sites => element.attr("torquescale", number(data[10])),
+            "weld" => element.numbers("relpose", &data[3..10]).attr("torquescale", number(data[10])),
+            _ => element,
+        };
+        let element = element
+            .attr("active", m.equality_is_active(e))
+            .numbers("solref", row_of(m.eq_solref(), m.neq(), e))
+            .numbers("solimp", row_of(m.eq_solimp(), m.neq(), e));
+        Ok(element.leaf())
+    }
+
+    pub(super) fn tendons(&self) -> Result<Vec<String>, PartError> {
+        let mut lines = Vec::new();
+        for tendon in 0..self.model.ntendon() {
+            self.tendon(tendon, &mut lines)?;
+        }
+        Ok(lines)
+    }
+
+    fn tendon(&self, t: usize, lines: &mut Vec<String>) -> Result<(), PartError> {
+        let m = self.model;
+        let first = m.tendon_adr()[t] as usize;
+        let path = first..first + m.tendon_num()[t] as usize;
+        let point = |p: usize| words::path_point(m.wrap_type()[p]);
+        let fixed = path.clone().all(|p| point(p) == Some(PathPoint::Joint));
+        let tag = if fixed { "fixed" } else { "spatial" };
+        let mut element = Element::new(tag)
+            .attr("name", self.full(&self.names.tendons[t]))
+            .attr("group", m.tendon_group()[t])
+            .attr("margin", number(m.tendon_margin()[t]))
+            .attr("stiffness", number(m.tendon_stiffness()[t]))
+            .attr("damping", number(m.tendon_damping()[t]))
+            .attr("frictionloss", number(m.tendon_frictionloss()[t]));
+        element = match m.tendon_limited(t) {
+            true => element.attr("limited", "true").numbers("range", row(m.tendon_range(), 2, t)),
+            false => element.attr("limited", "false"),
+        };
+        let rest = row_of(m.tendon_lengthspring(), m.ntendon(), t);
+        // 2.2.2 has one length; 4.x a range without force.
+        let rest = if self.target == Target::V2 { &rest[..1] } else { rest };
+        element = element
+            .numbers("springlength", rest)
+            .numbers("solreflimit", row_of(m.tendon_solref_lim(), m.ntendon(), t))
+            .numbers("solimplimit", row_of(m.tendon_solimp_lim(), m.ntendon(), t))
+            .numbers("solreffriction", row_of(m.tendon_solref_fri(), m.ntendon(), t))
+            .numbers("solimpfriction", row_of(m.tendon_solimp_fri(), m.ntendon(), t));
+        if TARGET == Target::V4 {
+            if m.tendon_inertia(t) != 0.0 {
+                element = element.attr("armature", number(m.tendon_inertia(t)));
+            }
+            if let Some(range) = m.tendon_actuator_force(t) {
+                element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
+            }
+        }
+        if !fixed {
+            let material = some(m.tendon_matid()[t]).map(|id| self.full(&self.names.materials[id]));
+            element = element
+                .attr("width", number(m.tendon_width()[t]))
+                .opt("material", material)
+                .attr("rgba", singles(row(m.tendon_rgba(), 4, t)));
+        }
+        lines.push(element.open());
+        for p in path {
+            let (id, parameter) = (some(m.wrap_objid()[p]), m.wrap_prm()[p]);
+            let site = |id: usize| self.full(&self.names.sites[id]);
+            let element = match point(p) {
+                Some(PathPoint::Joint) => Element::new("joint")
+                    .opt("joint", id.map(|id| self.full(&self.names.joints[id])))
+                    .attr("coef", number(parameter)),
+                Some(PathPoint::Pulley) => Element::new("pulley").attr("divisor", number(parameter)),
+                Some(PathPoint::Site) => Element::new("site").opt("site", id.map(site)),
+                Some(PathPoint::Geom) => Element::new("geom")
+                    .opt("geom", id.map(|id| self.full(&self.names.geoms[id])))
+                    // MuJoCo keeps the index of a site among numbers.
+                    .opt("sidesite", some(parameter.round() as i32).map(site)),
+                None => return Err(self.beyond("tendon", t, "a path of unknown points")),
+            };
+            lines.push(format!("  {}", element.leaf()));
+        }
+        lines.push(format!("</{tag}>"));
+        Ok(())
+    }
+}

@@ -1,0 +1,157 @@
+//! MJCF files as parts of a scene: from the model that MuJoCo compiled of the file to lines of the scene's document.
+//!
+//! What is written is what MuJoCo made of the file, in full precision: includes, default classes, angles, local or global
+//! coordinates, composite bodies and the compiler's settings are resolved then, and none of them touches the rest of the
+//! scene. Every name gets the part's uid and a slash before it. What stands in the file's world and the bodies of it
+//! are in the scene's, moved by the pose of the part; a body that does not move and is called by the uid is its frame.
+
+mod actuators;
+mod assets;
+mod bodies;
+mod constraints;
+mod names;
+mod sensors;
+mod settings;
+
+pub use names::PartNames;
+pub(crate) use settings::compare;
+
+use crate::mj::{Asset, Model, Target};
+use crate::source::Source;
+use scene::Pose;
+
+/// Lines of a part for both lines of MuJoCo.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MjcfPart {
+    v2: PartLines,
+    v4: PartLines,
+}
+
+/// Lines of a part, by the section of the document where they belong.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartLines {
+    /// The file.
+    pub source: Source,
+    /// Meshes, height fields, textures, materials.
+    pub assets: Vec<String>,
+    /// Bodies of the world.
+    pub bodies: Vec<String>,
+    /// Pairs of geoms with contact parameters, pairs of bodies that never collide.
+    pub contacts: Vec<String>,
+    /// Equalities.
+    pub equalities: Vec<String>,
+    /// Tendons.
+    pub tendons: Vec<String>,
+    /// Actuators without an activation.
+    pub actuators: Vec<String>,
+    /// Actuators with an activation.
+    pub actuators_with_state: Vec<String>,
+    /// Sensors.
+    pub sensors: Vec<String>,
+}
+
+/// Something of a file that cannot be written back.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{element} {name:?} has {what}, which a part of a scene cannot have")]
+pub struct PartError {
+    /// The kind of element, as MJCF calls it.
+    pub element: &'static str,
+    /// Its name in the file; its number where it has none.
+    pub name: String,
+    /// What it has.
+    pub what: String,
+}
+
+/// A file that is being written as a part.
+struct Writing<'a> {
+    model: &'a Model,
+    names: &'a PartNames,
+    uid: &'a str,
+    pose: &'a Pose,
+    /// Beginning of the names of its files.
+    stem: &'a str,
+    target: Target,
+}
+
+impl MjcfPart {
+    /// The part called `uid` that stands at `pose`. Names of its files begin with `stem`.
+    ///
+    /// # Errors
+    /// Something of the model is not written back.
+    pub fn new(
+        model: &Model,
+        names: &PartNames,
+        uid: &str,
+        pose: &Pose,
+        stem: &str,
+        source: &Source,
+    ) -> Result<(Self, Vec<Asset>), PartError> {
+        if let Some(beyond) = model.beyond() {
+            let name = names.of(beyond.element, beyond.index);
+            return Err(PartError { element: beyond.element, name, what: beyond.what.into() });
+        }
+        let of = |target| Writing { model, names, uid, pose, stem, target };
+        let (v2, v4) = (of(Target::V2).lines(source)?, of(Target::V4).lines(source)?);
+        Ok((Self { v2, v4 }, of(Target::V2).files()?))
+    }
+
+    /// The lines for a line of MuJoCo.
+    pub fn lines(&self, target: Target) -> &PartLines {
+        match target {
+            Target::V2 => &self.v2,
+            Target::V4 => &self.v4,
+        }
+    }
+}
+
+impl Writing<'_> {
+    fn lines(&self, source: &Source) -> Result<PartLines, PartError> {
+        let [actuators, actuators_with_state] = self.actuators()?;
+        Ok(PartLines {
+            source: source.clone(),
+            assets: self.assets(),
+            bodies: self.bodies()?,
+            contacts: self.contacts(),
+            equalities: self.equalities()?,
+            tendons: self.tendons()?,
+            actuators,
+            actuators_with_state,
+            sensors: self.sensors()?,
+        })
+    }
+
+    /// Name in the scene of something of the file.
+    fn full(&self, name: &str) -> String {
+        format!("{}/{name}", self.uid)
+    }
+
+    /// Name in the scene of a body of the file; the world is what stands still.
+    fn body(&self, body: usize) -> String {
+        if body == 0 { self.uid.into() } else { self.full(&self.names.bodies[body]) }
+    }
+
+    /// An error about something of the file.
+    fn beyond(&self, element: &'static str, index: usize, what: impl Into<String>) -> PartError {
+        PartError { element, name: self.names.of(element, index), what: what.into() }
+    }
+}
+
+/// Row `index` of an array with rows of `width`.
+fn row<T>(values: &[T], width: usize, index: usize) -> &[T] {
+    &values[width * index..width * (index + 1)]
+}
+
+/// Row `index` of an array with `count` rows.
+fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
+    row(values, values.len() / count.max(1), index)
+}
+
+/// An index of MuJoCo's, where -1 is none.
+fn some(index: i32) -> Option<usize> {
+    usize::try_from(index).ok()
+}
+
+/// Single precision numbers with the shortest text that reads back as the same.
+fn singles(values: &[f32]) -> String {
+    values.iter().map(f32::to_string).collect::<Vec<_>>().join(" ")
+}

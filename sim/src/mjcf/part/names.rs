@@ -1,0 +1,99 @@
+//! Names of everything in a file: its own, and made-up ones for what has none.
+
+use crate::mj::{Model, ObjectKind};
+use std::collections::BTreeSet;
+
+/// Names of a file's objects in MuJoCo's order, without the part's uid; no two of a kind are the same.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartNames {
+    /// Bodies; the first is the world.
+    pub bodies: Vec<String>,
+    /// Joints.
+    pub joints: Vec<String>,
+    /// Geoms.
+    pub geoms: Vec<String>,
+    /// Sites.
+    pub sites: Vec<String>,
+    /// Whether each site has a name in the file.
+    pub named_sites: Vec<bool>,
+    /// Cameras.
+    pub cameras: Vec<String>,
+    /// Lights.
+    pub lights: Vec<String>,
+    /// Meshes.
+    pub meshes: Vec<String>,
+    /// Height fields.
+    pub height_fields: Vec<String>,
+    /// Textures.
+    pub textures: Vec<String>,
+    /// Materials.
+    pub materials: Vec<String>,
+    /// Equalities.
+    pub equalities: Vec<String>,
+    /// Tendons.
+    pub tendons: Vec<String>,
+    /// Actuators.
+    pub actuators: Vec<String>,
+    /// MuJoCo's own sensors.
+    pub sensors: Vec<String>,
+}
+
+/// Names of the objects of one kind; those without a name are called by the kind and their number.
+fn of_kind(model: &Model, kind: ObjectKind, word: &str, count: usize) -> Vec<String> {
+    let given: Vec<Option<String>> = (0..count).map(|i| model.name(kind, i)).collect();
+    let mut taken: BTreeSet<String> = given.iter().flatten().cloned().collect();
+    let mut name = |(index, name): (usize, Option<String>)| {
+        name.unwrap_or_else(|| {
+            let mut made_up = format!("{word}{index}");
+            while !taken.insert(made_up.clone()) {
+                made_up.push('_');
+            }
+            made_up
+        })
+    };
+    given.into_iter().enumerate().map(&mut name).collect()
+}
+
+impl PartNames {
+    /// The names of a model.
+    pub fn of_model(model: &Model) -> Self {
+        let named = |kind, word, count| of_kind(model, kind, word, count);
+        Self {
+            bodies: named(ObjectKind::Body, "body", model.nbody()),
+            joints: named(ObjectKind::Joint, "joint", model.njnt()),
+            geoms: named(ObjectKind::Geom, "geom", model.ngeom()),
+            sites: named(ObjectKind::Site, "site", model.nsite()),
+            named_sites: (0..model.nsite()).map(|i| model.name(ObjectKind::Site, i).is_some()).collect(),
+            cameras: named(ObjectKind::Camera, "camera", model.ncam()),
+            lights: named(ObjectKind::Light, "light", model.nlight()),
+            meshes: named(ObjectKind::Mesh, "mesh", model.nmesh()),
+            height_fields: named(ObjectKind::HeightField, "hfield", model.nhfield()),
+            textures: named(ObjectKind::Texture, "texture", model.ntex()),
+            materials: named(ObjectKind::Material, "material", model.nmat()),
+            equalities: named(ObjectKind::Equality, "equality", model.neq()),
+            tendons: named(ObjectKind::Tendon, "tendon", model.ntendon()),
+            actuators: named(ObjectKind::Actuator, "actuator", model.nactuator()),
+            sensors: named(ObjectKind::Sensor, "sensor", model.nsensor()),
+        }
+    }
+
+    /// The name of an object, by MJCF's word for its kind.
+    pub(super) fn of(&self, element: &str, index: usize) -> String {
+        let names = match element {
+            "body" => &self.bodies,
+            "joint" => &self.joints,
+            "geom" => &self.geoms,
+            "site" => &self.sites,
+            "camera" => &self.cameras,
+            "light" => &self.lights,
+            "mesh" => &self.meshes,
+            "texture" => &self.textures,
+            "equality" => &self.equalities,
+            "tendon" => &self.tendons,
+            "actuator" => &self.actuators,
+            "sensor" => &self.sensors,
+            _ => return index.to_string(),
+        };
+        names.get(index).cloned().unwrap_or_else(|| index.to_string())
+    }
+}

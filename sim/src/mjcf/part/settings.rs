@@ -1,0 +1,94 @@
+//! What a file says of the whole model, which is the scene's to say: found again in the text, to name file and line.
+
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::mj::Model;
+use crate::source::Source;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Most files that include each other; MuJoCo refuses a file that is included twice.
+const MOST_FILES: usize = 100;
+
+/// An element at the top of a file.
+#[derive(Clone, Debug)]
+struct Stated {
+    element: String,
+    /// Its attributes, and those of `<flag>` in it with that word before them.
+    attributes: Vec<String>,
+    source: Source,
+}
+
+/// Everything at the top of a file and of the files it includes, in order.
+fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files: &mut usize) {
+    *files += 1;
+    let Ok(document) = roxmltree::Document::parse(text) else { return };
+    let shared = Arc::new(file.to_path_buf());
+    for node in document.root_element().children().filter(roxmltree::Node::is_element) {
+        if node.tag_name().name() == "include" {
+            let Some(path) = node.attribute("file").map(|name| folder.join(name)) else { continue };
+            if let Ok(text) = std::fs::read_to_string(&path)
+                && *files < MOST_FILES
+            {
+                stated(&text, &path, folder, found, files);
+            }
+            continue;
+        }
+        let flags = node.children().filter(|child| child.has_tag_name("flag"));
+        let attributes = node.attributes().map(|a| a.name().to_string());
+        let attributes =
+            attributes.chain(flags.flat_map(|flag| flag.attributes()).map(|a| format!("flag {}", a.name())));
+        let line = document.text_pos_at(node.range().start).row;
+        found.push(Stated {
+            element: node.tag_name().name().to_string(),
+            attributes: attributes.collect(),
+            source: Source { file: Arc::clone(&shared), line },
+        });
+    }
+}
+
+/// Says what of a file's settings is not taken over: the scene's hold for all of its parts.
+pub(crate) fn compare(uid: &str, text: &str, file: &Path, model: &Model, scene: &Model) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    stated(text, file, file.parent().unwrap_or(Path::new("")), &mut found, &mut 0);
+    let mut diagnostics = Vec::new();
+    for difference in model.option_differences(scene) {
+        let options = found.iter().rev().filter(|s| s.element == "option");
+        let at = options.into_iter().find(|s| s.attributes.iter().any(|a| a == difference.name));
+        let default = if at.is_some() { "" } else { ", MuJoCo's default" };
+        diagnostics.push(Diagnostic::new(
+            DiagnosticKind::SettingIgnored,
+            at.map(|s| s.source.clone()),
+            format!(
+                "part {uid:?}: option {} is {}{default}; the scene's {} holds",
+                difference.name, difference.here, difference.there
+            ),
+        ));
+    }
+    let left_out = [
+        ("visual", "how pictures look is the scene's to say"),
+        ("statistic", "MuJoCo computes the scene's"),
+        ("custom", "a scene has none"),
+    ];
+    for (element, why) in left_out {
+        let at = found.iter().find(|s| s.element == element);
+        if let Some(stated) = at {
+            let message = format!("part {uid:?}: <{element}> is left out: {why}");
+            diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, stated.source.clone(), message));
+        }
+    }
+    let skies =
+        (0..model.ntex()).filter(|t| model.texture(*t).is_some_and(|t| t.kind == crate::mj::TextureType::Skybox));
+    let counts = [
+        ("keyframe", model.nkey(), "its numbers are of the file alone"),
+        ("skin", model.nskin(), "bodies are drawn by their geoms"),
+        ("skybox texture", skies.count(), "what is behind everything is the scene's to say"),
+    ];
+    for (element, count, why) in counts {
+        if count > 0 {
+            let message = format!("part {uid:?}: {count} {element}(s) are left out: {why}");
+            let at = found.iter().find(|s| s.element == element).map(|s| s.source.clone());
+            diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
+        }
+    }
+    diagnostics
+}

@@ -1,0 +1,580 @@
+//! MJCF files as parts of a scene: configuration, the loaded file, and its views of a running simulation.
+
+use crate::capture::link_pose;
+use crate::compile::{PartIndex, Simulation};
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::manager::EnvId;
+use crate::mj::{self, LoadError, Model, words};
+use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, compare};
+use crate::objects::robot::check_pose;
+use crate::objects::rows::{Rows, Table};
+use crate::pattern;
+use crate::sensor_list::SensorList;
+use crate::source::Source;
+use ::scene::Pose;
+use ::scene::pose::{from_row, to_row};
+use ndarray::{Array2, ArrayView2, AsArray, Ix2};
+use sensors::EngineSensor;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Configuration of an MJCF file as a part of a scene.
+///
+/// MuJoCo itself reads the file; what it made of it is put into the scene, every name with `uid/` before it. Bodies that the
+/// file leaves free are free, others stand as the file says. Settings for the whole model (`option`, `visual`, ...) are the
+/// scene's: what differs is a diagnostic.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MjcfCfg {
+    /// Name of the part, unique in the simulation; prefix of its names.
+    pub uid: String,
+    /// The file; with `text` only what errors call it.
+    pub path: PathBuf,
+    /// The MJCF itself, which names no files; the file's content where `None`.
+    pub text: Option<String>,
+    /// Pose of the file's world in the environment.
+    #[serde(with = "scene::file_format::pose")]
+    pub init_pose: Pose,
+    /// What kind of thing it is, for the table of mask ids; `mjcf` where `None`.
+    pub semantic_class: Option<String>,
+}
+
+impl Default for MjcfCfg {
+    /// No file yet.
+    fn default() -> Self {
+        Self { uid: "mjcf".into(), path: PathBuf::new(), text: None, init_pose: Pose::identity(), semantic_class: None }
+    }
+}
+
+impl MjcfCfg {
+    /// A file where its own world is the environment.
+    pub fn file(uid: impl Into<String>, path: impl Into<PathBuf>) -> Self {
+        Self { uid: uid.into(), path: path.into(), ..Self::default() }
+    }
+
+    /// MJCF text, which names no files.
+    pub fn text(uid: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { uid: uid.into(), path: "text".into(), text: Some(text.into()), ..Self::default() }
+    }
+}
+
+/// Number of an actuator of a part: its column in `get_ctrl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ActuatorIndex(pub usize);
+
+/// A body or a site of a part, as sensors see it.
+#[derive(Clone, Debug)]
+pub(crate) struct Frame {
+    /// `uid/body` or `uid/site`.
+    pub(crate) name: String,
+    /// The body in the file.
+    pub(crate) body: usize,
+    /// Its pose in the body's frame.
+    pub(crate) body_from_frame: Pose,
+    /// Which frame of the part moves it.
+    pub(crate) carrier: usize,
+}
+
+/// A file that was added: what does not change while the simulation runs.
+#[derive(Debug)]
+pub struct MjcfData {
+    cfg: MjcfCfg,
+    model: Model,
+    names: PartNames,
+    document: Arc<PartDocument>,
+    files: Vec<mj::Asset>,
+    frames: Vec<Frame>,
+    sensors: Vec<EngineSensor>,
+    first_mask_id: i32,
+}
+
+impl MjcfData {
+    /// Reads and compiles the file, part number `index` of the simulation, whose model is `scene` so far.
+    pub(crate) fn load(
+        cfg: MjcfCfg,
+        index: usize,
+        first_mask_id: i32,
+        scene: &Model,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<Self> {
+        check_pose("init_pose", &cfg.init_pose)?;
+        let file = cfg.path.display().to_string();
+        let text = match &cfg.text {
+            Some(text) => text.clone(),
+            None => {
+                std::fs::read_to_string(&cfg.path).map_err(|error| Error::File { path: cfg.path.clone(), error })?
+            }
+        };
+        let compiled = if cfg.text.is_some() { mj::compile(&text, &[]) } else { mj::compile_file(&cfg.path) };
+        let model = compiled.map(mj::Compiled::into_model).map_err(|error| match error {
+            LoadError::Version(error) => Error::MujocoVersion(error),
+            LoadError::Compile(error) => {
+                Error::MjcfFile { part: cfg.uid.clone(), file: file.clone(), error: Box::new(error) }
+            }
+        })?;
+        let names = PartNames::of_model(&model);
+        let stem = format!("part{index}_");
+        let source = Source::new(&cfg.path, 1);
+        let (document, files) = PartDocument::new(&model, &names, &cfg.uid, &cfg.init_pose, &stem, &source)
+            .map_err(|error| Error::MjcfPart { part: cfg.uid.clone(), file, error: Box::new(error) })?;
+        diagnostics.extend(compare(&cfg.uid, &text, &cfg.path, &model, scene));
+        let frames = frames(&cfg.uid, &model, &names, diagnostics);
+        let sensors = engine_sensors(&cfg.uid, &model, &names);
+        Ok(Self { cfg, model, names, document: Arc::new(document), files, frames, sensors, first_mask_id })
+    }
+
+    /// Name of the part.
+    pub fn uid(&self) -> &str {
+        &self.cfg.uid
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &MjcfCfg {
+        &self.cfg
+    }
+
+    /// What MuJoCo made of the file alone.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Names of everything in the file, without the uid.
+    pub fn names(&self) -> &PartNames {
+        &self.names
+    }
+
+    pub(crate) fn document(&self) -> &Arc<PartDocument> {
+        &self.document
+    }
+
+    /// The files that its lines name.
+    pub(crate) fn files(&self) -> &[mj::Asset] {
+        &self.files
+    }
+
+    /// Its bodies but the world, then its sites that have a name, as sensors see them.
+    pub(crate) fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// MuJoCo's own sensors; the first value is that of the part alone.
+    pub(crate) fn sensors(&self) -> &[EngineSensor] {
+        &self.sensors
+    }
+
+    /// Name in the scene of something of the file.
+    pub(crate) fn full(&self, name: &str) -> String {
+        format!("{}/{name}", self.cfg.uid)
+    }
+
+    /// What the mask channel of cameras says of a body of the file; body 0 is what stands in its world.
+    pub(crate) fn mask_id(&self, body: usize) -> i32 {
+        self.first_mask_id + body as i32
+    }
+}
+
+/// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.
+fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<Frame> {
+    // Frame k is body k + 1. A body that is welded to another moves with it; what never moves stands for itself.
+    let carrier = |body: usize| match model.body_weldid()[body] as usize {
+        0 => body - 1,
+        moving => moving - 1,
+    };
+    let mut frames: Vec<Frame> = (1..model.nbody())
+        .map(|body| Frame {
+            name: format!("{uid}/{}", names.bodies[body]),
+            body,
+            body_from_frame: Pose::identity(),
+            carrier: carrier(body),
+        })
+        .collect();
+    for site in (0..model.nsite()).filter(|&site| names.named_sites[site]) {
+        let body = model.site_bodyid()[site] as usize;
+        let mut name = names.sites[site].clone();
+        while frames.iter().any(|frame| frame.name.strip_prefix(uid).is_some_and(|rest| rest[1..] == *name)) {
+            let message = format!("part {uid:?}: the site {name:?} is called as a body; its frame is \"{name}.site\"");
+            diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, None, message));
+            name.push_str(".site");
+        }
+        let (p, q) = (&model.site_pos()[3 * site..3 * site + 3], &model.site_quat()[4 * site..4 * site + 4]);
+        let carrier = if body == 0 { frames.len() } else { carrier(body) };
+        frames.push(Frame {
+            name: format!("{uid}/{name}"),
+            body,
+            body_from_frame: from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]),
+            carrier,
+        });
+    }
+    frames
+}
+
+/// MuJoCo's own sensors of a file.
+fn engine_sensors(uid: &str, model: &Model, names: &PartNames) -> Vec<EngineSensor> {
+    (0..model.nsensor())
+        .filter_map(|s| {
+            let word = words::sensor(model.sensor_type()[s])?;
+            // Angles and lengths have different units; what is observed decides.
+            let hinge = || {
+                let joint = usize::try_from(model.sensor_objid()[s]).ok()?;
+                words::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
+            };
+            let unit = match word.word {
+                "jointpos" | "jointlimitpos" => hinge().map(|hinge| if hinge { "rad" } else { "m" }),
+                "jointvel" | "jointlimitvel" => hinge().map(|hinge| if hinge { "rad/s" } else { "m/s" }),
+                "jointlimitfrc" | "jointactuatorfrc" => hinge().map(|hinge| if hinge { "N m" } else { "N" }),
+                _ => word.unit,
+            };
+            Some(EngineSensor {
+                name: format!("{uid}/{}", names.sensors[s]),
+                kind: word.word.into(),
+                unit: unit.map(Into::into),
+                first: model.sensor_adr()[s] as usize,
+                width: model.sensor_dim()[s] as usize,
+                solved: words::is_solved(model.sensor_needstage()[s]),
+                quaternion: word.quaternion,
+            })
+        })
+        .collect()
+}
+
+/// A part, to read. Arrays have one row per environment.
+#[derive(Clone, Copy, Debug)]
+pub struct MjcfPart<'a> {
+    data: &'a Arc<MjcfData>,
+    simulation: &'a Simulation,
+    index: usize,
+}
+
+impl<'a> MjcfPart<'a> {
+    pub(crate) fn new(data: &'a Arc<MjcfData>, simulation: &'a Simulation, index: usize) -> Self {
+        Self { data, simulation, index }
+    }
+
+    fn places(&self) -> &'a PartIndex {
+        &self.simulation.parts[self.index]
+    }
+
+    /// Name of the part.
+    pub fn uid(&self) -> &'a str {
+        self.data.uid()
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &'a MjcfCfg {
+        self.data.cfg()
+    }
+
+    /// What MuJoCo made of the file alone.
+    pub fn model(&self) -> &'a Model {
+        self.data.model()
+    }
+
+    /// Names of its joints, in MuJoCo's order.
+    pub fn joint_names(&self) -> &'a [String] {
+        &self.data.names.joints
+    }
+
+    /// Names of its bodies, in MuJoCo's order, without the world.
+    pub fn body_names(&self) -> &'a [String] {
+        &self.data.names.bodies[1..]
+    }
+
+    /// Names of its sites, in MuJoCo's order; those that the file does not name are called `site` and their number.
+    pub fn site_names(&self) -> &'a [String] {
+        &self.data.names.sites
+    }
+
+    /// Names of its actuators, in MuJoCo's order: the columns of [`get_ctrl`](Self::get_ctrl).
+    pub fn actuator_names(&self) -> &'a [String] {
+        &self.data.names.actuators
+    }
+
+    /// Names of MuJoCo's own sensors in it.
+    pub fn sensor_names(&self) -> &'a [String] {
+        &self.data.names.sensors
+    }
+
+    /// Numbers of the actuators that patterns match, in the order of the patterns.
+    ///
+    /// # Errors
+    /// A pattern matches nothing (with the nearest names), or an actuator is matched twice.
+    pub fn actuator_ids<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<ActuatorIndex>> {
+        let found = self.select(patterns, self.actuator_names(), "actuator")?;
+        Ok(found.into_iter().map(ActuatorIndex).collect())
+    }
+
+    /// Columns of [`get_qpos`](Self::get_qpos) of the joints that patterns match: 7 for a free joint (position, then w x y
+    /// z), 4 for a ball, 1 for others.
+    ///
+    /// # Errors
+    /// A pattern matches nothing (with the nearest names), or a joint is matched twice.
+    pub fn qpos_columns<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<Range<usize>>> {
+        self.columns(patterns, self.model().jnt_qposadr(), [7, 4, 1])
+    }
+
+    /// Columns of [`get_qvel`](Self::get_qvel) of the joints that patterns match: 6 for a free joint (velocity in the
+    /// environment, then angular velocity in the body), 3 for a ball, 1 for others.
+    ///
+    /// # Errors
+    /// As [`qpos_columns`](Self::qpos_columns).
+    pub fn qvel_columns<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<Range<usize>>> {
+        self.columns(patterns, self.model().jnt_dofadr(), [6, 3, 1])
+    }
+
+    fn columns<P: AsRef<str>>(&self, patterns: &[P], first: &[i32], widths: [usize; 3]) -> Result<Vec<Range<usize>>> {
+        let [free, ball, one] = widths;
+        let columns = |joint: usize| {
+            let first = first[joint] as usize;
+            let width = match words::joint(self.model().jnt_type()[joint]) {
+                Some("free") => free,
+                Some("ball") => ball,
+                _ => one,
+            };
+            first..first + width
+        };
+        Ok(self.select(patterns, self.joint_names(), "joint")?.into_iter().map(columns).collect())
+    }
+
+    fn select<P: AsRef<str>>(&self, patterns: &[P], names: &[String], what: &'static str) -> Result<Vec<usize>> {
+        pattern::select(patterns, names, what)
+            .map_err(|error| Error::MjcfNames { part: self.uid().into(), error: Box::new(error) })
+    }
+
+    /// Sum of the masses of its bodies \[kg\].
+    pub fn total_mass(&self) -> f64 {
+        self.model().body_mass().iter().sum()
+    }
+
+    /// Positions of its joints as MuJoCo has them \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
+    pub fn get_qpos(&self) -> Array2<f64> {
+        self.rows(&self.places().qpos, |env, place| env.data().qpos()[place])
+    }
+
+    /// Velocities of its joints as MuJoCo has them \[m/s, rad/s\], shape (N, nv).
+    pub fn get_qvel(&self) -> Array2<f64> {
+        self.rows(&self.places().dofs, |env, place| env.data().qvel()[place])
+    }
+
+    /// Controls of its actuators, in the units that the file gives them, shape (N, nu).
+    pub fn get_ctrl(&self) -> Array2<f64> {
+        self.rows(&self.places().controls, |env, place| env.data().ctrl()[place])
+    }
+
+    /// Forces of its actuators in the last step \[N or N m\], 0 after a reset, shape (N, nu).
+    pub fn get_actuator_force(&self) -> Array2<f64> {
+        self.rows(&self.places().actuators, |env, place| env.data().actuator_force()[place])
+    }
+
+    fn rows(&self, places: &[usize], read: impl Fn(&Env, usize) -> f64) -> Array2<f64> {
+        let n = self.simulation.batch.num_envs();
+        let mut values = Vec::with_capacity(n * places.len());
+        self.simulation.batch.for_each(|_, env| values.extend(places.iter().map(|&place| read(env, place))));
+        // One value for each environment and place was pushed.
+        Array2::from_shape_vec((n, places.len()), values).unwrap_or_default()
+    }
+
+    /// Pose of a body in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    ///
+    /// # Errors
+    /// There is no such body; the error lists the nearest names.
+    pub fn body_pose(&self, name: &str) -> Result<Array2<f64>> {
+        let body = self.find("body", name, self.body_names())? + 1;
+        Ok(self.poses(&(self.places().bodies[body], Pose::identity())))
+    }
+
+    /// Pose of a site in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    ///
+    /// # Errors
+    /// There is no such site; the error lists the nearest names.
+    pub fn site_pose(&self, name: &str) -> Result<Array2<f64>> {
+        let site = self.find("site", name, self.site_names())?;
+        let (p, q) = (&self.model().site_pos()[3 * site..], &self.model().site_quat()[4 * site..]);
+        let body = self.places().bodies[self.model().site_bodyid()[site] as usize];
+        Ok(self.poses(&(body, from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]))))
+    }
+
+    fn find(&self, what: &'static str, name: &str, names: &[String]) -> Result<usize> {
+        names.iter().position(|known| known == name).ok_or_else(|| Error::UnknownName {
+            what,
+            name: name.into(),
+            candidates: pattern::closest(name, names.iter().map(String::as_str))
+                .into_iter()
+                .map(String::from)
+                .collect(),
+        })
+    }
+
+    fn poses(&self, frame: &(usize, Pose)) -> Array2<f64> {
+        let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
+        self.simulation.batch.for_each(|i, env| {
+            for (k, value) in to_row(&link_pose(env.data(), frame)).into_iter().enumerate() {
+                poses[(i, k)] = value;
+            }
+        });
+        poses
+    }
+}
+
+/// A part, to command and to write.
+#[derive(Debug)]
+pub struct MjcfPartMut<'a> {
+    data: &'a Arc<MjcfData>,
+    simulation: &'a mut Simulation,
+    sensors: &'a mut SensorList,
+    index: usize,
+}
+
+impl<'a> MjcfPartMut<'a> {
+    pub(crate) fn new(
+        data: &'a Arc<MjcfData>,
+        simulation: &'a mut Simulation,
+        sensors: &'a mut SensorList,
+        index: usize,
+    ) -> Self {
+        Self { data, simulation, sensors, index }
+    }
+
+    /// The part, to read.
+    pub fn read(&self) -> MjcfPart<'_> {
+        MjcfPart::new(self.data, self.simulation, self.index)
+    }
+
+    /// Sets controls, which stay until changed or reset, and are 0 at first: rows for `env_ids` (all where `None`; a single
+    /// row is for all of them), columns for `actuators` (all where `None`). MuJoCo clamps them to the ranges of the file.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown actuator or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_ctrl<'t>(
+        &mut self,
+        controls: impl AsArray<'t, f64, Ix2>,
+        actuators: Option<&[ActuatorIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let all = &self.simulation.parts[self.index].controls;
+        let count = all.len();
+        let exists = |&ActuatorIndex(index): &ActuatorIndex| {
+            if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "actuator", index, count }) }
+        };
+        let chosen: Vec<usize> = match actuators {
+            None => (0..count).collect(),
+            Some(chosen) => chosen.iter().map(exists).collect::<Result<_>>()?,
+        };
+        let places: Vec<usize> = chosen.iter().map(|&index| all[index]).collect();
+        let of = |column: usize| format!("actuator {:?}", self.data.names.actuators[chosen[column]]);
+        let table = Table { argument: "set_ctrl", meaning: "environments, actuators", columns: chosen.len(), of: &of };
+        let rows = Rows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
+        for (env, row) in rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                env.set_controls(|controls| {
+                    places.iter().zip(row).for_each(|(&place, &value)| controls[place] = value)
+                });
+            });
+        }
+        Ok(())
+    }
+
+    /// Writes positions of all joints into the state, as [`get_qpos`](MjcfPart::get_qpos) gives them: rows of nq numbers for
+    /// `env_ids` (all where `None`; a single row is for all of them). Quaternions are normalised. A forward pass follows,
+    /// so that everything that is read afterwards belongs to the new state.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown environment, a value that is not finite, a quaternion of length zero; then nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_qpos<'t>(&mut self, positions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let places = self.simulation.parts[self.index].qpos.clone();
+        let rows = self.checked("write_qpos", positions.into(), &places, env_ids)?;
+        let quaternions = self.quaternions();
+        let length = |row: &[f64]| row.iter().map(|q| q * q).sum::<f64>().sqrt();
+        let normalised: Vec<(usize, Vec<f64>)> = rows
+            .iter()
+            .map(|(env, row)| {
+                let mut row = row.to_vec();
+                for &first in &quaternions {
+                    let quaternion = &mut row[first..first + 4];
+                    let norm = length(quaternion);
+                    if !(norm > 1e-9 && norm.is_finite()) {
+                        return Err(Error::Config {
+                            field: "write_qpos",
+                            value: format!("{quaternion:?} in columns {first} to {}", first + 3),
+                            expected: "a quaternion w, x, y, z must have a length that is not zero and not beyond all \
+                                       numbers",
+                        });
+                    }
+                    quaternion.iter_mut().for_each(|q| *q /= norm);
+                }
+                Ok((env, row))
+            })
+            .collect::<Result<_>>()?;
+        for (env, row) in normalised {
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| {
+                    let qpos = data.qpos_mut();
+                    places.iter().zip(&row).for_each(|(&place, &value)| qpos[place] = value);
+                });
+            });
+        }
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
+    /// Writes velocities of all joints into the state, as [`get_qvel`](MjcfPart::get_qvel) gives them: rows of nv numbers, as
+    /// in [`write_qpos`](Self::write_qpos).
+    ///
+    /// # Errors
+    /// Wrong shape, unknown environment, a value that is not finite; then nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let places = self.simulation.parts[self.index].dofs.clone();
+        let rows = self.checked("write_qvel", velocities.into(), &places, env_ids)?;
+        for (env, row) in rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| {
+                    let qvel = data.qvel_mut();
+                    places.iter().zip(row).for_each(|(&place, &value)| qvel[place] = value);
+                });
+            });
+        }
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
+    /// First columns of the quaternions of `get_qpos`.
+    fn quaternions(&self) -> Vec<usize> {
+        let model = &self.data.model;
+        let first = |joint: usize| {
+            let first = model.jnt_qposadr()[joint] as usize;
+            match words::joint(model.jnt_type()[joint]) {
+                Some("free") => Some(first + 3),
+                Some("ball") => Some(first),
+                _ => None,
+            }
+        };
+        (0..model.njnt()).filter_map(first).collect()
+    }
+
+    fn checked<'v>(
+        &self,
+        argument: &'static str,
+        values: ArrayView2<'v, f64>,
+        places: &[usize],
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rows<'v>> {
+        let of = |_| format!("part {:?}", self.data.uid());
+        let table = Table { argument, meaning: "environments, numbers of the joints", columns: places.len(), of: &of };
+        Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
+    }
+}
+
+impl MjcfCfg {
+    /// Makes its path relative to a folder; an absolute one stays, and text has none.
+    pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
+        if self.text.is_none() {
+            self.path = beside(&self.path);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What cameras and contact sensors say of a part.
+
+use super::{alone, empty};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_wxyz;
+use kinetoscope::sim::Visible;
+
+/// A textured, lit world with a mesh, a height field and a cube texture.
+const LOOKS: &str = r#"<mujoco><asset>
+  <texture name="checks" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="16" height="16"/>
+  <texture name="faces" type="cube" builtin="gradient" rgb1="0 1 0" rgb2="0 0 1" width="8" height="48"/>
+  <texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2="0 0 0" width="8" height="48"/>
+  <material name="checked" texture="checks" texrepeat="2 2"/><material name="faced" texture="faces" shininess="0.3"/>
+  <mesh name="wedge" vertex="0 0 0  0.2 0 0  0 0.3 0  0 0 0.4"/>
+  <hfield name="hills" nrow="3" ncol="3" size="0.5 0.5 0.1 0.1"/>
+  </asset><worldbody>
+  <light name="lamp" pos="0 0 3" dir="0 0.1 -1" cutoff="40"/>
+  <geom type="plane" size="2 2 1" material="checked"/>
+  <geom type="hfield" hfield="hills" pos="1 1 0"/>
+  <body name="thing" pos="0 0 0.5"><freejoint/><geom type="mesh" mesh="wedge"/>
+    <geom type="box" size="0.1 0.1 0.1" pos="0.3 0 0" material="faced"/></body></worldbody></mujoco>"#;
+
+/// What is drawn of the part is what is drawn of the file alone.
+#[test]
+fn a_part_looks_as_the_file_does() {
+    let file = Visible::of_model(&alone(LOOKS));
+    let mut sim = empty(1);
+    sim.add_mjcf(MjcfCfg { semantic_class: Some("toy".into()), ..MjcfCfg::text("looks", LOOKS) }).unwrap();
+    let part = sim.visible();
+    assert_eq!(part.left_out(), [""; 0]);
+    let (here, there) = (part.scene().instances(), file.scene().instances());
+    assert_eq!(here.len(), there.len());
+    for (a, b) in here.iter().zip(there) {
+        assert_eq!(a.material, b.material);
+        assert_eq!(a.fixed, b.fixed);
+    }
+    assert!(here.iter().filter(|i| i.material.texture.is_some()).count() == 2);
+    assert_eq!(part.scene().lights.len(), 1);
+    let ids = sim.mask_ids();
+    let names: Vec<_> = ids.iter().map(|id| (id.object.as_str(), id.link.as_deref(), id.class.as_str())).collect();
+    assert_eq!(names, [("looks", None, "toy"), ("looks", Some("thing"), "toy")]);
+    let names: Vec<&str> = here.iter().map(|i| i.name.as_ref()).collect();
+    assert_eq!(names, ["looks", "looks", "looks/thing", "looks/thing"]);
+
+    // The plane is 2 m below a camera that looks straight down.
+    let rotation = from_wxyz([0.0, 0.0, 1.0, 0.0]);
+    let camera = CameraCfg {
+        width: 9,
+        height: 9,
+        extrinsics: Extrinsics {
+            placement: Placement::Pose { pos: [-1.0, -1.0, 2.0], rotation },
+            ..Default::default()
+        },
+        channels: Channels::from_names(&["depth", "mask"]).unwrap(),
+        ..Default::default()
+    };
+    let camera = sim.add_sensor("camera", camera).unwrap();
+    let seen = sim.sensor(camera).unwrap();
+    assert!((f64::from(seen.depth().unwrap()[(0, 4, 4)]) - 2.0).abs() < 1e-6);
+    assert_eq!(seen.mask().unwrap()[(0, 4, 4)], sim.mask_ids()[0].id);
+}
+
+/// Contacts of a part's bodies are the part's: a contact sensor reads the weight of what stands on its world, and on the
+/// scene's ground.
+#[test]
+fn contacts_belong_to_bodies_of_the_part() {
+    let block = r#"<mujoco><worldbody><body name="block" pos="0 0 0.1"><freejoint/>
+        <geom type="box" size="0.1 0.1 0.1" mass="2"/></body></worldbody></mujoco>"#;
+    let with_floor = block.replace("<worldbody>", "<worldbody><geom type=\"plane\" size=\"1 1 1\"/>");
+    for (text, ground) in [(block.to_string(), Some(GroundCfg::default())), (with_floor, None)] {
+        let cfg = SimulationManagerCfg { ground, physics_dt: 0.002, ..Default::default() };
+        let mut sim = SimulationManager::new(cfg).unwrap();
+        sim.add_mjcf(MjcfCfg::text("part", &text)).unwrap();
+        let cube = RigidObjectCfg { uid: "cube".into(), mass: Some(1.0), ..Default::default() };
+        let top = Pose::translation(0.0, 0.0, 0.25);
+        sim.add_rigid_object(RigidObjectCfg { init_pose: top, ..cube }).unwrap();
+        let cfg = ContactSensorCfg { bodies: vec!["part/block".into()], ..Default::default() };
+        let id = sim.add_sensor("contact", cfg).unwrap();
+        sim.update(1000);
+        let force = sim.sensor(id).unwrap().net_forces_w();
+        // 2 kg stand, with 1 kg on them: ground and cube together give the block's weight.
+        assert!((force[(0, 0, 2)] - 2.0 * 9.81).abs() < 1e-3, "{force}");
+    }
+}
