@@ -14,7 +14,6 @@ use kinetoscope::scene::{Marker, Random};
 use kinetoscope::sensors::camera::PointFrame;
 use kinetoscope::sensors::camera::colormap::mask_color;
 use launcher::{Launcher, Progress, cloud, picture, stage};
-use nalgebra::Point3;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -308,20 +307,10 @@ fn balls(camera: &Camera, env: usize) -> launcher::Result<Vec<(EnvId, Marker)>> 
     Ok(markers.collect())
 }
 
-/// How far from its pixel's centre a point of the cloud is, seen again through the camera's matrices: the largest distance in
-/// pixels.
+/// How far the points are from the pixels that they were made of, seen again \[pixels\].
 fn round_trip(camera: &Camera, env: usize) -> launcher::Result<f64> {
     let (map, k) = (camera.point_map(env, PointFrame::World)?, camera.intrinsic_matrices());
-    let row: [f64; 7] = std::array::from_fn(|i| camera.pose_w(CameraConvention::Ros)[(env, i)]);
-    let camera_from_world = kinetoscope::scene::pose::from_row(&row).inverse();
-    let mut worst = 0.0_f64;
-    for (v, line) in map.outer_iter().enumerate() {
-        for (u, point) in line.outer_iter().enumerate().filter(|(_, point)| point[0].is_finite()) {
-            let at = camera_from_world * Point3::new(point[0], point[1], point[2]).cast::<f64>();
-            let pixel = |axis: usize, x: f64| k[(env, axis, axis)] * x / at.z + k[(env, axis, 2)];
-            let apart = [pixel(0, at.x) - (u as f64 + 0.5), pixel(1, at.y) - (v as f64 + 0.5)];
-            worst = worst.max(apart[0].abs()).max(apart[1].abs());
-        }
-    }
-    Ok(worst)
+    let pose: [f64; 7] = std::array::from_fn(|i| camera.pose_w(CameraConvention::Ros)[(env, i)]);
+    let lens = [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]];
+    Ok(cloud::round_trip(&map, lens, &pose))
 }

@@ -5,6 +5,7 @@ use crate::frames::{pose, put};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::matching;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use ndarray::{ArrayView2, ArrayView3};
 use scene::pose::{from_row, to_wxyz};
 use scene::{Marker, Pose, SceneState};
@@ -174,12 +175,16 @@ impl Sensor for FrameTransformer {
 /// A summary of several lines.
 impl fmt::Display for FrameTransformer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Frame transformer")?;
-        writeln!(f, "  environments     : {}", self.sampler.num_envs())?;
-        writeln!(f, "  update period (s): {}", self.sampler.period())?;
-        writeln!(f, "  source body      : {}", self.source_name)?;
-        writeln!(f, "  number of targets: {}", self.names.len())?;
-        write!(f, "  target frames    : {}", self.names.join(", "))
+        summary::write(
+            f,
+            "Frame transformer",
+            &self.sampler,
+            &[
+                ("source body", &self.source_name),
+                ("number of targets", &self.names.len()),
+                ("target frames", &summary::list(&self.names)),
+            ],
+        )
     }
 }
 

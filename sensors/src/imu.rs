@@ -4,11 +4,13 @@ use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use nalgebra::Vector3;
 use ndarray::ArrayView2;
 use scene::pose::to_wxyz;
 use scene::{Pose, SceneState};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Configuration of an [`Imu`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,6 +51,8 @@ impl Default for ImuCfg {
 /// period nor a reset shows in it.
 #[derive(Clone, Debug)]
 pub struct Imu {
+    /// Name of the body.
+    body: String,
     mount: Mount,
     sampler: Sampler,
 }
@@ -88,6 +92,7 @@ impl SensorCfg for ImuCfg {
             Channel::new("ang_acc_b", 3),
         ];
         Ok(Imu {
+            body: context.bodies[body].clone(),
             mount: Mount { body, body_from_imu: self.offset, gravity_bias },
             sampler: Sampler::new("imu", self.requires(), context, &self.sampling, &channels)?,
         })
@@ -134,6 +139,13 @@ impl Sensor for Imu {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for Imu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        summary::write(f, "Imu", &self.sampler, &[("body", &self.body)])
     }
 }
 

@@ -7,9 +7,11 @@ use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::select;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
 use scene::SceneState;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Configuration of a [`JointState`] sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -73,6 +75,13 @@ impl Sensor for JointState {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for JointState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        summary::write(f, "Joint state", &self.sampler, &[("joints", &summary::list(&self.names))])
     }
 }
 

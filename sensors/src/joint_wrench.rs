@@ -5,10 +5,12 @@ use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::select;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use nalgebra::Vector3;
 use ndarray::ArrayView3;
 use scene::{Pose, SceneState};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Configuration of a [`JointWrench`] sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -126,6 +128,13 @@ impl Sensor for JointWrench {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for JointWrench {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        summary::write(f, "Joint wrench", &self.sampler, &[("links", &summary::list(&self.names))])
     }
 }
 

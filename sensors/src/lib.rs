@@ -32,6 +32,7 @@ pub mod schedule;
 pub mod select;
 pub mod sensor;
 pub(crate) mod share;
+mod summary;
 pub mod visibility;
 
 pub use camera::{Camera, CameraCfg, CameraError};

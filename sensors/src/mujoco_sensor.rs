@@ -4,10 +4,12 @@ use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::select::select;
 use crate::sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use ndarray::{ArrayView2, ArrayView3, Axis, Slice};
 use scene::SceneState;
 use scene::pattern::closest;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::ops::Range;
 
 /// Configuration of a [`MujocoSensor`].
@@ -92,6 +94,13 @@ impl Sensor for MujocoSensor {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for MujocoSensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        summary::write(f, "MuJoCo's own sensors", &self.sampler, &[("sensors", &summary::list(&self.names))])
     }
 }
 

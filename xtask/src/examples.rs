@@ -65,6 +65,13 @@ const TABLE: &[Run] = &[
     run_of("run_ray_caster", &[2], "--headless --steps 1 --resolution 0"),
     run_of("run_ray_caster", &[2], "--headless --steps 1 --cell 0.3"),
     run_of(
+        "run_ray_caster_camera",
+        &[0],
+        "--headless --num-envs 2 --steps 100 --save --camera-id 1 --out {out}/ray_caster_camera \
+         --report {out}/ray_caster_camera.json",
+    ),
+    run_of("run_ray_caster_camera", &[2], "--headless --steps 1 --height 0"),
+    run_of(
         "run_frame_transformer",
         &[0],
         "--headless --num-envs 2 --steps 200 --out {out}/frames --report {out}/frames.json",

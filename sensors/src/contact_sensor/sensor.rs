@@ -6,6 +6,7 @@ use crate::error::SensorError;
 use crate::sampling::{Sampled, Sampler};
 use crate::select::matching;
 use crate::sensor::Sensor;
+use crate::summary;
 use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
 use scene::{Marker, SceneState};
 use std::fmt;
@@ -271,13 +272,15 @@ impl ContactSensor {
 /// A summary of several lines.
 impl fmt::Display for ContactSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |names: &[String]| if names.is_empty() { "none".into() } else { names.join(", ") };
-        writeln!(f, "Contact sensor")?;
-        writeln!(f, "  environments     : {}", self.sampler.num_envs())?;
-        writeln!(f, "  update period (s): {}", self.sampler.period())?;
-        writeln!(f, "  history length   : {}", self.sampler.history_length())?;
-        writeln!(f, "  number of bodies : {}", self.names.len())?;
-        writeln!(f, "  body names       : {}", list(&self.names))?;
-        write!(f, "  filters          : {}", list(&self.filters))
+        summary::write(
+            f,
+            "Contact sensor",
+            &self.sampler,
+            &[
+                ("number of bodies", &self.names.len()),
+                ("body names", &summary::list(&self.names)),
+                ("filters", &summary::list(&self.filters)),
+            ],
+        )
     }
 }

@@ -10,9 +10,11 @@ use crate::ray::caster::scan::Scan;
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
 use scene::pose::{from_row, to_row};
 use scene::{Pose, PoseF64, SceneState};
+use std::fmt;
 
 /// A camera in every environment that casts one ray per pixel; [`Sampled`] has the stamps and counts of its pictures.
 ///
@@ -62,6 +64,21 @@ struct Shown {
     distance: Array3<f32>,
     normal: Array4<f32>,
     mask: Array3<i32>,
+}
+
+/// A summary of several lines.
+impl fmt::Display for RayCasterCamera {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (height, width) = self.image_shape();
+        let targets = self.scan.targets();
+        let targets = format!("{} ({} of them fixed)", targets.len(), targets.fixed_count());
+        summary::write(
+            f,
+            "Ray-caster camera",
+            &self.sampler,
+            &[("pictures", &format!("{width} x {height}")), ("targets", &targets)],
+        )
+    }
 }
 
 impl RayCasterCamera {
