@@ -12,7 +12,7 @@ use crate::visibility::{Projection, RenderError, View};
 use scene::{Instance, PoseF32};
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
-const BAND: usize = 32 * 1024;
+const BAND: usize = 128 * 1024;
 /// Lamps with a shadow, at most.
 const MAX_SHADOWS: usize = 4;
 
