@@ -230,6 +230,17 @@ mod tests {
         assert_eq!(lock(&long.taken).len(), 40);
     }
 
+    #[test]
+    fn threads_end_with_the_last_clone() {
+        let crew = Crew::default();
+        crew.run(3, &Arc::new(Numbers { count: 5, ..Numbers::default() }));
+        let (clone, shared) = (crew.clone(), Arc::downgrade(&crew.0.shared));
+        drop(crew);
+        assert_eq!(shared.strong_count(), 3, "its owner and two threads");
+        drop(clone);
+        assert_eq!(shared.strong_count(), 0);
+    }
+
     /// A panic reaches the caller, whichever thread it was on, and the crew goes on.
     #[test]
     fn panics_reach_the_caller() {
