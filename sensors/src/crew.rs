@@ -161,7 +161,7 @@ impl Shared {
 mod tests {
     use super::*;
     use std::collections::BTreeSet;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::thread::ThreadId;
 
     /// Takes numbers up to `count`, slowly; fails at `fail`.
@@ -216,18 +216,45 @@ mod tests {
         crew.run(1, &work);
         assert_eq!((lock(&work.taken).len(), format!("{crew:?}").as_str()), (5, "Crew { threads: 0 }"));
         // While the crew does one thing, somebody else asks it to do another.
-        let long = Arc::new(Numbers { count: 40, ..Numbers::default() });
+        let long = Arc::new(Waiting::default());
         std::thread::scope(|scope| {
             scope.spawn(|| crew.run(2, &long));
-            while lock(&long.taken).is_empty() {
+            while long.there.load(Ordering::Relaxed) == 0 {
                 std::thread::yield_now();
             }
             let short = Arc::new(Numbers { count: 5, ..Numbers::default() });
             crew.run(2, &short);
+            long.over.store(true, Ordering::Relaxed);
             assert!(lock(&short.taken).iter().all(|(_, desk, thread)| *desk == 0 && *thread == me()));
             assert_eq!(lock(&short.taken).len(), 5);
         });
-        assert_eq!(lock(&long.taken).len(), 40);
+    }
+
+    /// Lasts until it is told that it is over.
+    #[derive(Default)]
+    struct Waiting {
+        there: AtomicUsize,
+        over: AtomicBool,
+    }
+
+    impl Work for Waiting {
+        fn work(&self, _desk: usize) {
+            self.there.fetch_add(1, Ordering::Relaxed);
+            while !self.over.load(Ordering::Relaxed) {
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        }
+    }
+
+    #[test]
+    fn threads_end_with_the_last_clone() {
+        let crew = Crew::default();
+        crew.run(3, &Arc::new(Numbers { count: 5, ..Numbers::default() }));
+        let (clone, shared) = (crew.clone(), Arc::downgrade(&crew.0.shared));
+        drop(crew);
+        assert_eq!(shared.strong_count(), 3, "its owner and two threads");
+        drop(clone);
+        assert_eq!(shared.strong_count(), 0);
     }
 
     /// A panic reaches the caller, whichever thread it was on, and the crew goes on.
