@@ -88,7 +88,8 @@ pub struct SensorContext {
     pub seed: u64,
     /// Index of environment 0 among the environments of all processes: part of the key of random numbers.
     pub first_env: usize,
-    /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, or the uid of an object.
+    /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, the uid of an object, `uid/body` or
+    /// `uid/site` of an MJCF file.
     pub bodies: Arc<[String]>,
     /// For every body, the body that moves it: itself where it moves by a joint of its own or not at all, else the one that
     /// fixed joints fuse it to. As long as `bodies`, or empty where nobody knows.

@@ -4,6 +4,33 @@ use super::{empty, machine};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 
+/// A robot with implicit drives moves beside a part as it does alone: its rows are found among the part's equalities and
+/// friction.
+#[test]
+fn drives_of_robots_act_beside_parts() {
+    let run = |with_part: bool| {
+        let mut sim = empty(1);
+        let part = with_part.then(|| sim.add_mjcf(MjcfCfg::text("a", machine())).unwrap());
+        let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+        let far = Pose::translation(5.0, 0.0, 0.0);
+        let robot = sim.add_robot(RobotCfg { urdf, init_pose: far, ..Default::default() }).unwrap();
+        sim.robot_mut(robot).set_qpos(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
+        if with_part {
+            sim.add_mjcf(MjcfCfg { init_pose: Pose::translation(0.0, 3.0, 0.0), ..MjcfCfg::text("b", machine()) })
+                .unwrap();
+        }
+        sim.update(250);
+        assert!(sim.diverged().is_empty());
+        let read = sim.robot(robot);
+        (read.get_qpos(), read.get_qf(), part.map(|part| sim.mjcf_part(part).get_qpos()))
+    };
+    let ((alone, efforts, _), (beside, efforts_beside, _)) = (run(false), run(true));
+    // The solver stops at a residual of 1e-8 of the whole scene, which is another one.
+    assert!((&alone - &beside).iter().all(|d| d.abs() < 1e-6), "{alone} {beside}");
+    assert!((&efforts - &efforts_beside).iter().all(|d| d.abs() < 1e-3), "{efforts} {efforts_beside}");
+    assert!(efforts.iter().any(|effort| effort.abs() > 1.0) && alone.iter().any(|q| q.abs() > 0.3));
+}
+
 #[test]
 fn a_part_in_motion_is_bit_equal_after_more_was_added() {
     let mut sim = empty(2);

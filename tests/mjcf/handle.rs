@@ -45,6 +45,43 @@ fn positions_velocities_and_controls_are_per_environment() {
     assert_eq!(sim.mjcf_part(part).get_qpos(), start);
 }
 
+/// A body moved by hand goes where it is put, in its environment; what is welded to it follows.
+#[test]
+fn bodies_moved_by_hand_are_put_somewhere() {
+    let mut sim = empty(2);
+    let text = machine().replace("</equality>", "<weld body1=\"target\" body2=\"ball\"/></equality>");
+    let part = sim.add_mjcf(MjcfCfg::text("m", text)).unwrap();
+    let id =
+        sim.add_sensor("frames", FrameTransformerCfg::from("m/target", vec![TargetFrameCfg::of("m/ball")])).unwrap();
+    let place = array![[0.6, 0.4, 0.5, 2.0, 0.0, 0.0, 0.0]];
+    sim.mjcf_part_mut(part).write_mocap_pose("target", &place, Some(&[EnvId(1)])).unwrap();
+    let at = |sim: &SimulationManager, body: &str, env| {
+        let pose = sim.mjcf_part(part).body_pose(body).unwrap();
+        [0, 1, 2, 3].map(|k| pose[(env, k)])
+    };
+    assert_eq!([at(&sim, "target", 0), at(&sim, "target", 1)], [[1.0, 1.0, 1.0, 1.0], [0.6, 0.4, 0.5, 1.0]]);
+    assert_eq!(sim.sensor(id).unwrap().source_pos_w()[(1, 0)], 0.6, "seen at once");
+    let before = at(&sim, "ball", 1);
+    sim.update(1000);
+    assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0], "it stays");
+    // The ball started at (0.5, 0.3, 0.3), relative to a target at (1, 1, 1): (-0.5, -0.7, -0.7) from it. Welds are soft: they
+    // hang a little low, and the string of the ball's neighbours does not touch it.
+    let ball = at(&sim, "ball", 1);
+    assert!((ball[0] - 0.1).abs() < 1e-3 && (ball[1] + 0.3).abs() < 1e-3, "{before:?} {ball:?}");
+    let others = at(&sim, "ball", 0);
+    assert!((others[0] - 0.5).abs() < 1e-3 && (others[1] - 0.3).abs() < 1e-3, "{others:?}");
+    // More in the scene does not move it.
+    sim.add_rigid_object(RigidObjectCfg { init_pose: Pose::translation(5.0, 0.0, 1.0), ..Default::default() }).unwrap();
+    assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0]);
+    let mut write = sim.mjcf_part_mut(part);
+    let error = write.write_mocap_pose("ball", &place, None).unwrap_err().to_string();
+    assert!(error.contains("\"target\"") && error.contains("mocap"), "{error}");
+    let zero = Array2::zeros((1, 7));
+    assert!(write.write_mocap_pose("target", &zero, None).unwrap_err().to_string().contains("quaternion"));
+    sim.reset(None).unwrap();
+    assert_eq!(at(&sim, "target", 1), [1.0; 4]);
+}
+
 #[test]
 fn mistakes_are_errors_and_nothing_is_written() {
     let mut sim = empty(2);

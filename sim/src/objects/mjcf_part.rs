@@ -364,7 +364,8 @@ impl<'a> MjcfPart<'a> {
         self.rows(&self.places().controls, |env, place| env.data().ctrl()[place])
     }
 
-    /// Forces of its actuators in the last step \[N or N m\], 0 after a reset, shape (N, nu).
+    /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): in the last step; after a reset or a
+    /// write 0, or those of the state as it is where a sensor asks for what is solved.
     pub fn get_actuator_force(&self) -> Array2<f64> {
         self.rows(&self.places().actuators, |env, place| env.data().actuator_force()[place])
     }
@@ -489,24 +490,11 @@ impl<'a> MjcfPartMut<'a> {
         let places = self.simulation.parts[self.index].qpos.clone();
         let rows = self.checked("write_qpos", positions.into(), &places, env_ids)?;
         let quaternions = self.quaternions();
-        let length = |row: &[f64]| row.iter().map(|q| q * q).sum::<f64>().sqrt();
         let normalised: Vec<(usize, Vec<f64>)> = rows
             .iter()
             .map(|(env, row)| {
                 let mut row = row.to_vec();
-                for &first in &quaternions {
-                    let quaternion = &mut row[first..first + 4];
-                    let norm = length(quaternion);
-                    if !(norm > 1e-9 && norm.is_finite()) {
-                        return Err(Error::Config {
-                            field: "write_qpos",
-                            value: format!("{quaternion:?} in columns {first} to {}", first + 3),
-                            expected: "a quaternion w, x, y, z must have a length that is not zero and not beyond all \
-                                       numbers",
-                        });
-                    }
-                    quaternion.iter_mut().for_each(|q| *q /= norm);
-                }
+                quaternions.iter().try_for_each(|&first| normalise("write_qpos", &mut row, first))?;
                 Ok((env, row))
             })
             .collect::<Result<_>>()?;
@@ -543,6 +531,51 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
+    /// Puts a body that the file says is moved by hand (`mocap="true"`) somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the
+    /// environment \[m\] for `env_ids` (all where `None`; a single row is for all of them), where it stays until it is put
+    /// elsewhere or reset. Quaternions are normalised. A forward pass follows.
+    ///
+    /// # Errors
+    /// There is no such body, or it is not moved by hand (with those that are); wrong shape, unknown environment, a value that
+    /// is not finite, a quaternion of length zero; then nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_mocap_pose<'t>(
+        &mut self,
+        body: &str,
+        poses: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (file, names) = (&self.data.model, &self.data.names.bodies);
+        let by_hand: Vec<usize> = (1..file.nbody()).filter(|&b| file.body_mocapid()[b] >= 0).collect();
+        let found = by_hand.iter().find(|&&b| names[b] == body).ok_or_else(|| Error::UnknownName {
+            what: "body moved by hand (mocap) called",
+            name: body.into(),
+            candidates: pattern::closest(body, by_hand.iter().map(|&b| names[b].as_str()))
+                .into_iter()
+                .map(String::from)
+                .collect(),
+        })?;
+        let here = self.simulation.parts[self.index].bodies[*found];
+        let mocap = self.simulation.batch.model().body_mocapid()[here];
+        let of = |_| format!("body {body:?}");
+        let table =
+            Table { argument: "write_mocap_pose", meaning: "environments, x y z qw qx qy qz", columns: 7, of: &of };
+        let rows = Rows::check(table, poses.into(), env_ids, self.simulation.batch.num_envs())?;
+        let mut places: Vec<(usize, [f64; 7])> = rows.arrays::<7>().collect();
+        places.iter_mut().try_for_each(|(_, pose)| normalise("write_mocap_pose", pose, 3))?;
+        let mocap = usize::try_from(mocap).map_err(|_| Error::FixedBody(body.into()))?;
+        for (env, [x, y, z, quaternion @ ..]) in places {
+            self.simulation.batch.write(env, |env| {
+                env.write(|data| {
+                    data.mocap_pos_mut()[3 * mocap..3 * mocap + 3].copy_from_slice(&[x, y, z]);
+                    data.mocap_quat_mut()[4 * mocap..4 * mocap + 4].copy_from_slice(&quaternion);
+                });
+            });
+        }
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
     /// First columns of the quaternions of `get_qpos`.
     fn quaternions(&self) -> Vec<usize> {
         let model = &self.data.model;
@@ -568,6 +601,21 @@ impl<'a> MjcfPartMut<'a> {
         let table = Table { argument, meaning: "environments, numbers of the joints", columns: places.len(), of: &of };
         Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
     }
+}
+
+/// Makes the quaternion at `first` in a row one of length 1.
+fn normalise(argument: &'static str, row: &mut [f64], first: usize) -> Result<()> {
+    let quaternion = &mut row[first..first + 4];
+    let norm = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+    if !(norm > 1e-9 && norm.is_finite()) {
+        return Err(Error::Config {
+            field: argument,
+            value: format!("{quaternion:?} in columns {first} to {}", first + 3),
+            expected: "a quaternion w, x, y, z must have a length that is not zero and not beyond all numbers",
+        });
+    }
+    quaternion.iter_mut().for_each(|q| *q /= norm);
+    Ok(())
 }
 
 impl MjcfCfg {
