@@ -15,6 +15,7 @@ mod arrays;
 mod data;
 mod error;
 mod guard;
+mod jacobian;
 mod look;
 mod memory;
 mod model;
