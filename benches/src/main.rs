@@ -6,6 +6,7 @@ mod camera;
 mod contacts;
 mod drive;
 mod foreign;
+mod ik;
 mod interleave;
 mod memory;
 mod models;
@@ -29,6 +30,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("camera", camera::run),
     ("rays", rays::run),
     ("contacts", contacts::run),
+    ("ik", ik::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -47,7 +49,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, ik, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

@@ -2,6 +2,7 @@
 
 use crate::batch::BatchError;
 use crate::drive::plan::PlanError;
+use crate::kinematics::KinematicsError;
 use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
@@ -59,6 +60,15 @@ pub enum Error {
         /// What is wrong.
         #[source]
         error: Box<PatternError>,
+    },
+    /// Kinematics of a robot cannot be computed.
+    #[error("robot {robot:?}: {error}")]
+    Kinematics {
+        /// The robot.
+        robot: String,
+        /// What is wrong.
+        #[source]
+        error: Box<KinematicsError>,
     },
     /// Heights of a terrain cannot be made.
     #[error(transparent)]

@@ -22,6 +22,7 @@ mod gather;
 pub mod inertia;
 pub mod inspect;
 pub mod interactive_scene;
+pub mod kinematics;
 mod manager;
 pub mod mj;
 pub mod mjcf;
@@ -38,10 +39,12 @@ pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};
 pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
+pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{
     EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
 };
 pub use mjcf::document::{Cone, Integrator};
+pub use objects::kinematics::IkResult;
 pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};

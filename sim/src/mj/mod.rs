@@ -17,6 +17,7 @@ mod control;
 mod data;
 mod error;
 mod guard;
+mod jacobian;
 mod look;
 mod memory;
 mod model;

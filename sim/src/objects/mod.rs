@@ -1,6 +1,7 @@
 //! What is added to a simulation: handle, configuration and data views of each kind in one file.
 
 pub(crate) mod free_body;
+pub mod kinematics;
 pub mod mjcf_part;
 pub mod rigid_object;
 pub mod robot;

@@ -1,7 +1,7 @@
 //! Robots: configuration, the loaded robot, and its views of a running simulation.
 
 use crate::compile::{JointIndexing, RobotIndex, Simulation};
-use crate::description::{Inertial, JointKind, RobotDescription};
+use crate::description::{Inertial, JointKind, LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::{DriveCfg, DriveModel};
@@ -191,6 +191,13 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     Ok(())
 }
 
+/// There is no such name; the nearest of those there are.
+#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+pub(super) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Error {
+    let candidates = pattern::closest(name, names).into_iter().map(str::to_string).collect();
+    Error::UnknownName { what, name: name.into(), candidates }
+}
+
 pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
     let fail = |expected| Err(Error::Config { field, value: format!("{:?}", to_row(pose)), expected });
     if !to_row(pose).iter().all(|x| x.is_finite()) {
@@ -243,8 +250,8 @@ pub(crate) fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> 
 /// [`joint_names`](Self::joint_names).
 #[derive(Clone, Copy, Debug)]
 pub struct Robot<'a> {
-    data: &'a Arc<RobotData>,
-    simulation: &'a Simulation,
+    pub(super) data: &'a Arc<RobotData>,
+    pub(super) simulation: &'a Simulation,
     index: usize,
 }
 
@@ -253,7 +260,7 @@ impl<'a> Robot<'a> {
         Self { data, simulation, index }
     }
 
-    fn indexing(&self) -> &'a RobotIndex {
+    pub(super) fn indexing(&self) -> &'a RobotIndex {
         &self.simulation.robots[self.index]
     }
 
@@ -292,14 +299,7 @@ impl<'a> Robot<'a> {
     /// # Errors
     /// There is no such part; the error lists those there are.
     pub fn get_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
-        let members = self.data.parts.get(part).ok_or_else(|| Error::UnknownName {
-            what: "control part",
-            name: part.into(),
-            candidates: pattern::closest(part, self.data.parts.keys().map(String::as_str))
-                .into_iter()
-                .map(str::to_string)
-                .collect(),
-        })?;
+        let members = self.data.parts.get(part).ok_or_else(|| unknown("control part", part, self.control_parts()))?;
         Ok(members.iter().map(|&i| JointIndex(i)).collect())
     }
 
@@ -308,14 +308,11 @@ impl<'a> Robot<'a> {
     /// # Errors
     /// There is no such joint; the error lists the nearest names.
     pub fn joint_id(&self, name: &str) -> Result<JointIndex> {
-        self.joint_names().iter().position(|n| n == name).map(JointIndex).ok_or_else(|| Error::UnknownName {
-            what: "joint",
-            name: name.into(),
-            candidates: pattern::closest(name, self.joint_names().iter().map(String::as_str))
-                .into_iter()
-                .map(str::to_string)
-                .collect(),
-        })
+        self.joint_names()
+            .iter()
+            .position(|n| n == name)
+            .map(JointIndex)
+            .ok_or_else(|| unknown("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
     /// Whether a joint follows another one.
@@ -414,6 +411,10 @@ impl<'a> Robot<'a> {
         self.root().velocities()
     }
 
+    pub(super) fn link_id(&self, name: &str) -> Result<LinkId> {
+        self.data.description.link_id(name).ok_or_else(|| unknown("link", name, self.link_names()))
+    }
+
     fn root(&self) -> FreeBody<'a> {
         FreeBody { simulation: self.simulation, index: self.indexing().root }
     }
@@ -423,11 +424,7 @@ impl<'a> Robot<'a> {
     /// # Errors
     /// There is no such link; the error lists the nearest names.
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
-        let link = self.data.description.link_id(name).ok_or_else(|| Error::UnknownName {
-            what: "link",
-            name: name.into(),
-            candidates: pattern::closest(name, self.link_names()).into_iter().map(str::to_string).collect(),
-        })?;
+        let link = self.link_id(name)?;
         let (body, body_from_link) = self.indexing().links[link.0];
         let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
         self.simulation.batch.for_each(|i, env| {

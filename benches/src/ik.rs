@@ -1,0 +1,237 @@
+//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default positions.
+//! The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping, positions cut at
+//! the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
+
+use crate::interleave::{Plan, Side, measure, median};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::ndarray::{Array2, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Random;
+use kinetoscope::scene::pose::{from_row, to_row};
+use kinetoscope::sim::mj::{Data, ObjectKind};
+use nalgebra::{Matrix6, Vector6};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+const TARGETS: usize = 1000;
+/// Square of the rival's damping.
+const DAMPING: f64 = 1e-3;
+
+/// Name, file, and the link that its last joint moves.
+fn arms() -> Outcome<[(&'static str, PathBuf, &'static str); 3]> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/arms");
+    Ok([
+        ("SR5, 6 joints", assets::path("sr5/SR5.urdf")?, "link6"),
+        ("Panda's axes, 7 joints", folder.join("seven_axes.urdf"), "link7"),
+        ("UR5e's axes, 6 joints", folder.join("six_axes.urdf"), "wrist_3_link"),
+    ])
+}
+
+/// The poses of a frame that are to be reached.
+struct Task {
+    link: &'static str,
+    limits: Vec<[f64; 2]>,
+    start: Vec<f64>,
+    targets: Vec<Pose>,
+    cfg: IkCfg,
+}
+
+/// Ours.
+struct Ours<'t> {
+    task: &'t Task,
+    sim: SimulationManager,
+    robot: RobotId,
+    next: usize,
+}
+
+impl Ours<'_> {
+    fn solve(&self, target: &Pose) -> Outcome<Option<Vec<f64>>> {
+        let tip = Tip::of_part("arm").at(self.task.link);
+        let found = self.sim.robot(self.robot).compute_ik(target, tip, &self.task.cfg, None, None)?;
+        Ok(found.success[0].then(|| found.qpos.row(0).to_vec()))
+    }
+}
+
+/// A bare MuJoCo loop.
+struct Bare<'t> {
+    task: &'t Task,
+    data: Data,
+    body: usize,
+    qpos: Vec<usize>,
+    dofs: Vec<usize>,
+    linear: Vec<f64>,
+    angular: Vec<f64>,
+    next: usize,
+}
+
+impl<'t> Bare<'t> {
+    fn new(task: &'t Task, sim: &SimulationManager, robot: RobotId) -> Outcome<Self> {
+        let (model, view) = (sim.batch().model(), sim.robot(robot));
+        let body = model.id(ObjectKind::Body, &format!("{}/{}", view.uid(), task.link)).ok_or("no body of the link")?;
+        let joint = |name: &String| model.id(ObjectKind::Joint, &format!("{}/{name}", view.uid())).ok_or("no joint");
+        let joints = view.joint_names().iter().map(joint).collect::<Result<Vec<usize>, _>>()?;
+        Ok(Self {
+            task,
+            data: Data::new(model)?,
+            body,
+            qpos: joints.iter().map(|&j| model.jnt_qposadr()[j] as usize).collect(),
+            dofs: joints.iter().map(|&j| model.jnt_dofadr()[j] as usize).collect(),
+            linear: vec![0.0; 3 * model.nv()],
+            angular: vec![0.0; 3 * model.nv()],
+            next: 0,
+        })
+    }
+
+    /// Where MuJoCo puts the link.
+    fn place(&mut self, positions: &[f64]) -> Outcome<Pose> {
+        for (&address, &q) in self.qpos.iter().zip(positions) {
+            self.data.qpos_mut()[address] = q;
+        }
+        self.data.place()?;
+        let (p, q) = (&self.data.xpos()[3 * self.body..], &self.data.xquat()[4 * self.body..]);
+        Ok(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]))
+    }
+
+    /// Way from a pose to the target.
+    fn error(pose: &Pose, target: &Pose) -> (Vector6<f64>, f64, f64) {
+        let way = target.translation.vector - pose.translation.vector;
+        let turn = (target.rotation * pose.rotation.inverse()).scaled_axis();
+        (Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z), way.norm(), turn.norm())
+    }
+
+    fn reaches(&mut self, positions: &[f64], target: &Pose) -> Outcome<bool> {
+        let (_, way, turn) = Self::error(&self.place(positions)?, target);
+        Ok(way <= self.task.cfg.position_tolerance && turn <= self.task.cfg.rotation_tolerance)
+    }
+
+    fn solve(&mut self, target: &Pose) -> Outcome<Option<Vec<f64>>> {
+        let task = self.task;
+        let mut random = Random::keyed(0, 0, "starts");
+        for start in 0..task.cfg.num_seeds {
+            let mut q = task.start.clone();
+            if start > 0 {
+                q = task.limits.iter().map(|[low, high]| low + (high - low) * random.uniform()).collect();
+            }
+            for _ in 0..task.cfg.max_iterations {
+                let pose = self.place(&q)?;
+                let (error, way, turn) = Self::error(&pose, target);
+                if way <= task.cfg.position_tolerance && turn <= task.cfg.rotation_tolerance {
+                    return Ok(Some(q));
+                }
+                let at = pose.translation.vector;
+                self.data.jacobian(self.body, [at.x, at.y, at.z], &mut self.linear, &mut self.angular)?;
+                let nv = self.linear.len() / 3;
+                let column = |dof: usize| {
+                    let (l, a) = (&self.linear, &self.angular);
+                    Vector6::new(l[dof], l[nv + dof], l[2 * nv + dof], a[dof], a[nv + dof], a[2 * nv + dof])
+                };
+                let mut gram = Matrix6::from_diagonal_element(DAMPING);
+                self.dofs.iter().for_each(|&dof| gram.ger(1.0, &column(dof), &column(dof), 1.0));
+                let y = gram.cholesky().ok_or("not positive definite")?.solve(&error);
+                for ((q, &dof), [low, high]) in q.iter_mut().zip(&self.dofs).zip(&task.limits) {
+                    *q = (*q + column(dof).dot(&y)).clamp(*low, *high);
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Side for Ours<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        self.next = 0;
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.solve(&self.task.targets[self.next % TARGETS])?;
+            self.next += 1;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+impl Side for Bare<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        self.next = 0;
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.solve(&self.task.targets[self.next % TARGETS])?;
+            self.next += 1;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let mut rows = Vec::new();
+    for (name, urdf, link) in arms()? {
+        rows.extend(one_arm(settings, name, urdf, link)?);
+    }
+    Ok(rows)
+}
+
+fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -> Outcome<Vec<Row>> {
+    let cfg = SimulationManagerCfg { threads: Some(1), ground: None, ..SimulationManagerCfg::default() };
+    let mut sim = SimulationManager::new(cfg)?;
+    let robot = sim.add_robot(RobotCfg {
+        urdf: UrdfCfg::single(urdf),
+        control_parts: vec![("arm".into(), vec![".*".into()])],
+        ..RobotCfg::default()
+    })?;
+    let view = sim.robot(robot);
+    let limits: Vec<[f64; 2]> =
+        view.qpos_limits().index_axis(Axis(0), 0).rows().into_iter().map(|limit| [limit[0], limit[1]]).collect();
+    let mut random = Random::keyed(1, 0, "targets");
+    let reachable = Array2::from_shape_fn((TARGETS, limits.len()), |(_, j)| {
+        limits[j][0] + (limits[j][1] - limits[j][0]) * random.uniform()
+    });
+    let start = view.get_default_qpos().row(0).to_vec();
+    let mut task = Task { link, limits, start, targets: Vec::new(), cfg: IkCfg::default() };
+    let mut judge = Bare::new(&task, &sim, robot)?;
+    let targets = reachable.rows().into_iter().map(|row| judge.place(&row.to_vec())).collect::<Outcome<_>>()?;
+    drop(judge);
+    task.targets = targets;
+
+    let mut bare = Bare::new(&task, &sim, robot)?;
+    let mut ours = Ours { task: &task, sim, robot, next: 0 };
+    let (mut micros, mut solved) = ([Vec::new(), Vec::new()], [0.0, 0.0]);
+    for target in &task.targets {
+        let target = from_row(&to_row(target));
+        let clock = Instant::now();
+        let found = ours.solve(&target)?;
+        micros[0].push(1e6 * clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        let theirs = bare.solve(&target)?;
+        micros[1].push(1e6 * clock.elapsed().as_secs_f64());
+        for (side, found) in [found, theirs].into_iter().enumerate() {
+            if let Some(positions) = found {
+                solved[side] += f64::from(u8::from(bare.reaches(&positions, &target)?)) * 100.0 / TARGETS as f64;
+            }
+        }
+    }
+    let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
+    let times = measure(plan, &mut [&mut ours, &mut bare])?;
+    let [our_median, their_median] = micros.map(median);
+    let rival = "DLS on mj_jac";
+    Ok(vec![
+        Row::new("ik", format!("{name}, mean"), "us/solve", 1, 1e6 * times.per_step(0)).against(
+            rival,
+            1e6 * times.per_step(1),
+            times.ratio(0, 1),
+        ),
+        Row::new("ik", format!("{name}, median"), "us/solve", 1, our_median).against(
+            rival,
+            their_median,
+            their_median / our_median,
+        ),
+        Row::new("ik", format!("{name}, solved"), "%", 1, solved[0]).against(rival, solved[1], solved[0] / solved[1]),
+    ])
+}

@@ -1,0 +1,275 @@
+//! Damped least squares within limits: from a start to where the error grows no smaller.
+
+use super::cfg::IkTask;
+use super::chain::Chain;
+use nalgebra::{Matrix6, Vector6};
+use scene::Pose;
+
+/// What is to be reached.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Problem<'p> {
+    pub(super) chain: &'p Chain,
+    pub(super) limits: &'p [[f64; 2]],
+    /// The target in the base of the chain.
+    pub(super) target: Pose,
+    pub(super) task: IkTask,
+    /// Radians that count as much as a metre.
+    pub(super) scale: f64,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop {
+    /// \[m\]
+    pub(super) position: f64,
+    /// \[rad\]
+    pub(super) rotation: f64,
+    /// Steps, those included that were taken back.
+    pub(super) iterations: u32,
+    /// Whether to stop where it goes on too slowly to be worth it.
+    pub(super) impatient: bool,
+}
+
+/// Positions, and what follows from them.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    pub(super) positions: Vec<f64>,
+    /// Columns of the Jacobian, weighted as the error is.
+    columns: Vec<Vector6<f64>>,
+    /// Way to the target: weighted translation, then rotation, in the axes of the base.
+    error: Vector6<f64>,
+    /// Half the squared length of the error.
+    pub(super) cost: f64,
+    /// \[m\]
+    pub(super) position_error: f64,
+    /// \[rad\]
+    pub(super) rotation_error: f64,
+}
+
+impl Point {
+    pub(super) fn new(joints: usize) -> Self {
+        Self {
+            positions: vec![0.0; joints],
+            columns: vec![Vector6::zeros(); joints],
+            error: Vector6::zeros(),
+            cost: f64::INFINITY,
+            position_error: f64::INFINITY,
+            rotation_error: f64::INFINITY,
+        }
+    }
+
+    /// Takes over all of another point of as many joints.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.positions.copy_from_slice(&other.positions);
+        self.columns.copy_from_slice(&other.columns);
+        (self.error, self.cost) = (other.error, other.cost);
+        (self.position_error, self.rotation_error) = (other.position_error, other.rotation_error);
+    }
+
+    /// Everything that follows from the positions.
+    pub(super) fn evaluate(&mut self, problem: &Problem<'_>) {
+        let pose = problem.chain.jacobian(&self.positions, &mut self.columns);
+        let way = problem.target.translation.vector - pose.translation.vector;
+        let turn = (problem.target.rotation * pose.rotation.inverse()).scaled_axis();
+        (self.position_error, self.rotation_error) = (way.norm(), turn.norm());
+        let (metre, radian) = match problem.task {
+            IkTask::Pose => (problem.scale, 1.0),
+            IkTask::Position => (problem.scale, 0.0),
+        };
+        let weights = Vector6::new(metre, metre, metre, radian, radian, radian);
+        for column in &mut self.columns {
+            column.component_mul_assign(&weights);
+        }
+        self.error = Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z).component_mul(&weights);
+        self.cost = 0.5 * self.error.norm_squared();
+    }
+
+    pub(super) fn is_within(&self, stop: &Stop, task: IkTask) -> bool {
+        self.position_error <= stop.position && (task == IkTask::Position || self.rotation_error <= stop.rotation)
+    }
+
+    /// Squared distance to other positions.
+    fn distance_squared(&self, positions: &[f64]) -> f64 {
+        self.positions.iter().zip(positions).map(|(a, b)| (a - b) * (a - b)).sum()
+    }
+}
+
+/// Added to the squares of singular values: a matrix without rank, as that of every chain of fewer than six joints, must
+/// have a factor.
+const FLOOR: f64 = 1e-10;
+/// Bounds of the damping, in multiples of the squared error. At the least a step may be a hundred times longer than the
+/// error; at the most it is lost in rounding.
+const LEAST_DAMPING: f64 = 1e-4;
+const MOST_DAMPING: f64 = 1e12;
+/// A step that takes off less than this part of the squared error is a slow one ...
+const SLOW: f64 = 0.02;
+/// ... and after so many in a row another start is worth more.
+const PATIENCE: u32 = 4;
+/// The longest step of a joint towards a posture \[rad or m\]: what is free is so on a curved surface.
+const LONGEST: f64 = 0.3;
+/// Part of the tolerances that a step towards a posture may leave: what it leaves must not hide what the step gained.
+const EXACT: f64 = 1e-5;
+/// Nearer to a limit \[rad or m\] than this a joint is at it.
+const AT_LIMIT: f64 = 1e-9;
+/// Nearer to a posture \[rad or m\] is not worth a step.
+const NEAR: f64 = 1e-6;
+
+/// The work memory of a search.
+#[derive(Clone, Debug)]
+pub(super) struct Descent {
+    /// Where it is.
+    pub(super) at: Point,
+    trial: Point,
+    kept: Point,
+    /// Joints that may move: those at a limit that would go beyond it may not.
+    free: Vec<bool>,
+}
+
+impl Descent {
+    pub(super) fn new(joints: usize) -> Self {
+        let point = Point::new(joints);
+        Self { at: point.clone(), trial: point.clone(), kept: point, free: vec![true; joints] }
+    }
+
+    /// Goes down from where it is; returns the number of steps, those included that were taken back.
+    ///
+    /// Levenberg-Marquardt with the step Jᵀ (J Jᵀ + λ)⁻¹ e, whose matrix has six rows whatever the number of joints. λ is a
+    /// multiple of the squared error, so that it vanishes at the target and bounds steps far from it (T. Sugihara,
+    /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011); the
+    /// multiple follows the ratio of what a step gained to what the linear model promised, and steps that gain nothing are
+    /// taken back (H. B. Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05). Limits: joints that
+    /// the error pushes against theirs are left out, and steps are cut at limits.
+    pub(super) fn descend(&mut self, problem: &Problem<'_>, stop: &Stop, damping: f64) -> u32 {
+        let (mut damping, mut growth, mut slow) = (damping, 2.0, 0);
+        let mut gram = self.gram_of_free(problem);
+        for iteration in 0..stop.iterations {
+            if self.at.is_within(stop, problem.task) {
+                return iteration;
+            }
+            let lambda = damping * self.at.cost + FLOOR;
+            let Some(factor) = (gram + Matrix6::from_diagonal_element(lambda)).cholesky() else { return iteration };
+            let y = factor.solve(&self.at.error);
+            let (mut left, mut moves) = (self.at.error, false);
+            for (i, column) in self.at.columns.iter().enumerate() {
+                let ([low, high], position) = (problem.limits[i], self.at.positions[i]);
+                let step = if self.free[i] { column.dot(&y) } else { 0.0 };
+                let next = (position + step).clamp(low, high);
+                self.trial.positions[i] = next;
+                left -= column * (next - position);
+                moves |= next != position;
+            }
+            if !moves {
+                return iteration;
+            }
+            self.trial.evaluate(problem);
+            let gained = self.at.cost - self.trial.cost;
+            if gained > 0.0 {
+                let promised = self.at.cost - 0.5 * left.norm_squared();
+                let kept_promise = if promised > 0.0 { (gained / promised).min(1.0) } else { 0.5 };
+                let change = (1.0 - (2.0 * kept_promise - 1.0).powi(3)).max(1.0 / 3.0);
+                damping = (damping * change).max(LEAST_DAMPING);
+                growth = 2.0;
+                slow = if gained < SLOW * self.at.cost { slow + 1 } else { 0 };
+                std::mem::swap(&mut self.at, &mut self.trial);
+                if stop.impatient && slow >= PATIENCE {
+                    return iteration + 1;
+                }
+                gram = self.gram_of_free(problem);
+            } else {
+                damping *= growth;
+                growth *= 2.0;
+                if damping > MOST_DAMPING {
+                    return iteration + 1;
+                }
+            }
+        }
+        stop.iterations
+    }
+
+    /// J Jᵀ of the joints that may move.
+    fn gram_of_free(&mut self, problem: &Problem<'_>) -> Matrix6<f64> {
+        for (i, free) in self.free.iter_mut().enumerate() {
+            let [low, high] = problem.limits[i];
+            let (position, pull) = (self.at.positions[i], self.at.columns[i].dot(&self.at.error));
+            *free = !(position <= low && pull < 0.0 || position >= high && pull > 0.0);
+        }
+        self.gram()
+    }
+
+    fn gram(&self) -> Matrix6<f64> {
+        let mut gram = Matrix6::zeros();
+        for (column, _) in self.at.columns.iter().zip(&self.free).filter(|(_, free)| **free) {
+            gram.ger(1.0, column, column, 1.0);
+        }
+        gram
+    }
+
+    /// Goes towards the positions `rest` as far as the target leaves it a choice, from where the target is reached; returns
+    /// the number of steps.
+    ///
+    /// Each step is the part of the way to `rest` that the Jacobian does not see, (1 - J⁺ J) (rest - q) (A. Liégeois, "Automatic
+    /// supervisory control of the configuration and behavior of multibody mechanisms", IEEE Trans. Systems, Man and
+    /// Cybernetics 7, 1977), followed by steps that bring the frame back. One that does not come nearer, or whose frame does not
+    /// come back, is taken back and halved: what was reached stays reached. It ends where there is nothing to gain, and near singular
+    /// positions, where what is free bends too sharply for steps of a thousandth.
+    pub(super) fn relax(&mut self, problem: &Problem<'_>, stop: &Stop, rest: &[f64], gain: f64) -> u32 {
+        let (mut part, mut used) = (gain, 0);
+        for _ in 0..stop.iterations {
+            if part < 1e-3 * gain || !self.aim(problem, rest, part) {
+                break;
+            }
+            self.kept.copy_from(&self.at);
+            std::mem::swap(&mut self.at, &mut self.trial);
+            self.at.evaluate(problem);
+            let back =
+                Stop { iterations: 8, position: EXACT * stop.position, rotation: EXACT * stop.rotation, ..*stop };
+            used += 1 + self.descend(problem, &back, LEAST_DAMPING);
+            let nearer = self.at.distance_squared(rest) < self.kept.distance_squared(rest);
+            if nearer && self.at.is_within(stop, problem.task) {
+                part = gain.min(2.0 * part);
+            } else {
+                self.at.copy_from(&self.kept);
+                part *= 0.5;
+            }
+        }
+        used
+    }
+
+    /// Puts `trial` a step nearer to `rest`; `false` where there is nowhere to go.
+    fn aim(&mut self, problem: &Problem<'_>, rest: &[f64], part: f64) -> bool {
+        self.free.fill(true);
+        // Every round takes a joint out, or is the last.
+        for _ in 0..=rest.len() {
+            let wish = |i: usize| part * (rest[i] - self.at.positions[i]);
+            let mut seen = Vector6::zeros();
+            for i in (0..rest.len()).filter(|&i| self.free[i]) {
+                seen += self.at.columns[i] * wish(i);
+            }
+            let Some(factor) = (self.gram() + Matrix6::from_diagonal_element(FLOOR)).cholesky() else { return false };
+            let y = factor.solve(&seen);
+            let step = |i: usize| if self.free[i] { wish(i) - self.at.columns[i].dot(&y) } else { 0.0 };
+            let blocked = (0..rest.len()).find(|&i| {
+                let ([low, high], position) = (problem.limits[i], self.at.positions[i]);
+                position <= low + AT_LIMIT && step(i) < 0.0 || position >= high - AT_LIMIT && step(i) > 0.0
+            });
+            if let Some(i) = blocked {
+                self.free[i] = false;
+                continue;
+            }
+            let longest = (0..rest.len()).map(|i| step(i).abs()).fold(0.0, f64::max);
+            // As far as the first limit: beyond it the frame would not stay where it is.
+            let room = |i: usize| {
+                let ([low, high], position) = (problem.limits[i], self.at.positions[i]);
+                (if step(i) > 0.0 { high - position } else { position - low }) / step(i).abs()
+            };
+            let shorter =
+                (0..rest.len()).filter(|&i| step(i) != 0.0).map(room).fold((LONGEST / longest).min(1.0), f64::min);
+            for i in 0..rest.len() {
+                let [low, high] = problem.limits[i];
+                self.trial.positions[i] = (self.at.positions[i] + shorter * step(i)).clamp(low, high);
+            }
+            return longest > NEAR;
+        }
+        false
+    }
+}

@@ -1,0 +1,410 @@
+//! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
+
+use crate::description::{JointId, JointKind, LinkId};
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};
+use crate::manager::{EnvId, env_list};
+use crate::objects::free_body::body_pose;
+use crate::objects::robot::{Robot, check_pose, unknown};
+use crate::objects::rows::{Rows, Table};
+use ::scene::Pose;
+use ::scene::pose::to_row;
+use nalgebra::Vector6;
+use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, AsArray, Ix2};
+use sensors::camera::{CameraError, Poses};
+
+/// What [`Robot::compute_ik`] found: one entry per environment that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IkResult {
+    /// Positions of the joints \[rad or m\], shape (N, dof of the part): those that do not move the frame stay at their initial
+    /// positions, mimic ones follow. Where `success` is false, the best that were found.
+    pub qpos: Array2<f64>,
+    /// Whether the frame is within the tolerances of its target, shape (N,).
+    pub success: Array1<bool>,
+    /// Distance between the frame and its target \[m\], shape (N,).
+    pub position_error: Array1<f64>,
+    /// Angle between the frame and its target \[rad\], shape (N,); also where only the position was to be reached.
+    pub rotation_error: Array1<f64>,
+    /// Steps of all starts together, shape (N,).
+    pub iterations: Array1<u32>,
+    /// The start that led there, shape (N,): 0 is that of the initial positions, others are random.
+    pub seed: Array1<u32>,
+}
+
+/// A [`Tip`] of a robot.
+struct Resolved {
+    chain: Chain,
+    /// The joints that were named, as columns of `get_qpos`: the columns of all arrays.
+    columns: Vec<usize>,
+    /// Whose joints they are, as errors say it.
+    of: String,
+    link: LinkId,
+}
+
+impl Robot<'_> {
+    /// Poses of a frame at joint positions `qpos` \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape
+    /// (N, 7). Where the robot's root is in each environment is part of them.
+    ///
+    /// `qpos` has a row for each of `env_ids` (all environments where `None`), or one for all of them, and a column for each joint
+    /// of the control part that `tip` names ([`get_joint_ids`](Self::get_joint_ids)), or for each joint of the robot. Other joints
+    /// are where they are in the environment, mimic joints where those are that they follow: their own columns are accepted and
+    /// ignored. Positions beyond the limits are taken as they are. The state does not change.
+    ///
+    /// # Errors
+    /// Unknown part, link or environment; wrong shape; a number that is not finite; a part that ends in several links.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn compute_fk<'t, 'n>(
+        &self,
+        qpos: impl AsArray<'t, f64, Ix2>,
+        tip: impl Into<Tip<'n>>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Array2<f64>> {
+        let resolved = self.resolve(&tip.into())?;
+        let rows = self.part_rows("compute_fk", qpos.into(), &resolved.columns, env_ids)?;
+        let mut poses = Array2::zeros((rows.envs().len(), 7));
+        let mut positions = vec![0.0; self.dof()];
+        for (i, (env, row)) in rows.iter().enumerate() {
+            let env_from_base = self.present(env, resolved.chain.base(), &mut positions);
+            put(&resolved.columns, row, &mut positions);
+            let pose = env_from_base * resolved.chain.pose(&positions);
+            poses.row_mut(i).assign(&ArrayView1::from(&to_row(&pose)));
+        }
+        Ok(poses)
+    }
+
+    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names), at positions `qpos` of all joints
+    /// \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7). For rows and mimic joints see
+    /// [`compute_fk`](Self::compute_fk).
+    ///
+    /// # Errors
+    /// Unknown environment; wrong shape; a number that is not finite.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn compute_link_fk<'t>(
+        &self,
+        qpos: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Array3<f64>> {
+        let columns: Vec<usize> = (0..self.dof()).collect();
+        let rows = self.part_rows("compute_link_fk", qpos.into(), &columns, env_ids)?;
+        let description = self.description();
+        let mut poses = Array3::zeros((rows.envs().len(), description.links.len(), 7));
+        let mut positions = vec![0.0; self.dof()];
+        for (i, (env, row)) in rows.iter().enumerate() {
+            put(&columns, row, &mut positions);
+            let standing = |link| self.simulation.batch.read(env, |env| self.link_in(env, link));
+            for (link, pose) in link_poses(description, &positions, standing).iter().enumerate() {
+                for (k, value) in to_row(pose).into_iter().enumerate() {
+                    poses[(i, link, k)] = value;
+                }
+            }
+        }
+        Ok(poses)
+    }
+
+    /// Jacobians of a frame, shape (N, 6, columns): velocity of its origin, then its angular velocity, both in the axes of the
+    /// environment, per unit of each joint's velocity, with the root standing still. At joint positions `qpos` \[rad or m\], or
+    /// where the joints are where it is `None`; rows and columns as in [`compute_fk`](Self::compute_fk).
+    ///
+    /// The column of a mimic joint is 0: what it does is in the column of the joint that it follows.
+    ///
+    /// # Errors
+    /// As [`compute_fk`](Self::compute_fk).
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn jacobian<'n>(
+        &self,
+        tip: impl Into<Tip<'n>>,
+        qpos: Option<ArrayView2<'_, f64>>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Array3<f64>> {
+        let Resolved { chain, columns, .. } = self.resolve(&tip.into())?;
+        let present = self.get_qpos();
+        let rows = qpos.map(|qpos| self.part_rows("jacobian", qpos, &columns, env_ids)).transpose()?;
+        let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
+        let mut jacobians = Array3::zeros((envs.len(), 6, columns.len()));
+        let mut positions = vec![0.0; self.dof()];
+        let mut of_joint = vec![Vector6::zeros(); self.dof()];
+        let mut given = rows.as_ref().map(Rows::iter);
+        for (i, &env) in envs.iter().enumerate() {
+            let env_from_base = self.present(env, chain.base(), &mut positions);
+            match given.as_mut().and_then(Iterator::next) {
+                Some((_, row)) => put(&columns, row, &mut positions),
+                None => positions.iter_mut().zip(present.row(env)).for_each(|(position, now)| *position = *now),
+            }
+            chain.jacobian(&positions, &mut of_joint);
+            for (k, &column) in columns.iter().enumerate() {
+                let in_base = of_joint[column];
+                let linear = env_from_base.rotation * in_base.fixed_rows::<3>(0);
+                let angular = env_from_base.rotation * in_base.fixed_rows::<3>(3);
+                for axis in 0..3 {
+                    jacobians[(i, axis, k)] = linear[axis];
+                    jacobians[(i, 3 + axis, k)] = angular[axis];
+                }
+            }
+        }
+        Ok(jacobians)
+    }
+
+    /// Joint positions that put a frame at `targets`: poses in the environment, typed or as rows `[x, y, z, qw, qx, qy, qz]` \[m\], one
+    /// for each of `env_ids` (all environments where `None`), or one for all of them. Quaternions are normalised.
+    ///
+    /// The joints of the control part that `tip` names, or all of the robot, are found within their limits
+    /// ([`qpos_limits`](Self::qpos_limits)); others stay where they are in the environment. The search starts from `initial`
+    /// \[rad or m\], with rows and columns as in [`compute_fk`](Self::compute_fk), or from where the joints are.
+    /// How: [`IkSolver`]. Contacts are not considered, and the state does not change: give what comes out to
+    /// [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success) says that it is right.
+    ///
+    /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the robot's
+    /// root is, up to the rounding of the target's pose in the frame of the root.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use sim::{IkCfg, RobotCfg, SimulationManager, SimulationManagerCfg, Tip, UrdfCfg};
+    /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-arm-{}.urdf", std::process::id()));
+    /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
+    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");
+    /// # let joint = |name: &str, a: &str, b: &str, x: f64| format!("<joint name='{name}' type='continuous'><parent link='{a}'/>
+    /// #   <child link='{b}'/><origin xyz='{x} 0 0'/><axis xyz='0 0 1'/></joint>");
+    /// # std::fs::write(&urdf, format!("<robot name='r'>{}{}{}{}{}</robot>", link("foot"), link("upper"), link("lower"),
+    /// #   joint("shoulder", "foot", "upper", 0.0), joint("elbow", "upper", "lower", 0.5)))?;
+    ///
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+    /// let arm = sim.add_robot(RobotCfg {
+    ///     urdf: UrdfCfg::single(&urdf),
+    ///     control_parts: vec![("arm".into(), vec!["shoulder".into(), "elbow".into()])],
+    ///     ..Default::default()
+    /// })?;
+    /// # std::fs::remove_file(&urdf)?;
+    /// let hand = Tip::of_part("arm").with_tcp(scene::Pose::translation(0.3, 0.0, 0.0));
+    /// let robot = sim.robot(arm);
+    /// let targets = robot.compute_fk(&array![[0.4, 0.9]], hand, None)?;
+    /// let found = robot.compute_ik(&targets, hand, &IkCfg::default(), None, None)?;
+    /// assert!(found.success[0] && found.position_error[0] < 1e-4);
+    /// assert!((found.qpos[(0, 0)] - 0.4).abs() < 1e-3 && (found.qpos[(0, 1)] - 0.9).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Unknown part, link or environment; wrong shape; a number that is not finite, or out of its range; a quaternion of length
+    /// zero; a part that ends in several links, or none of whose joints moves the frame. A target that cannot be reached is no
+    /// error.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn compute_ik<'n>(
+        &self,
+        targets: &(impl Poses + ?Sized),
+        tip: impl Into<Tip<'n>>,
+        cfg: &IkCfg,
+        initial: Option<ArrayView2<'_, f64>>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<IkResult> {
+        let Resolved { chain, columns, of, link } = self.resolve(&tip.into())?;
+        let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
+        let targets = targets.to_poses().map_err(|error| target_error(error, envs.len()))?;
+        if targets.len() != envs.len() && targets.len() != 1 {
+            let (found, expected) = (vec![targets.len(), 7], vec![envs.len(), 7]);
+            return Err(Error::Shape {
+                argument: "compute_ik",
+                found,
+                expected,
+                meaning: "environments, x y z qw qx qy qz",
+            });
+        }
+        let rows = initial.map(|rows| self.part_rows("compute_ik, initial", rows, &columns, env_ids)).transpose()?;
+        cfg.validate(columns.len()).map_err(|error| self.kinematics_error(error))?;
+
+        // Entries of `columns` that are to be found.
+        let free: Vec<usize> = (0..columns.len())
+            .filter(|&k| self.data.plans()[columns[k]].mimic.is_none() && chain.is_moved_by(columns[k]))
+            .collect();
+        if free.is_empty() {
+            return Err(self.nothing_moves(&chain, of, link));
+        }
+        let mut variable_of = vec![None; self.dof()];
+        free.iter().enumerate().for_each(|(variable, &k)| variable_of[columns[k]] = Some(variable));
+        let limits = free.iter().map(|&k| self.data.plans()[columns[k]].usable).collect();
+        let posture = cfg
+            .posture
+            .as_ref()
+            .map(|posture| Posture { rest: free.iter().map(|&k| posture.rest[k]).collect(), ..posture.clone() });
+        let cfg = IkCfg { posture, ..cfg.clone() };
+        let bound = chain.held(&free.iter().map(|&k| columns[k]).collect::<Vec<_>>(), &vec![0.0; self.dof()]);
+        let mut solver = IkSolver::new(bound, limits, cfg).map_err(|error| self.kinematics_error(error))?;
+
+        let mut result = IkResult {
+            qpos: Array2::zeros((envs.len(), columns.len())),
+            success: Array1::from_elem(envs.len(), false),
+            position_error: Array1::zeros(envs.len()),
+            rotation_error: Array1::zeros(envs.len()),
+            iterations: Array1::zeros(envs.len()),
+            seed: Array1::zeros(envs.len()),
+        };
+        let followers = self.mimic_drivers();
+        let (mut positions, mut start) = (vec![0.0; self.dof()], vec![0.0; free.len()]);
+        let mut given = rows.as_ref().map(Rows::iter);
+        for (i, &env) in envs.iter().enumerate() {
+            let env_from_base = self.present(env, chain.base(), &mut positions);
+            if let Some((_, row)) = given.as_mut().and_then(Iterator::next) {
+                put(&columns, row, &mut positions);
+            }
+            chain.hold_into(&variable_of, &positions, solver.chain_mut());
+            start.iter_mut().zip(&free).for_each(|(start, &k)| *start = positions[columns[k]]);
+            let target = env_from_base.inv_mul(&targets[if targets.len() == 1 { 0 } else { i }]);
+            let found = solver.solve(&target, &start).map_err(|error| self.kinematics_error(error))?;
+            free.iter().zip(found.positions).for_each(|(&k, &position)| positions[columns[k]] = position);
+            for (k, &column) in columns.iter().enumerate() {
+                let (driver, ratio, offset) = followers[column];
+                result.qpos[(i, k)] =
+                    if driver.0 == column { positions[column] } else { ratio * positions[driver.0] + offset };
+            }
+            result.success[i] = found.success;
+            result.position_error[i] = found.position_error;
+            result.rotation_error[i] = found.rotation_error;
+            result.iterations[i] = found.iterations;
+            result.seed[i] = found.seed;
+        }
+        Ok(result)
+    }
+
+    /// Finds what `tip` names.
+    fn resolve(&self, tip: &Tip<'_>) -> Result<Resolved> {
+        check_pose("tcp", &tip.tcp)?;
+        let part = match tip.name {
+            TipName::Part(part) => Some(part),
+            TipName::Link(_) => None,
+            TipName::Either(name) if self.control_parts().contains(&name) => Some(name),
+            TipName::Either(name) if self.description().link_id(name).is_some() => None,
+            TipName::Either(name) => {
+                let names = self.control_parts().into_iter().chain(self.link_names());
+                return Err(unknown("control part or link", name, names));
+            }
+        };
+        let (columns, of): (Vec<usize>, String) = match part {
+            Some(part) => {
+                let ids = self.get_joint_ids(part)?;
+                (ids.iter().map(|id| id.0).collect(), format!("control part {part:?}"))
+            }
+            None => ((0..self.dof()).collect(), "the robot".into()),
+        };
+        let link = match (tip.link, tip.name) {
+            (Some(link), _) | (None, TipName::Link(link)) => self.link_id(link)?,
+            (None, TipName::Part(name) | TipName::Either(name)) => match part {
+                Some(part) => self.end_of(part, &columns)?,
+                None => self.link_id(name)?,
+            },
+        };
+        let chain = Chain::new(self.description(), link, &tip.tcp).map_err(|error| self.kinematics_error(error))?;
+        Ok(Resolved { chain, columns, of, link })
+    }
+
+    /// The link where a part ends: see [`Tip::of_part`].
+    fn end_of(&self, part: &str, columns: &[usize]) -> Result<LinkId> {
+        let description = self.description();
+        let child = |column: usize| description.joint(self.data.plans()[column].joint).child;
+        let above = |link: LinkId| {
+            let parent =
+                move |link: &LinkId| description.link(*link).parent_joint.map(|id| description.joint(id).parent);
+            std::iter::successors(parent(&link), parent)
+        };
+        // Ends of branches: links that no other joint of the part is below.
+        let moved: Vec<LinkId> = columns.iter().map(|&column| child(column)).collect();
+        let ends: Vec<LinkId> =
+            moved.iter().copied().filter(|end| !moved.iter().any(|&other| above(other).any(|l| l == *end))).collect();
+        let [mut end] = ends[..] else {
+            let error = match ends.is_empty() {
+                true => KinematicsError::NothingMoves {
+                    of: format!("control part {part:?}, which is empty,"),
+                    link: description.link(description.root).name.clone(),
+                    movers: Vec::new(),
+                },
+                false => KinematicsError::SeveralTips {
+                    part: part.into(),
+                    links: ends.iter().map(|&l| description.link(l).name.clone()).collect(),
+                },
+            };
+            return Err(self.kinematics_error(error));
+        };
+        loop {
+            let link = description.link(end);
+            let fixed = |id: &&JointId| {
+                let joint = description.joint(**id);
+                joint.kind == JointKind::Fixed && description.link(joint.child).component == link.component
+            };
+            let mut behind = link.child_joints.iter().filter(fixed);
+            match (behind.next(), behind.next()) {
+                (Some(&id), None) => end = description.joint(id).child,
+                _ => return Ok(end),
+            }
+        }
+    }
+
+    fn nothing_moves(&self, chain: &Chain, of: String, link: LinkId) -> Error {
+        let movers = (0..self.dof()).filter(|&column| chain.is_moved_by(column));
+        self.kinematics_error(KinematicsError::NothingMoves {
+            of,
+            link: self.description().link(link).name.clone(),
+            movers: movers.map(|column| self.joint_names()[column].clone()).collect(),
+        })
+    }
+
+    fn kinematics_error(&self, error: KinematicsError) -> Error {
+        Error::Kinematics { robot: self.uid().into(), error: Box::new(error) }
+    }
+
+    /// Fills `positions` with where all joints are, and returns where the link `base` is, in an environment.
+    fn present(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
+        self.simulation.batch.read(env, |env| {
+            for (position, joint) in positions.iter_mut().zip(&self.indexing().joints) {
+                *position = env.data().qpos()[joint.qpos];
+            }
+            self.link_in(env, base)
+        })
+    }
+
+    fn link_in(&self, env: &Env, link: LinkId) -> Pose {
+        let (body, body_from_link) = self.indexing().links[link.0];
+        body_pose(env.data(), body) * body_from_link
+    }
+
+    /// Checks positions of the joints `columns`.
+    fn part_rows<'v>(
+        &self,
+        argument: &'static str,
+        values: ArrayView2<'v, f64>,
+        columns: &[usize],
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rows<'v>> {
+        let of = |column: usize| format!("joint {:?}", self.joint_names()[columns[column]]);
+        let table = Table { argument, meaning: "environments, joints", columns: columns.len(), of: &of };
+        Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
+    }
+}
+
+fn put(columns: &[usize], row: ArrayView1<'_, f64>, positions: &mut [f64]) {
+    for (&column, &value) in columns.iter().zip(row) {
+        positions[column] = value;
+    }
+}
+
+/// What is wrong with targets, as this room says it.
+fn target_error(error: CameraError, envs: usize) -> Error {
+    let argument = "compute_ik";
+    match error {
+        CameraError::PoseColumns { columns } => {
+            let (found, expected) = (vec![envs, columns], vec![envs, 7]);
+            Error::Shape { argument, found, expected, meaning: "environments, x y z qw qx qy qz" }
+        }
+        CameraError::Pose { row, pose } => match pose.iter().position(|x| !x.is_finite()) {
+            Some(column) => Error::NotFinite { argument, row, column, of: "target".into(), value: pose[column] },
+            None => Error::Config {
+                field: "target of compute_ik",
+                value: format!("{pose:?} in row {row}"),
+                expected: "the last four numbers must be a quaternion w, x, y, z of a length that is not zero",
+            },
+        },
+        other => Error::Config {
+            field: "target of compute_ik",
+            value: other.to_string(),
+            expected: "it must be rows of x, y, z, qw, qx, qy, qz",
+        },
+    }
+}

@@ -1,0 +1,12 @@
+//! Kinematics of robots: poses, Jacobians and inverse kinematics, judged by MuJoCo and by closed forms.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod arms;
+mod batches;
+mod forward;
+mod jacobian;
+mod limits;
+mod mistakes;
+mod planar;
+mod posture;
+mod robots;
