@@ -105,12 +105,17 @@ fn run(args: &Args) -> launcher::Result {
         map.rows().into_iter().filter(|p| p[0].is_finite()).map(|p| [p[0], p[1], p[2]]).collect();
     let error = cloud::round_trip(&map, lens(of, args.camera_id), &pose(of, args.camera_id));
     // The terrain stands in the middle of its environment, not turned.
-    let heights = points.iter().filter_map(|p| {
-        let height = sim.terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])])?;
-        Some((height - f64::from(p[2])).abs())
+    if points.is_empty() {
+        return Err("the camera sees nothing of the terrain".into());
+    }
+    let off = points.iter().map(|p| {
+        let height = sim.terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])]);
+        height.map_or(f64::INFINITY, |height| (height - f64::from(p[2])).abs())
     });
-    let worst = heights.fold(0.0, f64::max);
-    println!("\n{} points; they lie on the terrain to {worst:.1e} m", points.len());
+    // On the rim, rounding puts a point beside the terrain.
+    let (beside, on): (Vec<f64>, Vec<f64>) = off.partition(|off| off.is_infinite());
+    let worst = on.into_iter().fold(0.0, f64::max);
+    println!("\n{} points; they lie on the terrain to {worst:.1e} m, {} beside it", points.len(), beside.len());
     println!("Seen by the camera again, they are {error:.1e} pixels off at most");
     if args.save {
         let range = picture::finite_range(points.iter().map(|p| p[2])).unwrap_or([0.0, 1.0]);
@@ -133,6 +138,7 @@ fn run(args: &Args) -> launcher::Result {
         "camera_id": args.camera_id,
         "pictures": pictures,
         "points": points.len(),
+        "points_beside_the_terrain": beside.len(),
         "largest_distance_of_points_from_the_terrain": worst,
         "round_trip_error_pixels": error,
         "files": files,

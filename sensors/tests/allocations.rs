@@ -62,6 +62,37 @@ fn frames_allocate_nothing_and_scratch_memory_is_three_pictures_at_most() {
     }
 }
 
+/// Things come into the light and into the picture, come near and go apart: nothing of that takes memory.
+#[test]
+fn moving_things_allocate_nothing() {
+    let ball = || Instance::new(Sphere { radius: 0.3 }, Material::default(), 2);
+    let instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1), ball(), ball()];
+    let mut scene = RenderScene::new(instances).expect("a good scene");
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 1.0 };
+    scene.lights = vec![Light { kind: spot, ..Light::default() }];
+    let places =
+        |a: [f32; 3], b: [f32; 3]| [PoseF32::IDENTITY, PoseF32::from_translation(a), PoseF32::from_translation(b)];
+    let far = [50.0, 0.0, 0.3];
+    let moments = [
+        places(far, far),
+        places([0.0, 0.0, 0.4], far),
+        places([-1.8, 0.0, 0.4], [1.8, 0.0, 0.4]),
+        places([-1.2, -1.2, 0.4], [1.2, 1.2, 0.4]),
+        places([0.0, 0.0, 2.6], [0.0, 0.0, 0.4]),
+    ];
+    for size in [[320, 240], [640, 480]] {
+        let view = View::look_at(size, 0.9, [0.1, 0.0, 5.0], [0.; 3], [0., 0., 1.]).expect("a good view");
+        let mut frame = Frame::new(view.width, view.height, FOUR);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.render(&scene, &moments[0], &view, &mut frame).expect("a good frame");
+        for (k, poses) in moments.iter().enumerate() {
+            let draw = || rasterizer.render(&scene, poses, &view, &mut frame).expect("a good frame");
+            let allocations = allocation_counter::measure(draw).count_total;
+            assert_eq!(allocations, 0, "{size:?}, moment {k}");
+        }
+    }
+}
+
 #[test]
 fn batches_allocate_for_threads_and_not_for_frames() {
     let (scene, poses) = scene();

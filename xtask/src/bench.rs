@@ -31,6 +31,16 @@ pub(crate) struct BenchArgs {
 }
 
 pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
+    let path = repo.root.join(RESULTS);
+    let heading = heading(&machine());
+    let old = if args.update {
+        let old = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        // Before the benchmarks run for nothing.
+        replaced(&old, &heading, "")?;
+        Some(old)
+    } else {
+        None
+    };
     let mut rows = Vec::new();
     let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
     let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
@@ -70,12 +80,9 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     if args.name.is_some() && !args.update {
         return Ok(());
     }
-    let path = repo.root.join(RESULTS);
-    let page = if args.update {
-        let old = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
-        replaced(&old, &heading(&machine()), &tables)?
-    } else {
-        format!("{}\n{tables}", heading(&machine()))
+    let page = match &old {
+        Some(old) => replaced(old, &heading, &tables)?,
+        None => format!("{heading}\n{tables}"),
     };
     write(&path, &page)?;
     println!("written to {RESULTS}");

@@ -59,6 +59,9 @@ impl Brush {
             if frame.wants(Stage::Color) && self.colors.len() < groups {
                 self.colors.resize(groups, [[0.0; LANES]; 3]);
             }
+            if frame.wants(Stage::Color) && plan.planes > 1 {
+                self.edges.reserve();
+            }
             at_level!(level, s => self.band(s, plan, shot, projection, frame, top));
         }
     }

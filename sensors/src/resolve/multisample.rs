@@ -52,6 +52,11 @@ impl Edges {
         self.requests.capacity() * size_of::<Request>()
     }
 
+    /// Takes the memory it will ever need: later pictures have more edges.
+    pub(crate) fn reserve(&mut self) {
+        self.requests.reserve_exact(CAPACITY - self.requests.len());
+    }
+
     /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their centre sees
     /// keeps its share of the colour; the rest is added by [`resolve`](Self::resolve).
     #[inline(always)]
@@ -74,8 +79,6 @@ impl Edges {
         if left == 0 {
             return;
         }
-        // All of it at once: later pictures have more edges.
-        self.requests.reserve_exact(CAPACITY - self.requests.len());
         if self.requests.len() + 4 * LANES > CAPACITY {
             self.resolve(s, context, colors);
         }

@@ -12,7 +12,7 @@ use crate::visibility::{Projection, RenderError, View};
 use scene::{Instance, PoseF32};
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
-const BAND: usize = 128 * 1024;
+pub(crate) const BAND: usize = 128 * 1024;
 /// Lamps with a shadow, at most.
 const MAX_SHADOWS: usize = 4;
 
@@ -93,12 +93,7 @@ impl Plan {
 
     /// The parts of the shadow maps; all must be drawn before the picture.
     pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
-        self.shadows.iter_mut().take(self.maps).flat_map(|map| {
-            // Small maps in quarters, so that the scratch memory is smaller than the map.
-            let [width, height] = map.size();
-            let rows = (BAND / (width * BLOCK)).min(height / BLOCK / 4);
-            map.bands(rows.max(1))
-        })
+        self.shadows.iter_mut().take(self.maps).flat_map(ShadowMap::bands)
     }
 
     /// Rows of blocks that are drawn together.

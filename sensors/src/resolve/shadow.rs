@@ -1,5 +1,6 @@
 //! Shadow maps: what a lamp sees.
 
+use super::plan::BAND;
 use crate::camera::RasterCfg;
 use crate::lanes::{F, Level};
 use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
@@ -14,6 +15,8 @@ pub(crate) struct ShadowMap {
     projection: Projection,
     /// What the lamp sees.
     list: DrawList,
+    /// Texels along a side before it was cut.
+    side: usize,
     /// Rotation from the world's axes to the lamp's.
     lamp_from_world: [[f32; 3]; 3],
     /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
@@ -31,8 +34,16 @@ pub(crate) struct ShadowBand<'a> {
     list: &'a DrawList,
     /// Which row of blocks is the first.
     first: usize,
+    /// Texels of a band, at most, however the map is cut.
+    most: usize,
     nearness: &'a mut [f32],
     range: &'a mut [[f32; 2]],
+}
+
+/// Rows of blocks of a map that are drawn together. Of small maps a quarter, so that the scratch memory is smaller than the
+/// map.
+fn rows_of_bands([width, height]: [usize; 2]) -> usize {
+    (BAND / (width * BLOCK)).min(height / BLOCK / 4).max(1)
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -68,6 +79,7 @@ impl ShadowMap {
         Self {
             projection,
             list: DrawList::default(),
+            side: 0,
             lamp_from_world: PoseF32::IDENTITY.rotation,
             texel: 1.0,
             nearness: Vec::new(),
@@ -106,13 +118,14 @@ impl ShadowMap {
         self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
         self.list.build(&projection, scene, poses, cfg.lod, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
+        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
+        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
+        self.side = side;
         if !self.crop() {
             return false;
         }
         let Projection { width, height, .. } = self.projection;
-        // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
-        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
-        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
         // All of it is written when it is drawn.
         self.nearness.resize(width * height, 0.0);
         self.range.resize((width / BLOCK) * (height / BLOCK), [0.0; 2]);
@@ -139,27 +152,25 @@ impl ShadowMap {
             item.rect = [x0 - lo[0], y0 - lo[1], x1 - lo[0], y1 - lo[1]];
         }
         [projection.width, projection.height] = [0, 1].map(|k| usize::from(hi[k] - lo[k] + 1) * BLOCK);
-        // Whole texels, so that the map does not crawl over the surfaces with the cut.
+        // Whole texels: the cut moves no texel over the surfaces.
         projection.cx -= (usize::from(lo[0]) * BLOCK) as f32;
         projection.cy -= (usize::from(lo[1]) * BLOCK) as f32;
         true
     }
 
-    /// Texels in a row, and rows.
-    pub(crate) fn size(&self) -> [usize; 2] {
-        [self.projection.width, self.projection.height]
-    }
-
-    /// The map in parts that can be drawn one by one, each of `rows` rows of blocks.
-    pub(crate) fn bands(&mut self, rows: usize) -> impl Iterator<Item = ShadowBand<'_>> {
-        let Self { projection, list, nearness, range, .. } = self;
+    /// The map in parts that can be drawn one by one.
+    pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
+        let Self { projection, list, nearness, range, side, .. } = self;
         let (projection, list) = (&*projection, &*list);
+        let most = rows_of_bands([*side, *side]) * BLOCK * *side;
+        let rows = rows_of_bands([projection.width, projection.height]);
         let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
         let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
         parts.enumerate().map(move |(k, (nearness, range))| ShadowBand {
             projection,
             list,
             first: k * rows,
+            most,
             nearness,
             range,
         })
@@ -228,7 +239,8 @@ impl ShadowMap {
         load(s, &lit)
     }
 
-    /// Sixteen texels around a point. Exactly 1 where none of them is nearer, as if they had not been looked at.
+    /// Sixteen texels around a point. Exactly 1 where none of them is nearer, as if they had not been looked at (and where
+    /// those that are weigh less than a ninety-thousandth).
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let width = self.projection.width;
@@ -248,9 +260,10 @@ impl ShadowMap {
 impl ShadowBand<'_> {
     /// Draws the band, by way of a tile that stays in the cache.
     pub(crate) fn draw(self, level: Level, scene: &RenderScene, tile: &mut Tile, painter: &mut Painter) {
-        let Self { projection, list, first, nearness, range } = self;
+        let Self { projection, list, first, most, nearness, range } = self;
         let wide = projection.width / BLOCK;
         let rows = range.len() / wide;
+        tile.reserve(most);
         tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
         at_level!(level, s => {
             for item in &list.opaque {

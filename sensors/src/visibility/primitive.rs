@@ -90,6 +90,13 @@ fn sign<S: Simd>(s: S, x: F<S>) -> F<S> {
     select(x.simd_lt(splat(s, 0.0)), splat(s, -1.0), splat(s, 1.0))
 }
 
+/// Nearness 1/z of a plane, where rays that go `down` by so much for each metre of depth (negative) begin at a height above
+/// it \[m\].
+#[inline(always)]
+pub(crate) fn plane_nearness<S: Simd>(down: F<S>, height: f32) -> F<S> {
+    down * (-1.0 / height)
+}
+
 /// Where rays hit a shape with a closed form, in its own frame. Shapes made of triangles are never hit.
 #[inline(always)]
 pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: f32) -> PrimitiveHit<S> {

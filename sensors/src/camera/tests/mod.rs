@@ -4,6 +4,7 @@
 mod degenerate;
 mod detail;
 mod determinism;
+mod floors_and_lamps;
 mod golden;
 mod pictures;
 mod reference;

@@ -209,7 +209,7 @@ impl Field {
     }
 
     /// A ray straight down from above the surface, as height scanners cast them: it crosses one cell, and nothing else must
-    /// be known of it. `None` for other rays, and where it misses the footprint.
+    /// be known of it. `None` for other rays, for those that begin below the surface, and where it misses the footprint.
     #[inline(always)]
     fn plumb(&self, ray: &Ray) -> Option<Touch> {
         let (o, d) = (ray.origin, ray.direction);

@@ -1,8 +1,8 @@
 //! The tile rasterizer: fills a visibility buffer with the nearest surface at every sample.
 //!
-//! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover. The
-//! picture is drawn in bands that stay in the cache; things are drawn front to back, and blocks that are full
-//! of nearer things are skipped.
+//! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover, endless
+//! planes by their nearness, which is linear in the picture. The picture is drawn in bands that stay in the cache; things are
+//! drawn front to back, and blocks that are full of nearer things are skipped.
 
 mod cluster;
 mod detail;
@@ -104,22 +104,22 @@ fn draw_floor<S: Simd>(
     if height <= 0.0 {
         return;
     }
-    let [right, down, forward] = [right, down, forward].map(|x| -x / height);
     let (nearest, zero, id) = (splat(s, projection.nearest()), splat(s, 0.0), splat_u(s, first_id));
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
-                let [x, y] = [
-                    (bx * BLOCK) as f32 + 0.5 + offset[0] as f32 / 256.0 - projection.cx,
-                    (by * BLOCK) as f32 + 0.5 + offset[1] as f32 / 256.0 - projection.cy,
-                ];
-                let across = (load(s, &COLUMN) + x) * (camera.inverse_f[0] * right);
+                let offset = offset.map(|x| x as f32 / 256.0);
+                let u = load(s, &COLUMN) + ((bx * BLOCK) as f32 + 0.5 + offset[0]);
+                let across = (u - projection.cx) * camera.inverse_f[0] * right;
                 let samples = tile.samples(block, plane);
                 for row in 0..BLOCK / 2 {
-                    let q = across + (load(s, &ROW) + (y + (2 * row) as f32)) * (camera.inverse_f[1] * down) + forward;
-                    let hit = q.simd_gt(zero) & q.simd_le(nearest);
+                    let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
+                    // Rounded as [`Projection::rays`] does: what is resolved is what was seen.
+                    let down = across + (v - projection.cy) * camera.inverse_f[1] * down + forward;
+                    let q = primitive::plane_nearness(down, height);
+                    let hit = down.simd_lt(zero) & q.simd_le(nearest);
                     drawn |= keep(s, tile, samples + row * LANES, hit, q, id);
                 }
             }
@@ -175,7 +175,13 @@ fn draw_primitive<S: Simd>(
                     if !hit.hit.any_true() {
                         continue;
                     }
-                    let q = projection.nearness_lanes(hit.t);
+                    let q = match shape {
+                        // As an endless one at the same height, so that the later one does not shine through.
+                        Shape::Plane(_) if !projection.parallel => {
+                            primitive::plane_nearness(d.z, placed.local.instance_from_camera.translation[2])
+                        }
+                        _ => projection.nearness_lanes(hit.t),
+                    };
                     drawn |= keep(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
                 }
             }

@@ -32,6 +32,15 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
+    /// Takes memory for tiles of up to so many samples.
+    pub(crate) fn reserve(&mut self, samples: usize) {
+        let blocks = samples.div_ceil(AREA);
+        self.nearness.reserve_exact(samples.saturating_sub(self.nearness.len()));
+        self.id.reserve_exact(samples.saturating_sub(self.id.len()));
+        self.farthest.reserve_exact(blocks.saturating_sub(self.farthest.len()));
+        self.stale.reserve_exact(blocks.saturating_sub(self.stale.len()));
+    }
+
     /// Moves the tile and empties it.
     pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
         [self.x0, self.y0] = origin;
