@@ -362,8 +362,9 @@ impl SimulationManager {
 
     /// Adds an MJCF file to every environment, compiled as [`add_robot`](Self::add_robot) does: its bodies, joints, contacts,
     /// couplings, tendons, actuators and sensors, every name with `uid/` before it. Its bodies and named sites are frames that
-    /// cameras and sensors can be attached to. Its geoms collide by the bits that the file gives them; the ground, objects and
-    /// robots collide with every geom whose `contype` is not 0.
+    /// cameras and sensors can be attached to. Its geoms collide by the bits that the file gives them: the ground, terrains and
+    /// objects collide with every geom whose `contype` is not 0, robots with every geom that has the lowest bit in its
+    /// `contype`, as MuJoCo's default has.
     ///
     /// Settings of the file for its whole model, keyframes and skins are not taken over:
     /// [`diagnostics`](Self::diagnostics) names each.

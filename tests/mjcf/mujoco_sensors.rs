@@ -158,6 +158,26 @@ fn readings_at_rest_are_closed_forms() {
     near(value(&sim, "touch"), &[0.0], 1e-12);
 }
 
+/// Environments that are told different things read the same bits, whoever steps them.
+#[test]
+fn threads_change_no_bit() {
+    let run = |threads| {
+        let cfg = SimulationManagerCfg { num_envs: 5, threads: Some(threads), physics_dt: 0.002, ..Default::default() };
+        let mut sim = SimulationManager::new(cfg).unwrap();
+        let part = sim.add_mjcf(MjcfCfg::text("m", machine())).unwrap();
+        let id = sim.add_sensor("all", MujocoSensorCfg::default()).unwrap();
+        let controls = Array2::from_shape_fn((5, 3), |(env, k)| 0.1 * env as f64 - 0.2 * k as f64);
+        sim.mjcf_part_mut(part).set_ctrl(&controls, None, None).unwrap();
+        sim.update(150);
+        let values = sim.sensor(id).unwrap().values().to_owned();
+        (sim.mjcf_part(part).get_qpos(), values)
+    };
+    let ((qpos, values), (other_qpos, other_values)) = (run(1), run(3));
+    assert_eq!(bits(qpos.as_slice().unwrap()), bits(other_qpos.as_slice().unwrap()));
+    assert_eq!(bits(values.as_slice().unwrap()), bits(other_values.as_slice().unwrap()));
+    assert_ne!(qpos.row(0), qpos.row(1));
+}
+
 /// Rate, history and resets are those of all sensors.
 #[test]
 fn samples_come_at_their_rate() {

@@ -82,6 +82,9 @@ fn what_cannot_be_written_back_is_refused() {
     if mj::TARGET == mj::Target::V4 {
         let delayed = "<actuator><motor name=\"a\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/></actuator>";
         let contact = "<sensor><contact name=\"c\" geom1=\"g\"/></sensor>";
+        let cloth = "<worldbody><body name=\"c\" pos=\"0 0 3\"><flexcomp name=\"f\" type=\"grid\" count=\"3 3 1\" spacing=\"0.1 0.1 0.1\" \
+                     dim=\"2\" mass=\"1\" radius=\"0.01\"/></body></worldbody>";
+        cases.push(("", cloth, ["flex \"0\"", "deforms"]));
         cases.push(("stiffness=\"1 2 3\"", "", ["joint \"j\"", "stiffness of higher order"]));
         cases.push(("damping=\"1 -2 0\"", "", ["joint \"j\"", "damping of higher order"]));
         cases.push(("", delayed, ["actuator \"a\"", "delay"]));

@@ -60,6 +60,37 @@ fn a_part_looks_as_the_file_does() {
     assert_eq!(seen.mask().unwrap()[(0, 4, 4)], sim.mask_ids()[0].id);
 }
 
+/// A robot is in the way of a part's body, as MuJoCo's default bits say: a ball falls on the arm; one without the lowest bit
+/// falls past it.
+#[test]
+fn robots_are_in_the_way_of_parts() {
+    let touches = |contype: i32| {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { physics_dt: 0.002, ..Default::default() }).unwrap();
+        let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+        let robot = sim.add_robot(RobotCfg { uid: "sr5".into(), urdf, ..Default::default() }).unwrap();
+        let tip = sim.robot(robot).link_pose("ee_link").unwrap();
+        let ball = format!(
+            r#"<mujoco><worldbody><body name="ball" pos="{} {} {}"><freejoint/>
+            <geom size="0.1" contype="{contype}" mass="0.1"/></body></worldbody></mujoco>"#,
+            tip[(0, 0)],
+            tip[(0, 1)],
+            tip[(0, 2)] + 0.4
+        );
+        sim.add_mjcf(MjcfCfg::text("part", ball)).unwrap();
+        let cfg =
+            ContactSensorCfg { bodies: vec!["part/ball".into()], filters: vec!["sr5/.*".into()], ..Default::default() };
+        let id = sim.add_sensor("contact", cfg).unwrap();
+        let mut touched = false;
+        for _ in 0..400 {
+            sim.update(1);
+            touched |= sim.sensor(id).unwrap().force_matrix_w().iter().any(|f| *f > 0.0);
+        }
+        touched
+    };
+    // The arm's own bit is the second one.
+    assert!(touches(1) && !touches(2));
+}
+
 /// Contacts of a part's bodies are the part's: a contact sensor reads the weight of what stands on its world, and on the
 /// scene's ground.
 #[test]

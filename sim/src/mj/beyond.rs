@@ -33,9 +33,9 @@ impl Model {
             }};
         }
         let header = self.header();
-        let whole = [("flex", header.nflex), ("plugin", header.nplugin)];
-        if let Some((element, _)) = whole.into_iter().find(|(_, count)| *count > 0) {
-            return Some(Beyond { element, index: 0, what: "the element" });
+        let whole = [("flex", header.nflex, "a shape that deforms"), ("plugin", header.nplugin, "code of its own")];
+        if let Some((element, _, what)) = whole.into_iter().find(|(_, count, _)| *count > 0) {
+            return Some(Beyond { element, index: 0, what });
         }
         let numbers = [
             ("joint", array!(jnt_stiffnesspoly), self.njnt(), "a stiffness of higher order"),

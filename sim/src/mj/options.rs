@@ -23,7 +23,8 @@ fn numbers(values: &[f64]) -> String {
     values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// Flags that are on unless disabled.
+/// Flags that are on unless disabled. `autoreset` and `island` of 4.x are not here: what drives of robots need decides them
+/// ([`Compiled::prepare_for_stepping`](super::Compiled::prepare_for_stepping)).
 const DISABLED: &[(u32, &str)] = &[
     (mj::mjDSBL_CONSTRAINT, "flag constraint"),
     (mj::mjDSBL_EQUALITY, "flag equality"),

@@ -27,6 +27,21 @@ use std::sync::Arc;
 /// MuJoCo itself reads the file; what it made of it is put into the scene, every name with `uid/` before it. Bodies that the
 /// file leaves free are free, others stand as the file says. Settings for the whole model (`option`, `visual`, ...) are the
 /// scene's: what differs is a diagnostic.
+///
+/// ```
+/// use sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
+///
+/// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+/// let pendulum = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
+///     <joint name="hinge" axis="0 1 0"/><geom size="0.05" pos="0.3 0 0"/></body></worldbody>
+///   <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>"#;
+/// let part = sim.add_mjcf(MjcfCfg::text("pendulum", pendulum))?;
+/// let motor = sim.mjcf_part(part).actuator_ids(&["motor"])?;
+/// sim.mjcf_part_mut(part).set_ctrl(&ndarray::array![[0.1]], Some(&motor), None)?;
+/// sim.update(10);
+/// assert!(sim.mjcf_part(part).get_qpos()[(0, 0)] > 0.0, "it falls");
+/// # Ok::<(), sim::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MjcfCfg {
