@@ -1,6 +1,6 @@
-//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default positions.
-//! The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping, positions cut at
-//! the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
+//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default
+//! positions. The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping,
+//! positions cut at the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
 
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
