@@ -1,6 +1,6 @@
-//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default positions.
-//! The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping, positions cut at
-//! the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
+//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default
+//! positions. The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping,
+//! positions cut at the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
 
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
@@ -8,13 +8,15 @@ use crate::{Outcome, Settings};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-use kinetoscope::scene::pose::{from_row, to_row};
+use kinetoscope::scene::pose::from_row;
 use kinetoscope::sim::mj::{Data, ObjectKind};
 use nalgebra::{Matrix6, Vector6};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 const TARGETS: usize = 1000;
+/// Solves of a pose out of reach.
+const FAR: usize = 21;
 /// Square of the rival's damping.
 const DAMPING: f64 = 1e-3;
 
@@ -204,19 +206,27 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let mut ours = Ours { task: &task, sim, robot, next: 0 };
     let (mut micros, mut solved) = ([Vec::new(), Vec::new()], [0.0, 0.0]);
     for target in &task.targets {
-        let target = from_row(&to_row(target));
         let clock = Instant::now();
-        let found = ours.solve(&target)?;
+        let found = ours.solve(target)?;
         micros[0].push(1e6 * clock.elapsed().as_secs_f64());
         let clock = Instant::now();
-        let theirs = bare.solve(&target)?;
+        let theirs = bare.solve(target)?;
         micros[1].push(1e6 * clock.elapsed().as_secs_f64());
         for (side, found) in [found, theirs].into_iter().enumerate() {
             if let Some(positions) = found {
-                solved[side] += f64::from(u8::from(bare.reaches(&positions, &target)?)) * 100.0 / TARGETS as f64;
+                solved[side] += f64::from(u8::from(bare.reaches(&positions, target)?)) * 100.0 / TARGETS as f64;
             }
         }
     }
+    let beyond = Pose::translation(10.0, 0.0, 0.0) * task.targets[0];
+    let far: Vec<f64> = (0..FAR)
+        .map(|_| {
+            let clock = Instant::now();
+            let found = ours.solve(&beyond)?;
+            let micros = 1e6 * clock.elapsed().as_secs_f64();
+            if found.is_some() { Err("a pose out of reach was reached".into()) } else { Ok(micros) }
+        })
+        .collect::<Outcome<_>>()?;
     let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
     let times = measure(plan, &mut [&mut ours, &mut bare])?;
     let [our_median, their_median] = micros.map(median);
@@ -232,6 +242,7 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
             their_median,
             their_median / our_median,
         ),
+        Row::new("ik", format!("{name}, median out of reach"), "us/solve", 1, median(far)),
         Row::new("ik", format!("{name}, solved"), "%", 1, solved[0]).against(rival, solved[1], solved[0] / solved[1]),
     ])
 }

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 const TARGETS: usize = 1000;
 
-/// Targets are where MuJoCo puts `link` at uniformly random positions; each search starts from the default positions; what it
-/// finds is written into the simulation, and MuJoCo says where the link is.
+/// Targets are where MuJoCo puts `link` at uniformly random positions; each search starts from the default positions;
+/// what it finds is written into the simulation, and MuJoCo says where the link is.
 fn check(name: &str, cfg: RobotCfg, link: &str) {
     let (mut sim, id) = simulation(1, cfg);
     let reachable = random_qpos(&sim, id, TARGETS, 21);

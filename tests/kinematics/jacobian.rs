@@ -6,8 +6,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::ObjectKind;
 use nalgebra::Vector3;
 
-/// `mj_jac` at the origin of a frame on a link, in every environment: the columns of all joints, those of followers added to
-/// the joint they follow.
+/// `mj_jac` at the origin of a frame on a link, in every environment: the columns of all joints, those of followers
+/// added to the joint they follow.
 fn judge(sim: &SimulationManager, id: RobotId, body: &str, point: &Array2<f64>) -> Array3<f64> {
     let robot = sim.robot(id);
     let (model, nv) = (sim.batch().model(), sim.batch().model().nv());
@@ -34,8 +34,8 @@ fn largest(a: &Array3<f64>, b: &Array3<f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Columns as central differences of poses over 2 h = 2e-4: they are wrong by h² / 6 times third derivatives, which for arms
-/// of a metre are of about 1, so by 2e-9, and by 1e-16 / h of rounding.
+/// Columns as central differences of poses over 2 h = 2e-4: they are wrong by h² / 6 times third derivatives, which for
+/// arms of a metre are of about 1, so by 2e-9, and by 1e-16 / h of rounding.
 fn differences(sim: &SimulationManager, id: RobotId, tip: Tip<'_>, qpos: &Array2<f64>) -> Array3<f64> {
     const H: f64 = 1e-4;
     let robot = sim.robot(id);

@@ -68,8 +68,8 @@ fn joints_without_limits_take_no_unneeded_turns() {
     }
 }
 
-/// A gripper whose finger follows another, and an arm whose second joint follows the first: what was found, written into MuJoCo
-/// with the follower where it belongs, is at the target.
+/// A gripper whose finger follows another, and an arm whose second joint follows the first: what was found, written
+/// into MuJoCo with the follower where it belongs, is at the target.
 #[test]
 fn followers_follow() {
     let limit = "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"9\" velocity=\"9\"/>";

@@ -41,8 +41,8 @@ fn at(x: f64, y: f64) -> Array2<f64> {
     array![[x, y, 0.0, 1.0, 0.0, 0.0, 0.0]]
 }
 
-/// A position alone leaves two solutions: each start finds its own. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a joint, the
-/// smallest singular value of these Jacobians being above 0.1; the finish leaves far less.
+/// A position alone leaves two solutions: each start finds its own. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a
+/// joint, the smallest singular value of these Jacobians being above 0.1; the finish leaves far less.
 #[test]
 fn a_position_has_two_solutions() {
     let (_dir, sim, id) = two_links(WIDE);
@@ -82,9 +82,9 @@ fn a_pose_has_one_solution() {
     }
 }
 
-/// Beyond the outer circle and inside of the inner one the distance to them is left, the hand points at the target or away from
-/// it, and it says that it failed. The search ends where the error does not grow smaller in double precision: it is quadratic in
-/// the angle that is still missing, of about 1e-7.
+/// Beyond the outer circle and inside of the inner one the distance to them is left, the hand points at the target or
+/// away from it, and it says that it failed. The search ends where the error does not grow smaller in double precision:
+/// it is quadratic in the angle that is still missing, of about 1e-7.
 #[test]
 fn what_is_out_of_reach_is_approached_and_said_so() {
     let (_dir, sim, id) = two_links(WIDE);
@@ -120,8 +120,8 @@ fn what_no_joint_does_is_left() {
     assert!(expected.iter().any(|e| (found.qpos[(0, 0)] - e[0]).abs() + (found.qpos[(0, 1)] - e[1]).abs() < 1e-5));
 }
 
-/// An elbow that cannot stretch: it stays at its limit, and the hand as far out as that lets it, which is the third side of the
-/// triangle.
+/// An elbow that cannot stretch: it stays at its limit, and the hand as far out as that lets it, which is the third
+/// side of the triangle.
 #[test]
 fn a_limit_keeps_the_arm_short() {
     let (_dir, sim, id) = two_links("<limit lower=\"0.8\" upper=\"2.5\" effort=\"9\" velocity=\"9\"/>");

@@ -11,8 +11,8 @@ fn distance(qpos: &Array2<f64>) -> f64 {
     qpos.iter().zip(READY).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The motion of the joints that leaves the frame where it is: the singular vector of the Jacobian's missing singular value; and
-/// the smallest one that it has.
+/// The motion of the joints that leaves the frame where it is: the singular vector of the Jacobian's missing singular
+/// value; and the smallest one that it has.
 fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec<f64>, f64) {
     let jacobian = sim.robot(id).jacobian("arm", Some(qpos.view()), None).unwrap();
     let square = DMatrix::from_fn(7, 7, |row, column| if row < 6 { jacobian[(0, row, column)] } else { 0.0 });
@@ -22,9 +22,9 @@ fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec
     (svd.v_t.unwrap().row(svd.singular_values.imin()).iter().copied().collect(), values[1])
 }
 
-/// An arm of seven axes keeps its pose and comes as near to the posture as it can: on the curve of positions that reach the
-/// target the distance has no slope any more, unless a limit is in the way, or a singular position, where that curve has a bend
-/// that steps of finite length do not follow.
+/// An arm of seven axes keeps its pose and comes as near to the posture as it can: on the curve of positions that reach
+/// the target the distance has no slope any more, unless a limit is in the way, or a singular position, where that
+/// curve has a bend that steps of finite length do not follow.
 #[test]
 fn seven_axes_come_nearer_to_a_posture() {
     let (mut sim, id) = simulation(1, seven_axes());

@@ -108,7 +108,7 @@ pub struct IkCfg {
     pub rotation_tolerance: f64,
     /// Steps from each start, at least 1.
     pub max_iterations: u32,
-    /// Damping at each start, in multiples of the squared error; above 0. Small: bold first steps.
+    /// Damping at each start, in multiples of half the squared error; above 0. Small: bold first steps.
     pub damping: f64,
     /// Starts, at least 1: the first from the initial positions, all others from random ones.
     pub num_seeds: u32,

@@ -5,11 +5,11 @@ use crate::description::{JointId, JointKind, LinkId, RobotDescription};
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 use scene::Pose;
 
-/// The joints between a base link and a frame, in a form that is quick to evaluate: fixed joints are folded into the poses
-/// between the others, and joints that mimic have become further places where the joint acts that they follow.
+/// The joints between a base link and a frame, in a form that is quick to evaluate: fixed joints are folded into the
+/// poses between the others, and joints that mimic have become further places where the joint acts that they follow.
 ///
-/// The base is the root link, or the child of the last floating or planar joint above the frame: such joints have no column,
-/// and where their child is has to come from elsewhere.
+/// The base is the root link, or the child of the last floating or planar joint above the frame: such joints have no
+/// column, and where their child is has to come from elsewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     pub(super) base: LinkId,

@@ -9,13 +9,14 @@ use std::f64::consts::{PI, TAU};
 
 /// Solves the inverse kinematics of a [`Chain`] again and again; a solve allocates nothing.
 ///
-/// A solve goes down by damped least squares, within the limits, from the initial positions, and where that ends elsewhere than
-/// at the target from random ones, until one start leads there. Random starts are uniform within the limits, at most half a
-/// turn from their middle; without limits, from the initial position. The error is weighed as if the
-/// chain's [`reach`](Chain::reach) were two radians. Of positions that differ by whole turns, those are given that are nearest to
-/// the posture, or without one to the initial positions.
+/// A solve goes down by damped least squares, within the limits, from the initial positions, and where that ends
+/// elsewhere than at the target from random ones, until one start leads there. Random starts are uniform within the
+/// limits, at most half a turn from their middle; without limits, from the initial position. The error is weighed as if
+/// the chain's [`reach`](Chain::reach) were two radians. Of positions that differ by whole turns, those are given that
+/// are nearest to the posture, or without one to the initial positions.
 ///
-/// A solve takes at most `num_seeds * max_iterations` steps, and some more for the finish. One that is not solved takes them all.
+/// A solve takes at most `num_seeds * max_iterations` steps, and some more for the finish. One that is not solved takes
+/// them all.
 #[derive(Clone, Debug)]
 pub struct IkSolver {
     chain: Chain,
@@ -45,7 +46,8 @@ pub struct IkSolution<'s> {
 }
 
 impl IkSolver {
-    /// A solver for `chain`, whose variables are all to be found, each within its `limits` \[rad or m\], which may be infinite.
+    /// A solver for `chain`, whose variables are all to be found, each within its `limits` \[rad or m\], which may be
+    /// infinite.
     ///
     /// # Errors
     /// A variable does not move the frame; limits or numbers of the configuration are wrong.
@@ -83,12 +85,12 @@ impl IkSolver {
         &mut self.chain
     }
 
-    /// Positions that put the frame at `target`, a pose in the base link of the chain. `initial` \[rad or m\] has a number for
-    /// each variable, and is taken into the limits.
+    /// Positions that put the frame at `target`, a pose in the base link of the chain. `initial` \[rad or m\] has a
+    /// number for each variable, and is taken into the limits.
     ///
     /// # Errors
-    /// `initial` has the wrong length; a number is not finite; the rotation of the target is not of length 1. A target that is not
-    /// reached is no error: see [`IkSolution::success`].
+    /// `initial` has the wrong length; a number is not finite; the rotation of the target is not of length 1. A target
+    /// that is not reached is no error: see [`IkSolution::success`].
     pub fn solve(&mut self, target: &Pose, initial: &[f64]) -> Result<IkSolution<'_>, KinematicsError> {
         if initial.len() != self.limits.len() {
             let (expected, found) = (self.limits.len(), initial.len());

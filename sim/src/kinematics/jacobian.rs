@@ -5,13 +5,13 @@ use nalgebra::{Vector3, Vector6};
 use scene::Pose;
 
 impl Chain {
-    /// The geometric Jacobian at `positions` \[rad or m\]: for each variable the velocity of the origin of the frame and its
-    /// angular velocity, both in the axes of the base link, per unit of the variable \[m/rad, rad/rad, m/m\]. Returns the pose
-    /// of the frame.
+    /// The geometric Jacobian at `positions` \[rad or m\]: for each variable the velocity of the origin of the frame
+    /// and its angular velocity, both in the axes of the base link, per unit of the variable \[m/rad, rad/rad, m/m\].
+    /// Returns the pose of the frame.
     ///
-    /// A turning joint with the axis a through o gives (a × (p - o), a) at the origin p of the frame, a sliding one (a, 0).
-    /// Source: Siciliano et al., "Robotics", Springer 2009, equation 3.30. What follows a variable by a ratio adds that
-    /// much of its own.
+    /// A turning joint with the axis a through o gives (a × (p - o), a) at the origin p of the frame, a sliding one (a,
+    /// 0). Source: Siciliano et al., "Robotics", Springer 2009, equation 3.30. What follows a variable by a ratio adds
+    /// that much of its own.
     ///
     /// # Panics
     /// If there are fewer positions or columns than [`variables`](Self::variables).

@@ -133,12 +133,12 @@ impl Descent {
 
     /// Goes down from where it is; returns the number of steps, those included that were taken back.
     ///
-    /// Levenberg-Marquardt with the step Jᵀ (J Jᵀ + λ)⁻¹ e, whose matrix has six rows whatever the number of joints. λ is a
-    /// multiple of the squared error, so that it vanishes at the target and bounds steps far from it (T. Sugihara,
-    /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011); the
-    /// multiple follows the ratio of what a step gained to what the linear model promised, and steps that gain nothing are
-    /// taken back (H. B. Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05). Limits: joints that
-    /// the error pushes against theirs are left out, and steps are cut at limits.
+    /// Levenberg-Marquardt with the step Jᵀ (J Jᵀ + λ)⁻¹ e, whose matrix has six rows whatever the number of joints. λ
+    /// is a multiple of the squared error, so that it vanishes at the target and bounds steps far from it (T. Sugihara,
+    /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011);
+    /// the multiple follows the ratio of what a step gained to what the linear model promised, and steps that gain
+    /// nothing are taken back (H. B. Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05).
+    /// Limits: joints that the error pushes against theirs are left out, and steps are cut at limits.
     pub(super) fn descend(&mut self, problem: &Problem<'_>, stop: &Stop, damping: f64) -> u32 {
         let (mut damping, mut growth, mut slow) = (damping, 2.0, 0);
         let mut gram = self.gram_of_free(problem);
@@ -204,14 +204,14 @@ impl Descent {
         gram
     }
 
-    /// Goes towards the positions `rest` as far as the target leaves it a choice, from where the target is reached; returns
-    /// the number of steps.
+    /// Goes towards the positions `rest` as far as the target leaves it a choice, from where the target is reached;
+    /// returns the number of steps.
     ///
-    /// Each step is the part of the way to `rest` that the Jacobian does not see, (1 - J⁺ J) (rest - q) (A. Liégeois, "Automatic
-    /// supervisory control of the configuration and behavior of multibody mechanisms", IEEE Trans. Systems, Man and
-    /// Cybernetics 7, 1977), followed by steps that bring the frame back. One that does not come nearer, or whose frame does not
-    /// come back, is taken back and halved: what was reached stays reached. It ends where there is nothing to gain, and near singular
-    /// positions, where what is free bends too sharply for steps of a thousandth.
+    /// Each step is the part of the way to `rest` that the Jacobian does not see, (1 - J⁺ J) (rest - q) (A. Liégeois,
+    /// "Automatic supervisory control of the configuration and behavior of multibody mechanisms", IEEE Trans. Systems,
+    /// Man and Cybernetics 7, 1977), followed by steps that bring the frame back. One that does not come nearer, or
+    /// whose frame does not come back, is taken back and halved: what was reached stays reached. It ends where there is
+    /// nothing to gain, and near singular positions, where what is free bends too sharply for steps of a thousandth.
     pub(super) fn relax(&mut self, problem: &Problem<'_>, stop: &Stop, rest: &[f64], gain: f64) -> u32 {
         let (mut part, mut used) = (gain, 0);
         for _ in 0..stop.iterations {

@@ -1,10 +1,11 @@
 //! Where frames of a robot are, how joints move them, and which joint positions put them somewhere: kinematics of a
 //! [`RobotDescription`](crate::RobotDescription), of our own and without MuJoCo.
 //!
-//! [`Chain`] is the way from a base link to a frame, with everything that does not move folded together; it gives the pose of
-//! the frame ([`Chain::pose`]) and its Jacobian ([`Chain::jacobian`]). [`IkSolver`] turns it round. All of them work in the
-//! axes of the base link; [`Robot::compute_fk`](crate::Robot::compute_fk), [`Robot::jacobian`](crate::Robot::jacobian) and
-//! [`Robot::compute_ik`](crate::Robot::compute_ik) do so for the environments of a simulation, and in their frames.
+//! [`Chain`] is the way from a base link to a frame, with everything that does not move folded together; it gives the
+//! pose of the frame ([`Chain::pose`]) and its Jacobian ([`Chain::jacobian`]). [`IkSolver`] turns it round. All of them
+//! work in the axes of the base link; [`Robot::compute_fk`](crate::Robot::compute_fk),
+//! [`Robot::jacobian`](crate::Robot::jacobian) and [`Robot::compute_ik`](crate::Robot::compute_ik) do so for the
+//! environments of a simulation, and in their frames.
 //!
 //! Mimic joints are no variables: they follow, and what they do is part of what the joint does that they follow.
 //!

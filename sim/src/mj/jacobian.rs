@@ -20,8 +20,8 @@ impl Data {
     }
 
     /// The Jacobian of a point that moves with a body, by `mj_jac`, row-major, (3, nv) each: velocity of the point and
-    /// angular velocity in world axes per unit of each generalised velocity. Poses are those of the last forward pass or of
-    /// [`place`](Self::place).
+    /// angular velocity in world axes per unit of each generalised velocity. Poses are those of the last forward pass
+    /// or of [`place`](Self::place).
     ///
     /// # Errors
     /// MuJoCo's engine stopped.

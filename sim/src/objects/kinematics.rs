@@ -17,8 +17,8 @@ use sensors::camera::{CameraError, Poses};
 /// What [`Robot::compute_ik`] found: one entry per environment that was asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IkResult {
-    /// Positions of the joints \[rad or m\], shape (N, dof of the part): those that do not move the frame stay at their initial
-    /// positions, mimic ones follow. Where `success` is false, the best that were found.
+    /// Positions of the joints \[rad or m\], shape (N, dof of the part): those that do not move the frame stay at their
+    /// initial positions, mimic ones follow. Where `success` is false, the best that were found.
     pub qpos: Array2<f64>,
     /// Whether the frame is within the tolerances of its target, shape (N,).
     pub success: Array1<bool>,
@@ -43,13 +43,14 @@ struct Resolved {
 }
 
 impl Robot<'_> {
-    /// Poses of a frame at joint positions `qpos` \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape
-    /// (N, 7). Where the robot's root is in each environment is part of them.
+    /// Poses of a frame at joint positions `qpos` \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment
+    /// \[m\], shape (N, 7). Where the robot's root is in each environment is part of them.
     ///
-    /// `qpos` has a row for each of `env_ids` (all environments where `None`), or one for all of them, and a column for each joint
-    /// of the control part that `tip` names ([`get_joint_ids`](Self::get_joint_ids)), or for each joint of the robot. Other joints
-    /// are where they are in the environment, mimic joints where those are that they follow: their own columns are accepted and
-    /// ignored. Positions beyond the limits are taken as they are. The state does not change.
+    /// `qpos` has a row for each of `env_ids` (all environments where `None`), or one for all of them, and a column for
+    /// each joint of the control part that `tip` names ([`get_joint_ids`](Self::get_joint_ids)), or for each joint of
+    /// the robot. Other joints are where they are in the environment, mimic joints where those are that they follow:
+    /// their own columns are accepted and ignored. Positions beyond the limits are taken as they are. The state does
+    /// not change.
     ///
     /// # Errors
     /// Unknown part, link or environment; wrong shape; a number that is not finite; a part that ends in several links.
@@ -73,9 +74,9 @@ impl Robot<'_> {
         Ok(poses)
     }
 
-    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names), at positions `qpos` of all joints
-    /// \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7). For rows and mimic joints see
-    /// [`compute_fk`](Self::compute_fk).
+    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names), at positions `qpos` of all
+    /// joints \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7). For rows
+    /// and mimic joints see [`compute_fk`](Self::compute_fk).
     ///
     /// # Errors
     /// Unknown environment; wrong shape; a number that is not finite.
@@ -102,9 +103,10 @@ impl Robot<'_> {
         Ok(poses)
     }
 
-    /// Jacobians of a frame, shape (N, 6, columns): velocity of its origin, then its angular velocity, both in the axes of the
-    /// environment, per unit of each joint's velocity, with the root standing still. At joint positions `qpos` \[rad or m\], or
-    /// where the joints are where it is `None`; rows and columns as in [`compute_fk`](Self::compute_fk).
+    /// Jacobians of a frame, shape (N, 6, columns): velocity of its origin, then its angular velocity, both in the axes
+    /// of the environment, per unit of each joint's velocity, with the root standing still. At joint positions `qpos`
+    /// \[rad or m\], or where the joints are where it is `None`; rows and columns as in
+    /// [`compute_fk`](Self::compute_fk).
     ///
     /// The column of a mimic joint is 0: what it does is in the column of the joint that it follows.
     ///
@@ -145,17 +147,19 @@ impl Robot<'_> {
         Ok(jacobians)
     }
 
-    /// Joint positions that put a frame at `targets`: poses in the environment, typed or as rows `[x, y, z, qw, qx, qy, qz]` \[m\], one
-    /// for each of `env_ids` (all environments where `None`), or one for all of them. Quaternions are normalised.
+    /// Joint positions that put a frame at `targets`: poses in the environment, typed or as rows `[x, y, z, qw, qx, qy,
+    /// qz]` \[m\], one for each of `env_ids` (all environments where `None`), or one for all of them. Quaternions are
+    /// normalised.
     ///
     /// The joints of the control part that `tip` names, or all of the robot, are found within their limits
-    /// ([`qpos_limits`](Self::qpos_limits)); others stay where they are in the environment. The search starts from `initial`
-    /// \[rad or m\], with rows and columns as in [`compute_fk`](Self::compute_fk), or from where the joints are.
-    /// How: [`IkSolver`]. Contacts are not considered, and the state does not change: give what comes out to
-    /// [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success) says that it is right.
+    /// ([`qpos_limits`](Self::qpos_limits)); others stay where they are in the environment. The search starts from
+    /// `initial` \[rad or m\], with rows and columns as in [`compute_fk`](Self::compute_fk), or from where the joints
+    /// are. How: [`IkSolver`], on the calling thread. Contacts are not considered, and the state does not change: give
+    /// what comes out to [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success)
+    /// says that it is right.
     ///
-    /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the robot's
-    /// root is, up to the rounding of the target's pose in the frame of the root.
+    /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the
+    /// robot's root is, up to the rounding of the target's pose in the frame of the root.
     ///
     /// ```
     /// use ndarray::array;
@@ -185,9 +189,9 @@ impl Robot<'_> {
     /// ```
     ///
     /// # Errors
-    /// Unknown part, link or environment; wrong shape; a number that is not finite, or out of its range; a quaternion of length
-    /// zero; a part that ends in several links, or none of whose joints moves the frame. A target that cannot be reached is no
-    /// error.
+    /// Unknown part, link or environment; wrong shape; a number that is not finite, or out of its range; a quaternion
+    /// of length zero; a part that ends in several links, or none of whose joints moves the frame. A target that cannot
+    /// be reached is no error.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn compute_ik<'n>(
         &self,
