@@ -52,6 +52,8 @@ impl Brush {
         let Some(projection) = &plan.projection else { return };
         let wide = projection.width.div_ceil(BLOCK);
         let (step, top) = (plan.rows(), rows.start * BLOCK);
+        // Shadows may come later: memory is taken once.
+        self.tile.reserve(plan.most_of_shadow_bands());
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());

@@ -96,6 +96,11 @@ impl Plan {
         self.shadows.iter_mut().take(self.maps).flat_map(ShadowMap::bands)
     }
 
+    /// Samples of a tile that can hold any band of the shadow maps, of lamps too that cast no shadow now.
+    pub(crate) fn most_of_shadow_bands(&self) -> usize {
+        self.shadows.iter().map(ShadowMap::most_of_bands).max().unwrap_or(0)
+    }
+
     /// Rows of blocks that are drawn together.
     pub(crate) fn rows(&self) -> usize {
         let Some(projection) = &self.projection else { return 1 };

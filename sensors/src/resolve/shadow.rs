@@ -46,6 +46,11 @@ fn rows_of_bands([width, height]: [usize; 2]) -> usize {
     (BAND / (width * BLOCK)).min(height / BLOCK / 4).max(1)
 }
 
+/// Texels of a band, at most, however a map of `side` by `side` texels is cut.
+fn most_of_bands(side: usize) -> usize {
+    if side == 0 { 0 } else { rows_of_bands([side, side]) * BLOCK * side }
+}
+
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -132,6 +137,11 @@ impl ShadowMap {
         true
     }
 
+    /// Samples of a tile that can hold any band of the map, even if there is no map now.
+    pub(crate) fn most_of_bands(&self) -> usize {
+        most_of_bands(self.side)
+    }
+
     /// Cuts the map to what is seen, and a block more on each side for the texels around a point: everything else is lit.
     /// `false` where nothing is seen.
     fn crop(&mut self) -> bool {
@@ -162,7 +172,7 @@ impl ShadowMap {
     pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         let Self { projection, list, nearness, range, side, .. } = self;
         let (projection, list) = (&*projection, &*list);
-        let most = rows_of_bands([*side, *side]) * BLOCK * *side;
+        let most = most_of_bands(*side);
         let rows = rows_of_bands([projection.width, projection.height]);
         let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
         let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));

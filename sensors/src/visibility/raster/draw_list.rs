@@ -103,6 +103,18 @@ impl DrawList {
         self.placed.clear();
         self.opaque.clear();
         self.blended.clear();
+        // Room for all of it: what is seen changes from frame to frame, and memory must not grow with it.
+        let (mut opaque, mut blended) = (0, 0);
+        for instance in scene.instances() {
+            let items = instance.mesh().map_or(1, |mesh| mesh.clusters().len());
+            match keep(instance) {
+                Layer::Hidden => {}
+                Layer::Opaque => opaque += items,
+                _ => blended += items,
+            }
+        }
+        self.opaque.reserve_exact(opaque);
+        self.blended.reserve_exact(blended);
         for (index, (instance, pose)) in scene.instances().iter().zip(poses).enumerate() {
             let [lo, hi] = instance.shape.aabb();
             let local = projection.local(pose);
