@@ -17,8 +17,8 @@ use std::thread::JoinHandle;
 /// What is done with an environment, given its index.
 pub type EnvJob = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
 
-/// What is done with a chunk, given the index of its first environment.
-type ChunkJob = Arc<dyn Fn(usize, &mut Chunk) + Send + Sync>;
+/// What is done with a chunk.
+type ChunkJob = Arc<dyn Fn(&mut Taken) + Send + Sync>;
 
 /// What is done with a chunk. Steps are plain data: stepping allocates nothing.
 #[derive(Clone)]
@@ -37,6 +37,22 @@ struct Chunk {
     /// What [`Batch::step_and_read`] read, environment by environment.
     read: Vec<f64>,
 }
+
+/// A chunk that a thread has taken.
+struct Taken<'a> {
+    /// Index of its first environment.
+    first: usize,
+    chunk: MutexGuard<'a, Chunk>,
+    /// What the thread will probably take next.
+    next: Option<&'a Mutex<Chunk>>,
+    /// Whether environments leave the cache between their steps.
+    cold: bool,
+}
+
+/// From here on the environments of a batch are taken to leave the cache between their steps \[bytes\]. Measured with 64
+/// to 1024 humanoids and arms on 2 MiB of cache for each core: to ask for all arrays of the next one makes a step 5 %
+/// slower at 3 MB and 7 % faster at 11 MB.
+const CACHE: usize = 8 << 20;
 
 /// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
 const SPINS_BEFORE_SLEEP: u32 = 20_000;
@@ -77,6 +93,8 @@ pub struct Batch {
 struct Shared {
     chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
+    /// Whether environments leave the cache between their steps.
+    cold: bool,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
     /// Workers that have finished the current job.
@@ -130,6 +148,7 @@ impl Batch {
         // than 4 environments in one gain nothing.
         let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
         let drives = DriveState::new(drives, model);
+        let mut bytes = 0;
         let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
         for first in (0..num_envs).step_by(chunk_size) {
             let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
@@ -137,7 +156,9 @@ impl Batch {
                     Env::with_drives(model, drives.clone()).map_err(|error| BatchError::Environment { index, error })
                 })
                 .collect();
-            chunks.push(Mutex::new(Chunk { envs: chunk?, read: Vec::new() }));
+            let envs = chunk?;
+            bytes += envs.iter().map(|env| env.data().prefetched_bytes()).sum::<usize>();
+            chunks.push(Mutex::new(Chunk { envs, read: Vec::new() }));
         }
         let count = chunks.len();
         let threads = threads.min(count);
@@ -145,6 +166,7 @@ impl Batch {
         let shared = Arc::new(Shared {
             chunks,
             chunk_size,
+            cold: bytes > CACHE,
             shares: (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect(),
             finished: AtomicUsize::new(0),
             epoch: AtomicU64::new(0),
@@ -229,23 +251,18 @@ impl Batch {
         };
         if self.workers.is_empty() {
             // No other thread: straight to where the numbers go.
-            let mut index = 0;
-            for chunk in &self.shared.chunks {
-                for env in &mut lock(chunk).envs {
+            for c in 0..self.shared.chunks.len() {
+                self.shared.take(c).each(|index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
-                    index += 1;
-                }
+                });
             }
             return;
         }
-        let job = Job::Chunks(Arc::new(move |_, chunk: &mut Chunk| {
-            let Chunk { envs, read } = chunk;
-            read.clear();
-            for env in envs {
-                step(env, &mut |_, values| read.extend_from_slice(values));
-            }
+        let job = Job::Chunks(Arc::new(move |taken: &mut Taken| {
+            taken.chunk.read.clear();
+            taken.each(|_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
         }));
         let mut copied = vec![false; self.shared.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
@@ -260,9 +277,9 @@ impl Batch {
         };
         let chunk_size = self.shared.chunk_size;
         // What this thread read is copied while the others still step.
-        self.run_chunks_then(&job, |first, chunk| {
-            copy(first, chunk);
-            copied[first / chunk_size] = true;
+        self.run_chunks_then(&job, |taken| {
+            copy(taken.first, &taken.chunk);
+            copied[taken.first / chunk_size] = true;
         });
         for (c, chunk) in self.shared.chunks.iter().enumerate().filter(|(c, _)| !copied[*c]) {
             copy(c * chunk_size, &lock(chunk));
@@ -278,11 +295,11 @@ impl Batch {
     }
 
     fn run_chunks(&mut self, job: &Job) {
-        self.run_chunks_then(job, |_, _| {});
+        self.run_chunks_then(job, |_| {});
     }
 
     /// As [`run_chunks`](Self::run_chunks); `then` sees the chunks that this thread did, right after them.
-    fn run_chunks_then(&mut self, job: &Job, mut then: impl FnMut(usize, &Chunk)) {
+    fn run_chunks_then(&mut self, job: &Job, mut then: impl FnMut(&Taken)) {
         let shared = &*self.shared;
         for share in &shared.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
@@ -296,9 +313,9 @@ impl Batch {
             drop(slot);
             shared.wake.notify_all();
         }
-        let mut mine = |first: usize, chunk: &mut Chunk| {
-            job.act(first, chunk);
-            then(first, chunk);
+        let mut mine = |taken: &mut Taken| {
+            job.act(taken);
+            then(taken);
         };
         let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &mut mine)));
         let mut spins = 0_u32;
@@ -349,21 +366,45 @@ impl Batch {
 }
 
 impl Job {
-    /// Does it with a chunk, given the index of its first environment.
-    fn act(&self, first: usize, chunk: &mut Chunk) {
+    /// Does it with a chunk.
+    fn act(&self, taken: &mut Taken) {
         match self {
-            Self::Step(count, capture) => {
-                chunk.envs.iter_mut().for_each(|env| env.step_and_capture(*count, capture.as_ref()));
+            Self::Step(count, capture) => taken.each(|_, env, _| env.step_and_capture(*count, capture.as_ref())),
+            Self::Envs(job) => taken.each(|i, env, _| job(i, env)),
+            Self::Chunks(job) => job(taken),
+        }
+    }
+}
+
+impl Taken<'_> {
+    /// Does `act` with every environment, given its index and what the chunk has read.
+    fn each(&mut self, mut act: impl FnMut(usize, &mut Env, &mut Vec<f64>)) {
+        let Chunk { envs, read } = &mut *self.chunk;
+        for i in 0..envs.len() {
+            // Its memory comes while this one steps.
+            if let Some(next) = envs.get(i + 1) {
+                next.prefetch(self.cold);
+            } else if let Some(next) = self.next.and_then(|next| next.try_lock().ok()) {
+                next.envs.iter().take(1).for_each(|env| env.prefetch(self.cold));
             }
-            Self::Envs(job) => chunk.envs.iter_mut().enumerate().for_each(|(i, env)| job(first + i, env)),
-            Self::Chunks(job) => job(first, chunk),
+            act(self.first + i, &mut envs[i], read);
         }
     }
 }
 
 impl Shared {
+    /// Takes chunk `c`.
+    fn take(&self, c: usize) -> Taken<'_> {
+        Taken {
+            first: c * self.chunk_size,
+            chunk: lock(&self.chunks[c]),
+            next: self.chunks.get(c + 1),
+            cold: self.cold,
+        }
+    }
+
     /// Does the share of `thread`, then what is left of the shares after it.
-    fn take_chunks(&self, thread: usize, job: &mut dyn FnMut(usize, &mut Chunk)) {
+    fn take_chunks(&self, thread: usize, job: &mut dyn FnMut(&mut Taken)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
@@ -371,7 +412,7 @@ impl Shared {
                 if c >= share.chunks.end {
                     break;
                 }
-                job(c * self.chunk_size, &mut lock(&self.chunks[c]));
+                job(&mut self.take(c));
             }
         }
     }
@@ -396,11 +437,7 @@ fn work(shared: &Shared, thread: usize) {
     let mut seen = 0;
     while let Some((epoch, job)) = shared.wait_for_job(seen) {
         seen = epoch;
-        if catch_unwind(AssertUnwindSafe(|| {
-            shared.take_chunks(thread, &mut |first, chunk: &mut Chunk| job.act(first, chunk))
-        }))
-        .is_err()
-        {
+        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(thread, &mut |taken| job.act(taken)))).is_err() {
             shared.panicked.store(true, Ordering::Relaxed);
         }
         drop(job);
@@ -473,6 +510,22 @@ mod tests {
             }));
             batch.for_each(|_, env| assert_eq!(env.steps(), step));
         }
+    }
+
+    #[test]
+    fn so_many_that_they_leave_the_cache_step_as_few_do() {
+        let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
+        assert!(many.shared.cold && !few.shared.cold);
+        many.step(7);
+        few.step(7);
+        let mut expected = Vec::new();
+        few.for_each(|_, env| expected.push(env.data().qpos()[0].to_bits()));
+        many.for_each(|i, env| {
+            if let Some(&bits) = expected.get(i) {
+                assert_eq!(env.data().qpos()[0].to_bits(), bits);
+            }
+            assert_eq!(env.steps(), 7);
+        });
     }
 
     #[test]

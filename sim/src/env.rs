@@ -213,6 +213,16 @@ impl Env {
         self.seldom.growths
     }
 
+    /// Asks for memory that its next step needs, and waits for nothing; `arrays`: the large part as well.
+    pub(crate) fn prefetch(&self, arrays: bool) {
+        if arrays {
+            self.data.prefetch_arrays()
+        } else {
+            self.data.prefetch()
+        }
+        self.drives.prefetch();
+    }
+
     /// Does `count` steps; a diverged environment stands still.
     pub fn step(&mut self, count: u32) {
         self.step_and_capture(count, None);

@@ -127,6 +127,12 @@ impl DriveState {
         }
     }
 
+    /// Asks for the memory that is this environment's own, and waits for nothing.
+    pub(crate) fn prefetch(&self) {
+        mj::prefetch(&self.position);
+        mj::prefetch(&self.effort);
+    }
+
     /// Back to rest at the model's initial positions; gains stay.
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;

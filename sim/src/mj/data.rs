@@ -3,6 +3,7 @@
 use super::error::EngineError;
 use super::guard::guarded;
 use super::model::Model;
+use super::prefetch::Places;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 
@@ -11,6 +12,7 @@ use std::ptr::NonNull;
 pub struct Data {
     raw: NonNull<mj::mjData>,
     model: Model,
+    places: Places,
 }
 
 // SAFETY: an mjData is plain memory without thread affinity; `Data` is its only owner. It is not `Sync`: engine
@@ -136,12 +138,18 @@ impl Data {
         // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
-        Ok(Self { raw, model: model.clone() })
+        // SAFETY: just made, and nothing else knows it yet.
+        let places = Places::of(unsafe { raw.as_ref() });
+        Ok(Self { raw, model: model.clone(), places })
     }
 
     /// The model this data was made for.
     pub fn model(&self) -> &Model {
         &self.model
+    }
+
+    pub(super) fn places(&self) -> &Places {
+        &self.places
     }
 
     pub(super) fn raw(&self) -> *const mj::mjData {
