@@ -31,12 +31,11 @@ fn ask(start: *const u8, bytes: usize, level: Level) {
     for offset in (0..bytes).step_by(LINE) {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
         let line = start.wrapping_add(offset).cast();
-        // SAFETY: a prefetch reads and changes no value, and faults at no address.
-        unsafe {
-            match level {
-                Level::First => _mm_prefetch::<_MM_HINT_T0>(line),
-                Level::Second => _mm_prefetch::<_MM_HINT_T1>(line),
-            }
+        match level {
+            // SAFETY: a prefetch reads and changes no value, and faults at no address.
+            Level::First => unsafe { _mm_prefetch::<_MM_HINT_T0>(line) },
+            // SAFETY: likewise.
+            Level::Second => unsafe { _mm_prefetch::<_MM_HINT_T1>(line) },
         }
     }
     // Elsewhere Rust has no stable prefetch.
