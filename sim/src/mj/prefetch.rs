@@ -16,6 +16,9 @@ const BUFFER: usize = 32 << 10;
 /// Of its arena: contacts and the first constraint rows \[bytes\].
 const ARENA: usize = 8 << 10;
 
+/// The solver's statistics, most of `mjData` itself and hardly touched, end here on both lines of MuJoCo.
+const AFTER_STATISTICS: usize = offset_of!(mj::mjData, solver_fwdinv);
+
 /// Which caches the memory is to come to.
 #[derive(Clone, Copy)]
 enum Level {
@@ -79,10 +82,8 @@ impl Data {
     /// Asks for what every step of this data reads first, counters and pointers, and waits for nothing.
     pub fn prefetch(&self) {
         let header = self.places().header;
-        ask(header, LINE, Level::First);
-        // The solver's statistics before it are large and seldom touched.
-        let rest = offset_of!(mj::mjData, warning);
-        ask(header.wrapping_add(rest), size_of::<mj::mjData>() - rest, Level::First);
+        ask(header, 2 * LINE, Level::First);
+        ask(header.wrapping_add(AFTER_STATISTICS), size_of::<mj::mjData>() - AFTER_STATISTICS, Level::First);
     }
 
     /// As [`prefetch`](Self::prefetch), and for the state and the work memory.
@@ -96,6 +97,6 @@ impl Data {
     /// How much [`prefetch_arrays`](Self::prefetch_arrays) asks for \[bytes\].
     pub fn prefetched_bytes(&self) -> usize {
         let places = self.places();
-        size_of::<mj::mjData>() - offset_of!(mj::mjData, warning) + places.buffer_bytes + places.arena_bytes
+        size_of::<mj::mjData>() - AFTER_STATISTICS + places.buffer_bytes + places.arena_bytes
     }
 }
