@@ -15,6 +15,7 @@ use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
+use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use ::scene::Pose;
 use std::collections::BTreeSet;
@@ -35,6 +36,8 @@ pub(crate) struct Simulation {
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
     pub(crate) start: Arc<Start>,
+    /// Which numbers a state has.
+    pub(crate) layout: Arc<Layout>,
     /// Pairs of bodies that are excluded from contact because they overlap at the start.
     pub(crate) excluded: Vec<(String, String)>,
 }
@@ -432,6 +435,7 @@ impl Built {
             xml: self.xml,
             diagnostics,
             start: self.start,
+            layout: Arc::new(Layout::of(&self.model, &self.table)),
             excluded,
         };
         simulation.reset(&vec![true; cfg.num_envs]);

@@ -182,6 +182,28 @@ impl Env {
         }
     }
 
+    /// Everything that decides how the environment goes on.
+    pub(crate) fn remember(&self) -> EnvState {
+        let (mut motion, mut inputs) = (Motion::default(), Inputs::default());
+        self.save_present(&mut motion);
+        inputs.save(&self.data);
+        let (drives, diverged) = (self.drives.numbers(), self.diverged.clone());
+        EnvState { motion, inputs, drives, steps: self.steps, diverged }
+    }
+
+    /// Goes on from `state`, which is of an environment of a model with the same layout, and which
+    /// [fits](EnvState::fits).
+    pub(crate) fn recall(&mut self, state: &EnvState) {
+        self.drives.set_numbers(&state.drives);
+        self.diverged.clone_from(&state.diverged);
+        self.steps = state.steps;
+        self.solved_now = true;
+        self.seldom.solved.clear();
+        self.seldom.inputs.clone_from(&state.inputs);
+        self.go_to(&state.motion);
+        self.refresh(&state.motion);
+    }
+
     /// Positions, velocities and warm start, to carry over to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
         let mut state = Motion::default();
@@ -399,6 +421,28 @@ impl Env {
         // The last good state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
+    }
+}
+
+/// What decides how an environment goes on. Quaternions are as they were before the last forward pass.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EnvState {
+    pub motion: Motion,
+    pub inputs: Inputs,
+    /// As [`DriveState::numbers`] gives them.
+    pub drives: Vec<f64>,
+    pub steps: u64,
+    pub diverged: Option<Box<EnvStatus>>,
+}
+
+impl EnvState {
+    /// Whether it has as many numbers of each kind as `other`.
+    pub(crate) fn fits(&self, other: &Self) -> bool {
+        let lengths = |state: &Self| {
+            let (inputs, active) = state.inputs.values();
+            [state.motion.values().len(), inputs.len(), active.len(), state.drives.len()]
+        };
+        lengths(self) == lengths(other)
     }
 }
 

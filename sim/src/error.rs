@@ -7,6 +7,7 @@ use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::pattern::PatternError;
+use crate::snapshot::SnapshotError;
 use crate::source::Source;
 use crate::urdf::UrdfError;
 use std::path::PathBuf;
@@ -286,6 +287,9 @@ pub enum Error {
         /// Why.
         fault: String,
     },
+    /// A snapshot cannot be read, or is of something else.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
     /// A file cannot be read or written.
     #[error("{path}: {error}")]
     File {

@@ -258,16 +258,16 @@ static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug)]
 pub struct SimulationManager {
     serial: u64,
-    cfg: SimulationManagerCfg,
-    contents: Contents,
+    pub(crate) cfg: SimulationManagerCfg,
+    pub(crate) contents: Contents,
     visuals: VisualCache,
     /// What ray casters have built.
     ray_assets: RayAssets,
     /// Threads of the sensors.
     crew: Crew,
     diagnostics: Vec<Diagnostic>,
-    simulation: Simulation,
-    sensors: SensorList,
+    pub(crate) simulation: Simulation,
+    pub(crate) sensors: SensorList,
 }
 
 impl SimulationManager {

@@ -80,6 +80,18 @@ impl<T: Copy + PartialEq> Shared<T> {
     }
 }
 
+impl Shared<f64> {
+    /// Takes these values, bit by bit; shares `common` where they are those.
+    fn take(&mut self, values: &[f64], common: &Self) {
+        let same = |list: &[f64]| list.iter().map(|x| x.to_bits()).eq(values.iter().map(|x| x.to_bits()));
+        if same(common) {
+            self.clone_from(common);
+        } else if !same(self) {
+            self.0 = values.into();
+        }
+    }
+}
+
 /// What environments start with.
 #[derive(Debug, PartialEq)]
 struct Initial {
@@ -151,6 +163,33 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
+    /// Everything that may differ between environments: three gains of each drive, its targets (position, velocity,
+    /// feed-forward) and its effort, then the applied forces.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let gains = self.gains.iter().flat_map(|g| [g.kp, g.kd, g.max_effort]);
+        let targets = [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied];
+        gains.chain(targets.into_iter().flatten().copied()).collect()
+    }
+
+    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number.
+    pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
+        let n = self.position.len();
+        let (gains, rest) = numbers.split_at(3 * n);
+        for (i, &[kp, kd, max_effort]) in gains.as_chunks::<3>().0.iter().enumerate() {
+            self.gains.put(i, Gains { kp, kd, max_effort });
+        }
+        let (position, rest) = rest.split_at(n);
+        let (velocity, rest) = rest.split_at(n);
+        let (feedforward, rest) = rest.split_at(n);
+        let (effort, applied) = rest.split_at(n);
+        let initial = Arc::clone(&self.initial);
+        self.position.copy_from_slice(position);
+        self.velocity.take(velocity, &initial.no_targets);
+        self.feedforward.take(feedforward, &initial.no_targets);
+        self.effort.copy_from_slice(effort);
+        self.applied.take(applied, &initial.no_forces);
+    }
+
     /// The model's drives.
     pub fn table(&self) -> &Arc<DriveTable> {
         &self.initial.table
@@ -219,6 +258,13 @@ mod tests {
         copy.copy_from(&told, 0, 0);
         copy.copy_applied_from(&told, 0, 0);
         assert_eq!(copy, told);
+        let mut copy = other.clone();
+        copy.set_numbers(&told.numbers());
+        assert_eq!(copy, told);
+        copy.set_numbers(&other.numbers());
+        assert!(std::ptr::eq(&*copy.velocity, &*other.velocity) && copy == other, "shared again");
+        copy.set_numbers(&other.numbers().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
+        assert!(copy.feedforward[0].is_sign_negative() && copy.applied[0].is_sign_negative(), "to the last bit");
         told.gains[0].kp = 7.0;
         told.reset();
         assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");

@@ -1,0 +1,5 @@
+//! Work with single environments: states to go back to, rollouts, properties of their own, shares of several processes.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod snapshot;
+mod worlds;
