@@ -26,7 +26,7 @@ pub mod prelude {
         ActuatorIndex, BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes,
         EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId,
         MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Result, RigidObjectCfg,
-        RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Snapshot,
+        RobotCfg, RobotId, Rollout, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Snapshot,
         SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
     };
 }

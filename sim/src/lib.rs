@@ -27,6 +27,7 @@ mod manager;
 pub mod mj;
 pub mod mjcf;
 pub mod objects;
+pub mod rollout;
 mod sensor_list;
 pub mod snapshot;
 pub mod source;
@@ -51,6 +52,7 @@ pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObje
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
+pub use rollout::Rollout;
 pub use sensor_list::SensorId;
 pub use snapshot::{Snapshot, SnapshotError};
 pub use source::Source;

@@ -108,6 +108,11 @@ impl Model {
         &self.0.header
     }
 
+    /// Whether this is the very same model, buffer sizes included.
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// The same model with other buffer sizes, at least 1 of each: only the struct is copied, the arrays are shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
