@@ -11,6 +11,7 @@ mod interleave;
 mod memory;
 mod models;
 mod mujoco_batch;
+mod randomize;
 mod rays;
 mod rival;
 mod row;
@@ -31,6 +32,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("rays", rays::run),
     ("contacts", contacts::run),
     ("ik", ik::run),
+    ("randomize", randomize::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -49,7 +51,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, ik, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, ik, randomize, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

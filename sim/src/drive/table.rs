@@ -80,6 +80,18 @@ impl<T: Copy + PartialEq> Shared<T> {
     }
 }
 
+impl Shared<f64> {
+    /// Takes these values, bit by bit; shares `common` where they are those.
+    fn take(&mut self, values: &[f64], common: &Self) {
+        let same = |list: &[f64]| list.iter().map(|x| x.to_bits()).eq(values.iter().map(|x| x.to_bits()));
+        if same(common) {
+            self.clone_from(common);
+        } else if !same(self) {
+            self.0 = values.into();
+        }
+    }
+}
+
 /// What environments start with.
 #[derive(Debug, PartialEq)]
 struct Initial {
@@ -107,6 +119,9 @@ pub struct DriveState {
     pub effort: Box<[f64]>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Shared<f64>,
+    /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
+    /// the model holds the other half of it: they change together.
+    damping: Shared<f64>,
 }
 
 impl DriveState {
@@ -123,6 +138,7 @@ impl DriveState {
             feedforward: no_targets.clone(),
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
+            damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
         }
     }
@@ -157,6 +173,43 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
+    /// Sets the gains of a drive.
+    pub(crate) fn set_gains(&mut self, drive: usize, gains: Gains) {
+        self.gains.put(drive, gains);
+    }
+
+    /// Sets coefficients of the damping that is integrated with the drives.
+    pub(crate) fn set_damping(&mut self, damping: &[f64]) {
+        damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
+    }
+
+    /// What [`restoring`](Self::set_numbers) a state brings back: three gains of each drive, its targets (position, velocity,
+    /// feed-forward) and its effort, then the applied forces.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let gains = self.gains.iter().flat_map(|g| [g.kp, g.kd, g.max_effort]);
+        let targets = [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied];
+        gains.chain(targets.into_iter().flatten().copied()).collect()
+    }
+
+    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number.
+    pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
+        let n = self.position.len();
+        let (gains, rest) = numbers.split_at(3 * n);
+        for (i, &[kp, kd, max_effort]) in gains.as_chunks::<3>().0.iter().enumerate() {
+            self.gains.put(i, Gains { kp, kd, max_effort });
+        }
+        let (position, rest) = rest.split_at(n);
+        let (velocity, rest) = rest.split_at(n);
+        let (feedforward, rest) = rest.split_at(n);
+        let (effort, applied) = rest.split_at(n);
+        let initial = Arc::clone(&self.initial);
+        self.position.copy_from_slice(position);
+        self.velocity.take(velocity, &initial.no_targets);
+        self.feedforward.take(feedforward, &initial.no_targets);
+        self.effort.copy_from_slice(effort);
+        self.applied.take(applied, &initial.no_forces);
+    }
+
     /// The model's drives.
     pub fn table(&self) -> &Arc<DriveTable> {
         &self.initial.table
@@ -166,7 +219,7 @@ impl DriveState {
     pub fn apply(&self, data: &mut mj::Data) {
         let table = &*self.initial.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
-        implicit::apply_damping(table, data);
+        implicit::apply_damping(table, &self.damping, data);
         for (i, drive) in table.drives.iter().enumerate() {
             let target =
                 Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
@@ -225,6 +278,13 @@ mod tests {
         copy.copy_from(&told, 0, 0);
         copy.copy_applied_from(&told, 0, 0);
         assert_eq!(copy, told);
+        let mut copy = other.clone();
+        copy.set_numbers(&told.numbers());
+        assert_eq!(copy, told);
+        copy.set_numbers(&other.numbers());
+        assert!(std::ptr::eq(&*copy.velocity, &*other.velocity) && copy == other, "shared again");
+        copy.set_numbers(&other.numbers().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
+        assert!(copy.feedforward[0].is_sign_negative() && copy.applied[0].is_sign_negative(), "to the last bit");
         told.gains[0].kp = 7.0;
         told.reset();
         assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");

@@ -1,0 +1,169 @@
+//! Properties of single environments: masses of all links and friction of all shapes, drawn for every environment. The rival
+//! is what one does with bare MuJoCo: a whole model for each environment (`mj_copyModel`), to which the values are written,
+//! then `mj_setConst` (in a small `mjData`, which is made with the copy). Ours checks names and values and does a forward pass as well.
+
+use crate::interleave::{Plan, Side, measure};
+use crate::models::sr5;
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Random;
+use kinetoscope::sim::mj::{Editor, Model};
+use std::time::{Duration, Instant};
+
+const ENVS: usize = 64;
+const CASE: &str = "SR5 + hand, masses and friction";
+const RIVAL: &str = "whole models";
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let (sim, _) = sr5(ENVS, 1)?;
+    let model = sim.batch().model().clone();
+    let mut ours = Ours(sim);
+    let mut rival =
+        Whole { editors: editors(&model)?, masses: model.body_mass().to_vec(), model: model.clone(), draws: 0 };
+    let plan = Plan { seconds: settings.seconds, restart_after: u32::MAX };
+    let times = measure(plan, &mut [&mut ours, &mut rival])?;
+    let micros = |side| times.per_step(side) / ENVS as f64 * 1e6;
+    let again = Row::new("randomize", format!("{CASE}, again"), "µs/env", 1, micros(0));
+
+    let (mut ours, mut rival) = (First, FirstWhole { masses: model.body_mass().to_vec(), model: model.clone() });
+    let plan = Plan { seconds: settings.seconds, restart_after: u32::MAX };
+    let firsts = measure(plan, &mut [&mut ours, &mut rival])?;
+    let micros_first = |side| firsts.per_step(side) / ENVS as f64 * 1e6;
+    let first = Row::new("randomize", format!("{CASE}, first time"), "µs/env", 1, micros_first(0));
+
+    let (mut sim, _) = sr5(ENVS, 1)?;
+    draw(&mut sim)?;
+    let bytes = (0..ENVS).map(|env| sim.property_bytes(EnvId(env))).sum::<Result<usize>>()? as f64 / ENVS as f64;
+    let whole = model.shared_bytes() as f64;
+    let memory = Row::new("randomize", format!("{CASE}, memory"), "KiB/env", 1, bytes / 1024.0);
+    Ok(vec![
+        first.against(RIVAL, micros_first(1), firsts.ratio(0, 1)),
+        again.against(RIVAL, micros(1), times.ratio(0, 1)),
+        memory.against(RIVAL, whole / 1024.0, whole / bytes),
+    ])
+}
+
+fn draw(sim: &mut SimulationManager) -> Outcome<()> {
+    let randomization = Randomization::new().with(Property::Mass, ".*", Draw::Scale([0.8, 1.2])).with(
+        Property::Friction,
+        ".*",
+        Draw::Scale([0.5, 1.5]),
+    );
+    Ok(sim.randomize(&randomization, None)?)
+}
+
+fn editors(model: &Model) -> Outcome<Vec<Editor>> {
+    Ok((0..ENVS).map(|_| Editor::new(model)).collect::<Result<_, _>>()?)
+}
+
+/// The draws of the rival: as many numbers as ours.
+fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()> {
+    let mut factor = |low: f64, high: f64| low + (high - low) * random.uniform();
+    for body in 1..model.nbody() {
+        let scale = factor(0.8, 1.2);
+        editor.body_mass_mut()[body] = model.body_mass()[body] * scale;
+        for k in 3 * body..3 * body + 3 {
+            editor.body_inertia_mut()[k] = model.body_inertia()[k] * scale;
+        }
+    }
+    for geom in 0..model.ngeom() {
+        editor.geom_friction_mut()[3 * geom] = model.geom_friction()[3 * geom] * factor(0.5, 1.5);
+    }
+    Ok(editor.set_constants()?)
+}
+
+/// Draws for environments that were drawn for before.
+struct Ours(SimulationManager);
+
+impl Side for Ours {
+    fn restart(&mut self) -> Outcome<()> {
+        draw(&mut self.0)
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            draw(&mut self.0)?;
+        }
+        Ok(start.elapsed())
+    }
+}
+
+/// A whole model for each environment.
+struct Whole {
+    editors: Vec<Editor>,
+    masses: Vec<f64>,
+    model: Model,
+    draws: u64,
+}
+
+impl Side for Whole {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            for (env, editor) in self.editors.iter_mut().enumerate() {
+                write(editor, &self.model, &mut Random::keyed(0, env as u64, &self.draws.to_string()))?;
+            }
+            self.draws += 1;
+        }
+        let time = start.elapsed();
+        // It did the work.
+        if self.editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {
+            return Err("the rival changed no mass".into());
+        }
+        Ok(time)
+    }
+}
+
+/// Draws in a new simulation.
+struct First;
+
+impl Side for First {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let mut time = Duration::ZERO;
+        for _ in 0..steps {
+            let (mut sim, _) = sr5(ENVS, 1)?;
+            let start = Instant::now();
+            draw(&mut sim)?;
+            time += start.elapsed();
+        }
+        Ok(time)
+    }
+}
+
+/// Copies the model for each environment.
+struct FirstWhole {
+    masses: Vec<f64>,
+    model: Model,
+}
+
+impl Side for FirstWhole {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let mut time = Duration::ZERO;
+        for _ in 0..steps {
+            let start = Instant::now();
+            let mut editors = editors(&self.model)?;
+            for (env, editor) in editors.iter_mut().enumerate() {
+                write(editor, &self.model, &mut Random::keyed(0, env as u64, "first"))?;
+            }
+            time += start.elapsed();
+            if editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {
+                return Err("the rival changed no mass".into());
+            }
+        }
+        Ok(time)
+    }
+}
