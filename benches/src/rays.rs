@@ -1,8 +1,14 @@
-//! Height scans: our ray caster against `mj_ray`, one ray at a time, on the same rough terrain of 100 000 triangles, as a
-//! mesh and as a height field. (`mj_multiRay` casts all of its rays from one point, so it is of no use for parallel ones.)
+//! Height scans: our ray caster against MuJoCo's, on the same rough terrain of 100 000 triangles, as a mesh and as a height
+//! field. One thread on both sides. That both measure the same distances is checked before.
 //!
-//! Ours is the whole sensor, as a simulation updates it: frames, 187 vertical rays in each of 64 environments from 20 m
-//! above, points, normals and ids. One thread on both sides. That both measure the same distances is checked before.
+//! Ours is the whole sensor, as a simulation updates it: frames, 187 rays in each of 64 environments, distances, points,
+//! normals and ids. Three comparisons, of which MuJoCo measures distances only:
+//!
+//! - vertical rays from 20 m above, against `mj_ray`, one ray at a time;
+//! - the same, against `mj_multiRay`. That casts all of its rays from one point, so it is of no use for parallel ones; what it
+//!   is given is its best case of the same task: one call for each environment, from the middle of the scanner to the very
+//!   points that the parallel rays hit. (2.2.2 has no `mj_multiRay`.)
+//! - a fan of rays from that point, to a level grid of the scanner's size: the same rays on both sides.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
@@ -11,7 +17,8 @@ use kinetoscope::ndarray::{Array2, Array3, Axis};
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::scene::shape::HeightField;
 use kinetoscope::scene::{Pose, PoseF64, SceneState, pose};
-use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+use kinetoscope::sensors::ray::pattern::{Custom, Grid};
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg, RayPattern};
 use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext};
 use kinetoscope::sim::Visible;
 use kinetoscope::sim::mj::{self, Data, TARGET, Target};
@@ -57,9 +64,18 @@ impl Terrain {
             Self::Mesh => {
                 let field = HeightField::new([HALF, HALF, HEIGHT, FLOOR], SIDE, SIDE, &elevation);
                 let field = field.ok_or("terrain without points")?;
+                // The surface alone: the long triangles of the floor make MuJoCo thirty times as slow.
+                let mut mesh = field.mesh().to_tri_mesh();
+                let is_surface = |t: &[u32; 3]| t.iter().all(|&i| mesh.positions[i as usize][2] >= 0.0);
+                mesh.triangles.retain(is_surface);
+                if mesh.triangles.len() != 2 * (SIDE - 1) * (SIDE - 1) {
+                    return Err("terrain has two triangles in each cell".into());
+                }
                 let mut bytes = Vec::new();
-                write_binary_stl(&field.mesh().to_tri_mesh(), &mut bytes)?;
-                ("<mesh name='t' file='t.stl'/>".into(), "type='mesh' mesh='t'", ("t.stl", bytes))
+                write_binary_stl(&mesh, &mut bytes)?;
+                // It has no volume; 2.2.2 does not ask.
+                let inertia = if TARGET == Target::V4 { "inertia='shell'" } else { "" };
+                (format!("<mesh name='t' file='t.stl' {inertia}/>"), "type='mesh' mesh='t'", ("t.stl", bytes))
             }
             Self::Field => {
                 let side = SIDE as i32;
@@ -98,7 +114,7 @@ struct Ours {
 }
 
 impl Ours {
-    fn new(data: &Data) -> Outcome<Self> {
+    fn new(data: &Data, pattern: RayPattern) -> Outcome<Self> {
         let visible = Visible::of_model(data.model());
         let instances = visible.scene().instances().len();
         let mut poses = vec![PoseF64::IDENTITY; instances];
@@ -128,6 +144,7 @@ impl Ours {
             offset: Pose::translation(0.0, 0.0, ABOVE),
             alignment: RayAlignment::Yaw,
             targets: HitTargets::StaticOnly,
+            pattern,
             ..RayCasterCfg::default()
         };
         let mut caster = cfg.build(&context)?;
@@ -138,6 +155,22 @@ impl Ours {
     fn rays(&self) -> usize {
         ENVS * self.caster.num_rays()
     }
+
+    /// Where the rays begin and where they go.
+    fn lines(&self) -> Vec<([f64; 3], [f64; 3])> {
+        let (starts, directions) = (self.caster.ray_starts(), self.caster.ray_directions());
+        let row = |a: &Array3<f64>, env, k| [0, 1, 2].map(|axis| a[(env, k, axis)]);
+        let all = (0..ENVS).flat_map(|env| (0..self.caster.num_rays()).map(move |k| (env, k)));
+        all.map(|(env, k)| (row(&starts, env, k), row(&directions, env, k))).collect()
+    }
+}
+
+/// From one point to where vertical rays of the usual grid are at the height of the middle of the terrain.
+fn fan() -> Outcome<RayPattern> {
+    let down = 1.5 + ABOVE - 0.5 * HEIGHT;
+    let directions: Vec<_> =
+        RayPattern::from(Grid::default()).rays()?.iter().map(|ray| [ray.origin[0], ray.origin[1], -down]).collect();
+    Ok(Custom { starts: vec![[0.0; 3]; directions.len()], directions }.into())
 }
 
 impl Side for Ours {
@@ -166,10 +199,7 @@ struct Bare<'d> {
 
 impl<'d> Bare<'d> {
     fn new(data: &'d Data, ours: &Ours, per_step: usize) -> Self {
-        let (starts, directions) = (ours.caster.ray_starts(), ours.caster.ray_directions());
-        let row = |a: &Array3<f64>, env, k| [0, 1, 2].map(|axis| a[(env, k, axis)]);
-        let all = (0..ENVS).flat_map(|env| (0..ours.caster.num_rays()).map(move |k| (env, k)));
-        let rays: Vec<_> = all.map(|(env, k)| (row(&starts, env, k), row(&directions, env, k))).collect();
+        let rays = ours.lines();
         Self { data, distances: vec![0.0; rays.len()], rays, per_step, next: 0 }
     }
 
@@ -213,27 +243,134 @@ impl Side for Bare<'_> {
     }
 }
 
+/// The other rival: one call for each environment, with all of its rays.
+struct Together {
+    data: Data,
+    points: Vec<[f64; 3]>,
+    directions: Vec<[f64; 3]>,
+    distances: Vec<f64>,
+}
+
+impl Together {
+    /// Rays from the middle of each scanner to everything that ours hit.
+    fn new(data: &Data, ours: &Ours) -> Outcome<Self> {
+        let mut data = Data::new(data.model())?;
+        data.step1()?;
+        let rays = ours.caster.num_rays();
+        let lines = ours.lines();
+        let mut together = Self { data, points: vec![], directions: vec![], distances: vec![0.0; lines.len()] };
+        for scan in lines.chunks(rays) {
+            let middle = [0, 1, 2].map(|k| 0.5 * (scan[0].0[k] + scan[rays - 1].0[k]));
+            together.points.push(middle);
+        }
+        for (k, (start, direction)) in lines.iter().enumerate() {
+            let (env, ray) = (k / rays, k % rays);
+            let distance = ours.caster.distances()[(env, ray)];
+            let to = [0, 1, 2].map(|k| start[k] + distance * direction[k] - together.points[env][k]);
+            let length = to.iter().map(|x| x * x).sum::<f64>().sqrt();
+            together.directions.push(to.map(|x| x / length));
+        }
+        Ok(together)
+    }
+
+    fn cast(&mut self) -> Outcome<()> {
+        let rays = self.directions.len() / ENVS;
+        let scans = self.directions.chunks(rays).zip(self.distances.chunks_mut(rays));
+        for (point, (directions, distances)) in self.points.iter().zip(scans) {
+            self.data.multi_ray(*point, directions, 1, distances)?;
+        }
+        Ok(())
+    }
+
+    /// Both hit the same points, or, where something is in the way of the rays from the middle, one before.
+    fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
+        self.cast()?;
+        let rays = ours.caster.num_rays();
+        let mut before = 0;
+        for (k, (&distance, direction)) in self.distances.iter().zip(&self.directions).enumerate() {
+            let (env, ray) = (k / rays, k % rays);
+            let hit = [0, 1, 2].map(|axis| self.points[env][axis] + distance * direction[axis]);
+            let off = (0..3).map(|axis| hit[axis] - ours.caster.hits()[(env, ray, axis)]);
+            let off = off.map(|x| x * x).sum::<f64>().sqrt();
+            let full = (0..3).map(|axis| ours.caster.hits()[(env, ray, axis)] - self.points[env][axis]);
+            let full = full.map(|x| x * x).sum::<f64>().sqrt();
+            if distance < full - SAME && distance > 0.0 {
+                before += 1;
+            } else if off.is_nan() || off > SAME {
+                return Err(format!("ray {k}: mj_multiRay hits {off} m beside ours").into());
+            }
+        }
+        if before * 100 > self.distances.len() {
+            return Err(format!("{before} of {} rays of mj_multiRay hit something else", self.distances.len()).into());
+        }
+        Ok(())
+    }
+}
+
+impl Side for Together {
+    fn restart(&mut self) -> Outcome<()> {
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.cast()?;
+        }
+        Ok(start.elapsed())
+    }
+}
+
 pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     for terrain in [Terrain::Mesh, Terrain::Field] {
-        let name = format!("{ENVS} scans of 187 rays, {}", terrain.name());
-        eprintln!("  {name}");
         let data = terrain.data()?;
         let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: u32::MAX };
-        let count = [ENVS * 187, terrain.rival_rays()].map(|n| n as f64);
-        let times = in_both_orders(|_| {
-            let mut ours = Ours::new(&data)?;
-            let mut bare = Bare::new(&data, &ours, terrain.rival_rays());
-            if ours.rays() != ENVS * 187 {
-                return Err("a scan has 187 rays".into());
-            }
-            bare.must_agree(&ours)?;
-            measure(plan, &mut [&mut ours, &mut bare])
-        })?;
-        let per_ray = |t: &[f64]| [t[0] / count[0], t[1] / count[1]];
-        let ratio = times.mean_of(|t| per_ray(t)[1] / per_ray(t)[0]);
-        let rate = |side: usize| times.rate(side, count[side] as usize);
-        rows.push(Row::new("rays", &name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).wanted(WANTED));
+        let down = format!("{ENVS} scans of 187 rays, {}", terrain.name());
+        eprintln!("  {down}");
+        rows.push(one_by_one(plan, &data, terrain, &down)?);
+        rows.push(together(plan, &data, &down, &Grid::default().into())?);
+        let fans = format!("{ENVS} fans of 187 rays, {}", terrain.name());
+        eprintln!("  {fans}");
+        rows.push(together(plan, &data, &fans, &fan()?)?);
     }
     Ok(rows)
+}
+
+/// Vertical rays against `mj_ray`.
+fn one_by_one(plan: Plan, data: &Data, terrain: Terrain, name: &str) -> Outcome<Row> {
+    let count = [ENVS * 187, terrain.rival_rays()].map(|n| n as f64);
+    let times = in_both_orders(|_| {
+        let mut ours = Ours::new(data, Grid::default().into())?;
+        let mut bare = Bare::new(data, &ours, terrain.rival_rays());
+        if ours.rays() != ENVS * 187 {
+            return Err("a scan has 187 rays".into());
+        }
+        bare.must_agree(&ours)?;
+        measure(plan, &mut [&mut ours, &mut bare])
+    })?;
+    let per_ray = |t: &[f64]| [t[0] / count[0], t[1] / count[1]];
+    let ratio = times.mean_of(|t| per_ray(t)[1] / per_ray(t)[0]);
+    let rate = |side: usize| times.rate(side, count[side] as usize);
+    Ok(Row::new("rays", name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).wanted(WANTED))
+}
+
+/// Rays of a pattern against `mj_multiRay`; ours alone where there is none.
+fn together(plan: Plan, data: &Data, name: &str, pattern: &RayPattern) -> Outcome<Row> {
+    let has_rival = TARGET == Target::V4;
+    let times = in_both_orders(|_| {
+        let mut ours = Ours::new(data, pattern.clone())?;
+        if !has_rival {
+            return measure(plan, &mut [&mut ours]);
+        }
+        let mut together = Together::new(data, &ours)?;
+        together.must_agree(&ours)?;
+        measure(plan, &mut [&mut ours, &mut together])
+    })?;
+    let rate = |side: usize| times.rate(side, ENVS * 187);
+    let row = Row::new("rays", name, "rays/s", 1, rate(0));
+    Ok(match has_rival {
+        true => row.against("mj_multiRay", rate(1), times.ratio(0, 1)).wanted(WANTED),
+        false => row.without("mj_multiRay"),
+    })
 }

@@ -277,8 +277,11 @@ impl Sampler {
         (self.stamps[env], self.force_stamps[env]) = (self.row[0], self.row[1]);
         let mut values = &self.row[STAMPS..];
         for quantity in &mut self.quantities {
-            let (mine, rest) = values.split_at(quantity.now.ncols());
-            quantity.now.row_mut(env).iter_mut().zip(mine).for_each(|(now, value)| *now = *value);
+            let width = quantity.now.ncols();
+            let (mine, rest) = values.split_at(width);
+            if let Some(now) = quantity.now.as_slice_mut() {
+                now[env * width..(env + 1) * width].copy_from_slice(mine);
+            }
             values = rest;
         }
     }
@@ -334,6 +337,14 @@ impl Sampler {
     #[track_caller]
     pub fn values(&self, channel: &str) -> ArrayView2<'_, f64> {
         self.quantity(channel).now.view()
+    }
+
+    /// Current values of a channel in one environment.
+    #[track_caller]
+    pub(crate) fn row(&self, channel: &str, env: usize) -> &[f64] {
+        let now = &self.quantity(channel).now;
+        let width = now.ncols();
+        now.as_slice().map_or(&[], |all| &all[env * width..(env + 1) * width])
     }
 
     /// Current values of a channel in a shape with more axes, such as \[num_envs, bodies, 3\].

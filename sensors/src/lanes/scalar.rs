@@ -1,6 +1,6 @@
 //! The reference: plain loops over arrays.
 
-use super::{LANES, Simd};
+use super::{DOUBLES, LANES, Simd};
 
 /// No instruction set but what every machine has.
 #[derive(Clone, Copy, Debug)]
@@ -8,12 +8,12 @@ pub(crate) struct Scalar;
 
 // One copy of each loop: inlined into the kernels they would make functions of a hundred thousand instructions.
 #[inline(never)]
-fn pairs<A: Copy, B: Copy, R>(a: &[A; LANES], b: &[B; LANES], f: impl Fn(A, B) -> R) -> [R; LANES] {
+fn pairs<A: Copy, B: Copy, R, const N: usize>(a: &[A; N], b: &[B; N], f: impl Fn(A, B) -> R) -> [R; N] {
     std::array::from_fn(|k| f(a[k], b[k]))
 }
 
 #[inline(never)]
-fn choose<T: Copy>(m: &[bool; LANES], a: &[T; LANES], b: &[T; LANES]) -> [T; LANES] {
+fn choose<T: Copy, const N: usize>(m: &[bool; N], a: &[T; N], b: &[T; N]) -> [T; N] {
     std::array::from_fn(|k| if m[k] { a[k] } else { b[k] })
 }
 
@@ -22,6 +22,8 @@ impl Simd for Scalar {
     type I = [i32; LANES];
     type U = [u32; LANES];
     type M = [bool; LANES];
+    type D = [f64; DOUBLES];
+    type N = [bool; DOUBLES];
 
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()
@@ -55,6 +57,18 @@ impl Simd for Scalar {
     }
     fn bits(m: Self::M) -> u64 {
         (0..LANES).fold(0, |bits, k| bits | u64::from(m[k]) << k)
+    }
+    fn splat_d(self, x: f64) -> Self::D {
+        [x; DOUBLES]
+    }
+    fn load_d(self, x: &[f64; DOUBLES]) -> Self::D {
+        *x
+    }
+    fn array_d(x: Self::D) -> [f64; DOUBLES] {
+        x
+    }
+    fn bits_n(m: Self::N) -> u64 {
+        (0..DOUBLES).fold(0, |bits, k| bits | u64::from(m[k]) << k)
     }
     fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2] {
         [pairs.map(|x| x as i32), pairs.map(|x| (x >> 32) as i32)]
@@ -135,6 +149,45 @@ impl Simd for Scalar {
         choose(&m, &a, &b)
     }
     fn select_u(m: Self::M, a: Self::U, b: Self::U) -> Self::U {
+        choose(&m, &a, &b)
+    }
+    fn add_d(a: Self::D, b: Self::D) -> Self::D {
+        pairs(&a, &b, |a, b| a + b)
+    }
+    fn sub_d(a: Self::D, b: Self::D) -> Self::D {
+        pairs(&a, &b, |a, b| a - b)
+    }
+    fn mul_d(a: Self::D, b: Self::D) -> Self::D {
+        pairs(&a, &b, |a, b| a * b)
+    }
+    fn div_d(a: Self::D, b: Self::D) -> Self::D {
+        pairs(&a, &b, |a, b| a / b)
+    }
+    fn neg_d(a: Self::D) -> Self::D {
+        pairs(&a, &a, |a, _| -a)
+    }
+    fn sqrt_d(a: Self::D) -> Self::D {
+        pairs(&a, &a, |a, _| a.sqrt())
+    }
+    fn lt_d(a: Self::D, b: Self::D) -> Self::N {
+        pairs(&a, &b, |a, b| a < b)
+    }
+    fn le_d(a: Self::D, b: Self::D) -> Self::N {
+        pairs(&a, &b, |a, b| a <= b)
+    }
+    fn eq_d(a: Self::D, b: Self::D) -> Self::N {
+        pairs(&a, &b, |a, b| a == b)
+    }
+    fn and_n(a: Self::N, b: Self::N) -> Self::N {
+        pairs(&a, &b, |a, b| a & b)
+    }
+    fn or_n(a: Self::N, b: Self::N) -> Self::N {
+        pairs(&a, &b, |a, b| a | b)
+    }
+    fn not_n(a: Self::N) -> Self::N {
+        pairs(&a, &a, |a, _| !a)
+    }
+    fn select_d(m: Self::N, a: Self::D, b: Self::D) -> Self::D {
         choose(&m, &a, &b)
     }
 }

@@ -1,6 +1,6 @@
 //! The operations of an instruction set, and numbers that have operators.
 
-use super::LANES;
+use super::{DOUBLES, LANES};
 use fearless_simd::{Bytes, SimdBase, SimdFloat, SimdInt, SimdMask};
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
@@ -17,6 +17,10 @@ macro_rules! operations {
             type U: Copy;
             /// Sixteen conditions.
             type M: Copy;
+            /// Eight numbers of double precision.
+            type D: Copy;
+            /// Eight conditions.
+            type N: Copy;
 
             /// Compiles what is inlined into `f` for this instruction set.
             fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
@@ -30,6 +34,10 @@ macro_rules! operations {
             fn array_i(x: Self::I) -> [i32; LANES];
             fn array_u(x: Self::U) -> [u32; LANES];
             fn bits(m: Self::M) -> u64;
+            fn splat_d(self, x: f64) -> Self::D;
+            fn load_d(self, x: &[f64; DOUBLES]) -> Self::D;
+            fn array_d(x: Self::D) -> [f64; DOUBLES];
+            fn bits_n(m: Self::N) -> u64;
             /// The lower and the upper halves of sixteen pairs.
             fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2];
             $(fn $name($($arg: Self::$A),*) -> Self::$R;)*
@@ -40,6 +48,8 @@ macro_rules! operations {
             type I = fearless_simd::i32x16<T>;
             type U = fearless_simd::u32x16<T>;
             type M = fearless_simd::mask32x16<T>;
+            type D = fearless_simd::f64x8<T>;
+            type N = fearless_simd::mask64x8<T>;
 
             #[inline(always)]
             fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
@@ -83,6 +93,22 @@ macro_rules! operations {
             }
             #[inline(always)]
             fn bits(m: Self::M) -> u64 {
+                SimdMask::to_bitmask(m)
+            }
+            #[inline(always)]
+            fn splat_d(self, x: f64) -> Self::D {
+                SimdBase::splat(self, x)
+            }
+            #[inline(always)]
+            fn load_d(self, x: &[f64; DOUBLES]) -> Self::D {
+                SimdBase::from_slice(self, x)
+            }
+            #[inline(always)]
+            fn array_d(x: Self::D) -> [f64; DOUBLES] {
+                *x
+            }
+            #[inline(always)]
+            fn bits_n(m: Self::N) -> u64 {
                 SimdMask::to_bitmask(m)
             }
             #[inline(always)]
@@ -130,6 +156,19 @@ operations! {
     select(m: M, a: F, b: F) -> F = fearless_simd::Select::select(m, a, b);
     select_i(m: M, a: I, b: I) -> I = fearless_simd::Select::select(m, a, b);
     select_u(m: M, a: U, b: U) -> U = fearless_simd::Select::select(m, a, b);
+    add_d(a: D, b: D) -> D = a + b;
+    sub_d(a: D, b: D) -> D = a - b;
+    mul_d(a: D, b: D) -> D = a * b;
+    div_d(a: D, b: D) -> D = a / b;
+    neg_d(a: D) -> D = -a;
+    sqrt_d(a: D) -> D = SimdFloat::sqrt(a);
+    lt_d(a: D, b: D) -> N = SimdBase::simd_lt(a, b);
+    le_d(a: D, b: D) -> N = SimdBase::simd_le(a, b);
+    eq_d(a: D, b: D) -> N = SimdBase::simd_eq(a, b);
+    and_n(a: N, b: N) -> N = a & b;
+    or_n(a: N, b: N) -> N = a | b;
+    not_n(a: N) -> N = !a;
+    select_d(m: N, a: D, b: D) -> D = fearless_simd::Select::select(m, a, b);
 }
 
 /// Sixteen values with operators.
@@ -166,6 +205,14 @@ lanes! {
 lanes! {
     /// Sixteen conditions.
     M
+}
+lanes! {
+    /// Eight numbers of double precision.
+    D
+}
+lanes! {
+    /// Eight conditions.
+    N
 }
 
 macro_rules! operators {

@@ -1,7 +1,9 @@
 //! A ray against a triangle, without gaps between neighbours.
 
 use super::Ray;
+use super::packet::{ALL, Packet};
 use super::vector::{V3, cross, sub, to_f64, unit};
+use crate::lanes::{D, D3, N, Simd, axes};
 
 /// Corners of a triangle \[m\].
 pub(crate) type Triangle = [[f32; 3]; 3];
@@ -47,6 +49,85 @@ impl Shear {
             return None;
         }
         Some((u * a[2] + v * b[2] + w * c[2]) * self.by[2] / whole)
+    }
+}
+
+/// The same for all rays of a packet, of which every one runs along the same axis: the same operations in the same order, so
+/// the same bits.
+#[derive(Clone, Copy)]
+pub(crate) struct ShearPacket<S: Simd> {
+    s: S,
+    /// In the order of `axes`.
+    origin: D3<S>,
+    axes: [usize; 3],
+    by: D3<S>,
+}
+
+impl<S: Simd> ShearPacket<S> {
+    /// `None` where some rays run along one axis and some along another.
+    #[inline(always)]
+    pub(crate) fn new(s: S, packet: &Packet) -> Option<Self> {
+        let d = packet.directions(s);
+        let (x, y, z) = (d[0].abs(), d[1].abs(), d[2].abs());
+        let first = (y.lt(x) & z.lt(x)).to_bitmask();
+        let third = y.le(z).to_bitmask() & !first;
+        let last = match (first, third) {
+            (ALL, _) => 0,
+            (0, ALL) => 2,
+            (0, 0) => 1,
+            _ => return None,
+        };
+        let [i, j] = [(last + 1) % 3, (last + 2) % 3];
+        let origin = packet.origins(s);
+        let inverse = D::splat(s, 1.0) / d[last];
+        let by = [d[i] * inverse, d[j] * inverse, inverse];
+        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], by })
+    }
+
+    /// The axis along which rays are longest comes last.
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// Where rays begin, in the order of the axes.
+    #[inline(always)]
+    pub(crate) fn origin(&self) -> D3<S> {
+        self.origin
+    }
+
+    /// How far rays get along the first and the second axis, for each metre along the third.
+    #[inline(always)]
+    pub(crate) fn slopes(&self) -> [D<S>; 2] {
+        [self.by[0], self.by[1]]
+    }
+
+    /// Distances of the plane of a triangle, and which rays are inside of the triangle; `None` where none is.
+    #[inline(always)]
+    pub(crate) fn distances(&self, triangle: &Triangle) -> Option<(D<S>, N<S>)> {
+        let (s, [i, j, k]) = (self.s, self.axes);
+        let [a, b, c] = axes(
+            #[inline(always)]
+            |corner| {
+                let p = &triangle[corner];
+                let x = D::splat(s, f64::from(p[i])) - self.origin[0];
+                let y = D::splat(s, f64::from(p[j])) - self.origin[1];
+                let z = D::splat(s, f64::from(p[k])) - self.origin[2];
+                [x - self.by[0] * z, y - self.by[1] * z, z]
+            },
+        );
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let zero = D::splat(s, 0.0);
+        // Where one of them is no number, neither is the distance, and it does not matter which side that is.
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let whole = u + v + w;
+        let inside = !((least.lt(zero) & zero.lt(most)) | whole.eq(zero));
+        if inside.to_bitmask() == 0 {
+            return None;
+        }
+        Some(((u * a[2] + v * b[2] + w * c[2]) * self.by[2] / whole, inside))
     }
 }
 

@@ -1,11 +1,14 @@
 //! What rays hit in one environment.
 
-use super::bvh::{Bvh, Stack};
+use super::bvh::{Beam, Bvh, Stack, Walked};
+use super::packet::{Packet, WIDTH};
 use super::shape::{ForShape, RayShape, Solid, Touch};
-use super::vector::{V3, along, dot, sub};
+use super::triangle::ShearPacket;
+use super::vector::{V3, dot};
 use super::{Ray, RayAssets};
-use crate::lanes::{Level, Simd, at_level};
+use crate::lanes::{D, Level, Simd, at_level};
 use scene::{PoseF64, RenderScene};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// More instances that do not move than this are put into a tree.
@@ -13,6 +16,8 @@ const FEW: usize = 4;
 /// How much larger bounding spheres are: more than the rounding of the test, for things down to a billionth of their
 /// distance.
 const LARGER: f64 = 1.0 + 1e-6;
+/// Targets of a tree that a packet meets together; where there are more in its way, rays go on one by one.
+const BUDGET: usize = 48;
 
 /// What a ray hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +90,7 @@ pub struct RayWorld {
     fixed: Arc<FixedWorld>,
     moving: Vec<Placed>,
     level: Level,
+    packets: Vec<Packet>,
     outer: Stack,
     inner: Stack,
 }
@@ -216,6 +222,7 @@ impl RayWorld {
             fixed: Arc::new(FixedWorld::default()),
             moving: Vec::with_capacity(targets.moving.len()),
             level,
+            packets: Vec::new(),
             outer: Stack::default(),
             inner: Stack::default(),
         }
@@ -270,42 +277,69 @@ impl RayWorld {
         at_level!(level, s => self.cast_at(s, rays, max_distance, hits));
     }
 
-    #[inline(always)]
     fn cast_at<S: Simd>(&mut self, s: S, rays: &[Ray], max_distance: f64, hits: &mut [RayHit]) {
+        let Self { targets, fixed, moving, packets, outer, inner, .. } = self;
+        packets.clear();
+        let bundle = s.vectorize(
+            #[inline(always)]
+            || {
+                packets.extend(rays.chunks(WIDTH).map(|rays| Packet::of(rays, max_distance)));
+                Bundle::around(s, packets, max_distance)
+            },
+        );
+        let single = fixed.one_by_one.iter().map(|&k| &fixed.placed[k as usize]);
+        for placed in single.chain(moving.iter()).filter(|placed| bundle.may_meet(placed)) {
+            meet(s, targets, placed, packets, hits, inner);
+        }
+        for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
+            fixed.meet_tree(s, targets, packet, hits, [&mut *outer, &mut *inner]);
+        }
+    }
+}
+
+impl FixedWorld {
+    /// The rays of a packet against what is in the tree; keeps what is nearer than the hits.
+    fn meet_tree<S: Simd>(
+        &self,
+        s: S,
+        targets: &RayTargets,
+        packet: &mut Packet,
+        hits: &mut [RayHit],
+        [outer, inner]: [&mut Stack; 2],
+    ) {
+        let Some((bvh, order)) = &self.tree else { return };
+        let mut leaf = |leaf: Range<usize>, packet: &mut Packet| {
+            for &k in &order[leaf] {
+                meet(s, targets, &self.placed[k as usize], std::slice::from_mut(packet), hits, inner);
+            }
+        };
         s.vectorize(
             #[inline(always)]
             || {
-                let Self { targets, fixed, moving, outer, inner, .. } = self;
-                let single = fixed.one_by_one.iter().map(|&k| &fixed.placed[k as usize]);
-                let all = single.chain(moving.iter());
-                let bundle = Bundle::around(rays, max_distance);
-                for placed in all.filter(|placed| bundle.may_meet(placed)) {
-                    let target = &targets.targets[placed.target as usize];
-                    target.solid.with(Sweep {
-                        target,
-                        placed,
-                        rays,
-                        hits: &mut *hits,
-                        max_distance,
-                        stack: &mut *inner,
-                    });
+                let limits = packet.limits(s);
+                if let Some(shear) = ShearPacket::new(s, packet)
+                    && let Some(beam) = Beam::around(s, packet, &shear, bvh)
+                {
+                    let walked = bvh.walk_beam(
+                        &beam,
+                        limits,
+                        BUDGET,
+                        outer,
+                        #[inline(always)]
+                        |things| {
+                            leaf(things, packet);
+                            Some(packet.limits(s))
+                        },
+                    );
+                    if walked == Walked::All {
+                        return;
+                    }
                 }
-                let Some((bvh, order)) = &fixed.tree else { return };
-                for (ray, hit) in rays.iter().zip(hits).filter(|(ray, _)| ray.is_finite()) {
-                    bvh.walk(ray, hit.distance.min(max_distance), outer, |leaf, mut limit| {
-                        for &k in &order[leaf] {
-                            let placed = &fixed.placed[k as usize];
-                            let target = &targets.targets[placed.target as usize];
-                            if !placed.may_be_met(ray, limit) {
-                                continue;
-                            }
-                            let local = ray.seen_from(&placed.world_from_target);
-                            if let Some(touch) = target.solid.touch(&local, limit, inner) {
-                                keep(hit, ray, target, placed, touch);
-                                limit = hit.distance.min(max_distance);
-                            }
-                        }
-                        limit
+                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                    let mut one = packet.only(k);
+                    bvh.walk(&packet.ray(k), packet.limit(k), outer, |things, _| {
+                        leaf(things, &mut one);
+                        one.limit(k)
                     });
                 }
             },
@@ -313,16 +347,22 @@ impl RayWorld {
     }
 }
 
-impl Placed {
-    /// Whether a ray may meet the sphere around it at a distance up to `limit`.
-    #[inline(always)]
-    fn may_be_met(&self, ray: &Ray, limit: f64) -> bool {
-        let to_middle = sub(self.middle, ray.origin);
-        let t = dot(to_middle, ray.direction);
-        // Where the ray is nearest to the middle; not by the difference of squares, which cancels.
-        let beside = along(to_middle, -t, ray.direction);
-        dot(beside, beside) <= self.radius * self.radius && t + self.radius >= 0.0 && t - self.radius <= limit
-    }
+/// Every ray of some packets against one target: keeps what is nearer than the hits, in `hits`, of the same rays. Compiled once
+/// for each instruction set.
+#[inline(never)]
+fn meet<S: Simd>(
+    s: S,
+    targets: &RayTargets,
+    placed: &Placed,
+    packets: &mut [Packet],
+    hits: &mut [RayHit],
+    stack: &mut Stack,
+) {
+    let target = &targets.targets[placed.target as usize];
+    s.vectorize(
+        #[inline(always)]
+        || target.solid.with(Sweep { s, target, placed, packets, hits, stack }),
+    );
 }
 
 /// The box around some rays.
@@ -333,18 +373,19 @@ struct Bundle {
 
 impl Bundle {
     #[inline(always)]
-    fn around(rays: &[Ray], max_distance: f64) -> Self {
+    fn around<S: Simd>(s: S, packets: &[Packet], max_distance: f64) -> Self {
         // An infinity times a zero would be no number.
         let far = max_distance.min(1e30);
-        let mut all = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
-        for ray in rays {
+        let (mut lo, mut hi) = ([D::splat(s, f64::INFINITY); 3], [D::splat(s, f64::NEG_INFINITY); 3]);
+        for packet in packets {
+            let (origin, direction) = (packet.origins(s), packet.directions(s));
             for k in 0..3 {
-                let (a, b) = (ray.origin[k], ray.origin[k] + far * ray.direction[k]);
-                all.lo[k] = all.lo[k].min(a.min(b));
-                all.hi[k] = all.hi[k].max(a.max(b));
+                let (a, b) = (origin[k], origin[k] + direction[k] * far);
+                (lo[k], hi[k]) = (lo[k].min(a.min(b)), hi[k].max(a.max(b)));
             }
         }
-        all
+        let ([x, y, z], [a, b, c]) = (lo, hi);
+        Self { lo: [x.least(), y.least(), z.least()], hi: [a.most(), b.most(), c.most()] }
     }
 
     /// Whether it meets the sphere around a target.
@@ -355,26 +396,29 @@ impl Bundle {
 }
 
 /// Every ray against one target.
-struct Sweep<'a> {
+struct Sweep<'a, S> {
+    s: S,
     target: &'a Target,
     placed: &'a Placed,
-    rays: &'a [Ray],
+    packets: &'a mut [Packet],
     hits: &'a mut [RayHit],
-    max_distance: f64,
     stack: &'a mut Stack,
 }
 
-impl ForShape for Sweep<'_> {
+impl<S: Simd> ForShape for Sweep<'_, S> {
     #[inline(always)]
     fn run<T: RayShape>(self, shape: &T) {
-        let Self { target, placed, rays, hits, max_distance, stack } = self;
-        for (ray, hit) in rays.iter().zip(hits) {
-            let limit = hit.distance.min(max_distance);
-            if !ray.is_finite() || placed.radius < f64::INFINITY && !placed.may_be_met(ray, limit) {
-                continue;
-            }
-            if let Some(touch) = shape.touch(&ray.seen_from(&placed.world_from_target), limit, stack) {
-                keep(hit, ray, target, placed, touch);
+        let Self { s, target, placed, packets, hits, stack } = self;
+        let pose = &placed.world_from_target;
+        for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
+            let Some(local) = packet.seen_from(s, pose, placed.middle, placed.radius) else { continue };
+            let mut touches = [None; WIDTH];
+            shape.touch_packet(s, &local, stack, &mut touches);
+            for (k, hit) in hits.iter_mut().enumerate() {
+                if let Some(touch) = touches[k] {
+                    keep(hit, packet.ray(k).direction, target, placed, touch);
+                    packet.shorten(k, hit.distance);
+                }
             }
         }
     }
@@ -382,10 +426,10 @@ impl ForShape for Sweep<'_> {
 
 /// Keeps a touch that is nearer than the hit, or as near and of an instance that comes before.
 #[inline(always)]
-fn keep(hit: &mut RayHit, ray: &Ray, target: &Target, placed: &Placed, touch: Touch) {
+fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Touch) {
     if touch.t < hit.distance || touch.t == hit.distance && target.instance < hit.instance {
         let normal = placed.world_from_target.rotate(touch.normal);
-        let normal = if dot(normal, ray.direction) > 0.0 { normal.map(|x| 0.0 - x) } else { normal };
+        let normal = if dot(normal, direction) > 0.0 { normal.map(|x| 0.0 - x) } else { normal };
         *hit = RayHit { distance: touch.t, normal, instance: target.instance, mask_id: target.mask_id };
     }
 }

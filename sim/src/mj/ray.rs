@@ -37,4 +37,44 @@ impl Data {
         let distance = guarded(|| unsafe { mj::mj_ray(model, data, origin, direction, groups, 1, -1, &raw mut geom) })?;
         Ok(usize::try_from(geom).ok().filter(|_| distance >= 0.0).map(|geom| RayHit { distance, geom }))
     }
+
+    /// The nearest geoms along rays from one point, by `mj_multiRay`, as [`ray`](Self::ray) has them: writes distances in
+    /// multiples of the rays' directions to `distances`, -1 for a ray that hits nothing. It culls geoms for all rays at once.
+    ///
+    /// # Errors
+    /// MuJoCo's engine stopped, or is of a version without `mj_multiRay`.
+    ///
+    /// # Panics
+    /// There are not as many distances as directions.
+    #[track_caller]
+    pub fn multi_ray(
+        &mut self,
+        origin: [f64; 3],
+        directions: &[[f64; 3]],
+        groups: u32,
+        distances: &mut [f64],
+    ) -> Result<(), EngineError> {
+        assert_eq!(directions.len(), distances.len(), "as many distances as directions");
+        #[cfg(mj4)]
+        {
+            let groups: [u8; mj::mjNGROUP as usize] = std::array::from_fn(|k| u8::from(groups >> k & 1 == 1));
+            let count = i32::try_from(directions.len()).unwrap_or(i32::MAX);
+            // Where MuJoCo's numbers end: nothing is left out.
+            let cutoff = 1e10;
+            let (data, model) = (self.raw_mut(), self.model().raw());
+            let (from, along, groups) = (origin.as_ptr(), directions.as_ptr().cast(), groups.as_ptr());
+            let (to, geoms, normals) = (distances.as_mut_ptr(), std::ptr::null_mut(), std::ptr::null_mut());
+            // SAFETY: model and data are alive and belong together, and nobody else uses the data, whose stack it works on;
+            // the arrays have the lengths that mj_multiRay reads and writes (3, 3 for each of `count` rays, mjNGROUP, and
+            // `count` distances); those for geoms and normals may be null.
+            guarded(|| unsafe {
+                mj::mj_multiRay(model, data, from, along, groups, true, -1, geoms, to, normals, count, cutoff);
+            })
+        }
+        #[cfg(not(mj4))]
+        {
+            let _ = (origin, groups);
+            Err(EngineError { message: "this version of MuJoCo has no mj_multiRay".into() })
+        }
+    }
 }

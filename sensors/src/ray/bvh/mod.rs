@@ -3,7 +3,10 @@
 //! Boxes are single precision, rounded outward by more than the error of a single precision test, so that nothing is
 //! missed; what is in them is tested in double precision by who asks. So the result does not depend on the tree.
 
+mod beam;
 mod build;
+
+pub(crate) use beam::{Beam, Walked};
 
 use super::Ray;
 use super::vector::{V3, along};

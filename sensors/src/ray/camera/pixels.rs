@@ -5,7 +5,6 @@ use crate::ray::Ray;
 use crate::ray::caster::scan::Rays;
 use nalgebra::Vector3;
 use scene::PoseF64;
-use std::ops::Range;
 
 /// The pixels of a picture, row by row. Rays are made when they are cast: every environment may have a lens of its own.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +30,8 @@ impl Rays for Pixels {
         self.width * self.height
     }
 
-    fn add(&self, (world_from_camera, lens): &Self::View, range: Range<usize>, out: &mut Vec<Ray>) {
+    fn add(&self, (world_from_camera, lens): &Self::View, which: impl Iterator<Item = usize>, out: &mut Vec<Ray>) {
         let ray = |k| Ray { origin: [0.0; 3], direction: self.direction(lens, k) };
-        out.extend(range.map(|k| ray(k).mapped_by(world_from_camera)));
+        out.extend(which.map(|k| ray(k).mapped_by(world_from_camera)));
     }
 }

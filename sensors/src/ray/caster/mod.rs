@@ -2,6 +2,7 @@
 
 mod alignment;
 mod cfg;
+mod order;
 pub(crate) mod scan;
 mod sensor;
 mod summary;

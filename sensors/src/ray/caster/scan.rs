@@ -1,5 +1,6 @@
 //! Rays of many environments at once, on several threads.
 
+use super::order::neighbours_together;
 use crate::crew::{Crew, Work};
 use crate::ray::world::FixedWorld;
 use crate::ray::{Ray, RayHit, RayTargets, RayWorld};
@@ -7,7 +8,6 @@ use crate::sensor::SensorContext;
 use ndarray::Array2;
 use scene::PoseF64;
 use std::fmt;
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -26,8 +26,13 @@ pub(crate) trait Rays: Clone + fmt::Debug + Send + Sync + 'static {
     /// How many there are.
     fn count(&self) -> usize;
 
+    /// In which order they are cast best, neighbours together; `None` for their own. It changes no hit.
+    fn order(&self) -> Option<Vec<u32>> {
+        None
+    }
+
     /// Adds some of the rays to `out`, in the frame of the environment.
-    fn add(&self, view: &Self::View, range: Range<usize>, out: &mut Vec<Ray>);
+    fn add(&self, view: &Self::View, which: impl Iterator<Item = usize>, out: &mut Vec<Ray>);
 }
 
 /// Rays of a frame, which is somewhere else in every environment.
@@ -38,8 +43,12 @@ impl Rays for Vec<Ray> {
         self.len()
     }
 
-    fn add(&self, world_from_rays: &PoseF64, range: Range<usize>, out: &mut Vec<Ray>) {
-        out.extend(self[range].iter().map(|ray| ray.mapped_by(world_from_rays)));
+    fn order(&self) -> Option<Vec<u32>> {
+        Some(neighbours_together(self))
+    }
+
+    fn add(&self, world_from_rays: &PoseF64, which: impl Iterator<Item = usize>, out: &mut Vec<Ray>) {
+        out.extend(which.map(|k| self[k].mapped_by(world_from_rays)));
     }
 }
 
@@ -57,6 +66,8 @@ pub(crate) struct Scan<R: Rays> {
 struct Round<R: Rays> {
     targets: Arc<RayTargets>,
     rays: R,
+    /// The order in which they are cast.
+    order: Option<Vec<u32>>,
     task: RwLock<Task<R::View>>,
     /// The next part that somebody takes.
     next: AtomicUsize,
@@ -99,6 +110,7 @@ impl<R: Rays> Scan<R> {
             desks: (0..context.threads.max(1)).map(|_| Mutex::new(desk())).collect(),
             parts: (0..n).flat_map(|_| of_view()).map(Mutex::new).collect(),
             targets,
+            order: rays.order(),
             rays,
         };
         Self { crew: context.crew.clone(), slots: vec![NOWHERE; n], round: Arc::new(round) }
@@ -148,12 +160,16 @@ impl<R: Rays> Scan<R> {
         self.crew.run(threads, &self.round);
     }
 
-    /// Shows the hits of an environment of the last cast, with the index of the ray.
+    /// Shows the hits of an environment of the last cast, in any order, with the index of the ray.
     pub(crate) fn each_hit(&self, env: usize, mut show: impl FnMut(usize, &RayHit)) {
         let (slot, per_view) = (self.slots[env], self.round.per_view());
         let first = if slot == NOWHERE { self.round.parts.len() } else { slot * per_view };
         for (part, hits) in self.round.parts.iter().skip(first).take(per_view).enumerate() {
-            lock(hits).iter().enumerate().for_each(|(k, hit)| show(part * PART + k, hit));
+            let first = part * PART;
+            match &self.round.order {
+                Some(order) => lock(hits).iter().zip(&order[first..]).for_each(|(hit, &k)| show(k as usize, hit)),
+                None => lock(hits).iter().zip(first..).for_each(|(hit, k)| show(k, hit)),
+            }
         }
     }
 }
@@ -185,7 +201,11 @@ impl<R: Rays> Work for Round<R> {
             }
             let mut hits = lock(&self.parts[part]);
             rays.clear();
-            self.rays.add(view, first..first + hits.len(), rays);
+            let range = first..first + hits.len();
+            match &self.order {
+                Some(order) => self.rays.add(view, order[range].iter().map(|&k| k as usize), rays),
+                None => self.rays.add(view, range, rays),
+            }
             world.cast(rays, task.max_distance, &mut hits);
         }
     }
@@ -194,10 +214,11 @@ impl<R: Rays> Work for Round<R> {
 /// A scan of its own: clones cast at the same time.
 impl<R: Rays> Clone for Scan<R> {
     fn clone(&self) -> Self {
-        let Round { targets, rays, task, desks, parts, .. } = &*self.round;
+        let Round { targets, rays, order, task, desks, parts, .. } = &*self.round;
         let round = Round {
             targets: Arc::clone(targets),
             rays: rays.clone(),
+            order: order.clone(),
             task: RwLock::new(read(task).clone()),
             next: AtomicUsize::new(0),
             desks: desks.iter().map(|desk| Mutex::new(lock(desk).clone())).collect(),

@@ -122,15 +122,17 @@ impl RayCaster {
         let (frame, count) = (self.frame(env), self.sample_counts()[env]);
         let Self { sampler, shown, scan, .. } = self;
         shown.counts[env] = count;
-        let (distances, ids) = (sampler.values("distances"), sampler.values("ids"));
-        for (k, ray) in scan.rays().iter().enumerate() {
-            let (distance, id) = (distances[(env, k)], ids[(env, k)] as i32);
-            let is_hit = id != 0;
-            let point = if is_hit { ray.mapped_by(&frame).at(distance) } else { [f64::INFINITY; 3] };
-            for (axis, x) in point.into_iter().enumerate() {
-                shown.points[(env, k, axis)] = x;
-            }
-            (shown.ids[(env, k)], shown.mask[(env, k)]) = (id, is_hit);
+        let rays = scan.rays();
+        let (distances, ids) = (sampler.row("distances", env), sampler.row("ids", env));
+        let points = part_of(shown.points.as_slice_mut(), env, 3 * rays.len());
+        for (((ray, &distance), &id), point) in rays.iter().zip(distances).zip(ids).zip(points.chunks_exact_mut(3)) {
+            let hit = ray.mapped_by(&frame).at(distance);
+            point.copy_from_slice(&if id != 0.0 { hit } else { [f64::INFINITY; 3] });
+        }
+        let (shown_ids, mask) = (shown.ids.as_slice_mut(), shown.mask.as_slice_mut());
+        let (shown_ids, mask) = (part_of(shown_ids, env, rays.len()), part_of(mask, env, rays.len()));
+        for ((&id, shown_id), mask) in ids.iter().zip(shown_ids).zip(mask) {
+            (*shown_id, *mask) = (id as i32, id != 0.0);
         }
     }
 
@@ -140,6 +142,11 @@ impl RayCaster {
         let row = std::array::from_fn(|k| if k < 3 { pos[(env, k)] } else { quat[(env, k - 3)] });
         self.alignment.align(&from_row(&row))
     }
+}
+
+/// The numbers of an environment in an array in C order.
+fn part_of<T>(all: Option<&mut [T]>, env: usize, width: usize) -> &mut [T] {
+    all.map_or(&mut [], |all| &mut all[env * width..(env + 1) * width])
 }
 
 /// What was cast, for the sampler.

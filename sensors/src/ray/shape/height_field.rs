@@ -6,11 +6,21 @@
 //! highest heights. Source: Tevs, Ihrke, Seidel: Maximum mipmaps for fast, accurate, and scalable dynamic height field
 //! rendering, I3D 2008.
 
-use super::{RayShape, Touch};
+mod packet;
+
+use super::{RayShape, Touch, Touches};
+use crate::lanes::Simd;
 use crate::ray::bvh::Stack;
+use crate::ray::packet::{ALL, Packet};
 use crate::ray::vector::{V3, along, unit};
 use crate::ray::{Assets, Ray};
 use std::sync::Arc;
+
+/// Cells that a walk looks at one by one before it looks at blocks: rays from above mostly hit in the first or the second.
+const FIRST_CELLS: usize = 4;
+
+/// Rounding may put a height that is met at most this part of the heights beyond the ends of a piece of the ray.
+const SLACK: f64 = 1e-12;
 
 /// Terrain, one for each asset.
 #[derive(Clone, Debug)]
@@ -80,10 +90,9 @@ impl Field {
                 let (i, j) = (k % wide, k / wide);
                 let parts = [0, 1, 2, 3].map(|p| [2 * i + p % 2, 2 * j + p / 2]);
                 let inside = parts.into_iter().filter(|p| p[0] < below[0] && p[1] < below[1]);
-                inside.map(|p| field.range(field.pyramid.len(), p)).fold(
-                    [f64::INFINITY, f64::NEG_INFINITY],
-                    |[lo, hi], [a, b]| [lo.min(a), hi.max(b)],
-                )
+                inside
+                    .map(|p| field.range(field.pyramid.len(), p))
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], [a, b]| [lo.min(a), hi.max(b)])
             });
             let blocks = blocks.collect();
             field.pyramid.push(Level { wide, blocks });
@@ -133,7 +142,8 @@ impl Field {
         // Right of the diagonal where positive.
         let (w, dw) = (x - y, dx - dy);
         let diagonal = if dw == 0.0 { to } else { -w / dw };
-        let pieces = if diagonal > from && diagonal < to { [(from, diagonal), (diagonal, to)] } else { [(from, to); 2] };
+        let pieces =
+            if diagonal > from && diagonal < to { [(from, diagonal), (diagonal, to)] } else { [(from, to); 2] };
         let count = if pieces[0].1 < to { 2 } else { 1 };
         for &(from, to) in &pieces[..count] {
             let right = w + dw * (0.5 * from + 0.5 * to) >= 0.0;
@@ -157,8 +167,9 @@ impl Field {
         let position = |t: f64, k: usize| walk.origin[k] + t * walk.direction[k];
         let clamped = |p: f64, lo: usize, hi: usize| (p.max(0.0) as usize).clamp(lo, hi);
         let mut cell = [0, 1].map(|k| clamped(position(from, k), 0, self.cells[k] - 1));
-        let mut level = 0;
+        let (mut level, mut steps) = (0, 0);
         loop {
+            steps += 1;
             let block = cell.map(|c| c >> level);
             // Where the ray leaves the block, and across which side.
             let mut leave = to;
@@ -176,8 +187,7 @@ impl Field {
             let leave = leave.max(from);
             let [lo, hi] = self.range(level, block);
             let (z0, z1) = (walk.z + walk.dz * from, walk.z + walk.dz * leave);
-            // Rounding may put a height that is met at most this far beyond the ends.
-            let slack = 1e-12 * (walk.z.abs() + self.top - self.floor);
+            let slack = SLACK * (walk.z.abs() + self.top - self.floor);
             let clear = if walk.side > 0.0 { z0.min(z1) > hi + slack } else { z0.max(z1) < lo - slack };
             if !clear && level > 0 {
                 level -= 1;
@@ -202,7 +212,8 @@ impl Field {
             from = leave;
             // Over the border of a larger block: try that one next.
             let aligned = if walk.direction[k] > 0.0 { next } else { cell[k] + 1 };
-            if clear && level < self.pyramid.len() && aligned.trailing_zeros() as usize > level {
+            if clear && steps >= FIRST_CELLS && level < self.pyramid.len() && aligned.trailing_zeros() as usize > level
+            {
                 level += 1;
             }
         }
@@ -282,11 +293,17 @@ impl Field {
         (walk.side < 0.0 || leave.1 == 2 && d[2] < 0.0).then(|| wall(to, leave.1)).flatten()
     }
 
+    /// The cell of a point of the footprint, in units of cells.
+    #[inline(always)]
+    fn cell_at(&self, at: [f64; 2]) -> [usize; 2] {
+        [0, 1].map(|k| (at[k].max(0.0) as usize).min(self.cells[k] - 1))
+    }
+
     /// Height of the surface over a point of the footprint \[m\], and its slopes (per cell).
     #[inline(always)]
     fn surface(&self, x: f64, y: f64) -> [f64; 3] {
         let at = [(x + self.half[0]) * self.per_metre[0], (y + self.half[1]) * self.per_metre[1]];
-        let cell = [0, 1].map(|k| (at[k].max(0.0) as usize).min(self.cells[k] - 1));
+        let cell = self.cell_at(at);
         let [x, y] = [0, 1].map(|k| at[k] - cell[k] as f64);
         let [h, hx, hy] = Self::plane(self.corners(cell), x >= y);
         [h + hx * x + hy * y, hx, hy]
@@ -303,6 +320,16 @@ impl RayShape for HeightField {
     #[inline(always)]
     fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Touch> {
         self.field.touch(ray, limit)
+    }
+
+    #[inline(always)]
+    fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, _stack: &mut Stack, touches: &mut Touches) {
+        let field = &*self.field;
+        let plumb = field.plumb_packet(s, packet, touches);
+        let done = if plumb == ALL { plumb } else { plumb | field.steep_packet(s, packet, !plumb, touches) };
+        for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| done >> k & 1 == 0 && packet.has(*k)) {
+            *touch = field.touch(&packet.ray(k), packet.limit(k));
+        }
     }
 
     fn bounds(&self) -> Option<[V3; 2]> {

@@ -1,12 +1,18 @@
 //! Triangles.
 
-use super::{RayShape, Touch};
-use crate::ray::bvh::{Bvh, Stack};
-use crate::ray::triangle::{Shear, Triangle, normal};
+use super::{RayShape, Touch, Touches, touch_each};
+use crate::lanes::{D, Simd};
+use crate::ray::bvh::{Beam, Bvh, Stack, Walked};
+use crate::ray::packet::{Packet, WIDTH};
+use crate::ray::triangle::{Shear, ShearPacket, Triangle, normal};
 use crate::ray::vector::{V3, to_f64};
 use crate::ray::{Assets, Ray};
 use scene::RenderMesh;
 use std::sync::Arc;
+
+/// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
+/// about as much as these.
+const BUDGET: usize = 160;
 
 /// Triangles in a tree, one for each asset.
 #[derive(Clone, Debug)]
@@ -58,15 +64,20 @@ impl Mesh {
     }
 }
 
-impl RayShape for Mesh {
+impl MeshTree {
+    #[cfg(test)]
+    pub(crate) fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// The nearest triangle up to `limit`, or one that was found before.
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
-        let tree = &*self.tree;
+    fn nearest(&self, ray: &Ray, limit: f64, found: Option<(f64, usize)>, stack: &mut Stack) -> Option<(f64, usize)> {
         let shear = Shear::new(ray);
-        let mut best: Option<(f64, usize)> = None;
-        tree.bvh.walk(ray, limit, stack, |leaf, mut limit| {
+        let mut best = found;
+        self.bvh.walk(ray, limit, stack, |leaf, mut limit| {
             let first = leaf.start;
-            for (k, triangle) in tree.triangles[leaf].iter().enumerate() {
+            for (k, triangle) in self.triangles[leaf].iter().enumerate() {
                 let Some(t) = shear.distance(triangle).filter(|&t| t >= 0.0 && t <= limit) else { continue };
                 // On an edge the first triangle counts, in whatever order they are met.
                 if best.is_none_or(|(s, index)| t < s || first + k < index) {
@@ -76,8 +87,62 @@ impl RayShape for Mesh {
             }
             limit
         });
-        let (t, index) = best?;
-        Some(Touch { t: t + 0.0, normal: normal(&tree.triangles[index])? })
+        best
+    }
+
+    #[inline(always)]
+    fn touch(&self, (t, index): (f64, usize)) -> Option<Touch> {
+        Some(Touch { t: t + 0.0, normal: normal(&self.triangles[index])? })
+    }
+}
+
+impl RayShape for Mesh {
+    #[inline(always)]
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
+        self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
+    }
+
+    /// One walk for all rays where they run side by side. Every triangle that a ray may hit is tested by the arithmetic of
+    /// the single ray, and the nearest one counts, the first one of those that are as near: the same bits.
+    #[inline(always)]
+    fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
+        let tree = &*self.tree;
+        let Some(shear) = ShearPacket::new(s, packet) else { return touch_each(self, packet, stack, touches) };
+        let Some(beam) = Beam::around(s, packet, &shear, &tree.bvh) else {
+            return touch_each(self, packet, stack, touches);
+        };
+        if beam.share() * tree.triangles.len() as f64 > BUDGET as f64 {
+            return touch_each(self, packet, stack, touches);
+        }
+        let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
+        // Of the best triangle, as a number that has all of them; +inf where there is none.
+        let mut best = D::splat(s, f64::INFINITY);
+        let walked = tree.bvh.walk_beam(
+            &beam,
+            limit,
+            BUDGET,
+            stack,
+            #[inline(always)]
+            |leaf| {
+                let mut nearer = 0;
+                for (index, triangle) in leaf.clone().zip(&tree.triangles[leaf]) {
+                    let Some((t, inside)) = shear.distances(triangle) else { continue };
+                    let index = D::splat(s, index as f64);
+                    let better = inside & zero.le(t) & t.le(limit) & (t.lt(limit) | index.lt(best));
+                    (limit, best) = (better.select(t, limit), better.select(index, best));
+                    nearer |= better.to_bitmask();
+                }
+                if nearer != 0 { Some(limit) } else { None }
+            },
+        );
+        let (limit, best) = (limit.array(), best.array());
+        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+            let mut found = (best[k] < f64::INFINITY).then(|| (limit[k], best[k] as usize));
+            if walked == Walked::Part {
+                found = tree.nearest(&packet.ray(k), limit[k], found, stack);
+            }
+            touches[k] = found.and_then(|found| tree.touch(found));
+        }
     }
 
     fn bounds(&self) -> Option<[V3; 2]> {

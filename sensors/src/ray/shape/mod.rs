@@ -6,8 +6,10 @@
 mod interval;
 
 use super::bvh::Stack;
+use super::packet::{Packet, WIDTH};
 use super::vector::V3;
 use super::{Assets, Ray};
+use crate::lanes::Simd;
 use scene::Shape;
 
 /// Where a ray touches a surface.
@@ -19,13 +21,34 @@ pub(crate) struct Touch {
     pub(crate) normal: V3,
 }
 
+/// What the rays of a packet touch, lane by lane.
+pub(crate) type Touches = [Option<Touch>; WIDTH];
+
 /// What a shape must be able to do.
 pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
     fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch>;
 
+    /// The same for every ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
+    /// without a ray may stay.
+    #[inline(always)]
+    fn touch_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches)
+    where
+        Self: Sized,
+    {
+        touch_each(self, packet, stack, touches);
+    }
+
     /// Smallest and largest coordinates; `None` for a shape without an end.
     fn bounds(&self) -> Option<[V3; 2]>;
+}
+
+/// One ray after the other.
+#[inline(always)]
+fn touch_each(shape: &impl RayShape, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
+    for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| packet.has(*k)) {
+        *touch = shape.touch(&packet.ray(k), packet.limit(k), stack);
+    }
 }
 
 /// Work that does not depend on the kind of shape, compiled for each.
@@ -62,7 +85,7 @@ macro_rules! ray_shapes {
             }
 
             /// The nearest surface at a distance from 0 to `limit`, both included.
-            #[inline(always)]
+            #[cfg(test)]
             pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
                 match self { $(Self::$Name(shape) => shape.touch(ray, limit, stack),)* }
             }

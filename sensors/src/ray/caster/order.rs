@@ -1,0 +1,77 @@
+//! The order in which rays are cast: those that run side by side in one packet, whatever the order of the pattern.
+
+use crate::ray::Ray;
+use crate::ray::packet::WIDTH;
+
+/// What a difference of directions counts, in metres of difference between starts: rays of a fan are that far apart where
+/// they are likely to hit.
+const REACH: f64 = 10.0;
+
+/// Indices of all rays, so that each [`WIDTH`] of them are neighbours: halves of halves, each time across the longer side.
+pub(super) fn neighbours_together(rays: &[Ray]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..rays.len() as u32).collect();
+    split(rays, &mut order);
+    order
+}
+
+/// Start and direction of a ray in metres.
+fn place(ray: &Ray) -> [f64; 6] {
+    std::array::from_fn(|k| if k < 3 { ray.origin[k] } else { REACH * ray.direction[k - 3] })
+}
+
+fn split(rays: &[Ray], order: &mut [u32]) {
+    if order.len() <= WIDTH {
+        return;
+    }
+    let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);
+    for &k in order.iter() {
+        for (axis, x) in place(&rays[k as usize]).into_iter().enumerate() {
+            (low[axis], high[axis]) = (low[axis].min(x), high[axis].max(x));
+        }
+    }
+    let long = |axis: usize| high[axis] - low[axis];
+    let axis = (1..6).fold(0, |best, axis| if long(axis) > long(best) { axis } else { best });
+    let at = |k: u32| place(&rays[k as usize])[axis];
+    // Rays of the same place stay in their order.
+    order.sort_unstable_by(|&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
+    // Whole packets on the left.
+    let middle = (order.len() / 2).next_multiple_of(WIDTH);
+    let (left, right) = order.split_at_mut(middle);
+    split(rays, left);
+    split(rays, right);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ray::RayPattern;
+    use crate::ray::pattern::{Grid, Lidar};
+
+    /// Sum over packets of the length of the sides of the box around starts and directions.
+    fn spread(rays: &[Ray], order: &[u32]) -> f64 {
+        let of = |packet: &[u32], axis: usize| {
+            let at = |k: &u32| place(&rays[*k as usize])[axis];
+            let high = packet.iter().map(at).fold(f64::NEG_INFINITY, f64::max);
+            high - packet.iter().map(at).fold(f64::INFINITY, f64::min)
+        };
+        order.chunks(WIDTH).map(|packet| (0..6).map(|axis| of(packet, axis)).sum::<f64>()).sum()
+    }
+
+    #[test]
+    fn packets_are_neighbours_and_every_ray_is_there_once() {
+        let lidar = Lidar { channels: 16, horizontal_resolution_deg: 2.0, ..Lidar::default() };
+        for pattern in [RayPattern::from(Grid::default()), lidar.into()] {
+            let rays = pattern.rays().expect("a good pattern");
+            let order = neighbours_together(&rays);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..rays.len() as u32));
+            let own: Vec<u32> = (0..rays.len() as u32).collect();
+            let (before, after) = (spread(&rays, &own), spread(&rays, &order));
+            println!("{}: {before} {after}", pattern.name());
+            assert!(after < 0.8 * before, "{}: {after} of {before}", pattern.name());
+            assert_eq!(order, neighbours_together(&rays), "the same every time");
+        }
+        assert!(neighbours_together(&[]).is_empty());
+    }
+}
