@@ -24,9 +24,9 @@ pub mod prelude {
     };
     pub use sim::{
         ActuatorIndex, BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes,
-        EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId,
-        MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Result, RigidObjectCfg,
-        RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId,
-        Tip, UrdfCfg,
+        EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, LinkId,
+        MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Result,
+        RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Still,
+        TerrainCfg, TerrainId, Tip, UrdfCfg,
     };
 }

@@ -354,9 +354,11 @@ fn set_up_drives(
             let mut drive = None;
             if let Some(actuator) = plan.actuator {
                 let ctrl = compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing("actuator", &name))?;
-                let gains = Gains { kp: actuator.kp, kd: actuator.kd, max_effort: plan.max_effort };
+                let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+                let initial = Gains { kp: actuator.kp, kd: actuator.kd, max_effort, max_velocity };
+                let (realization, setting, range) = (Realization::Actuator, plan.setting, plan.usable);
                 let index = table.drives.len();
-                table.drives.push(Drive { qpos, dof, ctrl, realization: Realization::Actuator, initial: gains });
+                table.drives.push(Drive { qpos, dof, ctrl, realization, initial, setting, range });
                 start.targets.push((index, plan.initial));
                 drive = Some(index);
                 if implicit {
@@ -490,7 +492,8 @@ impl Simulation {
                         data.qpos_mut()[address] = position;
                     }
                     for &(drive, target) in &start.targets {
-                        drives.position[drive] = target;
+                        let [low, high] = drives.ranges[drive];
+                        drives.position[drive] = target.clamp(low, high);
                     }
                 });
             }

@@ -33,7 +33,7 @@ pub mod urdf;
 pub mod visible;
 
 pub use ::scene::pattern;
-pub use description::RobotDescription;
+pub use description::{LinkId, RobotDescription};
 pub use diagnostic::{Diagnostic, DiagnosticKind};
 pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};
 pub use error::{Error, Result};

@@ -11,6 +11,7 @@ mod mimic;
 mod modes;
 mod native;
 mod robots;
+mod run_time;
 mod soft;
 mod tutorial;
 mod worlds;

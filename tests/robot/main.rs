@@ -4,3 +4,4 @@
 mod quadruped;
 mod root;
 mod standing;
+mod state;

@@ -40,6 +40,8 @@ pub struct DriveCfg {
     pub damping: PerJoint,
     /// Largest effort \[N m or N\]; where unset, the URDF's.
     pub max_effort: Option<PerJoint>,
+    /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; the drive law does not know it.
+    pub max_velocity: Option<PerJoint>,
     /// Dry friction \[N m or N\]; where unset, the URDF's.
     pub friction: Option<PerJoint>,
     /// Rotor inertia \[kg m² or kg\].
@@ -54,6 +56,7 @@ impl Default for DriveCfg {
             stiffness: PerJoint::All(DEFAULT_STIFFNESS),
             damping: PerJoint::All(DEFAULT_DAMPING),
             max_effort: None,
+            max_velocity: None,
             friction: None,
             armature: PerJoint::All(0.0),
         }
@@ -74,6 +77,8 @@ pub struct JointGains {
     pub damping: f64,
     /// Largest effort, if the configuration sets one.
     pub max_effort: Option<f64>,
+    /// Largest speed, if the configuration sets one.
+    pub max_velocity: Option<f64>,
     /// Dry friction, if the configuration sets one.
     pub friction: Option<f64>,
     /// Rotor inertia.
@@ -107,7 +112,7 @@ pub enum DriveCfgError {
 ///
 /// # Errors
 /// A key that matches no joint, a joint matched by two keys, a negative or non-finite number (an infinite
-/// `max_effort` means unlimited and is allowed).
+/// `max_effort` or `max_velocity` means unlimited and is allowed).
 pub fn resolve(
     cfg: &DriveCfg,
     joints: &[&str],
@@ -120,7 +125,7 @@ pub fn resolve(
                 .map_err(|error| DriveCfgError::Pattern { property, error })?,
         };
         for value in assigned.iter().flatten() {
-            let unlimited = property == "max_effort" && *value == f64::INFINITY;
+            let unlimited = property.starts_with("max_") && *value == f64::INFINITY;
             if !(value.is_finite() && *value >= 0.0 || unlimited) {
                 return Err(DriveCfgError::Value { property, value: *value });
             }
@@ -134,6 +139,7 @@ pub fn resolve(
     let stiffness = each("stiffness", &cfg.stiffness)?;
     let damping = each("damping", &cfg.damping)?;
     let max_effort = optional("max_effort", &cfg.max_effort)?;
+    let max_velocity = optional("max_velocity", &cfg.max_velocity)?;
     let friction = optional("friction", &cfg.friction)?;
     let armature = each("armature", &cfg.armature)?;
     Ok((0..joints.len())
@@ -141,6 +147,7 @@ pub fn resolve(
             stiffness: stiffness[i].unwrap_or(DEFAULT_STIFFNESS),
             damping: damping[i].unwrap_or(DEFAULT_DAMPING),
             max_effort: max_effort[i],
+            max_velocity: max_velocity[i],
             friction: friction[i],
             armature: armature[i].unwrap_or(0.0),
         })

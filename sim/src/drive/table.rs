@@ -1,6 +1,6 @@
 //! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
 
-use super::{actuator, implicit};
+use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
 use crate::mj;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -28,11 +28,36 @@ pub struct Drive {
     pub ctrl: usize,
     /// How it acts.
     pub realization: Realization,
-    /// The gains and limit the model starts with.
+    /// The gains and limits the model starts with.
     pub initial: Gains,
+    /// Where the gains come from.
+    pub setting: Setting,
+    /// Positions a target may have \[rad or m\].
+    pub range: [f64; 2],
 }
 
-/// Gains and effort limit of one drive.
+/// What a user asks of one drive, in the user's units; the law takes [`Gains`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// What stiffness and damping mean.
+    pub drive_type: DriveType,
+    /// Stiffness, in the unit of the drive type.
+    pub stiffness: f64,
+    /// Damping, in the unit of the drive type.
+    pub damping: f64,
+    /// Inertia that the joint feels at the initial pose \[kg m² or kg\], once a drive type asked for it.
+    pub inertia: Option<f64>,
+}
+
+impl Setting {
+    /// Gains in torque units; `None` where the joint is to be passive.
+    pub fn actuator(&self) -> Option<ActuatorSpec> {
+        let info = JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) };
+        self.drive_type.mode().actuator(self.stiffness, self.damping, &info)
+    }
+}
+
+/// Gains and limits of one drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Proportional gain \[N m/rad or N/m\].
@@ -41,6 +66,8 @@ pub struct Gains {
     pub kd: f64,
     /// Largest effort \[N m or N\]; infinite where there is no limit.
     pub max_effort: f64,
+    /// Largest speed \[rad/s or m/s\]; infinite where there is no limit. Reported; it bounds nothing by itself.
+    pub max_velocity: f64,
 }
 
 /// All drives of a model, and the joints whose damping is integrated with them. Shared by all environments.
@@ -97,6 +124,10 @@ pub struct DriveState {
     initial: Arc<Initial>,
     /// Gains, one per drive.
     pub gains: Shared<Gains>,
+    /// What the gains were made of, one per drive.
+    pub settings: Shared<Setting>,
+    /// Positions a target may have \[rad or m\], one range per drive.
+    pub ranges: Shared<[f64; 2]>,
     /// Position targets \[rad or m\].
     pub position: Box<[f64]>,
     /// Velocity targets \[rad/s or m/s\].
@@ -118,6 +149,8 @@ impl DriveState {
         let no_forces = Shared(vec![0.0; model.nv()].into());
         Self {
             gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
+            settings: Shared(table.drives.iter().map(|d| d.setting).collect()),
+            ranges: Shared(table.drives.iter().map(|d| d.range).collect()),
             position: position.clone(),
             velocity: no_targets.clone(),
             feedforward: no_targets.clone(),
@@ -127,7 +160,7 @@ impl DriveState {
         }
     }
 
-    /// Back to rest at the model's initial positions; gains stay.
+    /// Back to rest at the model's initial positions; gains and limits stay.
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;
         self.position.copy_from_slice(&initial.position);
@@ -137,9 +170,31 @@ impl DriveState {
         self.applied.clone_from(&initial.no_forces);
     }
 
-    /// Takes gains, targets and effort of drive `from` of `other` for drive `to`.
+    /// Changes what is asked of a drive, and with it its gains; limits stay.
+    pub fn set(&mut self, drive: usize, change: impl FnOnce(&mut Setting)) {
+        let mut setting = self.settings[drive];
+        change(&mut setting);
+        let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
+        self.settings.put(drive, setting);
+        self.gains.put(drive, Gains { kp, kd, ..self.gains[drive] });
+    }
+
+    /// Changes the limits of a drive.
+    pub fn set_limits(&mut self, drive: usize, change: impl FnOnce(Gains) -> Gains) {
+        self.gains.put(drive, change(self.gains[drive]));
+    }
+
+    /// Changes the positions that targets of a drive may have; the present target is clamped to them.
+    pub fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
+        self.ranges.put(drive, [low, high]);
+        self.position[drive] = self.position[drive].clamp(low, high);
+    }
+
+    /// Takes gains, limits, targets and effort of drive `from` of `other` for drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.put(to, other.gains[from]);
+        self.settings.put(to, other.settings[from]);
+        self.ranges.put(to, other.ranges[from]);
         self.position[to] = other.position[from];
         self.velocity.put(to, other.velocity[from]);
         self.feedforward.put(to, other.feedforward[from]);
@@ -204,8 +259,10 @@ mod tests {
         )
         .expect("compiles")
         .into_model();
-        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY };
-        let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization: Realization::Actuator, initial };
+        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: f64::INFINITY };
+        let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
+        let (realization, range) = (Realization::Actuator, [-1.0, 1.0]);
+        let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization, initial, setting, range };
         let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], damped: Vec::new() }), &model);
         let (mut told, other) = (fresh.clone(), fresh.clone());
         assert!(std::ptr::eq(&*told.velocity, &*other.velocity));
@@ -214,15 +271,19 @@ mod tests {
         told.feedforward[0] = 0.3;
         told.applied[0] = 0.4;
         told.effort[0] = 0.5;
+        told.set_range(0, [0.2, 0.7]);
+        assert_eq!((told.position[0], other.ranges[0]), (0.2, range), "the target is inside of its range");
         assert_eq!(other, fresh);
         let mut copy = other.clone();
         copy.copy_from(&told, 0, 0);
         copy.copy_applied_from(&told, 0, 0);
         assert_eq!(copy, told);
-        told.gains[0].kp = 7.0;
+        told.set(0, |setting| setting.stiffness = 7.0);
         told.reset();
         assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");
-        told.gains[0] = initial;
+        assert_eq!((told.gains[0].kd, told.ranges[0]), (1.0, [0.2, 0.7]), "limits stay");
+        told.set(0, |setting| setting.stiffness = 3.0);
+        told.set_range(0, range);
         assert_eq!(told, fresh);
         assert!(std::ptr::eq(&*told.velocity, &*other.velocity), "shared again");
     }
