@@ -23,10 +23,10 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        ActuatorIndex, BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes,
-        EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, LinkId,
-        MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Result,
-        RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Still,
-        TerrainCfg, TerrainId, Tip, UrdfCfg,
+        ActuatorIndex, ActuatorModel, BodyType, ComponentCfg, DcMotor, DelayedPd, Diagnostic, DriveCfg, DriveModel,
+        DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, IdealPd, IkCfg, IkResult, IkTask, Integrator,
+        InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId,
+        ObjectShape, PerJoint, Posture, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId,
+        SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
     };
 }

@@ -343,7 +343,7 @@ fn set_up_drives(
     let mut indices = Vec::new();
     let mut start = Start::default();
     let mut row_drives: Vec<(usize, usize)> = Vec::new();
-    let (mut row_actuators, mut native_actuators) = (Vec::new(), Vec::new());
+    let (mut row_actuators, mut native_actuators, mut effort_sources) = (Vec::new(), Vec::new(), Vec::new());
     for (data, layout) in contents.robots.iter().zip(layouts) {
         let implicit = data.cfg().drive.model == DriveModel::Implicit;
         let mut joints = Vec::new();
@@ -361,7 +361,10 @@ fn set_up_drives(
                 table.drives.push(Drive { qpos, dof, ctrl, realization, initial, setting, range });
                 start.targets.push((index, plan.initial));
                 drive = Some(index);
-                if implicit {
+                if let Some(model) = plan.model {
+                    table.push_model(index, model);
+                    effort_sources.push(ctrl);
+                } else if implicit {
                     row_drives.push((dof, index));
                     row_actuators.push(ctrl);
                 } else {
@@ -399,6 +402,7 @@ fn set_up_drives(
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
     implicit::prepare(&mut compiled, &dofs, &row_actuators);
     compiled.unlimit_controls(&native_actuators);
+    compiled.make_effort_sources(&effort_sources);
     compiled.prepare_for_stepping(!row_drives.is_empty());
     let model = compiled.into_model();
     // Friction rows come in the order of degrees of freedom, one for each with friction.

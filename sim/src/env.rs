@@ -139,6 +139,7 @@ impl Env {
         self.solved_now = true;
         let initial = self.saved();
         change(&mut self.data, &mut self.drives);
+        self.drives.start();
         self.refresh(&initial);
     }
 
@@ -249,7 +250,7 @@ impl Env {
                     if raised != WarningCounts::default() {
                         self.seldom.warnings.add(&raised);
                     }
-                    self.drives.effort.copy_from_slice(efforts);
+                    self.drives.finish_step(efforts);
                     self.steps += 1;
                     self.solved_now = false;
                     return;

@@ -303,6 +303,17 @@ pub enum Error {
         /// The joint.
         joint: String,
     },
+    /// A joint's drive delays nothing.
+    #[error(
+        "set_delay: joint {joint:?} of robot {robot:?} is not driven by the actuator model delayed_pd; name it for this joint \
+         in drive.actuators"
+    )]
+    NoDelay {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
     /// Patterns of names of a robot match nothing, or are none.
     #[error("robot {robot:?}: {error}")]
     RobotNames {

@@ -35,7 +35,7 @@ pub mod visible;
 pub use ::scene::pattern;
 pub use description::{LinkId, RobotDescription};
 pub use diagnostic::{Diagnostic, DiagnosticKind};
-pub use drive::{DriveCfg, DriveModel, DriveType, PerJoint};
+pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveModel, DriveType, IdealPd, PerJoint};
 pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};

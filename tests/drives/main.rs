@@ -1,6 +1,7 @@
 //! Drives: what a joint does when it is told to, law by law.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod actuators;
 mod damping;
 mod export;
 mod friction;

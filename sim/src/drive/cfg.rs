@@ -1,5 +1,6 @@
 //! Drive properties as users write them, and their resolution to one set per joint.
 
+use super::models::ActuatorModel;
 use super::{DriveModel, DriveType};
 use crate::pattern::{self, PatternError};
 use serde::{Deserialize, Serialize};
@@ -34,13 +35,21 @@ pub struct DriveCfg {
     pub drive_type: DriveType,
     /// Who evaluates the law.
     pub model: DriveModel,
+    /// Explicit actuator models by joint pattern or control part; joints that none matches are driven by `model`. They use
+    /// the gains and limits below; a joint that the drive type leaves passive has none. Exports have MuJoCo's actuators with
+    /// the same gains in their place.
+    #[serde(with = "scene::file_format::pairs")]
+    pub actuators: Vec<(String, ActuatorModel)>,
     /// Stiffness \[N m/rad or N/m\] (drive type `force`).
     pub stiffness: PerJoint,
     /// Damping \[N m s/rad or N s/m\] (drive type `force`).
     pub damping: PerJoint,
     /// Largest effort \[N m or N\]; where unset, the URDF's.
     pub max_effort: Option<PerJoint>,
-    /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; the drive law does not know it.
+    /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; of the drive laws, only that of [`DcMotor`] knows
+    /// it.
+    ///
+    /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,
     /// Dry friction \[N m or N\]; where unset, the URDF's.
     pub friction: Option<PerJoint>,
@@ -53,6 +62,7 @@ impl Default for DriveCfg {
         Self {
             drive_type: DriveType::Force,
             model: DriveModel::Implicit,
+            actuators: Vec::new(),
             stiffness: PerJoint::All(DEFAULT_STIFFNESS),
             damping: PerJoint::All(DEFAULT_DAMPING),
             max_effort: None,
@@ -83,6 +93,8 @@ pub struct JointGains {
     pub friction: Option<f64>,
     /// Rotor inertia.
     pub armature: f64,
+    /// Explicit actuator model, if the configuration names one.
+    pub actuator: Option<ActuatorModel>,
 }
 
 /// An error of drive properties.
@@ -136,6 +148,8 @@ pub fn resolve(
         Some(values) => each(property, values),
         None => Ok(vec![None; joints.len()]),
     };
+    let actuators = pattern::assign(&cfg.actuators, parts, joints, "joint")
+        .map_err(|error| DriveCfgError::Pattern { property: "actuators", error })?;
     let stiffness = each("stiffness", &cfg.stiffness)?;
     let damping = each("damping", &cfg.damping)?;
     let max_effort = optional("max_effort", &cfg.max_effort)?;
@@ -150,6 +164,7 @@ pub fn resolve(
             max_velocity: max_velocity[i],
             friction: friction[i],
             armature: armature[i].unwrap_or(0.0),
+            actuator: actuators[i],
         })
         .collect())
 }

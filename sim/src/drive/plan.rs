@@ -2,7 +2,8 @@
 //! configuration. The stage between `RobotDescription` and MJCF.
 
 use super::cfg::{DriveCfg, DriveCfgError, resolve};
-use super::table::Setting;
+use super::models::ActuatorModel;
+use super::table::{Gains, Setting};
 use super::{ActuatorSpec, DriveType};
 use crate::description::{Joint, JointId, JointKind, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
@@ -18,6 +19,8 @@ pub struct JointPlan {
     pub joint: JointId,
     /// Its actuator; `None` for passive and mimic joints.
     pub actuator: Option<ActuatorSpec>,
+    /// The actuator's explicit model; `None` where it is driven as the robot is.
+    pub model: Option<ActuatorModel>,
     /// What the actuator's gains are made of.
     pub setting: Setting,
     /// Largest effort \[N m or N\]; infinite where there is none.
@@ -59,6 +62,16 @@ pub enum PlanError {
         /// The value given.
         value: f64,
     },
+    /// An actuator model does not go with its joint.
+    #[error("drive.actuators: {model} of joint {joint:?}: {reason}")]
+    ActuatorModel {
+        /// The joint.
+        joint: String,
+        /// Name of the model.
+        model: &'static str,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
     /// The description's dynamics cannot be computed.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
@@ -92,6 +105,7 @@ pub fn plan(
             JointPlan {
                 joint: id,
                 actuator: None,
+                model: gains.actuator,
                 setting: Setting { drive_type, stiffness, damping, inertia: None },
                 max_effort: gains.max_effort.or(effort).unwrap_or(f64::INFINITY),
                 max_velocity: gains.max_velocity.or(velocity).unwrap_or(f64::INFINITY),
@@ -116,6 +130,19 @@ pub fn plan(
     }
     for plan in plans.iter_mut().filter(|plan| plan.mimic.is_none()) {
         plan.actuator = plan.setting.actuator();
+    }
+    for plan in &mut plans {
+        let (Some(actuator), Some(model)) = (plan.actuator, plan.model) else {
+            plan.model = None;
+            continue;
+        };
+        let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+        let gains = Gains { kp: actuator.kp, kd: actuator.kd, max_effort, max_velocity };
+        model.law().check(&gains).map_err(|reason| PlanError::ActuatorModel {
+            joint: description.joint(plan.joint).name.clone(),
+            model: model.law().name(),
+            reason,
+        })?;
     }
     Ok((plans, diagnostics))
 }

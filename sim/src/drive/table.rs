@@ -1,8 +1,9 @@
 //! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
 
+use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
 use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
 use crate::mj;
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 
 /// How one drive acts in MuJoCo.
@@ -15,6 +16,11 @@ pub enum Realization {
     },
     /// MuJoCo's actuator.
     Actuator,
+    /// MuJoCo's actuator as a plain source of effort, whose control an explicit model computes.
+    Explicit {
+        /// Index among the explicit models.
+        model: usize,
+    },
 }
 
 /// One drive of a model.
@@ -75,8 +81,39 @@ pub struct Gains {
 pub struct DriveTable {
     /// The drives, in the order in which they were added.
     pub drives: Vec<Drive>,
+    /// Explicit models of those drives that have one.
+    pub models: Vec<DriveActuator>,
     /// Degrees of freedom whose viscous damping moved from the model to [`implicit`], with its coefficient.
     pub damped: Vec<(usize, f64)>,
+}
+
+/// The explicit model of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveActuator {
+    /// The drive.
+    pub drive: usize,
+    /// Its model.
+    pub model: ActuatorModel,
+    /// Where in the memory of an environment the model keeps what it needs.
+    pub memory: Range<usize>,
+}
+
+impl DriveTable {
+    /// Gives a drive an explicit model.
+    pub fn push_model(&mut self, drive: usize, model: ActuatorModel) {
+        let first = self.models.last().map_or(0, |last| last.memory.end);
+        let memory = first..first + model.law().memory().len();
+        self.drives[drive].realization = Realization::Explicit { model: self.models.len() };
+        self.models.push(DriveActuator { drive, model, memory });
+    }
+
+    /// The explicit model of a drive.
+    pub fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
+        match self.drives[drive].realization {
+            Realization::Explicit { model } => Some(&self.models[model]),
+            Realization::Row { .. } | Realization::Actuator => None,
+        }
+    }
 }
 
 /// A list that environments share until one writes to its own. Nobody sets most of what a drive can be told, and memory
@@ -138,6 +175,8 @@ pub struct DriveState {
     pub effort: Box<[f64]>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Shared<f64>,
+    /// What explicit models keep from step to step.
+    pub memory: Box<[f64]>,
 }
 
 impl DriveState {
@@ -147,7 +186,7 @@ impl DriveState {
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
         let no_targets = Shared(vec![0.0; n].into());
         let no_forces = Shared(vec![0.0; model.nv()].into());
-        Self {
+        let mut state = Self {
             gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
             settings: Shared(table.drives.iter().map(|d| d.setting).collect()),
             ranges: Shared(table.drives.iter().map(|d| d.range).collect()),
@@ -156,8 +195,31 @@ impl DriveState {
             feedforward: no_targets.clone(),
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
+            memory: table.models.iter().flat_map(|drive| drive.model.law().memory()).collect(),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
+        };
+        state.start();
+        state
+    }
+
+    /// Explicit models forget what was: the present targets are those at the start.
+    pub(crate) fn start(&mut self) {
+        self.each_memory(|law, target, memory| law.start(target, memory));
+    }
+
+    /// What a drive is asked for.
+    fn target(&self, drive: usize) -> Target {
+        let (position, velocity, feedforward) = (self.position[drive], self.velocity[drive], self.feedforward[drive]);
+        Target { position, velocity, feedforward }
+    }
+
+    /// Each explicit model with what its drive is asked for and what it keeps.
+    fn each_memory(&mut self, act: impl Fn(&dyn ActuatorLaw, &Target, &mut [f64])) {
+        let mut memory = std::mem::take(&mut self.memory);
+        for explicit in &self.initial.table.models {
+            act(explicit.model.law(), &self.target(explicit.drive), &mut memory[explicit.memory.clone()]);
         }
+        self.memory = memory;
     }
 
     /// Back to rest at the model's initial positions; gains and limits stay.
@@ -199,6 +261,9 @@ impl DriveState {
         self.velocity.put(to, other.velocity[from]);
         self.feedforward.put(to, other.feedforward[from]);
         self.effort[to] = other.effort[from];
+        if let (Some(mine), Some(theirs)) = (self.initial.table.model_of(to), other.initial.table.model_of(from)) {
+            self.memory[mine.memory.clone()].copy_from_slice(&other.memory[theirs.memory.clone()]);
+        }
     }
 
     /// Takes the force applied to degree of freedom `from` of `other` for degree of freedom `to`.
@@ -217,12 +282,25 @@ impl DriveState {
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, data);
         for (i, drive) in table.drives.iter().enumerate() {
-            let target =
-                Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
+            let target = self.target(i);
             match drive.realization {
                 Realization::Row { row } => implicit::apply(drive, row, &self.gains[i], &target, data),
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
+                Realization::Explicit { model } => {
+                    let DriveActuator { model, memory, .. } = &table.models[model];
+                    let now = JointMotion { position: data.qpos()[drive.qpos], velocity: data.qvel()[drive.dof] };
+                    let effort = model.law().effort(&now, &target, &self.gains[i], &self.memory[memory.clone()]);
+                    data.ctrl_mut()[drive.ctrl] = effort;
+                }
             }
+        }
+    }
+
+    /// After a step that stays: the efforts the drives gave in it, and what models keep of it.
+    pub(crate) fn finish_step(&mut self, efforts: &[f64]) {
+        self.effort.copy_from_slice(efforts);
+        if !self.memory.is_empty() {
+            self.each_memory(|law, target, memory| law.remember(target, memory));
         }
     }
 
@@ -231,7 +309,7 @@ impl DriveState {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
             Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
-            Realization::Actuator => data.actuator_force()[drive.ctrl],
+            Realization::Actuator | Realization::Explicit { .. } => data.actuator_force()[drive.ctrl],
         }));
     }
 }
@@ -263,7 +341,7 @@ mod tests {
         let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
         let (realization, range) = (Realization::Actuator, [-1.0, 1.0]);
         let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization, initial, setting, range };
-        let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], damped: Vec::new() }), &model);
+        let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], ..Default::default() }), &model);
         let (mut told, other) = (fresh.clone(), fresh.clone());
         assert!(std::ptr::eq(&*told.velocity, &*other.velocity));
         told.position[0] = 0.1;

@@ -130,9 +130,10 @@ impl RobotData {
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
         found.append(&mut planned);
-        if cfg.drive.model == DriveModel::Actuator {
+        let explicit = explicitly_driven(&plans, cfg.drive.model);
+        if explicit.iter().any(|plan| plan.actuator.is_some()) {
             let dt = manager.physics_option().timestep;
-            found.extend(crate::drive::actuator::warn_if_unstable(&description, &plans, !cfg.fix_base, dt));
+            found.extend(crate::drive::actuator::warn_if_unstable(&description, &explicit, !cfg.fix_base, dt));
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
@@ -172,6 +173,12 @@ impl RobotData {
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
+}
+
+/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others.
+fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
+    let explicit = |plan: &JointPlan| model == DriveModel::Actuator || plan.model.is_some();
+    plans.iter().map(|plan| JointPlan { actuator: plan.actuator.filter(|_| explicit(plan)), ..plan.clone() }).collect()
 }
 
 /// Adds what links carry.

@@ -5,15 +5,16 @@
 //! ([`DriveCfg`](crate::DriveCfg)).
 
 use crate::compile::JointIndexing;
-use crate::drive::DriveType;
 use crate::drive::plan::{PlanError, effective_inertias};
-use crate::drive::table::{DriveState, Realization, Setting};
+use crate::drive::table::{DriveActuator, DriveState, Realization, Setting};
+use crate::drive::{ActuatorModel, DelayedPd, DriveType};
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, env_list};
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
 use crate::objects::rows::Numbers;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
+use std::sync::Arc;
 
 impl Robot<'_> {
     /// Stiffness of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
@@ -39,6 +40,17 @@ impl Robot<'_> {
         self.simulation.batch.for_each(|_, env| types.extend(joints.iter().map(|joint| of(env, joint))));
         // One value for each environment and joint was pushed.
         Array2::from_shape_vec((n, joints.len()), types).unwrap_or_default()
+    }
+
+    /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints that [`DelayedPd`] does not drive.
+    pub fn get_delay(&self) -> Array2<u32> {
+        let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
+            Some(DriveActuator { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
+                f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
+            }
+            _ => 0.0,
+        });
+        delays.mapv(|steps| steps as u32)
     }
 }
 
@@ -121,6 +133,52 @@ impl RobotMut<'_> {
                     let change =
                         |old: &mut Setting| *old = Setting { drive_type, inertia: inertia.or(old.inertia), ..*old };
                     env.drives.set(drive, change);
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset, and what is under way
+    /// stays in its order. Rows and columns as in [`set_stiffness`](Self::set_stiffness).
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment; a joint of another model, or a delay above the model's `max_delay`. Then
+    /// nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_delay<'t>(
+        &mut self,
+        steps: impl AsArray<'t, u32, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let argument = "set_delay";
+        let steps: ArrayView2<'_, u32> = steps.into();
+        let steps = steps.mapv(f64::from);
+        let write = self.checked_numbers(argument, Numbers::Gain, steps.view(), joint_ids, env_ids)?;
+        let drives = self.driven(argument, &write.joints)?;
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        let name = |joint: usize| self.data.joint_names()[joint].clone();
+        let mut memories = Vec::with_capacity(drives.len());
+        for &(column, joint, drive) in &drives {
+            let Some(DriveActuator { model: ActuatorModel::DelayedPd(model), memory, .. }) = table.model_of(drive)
+            else {
+                return Err(Error::NoDelay { robot: self.data.uid().into(), joint: name(joint) });
+            };
+            for (row, (_, steps)) in write.rows.iter().enumerate() {
+                let (value, longest) = (steps[column], model.longest());
+                if value > f64::from(longest) {
+                    let (of, expected) =
+                        (format!("joint {:?}", name(joint)), format!("at most {longest}, its max_delay"));
+                    return Err(Error::OutOfRange { argument, row, column, of, value, expected });
+                }
+            }
+            memories.push((column, memory.clone()));
+        }
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for (column, memory) in &memories {
+                    DelayedPd::set_delay(&mut env.drives.memory[memory.clone()], row[*column] as u32);
                 }
             });
         }

@@ -6,6 +6,7 @@ use crate::manager::{EnvId, env_list};
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
 use crate::objects::rows::{Numbers, Rows, Table};
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
+use std::sync::Arc;
 
 impl Robot<'_> {
     /// Positions that targets may have \[rad or m\], shape (N, dof, 2): the joint's own limits, narrowed by the limits of
@@ -140,11 +141,11 @@ impl RobotMut<'_> {
     /// [`set_stiffness`](Self::set_stiffness), which also names the errors.
     ///
     /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive law
-    /// bounds the speed of a joint.
+    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is negative or NaN; a joint without a drive. Then nothing is
-    /// set.
+    /// Wrong shape, unknown joint or environment, a value that is negative or NaN, or that its actuator model cannot take; a
+    /// joint without a drive. Then nothing is set.
     #[doc(alias = "max_velocity")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qvel_limits<'t>(
@@ -155,6 +156,26 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let write = self.checked_numbers("set_qvel_limits", Numbers::Limit, limits.into(), joint_ids, env_ids)?;
         let drives = self.driven("set_qvel_limits", &write.joints)?;
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        for (row, (_, values)) in write.rows.iter().enumerate() {
+            for &(column, joint, drive) in &drives {
+                let (value, gains) = (values[column], table.drives[drive].initial);
+                let checked = table
+                    .model_of(drive)
+                    .map_or(Ok(()), |explicit| explicit.model.law().check(&Gains { max_velocity: value, ..gains }));
+                checked.map_err(|expected| {
+                    let (argument, of) = ("set_qvel_limits", format!("joint {:?}", self.data.joint_names()[joint]));
+                    Error::OutOfRange {
+                        argument,
+                        row,
+                        column,
+                        of,
+                        value,
+                        expected: format!("right for its model: {expected}"),
+                    }
+                })?;
+            }
+        }
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 for &(column, _, drive) in &drives {
