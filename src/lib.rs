@@ -27,6 +27,6 @@ pub mod prelude {
         DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, IdealPd, IkCfg, IkResult, IkTask, Integrator,
         InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId,
         ObjectShape, PerJoint, Posture, Result, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId,
-        SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
+        SimulationManager, SimulationManagerCfg, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WrenchFrame,
     };
 }

@@ -16,6 +16,7 @@ use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
+use crate::wrenches::Wrenches;
 use ::scene::Pose;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -528,11 +529,15 @@ impl Simulation {
             .flat_map(|(old, new)| old.joints.iter().zip(&new.joints))
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
+        let bodies: Vec<Option<usize>> = (0..old_model.nbody())
+            .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
+            .collect();
         let parts = PartTransfer::new(old, self);
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
                 old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
+            let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -551,6 +556,9 @@ impl Simulation {
                     parts.write(&part_state, data);
                     data.set_time(time);
                 });
+                if wrenches != Wrenches::default() {
+                    env.set_wrenches(|mine| *mine = wrenches);
+                }
                 env.take_history(&history);
             });
         }

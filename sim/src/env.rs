@@ -13,6 +13,7 @@
 use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts};
+use crate::wrenches::Wrenches;
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -68,6 +69,8 @@ pub struct Env {
     /// Whether what MuJoCo solves was last solved for the present state, not for the one before the last step.
     solved_now: bool,
     seldom: Box<Seldom>,
+    /// What a user applies to bodies; most environments have none.
+    wrenches: Option<Box<Wrenches>>,
 }
 
 /// What a good step does not touch.
@@ -100,6 +103,7 @@ impl Env {
             raw_quats: RawQuats::new(model),
             solved_now: true,
             seldom: Box::default(),
+            wrenches: None,
         };
         let initial = env.saved();
         env.refresh(&initial);
@@ -129,11 +133,40 @@ impl Env {
         self.seldom.inputs.save(&self.data);
     }
 
+    /// What a user applies to bodies.
+    pub(crate) fn wrenches(&self) -> &Wrenches {
+        static NONE: Wrenches = Wrenches { list: Vec::new(), weightless: Vec::new() };
+        self.wrenches.as_deref().unwrap_or(&NONE)
+    }
+
+    /// Changes what a user applies to bodies; it is no state: what was computed of the state stays right.
+    pub(crate) fn set_wrenches(&mut self, change: impl FnOnce(&mut Wrenches)) {
+        let wrenches = self.wrenches.get_or_insert_default();
+        wrenches.clear(&mut self.data);
+        change(wrenches);
+        wrenches.apply(&mut self.data);
+        if **wrenches == Wrenches::default() {
+            self.wrenches = None;
+        }
+        self.seldom.inputs.save(&self.data);
+    }
+
+    /// Makes drives and wrenches act on the next `mj_step2`.
+    fn apply_inputs(&mut self) {
+        self.drives.apply(&mut self.data);
+        if let Some(wrenches) = &self.wrenches {
+            wrenches.apply(&mut self.data);
+        }
+    }
+
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.data.reset();
         self.data.take_warnings();
         self.drives.reset();
+        if let Some(wrenches) = &mut self.wrenches {
+            wrenches.list.clear();
+        }
         self.diverged = None;
         self.steps = 0;
         self.solved_now = true;
@@ -275,7 +308,7 @@ impl Env {
         efforts: &mut Vec<f64>,
         capture: Option<&Capture>,
     ) -> Result<(), EngineError> {
-        self.drives.apply(&mut self.data);
+        self.apply_inputs();
         if self.data.model().integrator() == mj::mjINT_RK4 {
             // mj_step2 would integrate with Euler, whatever the model says.
             self.data.step()?;
@@ -309,7 +342,7 @@ impl Env {
         let before = &mut scratch.before;
         self.save_present(before);
         loop {
-            self.drives.apply(&mut self.data);
+            self.apply_inputs();
             let done = self.data.step2().and_then(|()| self.capture(before, capture));
             match judge(done, &self.data.take_warnings()) {
                 Verdict::Good => break,

@@ -31,6 +31,7 @@ mod sensor_list;
 pub mod source;
 pub mod urdf;
 pub mod visible;
+mod wrenches;
 
 pub use ::scene::pattern;
 pub use description::{LinkId, RobotDescription};
@@ -54,3 +55,4 @@ pub use sensor_list::SensorId;
 pub use source::Source;
 pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};
 pub use visible::{MaskId, Still, Visible};
+pub use wrenches::WrenchFrame;

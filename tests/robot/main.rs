@@ -5,3 +5,4 @@ mod quadruped;
 mod root;
 mod standing;
 mod state;
+mod wrenches;

@@ -8,6 +8,7 @@ pub mod robot;
 mod robot_drives;
 mod robot_limits;
 mod robot_state;
+mod robot_wrenches;
 mod rows;
 pub mod shape;
 pub mod terrain;

@@ -275,6 +275,11 @@ impl<'a> Robot<'a> {
         Self { data, simulation, index }
     }
 
+    /// Which of the simulation's robots it is.
+    pub(super) fn index(&self) -> usize {
+        self.index
+    }
+
     pub(super) fn indexing(&self) -> &'a RobotIndex {
         &self.simulation.robots[self.index]
     }
