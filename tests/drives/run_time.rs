@@ -223,8 +223,11 @@ fn gains_stay_when_the_world_changes() {
     assert_close(world.view().get_qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT, "the law of the new gains");
 }
 
-/// One mistake in a call of one of the setters, and what its message says.
-type Mistake = (fn(&mut kinetoscope::sim::RobotMut<'_>) -> Result<()>, &'static [&'static str]);
+/// A call of one of the setters.
+type Call = fn(&mut kinetoscope::sim::RobotMut<'_>) -> Result<()>;
+
+/// One mistake in a call, and what its message says.
+type Mistake = (Call, &'static [&'static str]);
 
 const MISTAKES: &[Mistake] = &[
     (|r| r.set_stiffness(&array![[1.0]], None, None), &["set_stiffness has shape [1, 1]", "[3, 2]", "one row for all"]),
@@ -274,7 +277,7 @@ fn mistakes_are_errors_and_nothing_is_set() {
 /// Joints without a drive cannot be given one, and MuJoCo's own actuators keep their gains: both say what to do.
 #[test]
 fn drives_that_cannot_change_say_why() {
-    let calls: [(&str, fn(&mut kinetoscope::sim::RobotMut<'_>) -> Result<()>); 5] = [
+    let calls: [(&str, Call); 5] = [
         ("set_stiffness", |r| r.set_stiffness(&array![[1.0]], None, None)),
         ("set_damping", |r| r.set_damping(&array![[1.0]], None, None)),
         ("set_drive_type", |r| r.set_drive_type(DriveType::Force, None, None)),
