@@ -8,6 +8,9 @@ use crate::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::plan::PlanError;
+use kinetoscope::sim::env::Env;
+use kinetoscope::sim::mj::Buffers;
+use std::sync::Arc;
 
 const EXACT: f64 = 1e-9;
 const H: f64 = 0.01;
@@ -178,6 +181,41 @@ fn delayed_targets_arrive_in_their_order_in_each_environment() {
         world.sim.reset(None).unwrap();
         assert_eq!(world.view().get_delay().column(0).to_vec(), [0, 1, 3, 6]);
     }
+}
+
+/// A step that is done again, because its buffers were too small, is one step of the delay line.
+#[test]
+fn a_step_that_is_done_again_delays_nothing_twice() {
+    let joints = ["a", "b", "c"].map(|name| Joint::wheel(name, M).range(-0.02, 0.02));
+    let world = world(&joints, with(DelayedPd { delay: 3, max_delay: 0 }, 25.0, 1.0), weightless());
+    let sized = |buffers: Buffers| {
+        let (model, drives) = world.sim.batch().read(0, |env| (env.data().model().clone(), env.drives.clone()));
+        let mut env = Env::new(&model.with_buffers(buffers), &Arc::clone(drives.table())).unwrap();
+        env.drives = drives;
+        env
+    };
+    // One size for each line of MuJoCo: rows of constraints on 2.2.2, one arena on 4.x.
+    let huge = Buffers { contacts: 100, constraints: 100, arena_bytes: 1 << 20 };
+    let sizes = (0..40).map(|i| Buffers { constraints: 1, arena_bytes: (512.0 * 1.15_f64.powi(i)) as usize, ..huge });
+    let mut in_motion = 0;
+    for size in sizes {
+        let (mut small, mut large) = (sized(size), sized(huge));
+        let before = small.growths();
+        for n in 0..60 {
+            for env in [&mut small, &mut large] {
+                for drive in 0..3 {
+                    // The stops are hit one after the other: each needs a row more.
+                    env.drives.feedforward[drive] = 20.0 * (0.3 * f64::from(n) - drive as f64).sin();
+                }
+                step(env);
+            }
+            assert_eq!(small.data().qpos(), large.data().qpos(), "step {n}, {size:?}");
+            assert_eq!(small.drives, large.drives, "step {n}, {size:?}");
+        }
+        in_motion += small.growths() - before;
+        assert_eq!(large.growths(), 0);
+    }
+    assert!(in_motion > 0, "some step was done again");
 }
 
 /// Underdamped second order: M q'' = kp (q* - q) - kd q' from rest,
