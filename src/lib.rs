@@ -23,10 +23,11 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        ActuatorIndex, BodyType, ComponentCfg, Diagnostic, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes,
-        EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, MaskId,
-        MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Result, RigidObjectCfg,
-        RobotCfg, RobotId, Rollout, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, Snapshot,
-        SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
+        ActuatorIndex, BodyType, ComponentCfg, Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg,
+        EntityTypes, EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex,
+        LightCfg, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties,
+        Property, Randomization, RandomizationError, Result, RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg,
+        SensorId, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip,
+        UrdfCfg,
     };
 }

@@ -123,6 +123,15 @@ impl Env {
         self.refresh(&good);
     }
 
+    /// Goes on with another model of the same sizes, after a forward pass.
+    pub(crate) fn set_model(&mut self, model: Model) {
+        self.raw_quats.restore(&mut self.data);
+        let good = self.saved();
+        self.data.set_model(model);
+        self.solved_now = true;
+        self.refresh(&good);
+    }
+
     /// Sets controls, which are no state: what was computed of the state stays right.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
         change(self.data.ctrl_mut());

@@ -7,6 +7,7 @@ use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::pattern::PatternError;
+use crate::randomization::RandomizationError;
 use crate::snapshot::SnapshotError;
 use crate::source::Source;
 use crate::urdf::UrdfError;
@@ -287,6 +288,9 @@ pub enum Error {
         /// Why.
         fault: String,
     },
+    /// A property of an environment cannot be drawn or set.
+    #[error(transparent)]
+    Randomization(#[from] RandomizationError),
     /// A snapshot cannot be read, or is of something else.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),

@@ -27,6 +27,7 @@ mod manager;
 pub mod mj;
 pub mod mjcf;
 pub mod objects;
+pub mod randomization;
 pub mod rollout;
 mod sensor_list;
 pub mod snapshot;
@@ -52,6 +53,7 @@ pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObje
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
+pub use randomization::{Draw, Properties, Property, Randomization, RandomizationError};
 pub use rollout::Rollout;
 pub use sensor_list::SensorId;
 pub use snapshot::{Snapshot, SnapshotError};

@@ -268,6 +268,8 @@ pub struct SimulationManager {
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
+    /// How often properties were drawn for each environment.
+    pub(crate) draws: Vec<u64>,
 }
 
 impl SimulationManager {
@@ -287,6 +289,7 @@ impl SimulationManager {
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(cfg.substeps);
         let visuals = VisualCache::default();
+        let draws = vec![0; cfg.num_envs];
         Ok(Self {
             serial,
             cfg,
@@ -297,6 +300,7 @@ impl SimulationManager {
             diagnostics: Vec::new(),
             simulation,
             sensors,
+            draws,
         })
     }
 
@@ -401,6 +405,7 @@ impl SimulationManager {
                 None => diagnostics.push(diagnostic.clone()),
             }
         }
+        simulation.carry_properties(&self.simulation)?;
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
         mj::release_freed();

@@ -186,7 +186,6 @@ impl SimulationManager {
             })?;
             mine
         })?;
-        drop(work);
         let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
         for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
             entries.push(entry);

@@ -39,8 +39,8 @@ fn a_rollout_is_stepping_by_hand_and_disturbs_nothing() {
         let present = sim.snapshot(ALL).unwrap();
         for t in 0..STEPS {
             let now = controls.index_axis(Axis(1), t);
-            sim.robot_mut(ids.arm).set_qpos(&now.slice(s![.., ..6]), None, None).unwrap();
-            sim.mjcf_part_mut(ids.machine).set_ctrl(&now.slice(s![.., 6..]), None, None).unwrap();
+            sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
+            sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
             sim.update(1);
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }

@@ -119,6 +119,9 @@ pub struct DriveState {
     pub effort: Box<[f64]>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Shared<f64>,
+    /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
+    /// the model holds the other half of it: they change together.
+    damping: Shared<f64>,
 }
 
 impl DriveState {
@@ -135,6 +138,7 @@ impl DriveState {
             feedforward: no_targets.clone(),
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
+            damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
         }
     }
@@ -163,7 +167,17 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
-    /// Everything that may differ between environments: three gains of each drive, its targets (position, velocity,
+    /// Sets the gains of a drive.
+    pub(crate) fn set_gains(&mut self, drive: usize, gains: Gains) {
+        self.gains.put(drive, gains);
+    }
+
+    /// Sets coefficients of the damping that is integrated with the drives.
+    pub(crate) fn set_damping(&mut self, damping: &[f64]) {
+        damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
+    }
+
+    /// What [`restoring`](Self::set_numbers) a state brings back: three gains of each drive, its targets (position, velocity,
     /// feed-forward) and its effort, then the applied forces.
     pub(crate) fn numbers(&self) -> Vec<f64> {
         let gains = self.gains.iter().flat_map(|g| [g.kp, g.kd, g.max_effort]);
@@ -199,7 +213,7 @@ impl DriveState {
     pub fn apply(&self, data: &mut mj::Data) {
         let table = &*self.initial.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
-        implicit::apply_damping(table, data);
+        implicit::apply_damping(table, &self.damping, data);
         for (i, drive) in table.drives.iter().enumerate() {
             let target =
                 Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
