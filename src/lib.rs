@@ -27,7 +27,7 @@ pub mod prelude {
         EntityTypes, EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex,
         LightCfg, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties,
         Property, Randomization, RandomizationError, Result, RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg,
-        SensorId, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip,
-        UrdfCfg,
+        SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
+        TerrainCfg, TerrainId, Tip, UrdfCfg,
     };
 }

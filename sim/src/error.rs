@@ -8,6 +8,7 @@ use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
+use crate::shard::ShardError;
 use crate::snapshot::SnapshotError;
 use crate::source::Source;
 use crate::urdf::UrdfError;
@@ -288,6 +289,9 @@ pub enum Error {
         /// Why.
         fault: String,
     },
+    /// The launcher's variables say no part of several processes.
+    #[error(transparent)]
+    Shard(#[from] ShardError),
     /// A property of an environment cannot be drawn or set.
     #[error(transparent)]
     Randomization(#[from] RandomizationError),

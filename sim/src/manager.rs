@@ -14,6 +14,7 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData,
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::sensor_list::{SensorId, SensorList};
+use crate::shard::Shard;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::Marker;
 use nalgebra::Vector3;
@@ -48,9 +49,11 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of random numbers. The physics has none; the noise of sensors is keyed by this seed, the environment and the
-    /// name of the sensor.
+    /// Seed of random numbers. The physics has none; the noise of sensors and the draws of properties are keyed by this seed,
+    /// the global index of the environment and what they are for.
     pub seed: u64,
+    /// Which part of the environments this process has, where several simulate together.
+    pub shard: Shard,
     /// Threads that step; every core where unset.
     pub threads: Option<usize>,
     /// Distance of environments in the overview \[m\].
@@ -110,6 +113,7 @@ impl Default for SimulationManagerCfg {
             solver_iterations: 100,
             friction: [1.0, 0.005, 0.0001],
             seed: 0,
+            shard: Shard::default(),
             threads: None,
             arena_space: 5.0,
             ground: Some(GroundCfg::default()),
@@ -144,6 +148,14 @@ impl SimulationManagerCfg {
         }
         if self.num_envs > MAX_ENVS {
             return fail("num_envs", &self.num_envs, "one process can hold at most 1048576 environments");
+        }
+        let Shard { rank, world } = self.shard;
+        if rank >= world || world.checked_mul(self.num_envs).is_none() {
+            return fail(
+                "shard",
+                &format!("rank {rank} of {world}"),
+                "the rank must be 0 to the number of processes - 1",
+            );
         }
         if !positive(self.physics_dt) || self.physics_dt > 1.0 {
             return fail("physics_dt", &self.physics_dt, "it must be above 0 and at most 1 second, such as 0.01");
@@ -201,6 +213,11 @@ impl SimulationManagerCfg {
             }
         }
         Ok(())
+    }
+
+    /// Global index of the first environment of this process.
+    pub fn first_env(&self) -> usize {
+        self.shard.rank * self.num_envs
     }
 
     pub(crate) fn physics_option(&self) -> PhysicsOption {
@@ -465,7 +482,7 @@ impl SimulationManager {
             gravity: self.cfg.gravity,
             name: "".into(),
             seed: self.cfg.seed,
-            first_env: 0,
+            first_env: self.cfg.first_env(),
             bodies: self.contents.body_names(),
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),

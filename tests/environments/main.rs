@@ -3,5 +3,6 @@
 
 mod randomize;
 mod rollout;
+mod shard;
 mod snapshot;
 mod worlds;

@@ -171,7 +171,7 @@ impl SimulationManager {
 
     /// The random numbers of the next draw for an environment, and what they are for.
     fn keys(&self) -> impl Fn(usize, &str) -> Random + use<> {
-        let (seed, first, draws) = (self.cfg.seed, 0, self.draws.clone());
+        let (seed, first, draws) = (self.cfg.seed, self.cfg.first_env(), self.draws.clone());
         move |env, what| Random::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
     }
 
