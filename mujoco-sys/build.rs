@@ -153,7 +153,8 @@ fn write_bindings(installation: &Installation, path: &Path) {
 
 /// Accessors of all arrays of `mjModel` and `mjData`, generated from MuJoCo's own X-macros: no stride is typed by hand.
 ///
-/// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements.
+/// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements; `model::each`
+/// goes through the arrays of a model.
 fn write_fields(installation: &Installation, path: &Path) {
     let text = fs::read_to_string(installation.header("mjxmacro.h")).expect("mjxmacro.h stands beside mujoco.h");
     let lists = x_macros(&text);
@@ -171,9 +172,15 @@ fn write_fields(installation: &Installation, path: &Path) {
         }
         assert!(arrays.len() > 50, "mjxmacro.h: only {} arrays found for {module}", arrays.len());
         writeln!(out, "pub mod {module} {{\n    use crate::*;").unwrap();
+        let mut each = String::new();
         for (name, (kind, rows, cols)) in arrays {
             let kind = rust_type(kind);
             let (rows, cols) = (size_expression(rows), size_expression(cols));
+            writeln!(
+                each,
+                "        array(ModelArray {{ name: \"{name}\", kind: \"{kind}\", pointer: ::std::mem::offset_of!(mjModel, {name}), bytes: unsafe {{ ({rows}) * ({cols}) }} * ::std::mem::size_of::<{kind}>() }});"
+            )
+            .unwrap();
             let (arguments, owner) = if module == "model" {
                 ("m: *const mjModel", "m")
             } else {
@@ -190,6 +197,14 @@ fn write_fields(installation: &Installation, path: &Path) {
             writeln!(
                 out,
                 "    pub unsafe fn {name}_mut<'a>({arguments}) -> &'a mut [{kind}] {{ unsafe {{ super::slice_mut((*{owner}).{name}, ({rows}) * ({cols})) }} }}"
+            )
+            .unwrap();
+        }
+        if module == "model" {
+            writeln!(
+                out,
+                "    pub unsafe fn each(m: *const mjModel, mut array: impl FnMut(ModelArray)) {{\n{each}    }}\n    \
+                 pub use super::ModelArray;"
             )
             .unwrap();
         }

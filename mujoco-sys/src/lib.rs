@@ -31,5 +31,18 @@ pub mod fields {
         if len == 0 || pointer.is_null() { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(pointer, len) } }
     }
 
+    /// An array of `mjModel`, as `model::each` lists them.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct ModelArray {
+        /// MuJoCo's name.
+        pub name: &'static str,
+        /// Rust's name of the type of an element.
+        pub kind: &'static str,
+        /// Where in `mjModel` its pointer is.
+        pub pointer: usize,
+        /// Its size.
+        pub bytes: usize,
+    }
+
     include!(concat!(env!("OUT_DIR"), "/fields.rs"));
 }

@@ -15,11 +15,13 @@ use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
+use crate::randomization::{Maker, OwnValues, Tables};
+use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
 use ::scene::Pose;
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A compiled scene and its environments.
 #[derive(Debug)]
@@ -36,6 +38,14 @@ pub(crate) struct Simulation {
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
     pub(crate) start: Arc<Start>,
+    /// Which numbers a state has.
+    pub(crate) layout: Arc<Layout>,
+    /// Where properties are that environments may have for themselves.
+    pub(crate) tables: OnceLock<Arc<Tables>>,
+    /// Makes models with such properties; made when the first is drawn.
+    pub(crate) maker: Option<Maker>,
+    /// What each environment has for itself.
+    pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
     /// Pairs of bodies that are excluded from contact because they overlap at the start.
     pub(crate) excluded: Vec<(String, String)>,
 }
@@ -439,6 +449,10 @@ impl Built {
             xml: self.xml,
             diagnostics,
             start: self.start,
+            layout: Arc::new(Layout::of(&self.model, &self.table)),
+            tables: OnceLock::new(),
+            maker: None,
+            own_values: vec![None; cfg.num_envs],
             excluded,
         };
         simulation.reset(&vec![true; cfg.num_envs]);

@@ -127,6 +127,15 @@ impl Env {
         self.refresh(&good);
     }
 
+    /// Goes on with another model of the same sizes, after a forward pass.
+    pub(crate) fn set_model(&mut self, model: Model) {
+        self.raw_quats.restore(&mut self.data);
+        let good = self.saved();
+        self.data.set_model(model);
+        self.solved_now = true;
+        self.refresh(&good);
+    }
+
     /// Sets controls, which are no state: what was computed of the state stays right.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
         change(self.data.ctrl_mut());
@@ -214,6 +223,32 @@ impl Env {
             warnings: self.seldom.warnings,
             growths: self.seldom.growths,
         }
+    }
+
+    /// Everything that decides how the environment goes on.
+    pub(crate) fn remember(&self) -> EnvState {
+        let (mut motion, mut inputs) = (Motion::default(), Inputs::default());
+        self.save_present(&mut motion);
+        inputs.save(&self.data);
+        let (drives, diverged) = (self.drives.numbers(), self.diverged.clone());
+        EnvState { motion, inputs, drives, wrenches: self.wrenches().clone(), steps: self.steps, diverged }
+    }
+
+    /// Goes on from `state`, which is of an environment of a model with the same layout, and which
+    /// [fits](EnvState::fits).
+    pub(crate) fn recall(&mut self, state: &EnvState) {
+        self.drives.set_numbers(&state.drives);
+        // A file that was made by hand may name any body.
+        let bodies = self.data.model().nbody();
+        let wrenches = state.wrenches.moved(|body| (body < bodies).then_some(body));
+        self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
+        self.diverged.clone_from(&state.diverged);
+        self.steps = state.steps;
+        self.solved_now = true;
+        self.seldom.solved.clear();
+        self.seldom.inputs.clone_from(&state.inputs);
+        self.go_to(&state.motion);
+        self.refresh(&state.motion);
     }
 
     /// Positions, velocities and warm start, to carry over to another model.
@@ -433,6 +468,29 @@ impl Env {
         // The last good state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
+    }
+}
+
+/// What decides how an environment goes on. Quaternions are as they were before the last forward pass.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EnvState {
+    pub motion: Motion,
+    pub inputs: Inputs,
+    /// As [`DriveState::numbers`] gives them.
+    pub drives: Vec<f64>,
+    pub wrenches: Wrenches,
+    pub steps: u64,
+    pub diverged: Option<Box<EnvStatus>>,
+}
+
+impl EnvState {
+    /// Whether it has as many numbers of each kind as `other`.
+    pub(crate) fn fits(&self, other: &Self) -> bool {
+        let lengths = |state: &Self| {
+            let (inputs, active) = state.inputs.values();
+            [state.motion.values().len(), inputs.len(), active.len(), state.drives.len()]
+        };
+        lengths(self) == lengths(other)
     }
 }
 

@@ -7,6 +7,9 @@ use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::pattern::PatternError;
+use crate::randomization::RandomizationError;
+use crate::shard::ShardError;
+use crate::snapshot::SnapshotError;
 use crate::source::Source;
 use crate::urdf::UrdfError;
 use std::path::PathBuf;
@@ -348,6 +351,15 @@ pub enum Error {
         /// Why.
         fault: String,
     },
+    /// The launcher's variables say no part of several processes.
+    #[error(transparent)]
+    Shard(#[from] ShardError),
+    /// A property of an environment cannot be drawn or set.
+    #[error(transparent)]
+    Randomization(#[from] RandomizationError),
+    /// A snapshot cannot be read, or is of something else.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
     /// A file cannot be read or written.
     #[error("{path}: {error}")]
     File {

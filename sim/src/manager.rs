@@ -14,6 +14,7 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData,
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::sensor_list::{SensorId, SensorList};
+use crate::shard::Shard;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::Marker;
 use nalgebra::Vector3;
@@ -48,9 +49,11 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of random numbers. The physics has none; the noise of sensors is keyed by this seed, the environment and the
-    /// name of the sensor.
+    /// Seed of random numbers. The physics has none; the noise of sensors and the draws of properties are keyed by this seed,
+    /// the global index of the environment and what they are for.
     pub seed: u64,
+    /// Which part of the environments this process has, where several simulate together.
+    pub shard: Shard,
     /// Threads that step; every core where unset.
     pub threads: Option<usize>,
     /// Distance of environments in the overview \[m\].
@@ -110,6 +113,7 @@ impl Default for SimulationManagerCfg {
             solver_iterations: 100,
             friction: [1.0, 0.005, 0.0001],
             seed: 0,
+            shard: Shard::default(),
             threads: None,
             arena_space: 5.0,
             ground: Some(GroundCfg::default()),
@@ -144,6 +148,14 @@ impl SimulationManagerCfg {
         }
         if self.num_envs > MAX_ENVS {
             return fail("num_envs", &self.num_envs, "one process can hold at most 1048576 environments");
+        }
+        let Shard { rank, world } = self.shard;
+        if rank >= world || world.checked_mul(self.num_envs).is_none() {
+            return fail(
+                "shard",
+                &format!("rank {rank} of {world}"),
+                "the rank must be 0 to the number of processes - 1",
+            );
         }
         if !positive(self.physics_dt) || self.physics_dt > 1.0 {
             return fail("physics_dt", &self.physics_dt, "it must be above 0 and at most 1 second, such as 0.01");
@@ -203,6 +215,11 @@ impl SimulationManagerCfg {
         Ok(())
     }
 
+    /// Global index of the first environment of this process.
+    pub fn first_env(&self) -> usize {
+        self.shard.rank * self.num_envs
+    }
+
     pub(crate) fn physics_option(&self) -> PhysicsOption {
         PhysicsOption {
             timestep: self.physics_dt / f64::from(self.substeps),
@@ -258,16 +275,18 @@ static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 #[derive(Debug)]
 pub struct SimulationManager {
     serial: u64,
-    cfg: SimulationManagerCfg,
-    contents: Contents,
+    pub(crate) cfg: SimulationManagerCfg,
+    pub(crate) contents: Contents,
     visuals: VisualCache,
     /// What ray casters have built.
     ray_assets: RayAssets,
     /// Threads of the sensors.
     crew: Crew,
     diagnostics: Vec<Diagnostic>,
-    simulation: Simulation,
-    sensors: SensorList,
+    pub(crate) simulation: Simulation,
+    pub(crate) sensors: SensorList,
+    /// How often properties were drawn for each environment.
+    pub(crate) draws: Vec<u64>,
 }
 
 impl SimulationManager {
@@ -287,6 +306,7 @@ impl SimulationManager {
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(cfg.substeps);
         let visuals = VisualCache::default();
+        let draws = vec![0; cfg.num_envs];
         Ok(Self {
             serial,
             cfg,
@@ -297,6 +317,7 @@ impl SimulationManager {
             diagnostics: Vec::new(),
             simulation,
             sensors,
+            draws,
         })
     }
 
@@ -401,6 +422,7 @@ impl SimulationManager {
                 None => diagnostics.push(diagnostic.clone()),
             }
         }
+        simulation.carry_properties(&self.simulation)?;
         simulation.carry_over(&self.simulation);
         self.simulation = simulation;
         mj::release_freed();
@@ -460,7 +482,7 @@ impl SimulationManager {
             gravity: self.cfg.gravity,
             name: "".into(),
             seed: self.cfg.seed,
-            first_env: 0,
+            first_env: self.cfg.first_env(),
             bodies: self.contents.body_names(),
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),

@@ -75,6 +75,33 @@ impl Wrenches {
         }
     }
 
+    /// All of it as numbers: 14 of each wrench after their count, then the bodies without weight.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.list.len() as f64];
+        for Wrench { of, body, axes, force, torque } in &self.list {
+            let q = axes.map_or([0.0; 4], |axes| [axes.w, axes.i, axes.j, axes.k]);
+            numbers.extend([of.0 as f64, of.1 as f64, *body as f64, f64::from(axes.is_some())]);
+            numbers.extend(q.iter().chain(force).chain(torque));
+        }
+        numbers.extend(self.weightless.iter().map(|&body| body as f64));
+        numbers
+    }
+
+    /// What [`numbers`](Self::numbers) gave; `None` where they are no wrenches.
+    pub(crate) fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        let (&count, rest) = numbers.split_first()?;
+        let (list, weightless) = rest.split_at_checked((count as usize).checked_mul(14)?)?;
+        let wrench = |&[robot, link, body, turned, w, i, j, k, fx, fy, fz, tx, ty, tz]: &[f64; 14]| Wrench {
+            of: (robot as usize, link as usize),
+            body: body as usize,
+            axes: (turned > 0.0).then(|| UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))),
+            force: Vector3::new(fx, fy, fz),
+            torque: Vector3::new(tx, ty, tz),
+        };
+        let list = list.as_chunks::<14>().0.iter().map(wrench).collect();
+        Some(Self { list, weightless: weightless.iter().map(|&body| body as usize).collect() })
+    }
+
     /// Writes what acts on the bodies that are named here; others keep what they have.
     pub(crate) fn apply(&self, data: &mut Data) {
         self.clear(data);

@@ -144,6 +144,18 @@ impl<T: Copy + PartialEq> Shared<T> {
     }
 }
 
+impl Shared<f64> {
+    /// Takes these values, bit by bit; shares `common` where they are those.
+    fn take(&mut self, values: &[f64], common: &Self) {
+        let same = |list: &[f64]| list.iter().map(|x| x.to_bits()).eq(values.iter().map(|x| x.to_bits()));
+        if same(common) {
+            self.clone_from(common);
+        } else if !same(self) {
+            self.0 = values.into();
+        }
+    }
+}
+
 /// What environments start with.
 #[derive(Debug, PartialEq)]
 struct Initial {
@@ -177,6 +189,9 @@ pub struct DriveState {
     pub applied: Shared<f64>,
     /// What explicit models keep from step to step.
     pub memory: Box<[f64]>,
+    /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
+    /// the model holds the other half of it: they change together.
+    damping: Shared<f64>,
 }
 
 impl DriveState {
@@ -196,6 +211,7 @@ impl DriveState {
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
             memory: table.models.iter().flat_map(|drive| drive.model.law().memory()).collect(),
+            damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
         };
         state.start();
@@ -271,6 +287,73 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
+    /// Sets gains in torque units and the effort limit of a drive; its drive type stays, and gives them back in its unit.
+    pub(crate) fn set_gains(&mut self, drive: usize, [kp, kd, max_effort]: [f64; 3]) {
+        let old = self.gains[drive];
+        if [old.kp, old.kd, old.max_effort] == [kp, kd, max_effort] {
+            return;
+        }
+        let unit = match self.settings[drive] {
+            Setting { drive_type: DriveType::Acceleration, inertia: Some(inertia), .. } => inertia,
+            _ => 1.0,
+        };
+        self.set(drive, |setting| (setting.stiffness, setting.damping) = (kp / unit, kd / unit));
+        let passive = self.settings[drive].drive_type == DriveType::None;
+        self.set_limits(drive, |gains| {
+            if passive { Gains { max_effort, ..gains } } else { Gains { kp, kd, max_effort, ..gains } }
+        });
+    }
+
+    /// Sets coefficients of the damping that is integrated with the drives.
+    pub(crate) fn set_damping(&mut self, damping: &[f64]) {
+        damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
+    }
+
+    /// What [`restoring`](Self::set_numbers) a state brings back: ten numbers of each drive (gains and limits, what they
+    /// were made of, range), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
+    /// explicit models keep.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let settings =
+            self.gains.iter().zip(&*self.settings).zip(&*self.ranges).flat_map(|((gains, setting), range)| {
+                let drive_type =
+                    DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
+                let Setting { stiffness, damping, inertia, .. } = *setting;
+                let Gains { kp, kd, max_effort, max_velocity } = *gains;
+                // No inertia is 0.
+                let inertia = inertia.unwrap_or(0.0);
+                [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, range[0], range[1]]
+            });
+        let targets =
+            [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied, &self.memory];
+        settings.chain(targets.into_iter().flatten().copied()).collect()
+    }
+
+    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number.
+    pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
+        let n = self.position.len();
+        let (settings, rest) = numbers.split_at(10 * n);
+        for (i, &numbers) in settings.as_chunks::<10>().0.iter().enumerate() {
+            let [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] = numbers;
+            let drive_type = DriveType::ALL.get(drive_type as usize).copied().unwrap_or_default();
+            let inertia = Some(inertia).filter(|inertia| *inertia > 0.0);
+            self.gains.put(i, Gains { kp, kd, max_effort, max_velocity });
+            self.settings.put(i, Setting { drive_type, stiffness, damping, inertia });
+            self.ranges.put(i, [low, high]);
+        }
+        let (position, rest) = rest.split_at(n);
+        let (velocity, rest) = rest.split_at(n);
+        let (feedforward, rest) = rest.split_at(n);
+        let (effort, rest) = rest.split_at(n);
+        let (applied, memory) = rest.split_at(self.applied.len());
+        let initial = Arc::clone(&self.initial);
+        self.position.copy_from_slice(position);
+        self.velocity.take(velocity, &initial.no_targets);
+        self.feedforward.take(feedforward, &initial.no_targets);
+        self.effort.copy_from_slice(effort);
+        self.applied.take(applied, &initial.no_forces);
+        self.memory.copy_from_slice(memory);
+    }
+
     /// The model's drives.
     pub fn table(&self) -> &Arc<DriveTable> {
         &self.initial.table
@@ -280,7 +363,7 @@ impl DriveState {
     pub fn apply(&self, data: &mut mj::Data) {
         let table = &*self.initial.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
-        implicit::apply_damping(table, data);
+        implicit::apply_damping(table, &self.damping, data);
         for (i, drive) in table.drives.iter().enumerate() {
             let target = self.target(i);
             match drive.realization {
@@ -356,6 +439,13 @@ mod tests {
         copy.copy_from(&told, 0, 0);
         copy.copy_applied_from(&told, 0, 0);
         assert_eq!(copy, told);
+        let mut copy = other.clone();
+        copy.set_numbers(&told.numbers());
+        assert_eq!(copy, told);
+        copy.set_numbers(&other.numbers());
+        assert!(std::ptr::eq(&*copy.velocity, &*other.velocity) && copy == other, "shared again");
+        copy.set_numbers(&other.numbers().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
+        assert!(copy.feedforward[0].is_sign_negative() && copy.applied[0].is_sign_negative(), "to the last bit");
         told.set(0, |setting| setting.stiffness = 7.0);
         told.reset();
         assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");

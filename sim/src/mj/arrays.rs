@@ -116,6 +116,8 @@ model_arrays! {
     dof_damping: f64, "Viscous damping, (nv,).";
     dof_armature: f64, "Rotor inertia, (nv,).";
     dof_frictionloss: f64, "Dry friction, (nv,).";
+    dof_bodyid: i32, "Body each degree of freedom moves, (nv,).";
+    body_invweight0: f64, "Inverse inertia of bodies at qpos0, translation and rotation, (nbody, 2).";
     dof_invweight0: f64, "Diagonal of the inverse inertia at qpos0, (nv,).";
     tendon_frictionloss: f64, "Dry friction of tendons, (ntendon,).";
     geom_type: i32, "Geom types, (ngeom,).";

@@ -144,6 +144,16 @@ impl Data {
         &self.model
     }
 
+    /// Goes on with another model of the same sizes: one [edited](super::Editor) from what this one's model was compiled
+    /// as. What depends on the model is computed by the next forward pass.
+    ///
+    /// # Panics
+    /// The model is another one, or its buffers have other sizes.
+    pub(crate) fn set_model(&mut self, model: Model) {
+        assert!(model.fits(&self.model), "a model of other sizes");
+        self.model = model;
+    }
+
     pub(super) fn raw(&self) -> *const mj::mjData {
         self.raw.as_ptr()
     }

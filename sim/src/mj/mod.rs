@@ -15,6 +15,7 @@ mod arrays;
 mod beyond;
 mod control;
 mod data;
+mod editor;
 mod error;
 mod guard;
 mod jacobian;
@@ -31,6 +32,7 @@ pub mod words;
 
 pub use beyond::Beyond;
 pub use data::{Data, Overflow, Warning, WarningCounts};
+pub use editor::{DiagonalInertia, Editor};
 pub use error::{CompileError, EngineError};
 pub use look::{
     HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,

@@ -2,22 +2,35 @@
 
 use super::data::Overflow;
 use mujoco_sys as mj;
+use mujoco_sys::fields::model::{ModelArray, each};
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Owns what `mj_loadXML` returned; freed when the last [`Model`] is gone.
+/// Owns a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`); freed when the last [`Model`] is gone.
 #[derive(Debug)]
-struct Storage(NonNull<mj::mjModel>);
+pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
-// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled`, which is its only
-// owner then.
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which is
+// its only owner then.
 unsafe impl Send for Storage {}
 // SAFETY: once shared in a `Model`, nothing writes to it.
 unsafe impl Sync for Storage {}
 
+impl Storage {
+    pub(super) fn header(&self) -> &mj::mjModel {
+        // SAFETY: the model is alive as long as `self`; who writes to it borrows its owner mutably.
+        unsafe { self.0.as_ref() }
+    }
+
+    pub(super) fn header_mut(&mut self) -> &mut mj::mjModel {
+        // SAFETY: the model is alive, and `self`, its owner, is borrowed mutably.
+        unsafe { self.0.as_mut() }
+    }
+}
+
 impl Drop for Storage {
     fn drop(&mut self) {
-        // SAFETY: made by mj_loadXML, deleted once.
+        // SAFETY: made by MuJoCo, deleted once.
         unsafe { mj::mj_deleteModel(self.0.as_ptr()) };
     }
 }
@@ -46,14 +59,24 @@ impl Compiled {
         // SAFETY: a bitwise copy of the struct: its pointers lead into `storage`, which outlives it, and the copy is
         // never freed as a model (mjModel has no destructor of its own).
         let header = unsafe { std::ptr::read(self.0.0.as_ptr()) };
-        Model(Arc::new(Header { header, storage: Arc::new(self.0) }))
+        Model(Arc::new(Header { header, storage: Arc::new(self.0), own: Arc::default() }))
     }
 }
 
-/// A shallow `mjModel`: sizes and options of its own, arrays shared with the storage.
-struct Header {
+/// A shallow `mjModel`: sizes and options of its own, arrays shared with the storage but for those that are its own. It is
+/// one allocation no longer, so nothing that takes a model to be one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) may
+/// see it; stepping and reading go through its pointers.
+pub(super) struct Header {
     header: mj::mjModel,
     storage: Arc<Storage>,
+    own: Arc<[OwnArray]>,
+}
+
+/// An array that a model has for itself. Nothing writes to it once the model is made.
+pub(super) struct OwnArray {
+    pub(super) field: ModelArray,
+    /// In units that are aligned for every kind of element.
+    pub(super) memory: Box<[u64]>,
 }
 
 impl std::fmt::Debug for Header {
@@ -62,10 +85,18 @@ impl std::fmt::Debug for Header {
     }
 }
 
-// SAFETY: the pointers in `header` lead into `storage`, which is Send + Sync; nothing writes through them.
+// SAFETY: the pointers in `header` lead into `storage` and `own`, which are Send + Sync; nothing writes through them.
 unsafe impl Send for Header {}
 // SAFETY: as above.
 unsafe impl Sync for Header {}
+
+/// Where an array of a model begins; null where it is empty. `field` is one of `fields::model::each`.
+pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u8 {
+    // SAFETY: the offset is that of a pointer inside of the struct.
+    let pointer = unsafe { std::ptr::from_ref(model).byte_add(field.pointer) };
+    // SAFETY: a pointer stands there, whatever it points to.
+    unsafe { pointer.cast::<*const u8>().read() }
+}
 
 /// An immutable model, cheap to clone, shared by all environments and threads.
 #[derive(Clone, Debug)]
@@ -108,13 +139,79 @@ impl Model {
         &self.0.header
     }
 
+    /// Whether this is the very same model, buffer sizes included.
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// The same model with other buffer sizes, at least 1 of each: only the struct is copied, the arrays are shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
-        // SAFETY: bitwise copy of a plain C struct; its pointers lead into `storage`, which the copy keeps alive.
-        let mut header = unsafe { std::ptr::read(&self.0.header) };
+        let mut header = self.copy_header();
         set_buffers(&mut header, buffers);
-        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage) }))
+        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+    }
+
+    /// The struct alone; its pointers lead into what `self` keeps alive.
+    pub(super) fn copy_header(&self) -> mj::mjModel {
+        // SAFETY: bitwise copy of a plain C struct that is never freed as a model.
+        unsafe { std::ptr::read(&self.0.header) }
+    }
+
+    /// The same model with a changed struct and arrays of its own.
+    ///
+    /// # Safety
+    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own`, where
+    /// it has the size of its field.
+    pub(super) unsafe fn with_arrays(&self, header: mj::mjModel, own: Arc<[OwnArray]>) -> Self {
+        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own }))
+    }
+
+    /// The model as it was compiled: one allocation.
+    pub(super) fn compiled(&self) -> &mj::mjModel {
+        self.0.storage.header()
+    }
+
+    /// Whether data of the one can be used with the other: made from one compiled model, with equal buffer sizes.
+    pub(super) fn fits(&self, other: &Self) -> bool {
+        let sizes = |m: &mj::mjModel| {
+            #[cfg(mj4)]
+            let stack = m.narena;
+            #[cfg(not(mj4))]
+            let stack = m.nstack;
+            (m.nconmax, m.njmax, stack)
+        };
+        Arc::ptr_eq(&self.0.storage, &other.0.storage) && sizes(self.header()) == sizes(other.header())
+    }
+
+    /// Names and sizes \[bytes\] of the arrays that this model does not share with the one it was compiled as.
+    pub fn own_arrays(&self) -> impl Iterator<Item = (&'static str, usize)> {
+        self.0.own.iter().map(|array| (array.field.name, array.field.bytes))
+    }
+
+    /// Memory that this model has for itself: the struct and its own arrays \[bytes\]. Models that differ in buffer sizes
+    /// only share their own arrays.
+    pub fn own_bytes(&self) -> usize {
+        let array = |array: &OwnArray| size_of::<OwnArray>() + size_of_val(&*array.memory);
+        size_of::<Header>() + self.0.own.iter().map(array).sum::<usize>()
+    }
+
+    /// Memory of the arrays that models share \[bytes\].
+    pub fn shared_bytes(&self) -> usize {
+        self.header().nbuffer as usize
+    }
+
+    /// Names of the arrays that are not the very same memory in both models.
+    pub fn arrays_apart(&self, other: &Self) -> Vec<&'static str> {
+        let (mine, theirs) = (self.array_pointers(), other.array_pointers());
+        mine.iter().zip(&theirs).filter(|(mine, theirs)| mine.1 != theirs.1).map(|(mine, _)| mine.0).collect()
+    }
+
+    fn array_pointers(&self) -> Vec<(&'static str, *const u8)> {
+        let mut pointers = Vec::new();
+        // SAFETY: the model is alive.
+        unsafe { each(self.raw(), |field| pointers.push((field.name, array_pointer(self.header(), &field)))) };
+        pointers
     }
 
     /// The buffer sizes a [`Data`](super::Data) of this model is made with.
@@ -254,13 +351,13 @@ impl Model {
 }
 
 #[cfg(mj4)]
-fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
+pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
     // MuJoCo cannot allocate nothing.
     header.narena = buffers.arena_bytes.max(1) as i64;
 }
 
 #[cfg(not(mj4))]
-fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
+pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
     // With 0 MuJoCo leaves contacts or constraints out without a warning, drives among them.
     let as_int = |n: usize| i32::try_from(n.max(1)).unwrap_or(i32::MAX);
     header.nconmax = as_int(buffers.contacts);

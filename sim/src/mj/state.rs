@@ -101,6 +101,16 @@ impl Motion {
         &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
     }
 
+    /// All numbers, time first.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// What [`values`](Self::values) gave.
+    pub(crate) fn from_values(values: Vec<f64>) -> Self {
+        Self { values }
+    }
+
     /// Puts the values into `data`, which is of the same model (its buffers may be larger).
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
@@ -149,6 +159,26 @@ impl RawQuats {
 }
 
 impl Inputs {
+    /// All numbers; and which equalities are active, where that is part of the data.
+    pub(crate) fn values(&self) -> (&[f64], &[bool]) {
+        #[cfg(mj4)]
+        let active = &self.active[..];
+        #[cfg(not(mj4))]
+        let active = &[];
+        (&self.values, active)
+    }
+
+    /// What [`values`](Self::values) gave.
+    pub(crate) fn from_values(values: Vec<f64>, active: Vec<bool>) -> Self {
+        #[cfg(not(mj4))]
+        let _ = active;
+        Self {
+            values,
+            #[cfg(mj4)]
+            active,
+        }
+    }
+
     /// Takes the values from `data`, reusing this memory.
     pub fn save(&mut self, data: &Data) {
         self.values.clear();

@@ -69,10 +69,10 @@ impl ActuatorLaw for DelayedPd {
     }
 
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64 {
-        let (delay, ring) = (memory[DELAY] as usize, memory[RING..].as_chunks::<3>().0);
-        let heard = match delay {
+        let ring = memory[RING..].as_chunks::<3>().0;
+        let heard = match (memory[DELAY] as usize).min(ring.len()) {
             0 => *target,
-            _ => {
+            delay => {
                 let [position, velocity, feedforward] = ring[(memory[NEXT] as usize + ring.len() - delay) % ring.len()];
                 Target { position, velocity, feedforward }
             }
@@ -85,7 +85,7 @@ impl ActuatorLaw for DelayedPd {
         let ring = memory[RING..].as_chunks_mut::<3>().0;
         let slots = ring.len();
         if slots > 0 {
-            ring[next] = [target.position, target.velocity, target.feedforward];
+            ring[next % slots] = [target.position, target.velocity, target.feedforward];
             memory[NEXT] = ((next + 1) % slots) as f64;
         }
     }

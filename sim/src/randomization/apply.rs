@@ -1,0 +1,139 @@
+//! From properties to the model and the drives of an environment.
+
+use super::Property;
+use super::error::RandomizationError;
+use super::properties::{OwnValues, Properties};
+use super::tables::{FrictionPlace, dofs_of, friction_place};
+use crate::drive::table::DriveTable;
+use crate::env::Env;
+use crate::error::Result;
+use crate::mj::{DiagonalInertia, Editor, Model};
+
+/// Makes models of environments of one compiled scene.
+#[derive(Debug)]
+pub(crate) struct Maker {
+    editor: Editor,
+    base: Model,
+}
+
+/// What an environment gets.
+pub(crate) struct Made {
+    /// `None` where the one it has will do.
+    model: Option<Model>,
+    /// Of each drive: proportional and derivative gain, effort limit.
+    gains: Vec<(usize, [f64; 3])>,
+    /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
+    damping: Vec<f64>,
+}
+
+impl Maker {
+    /// For environments of what `base` was compiled as.
+    pub(crate) fn new(base: &Model) -> Result<Self> {
+        Ok(Self { editor: Editor::new(base)?, base: base.clone() })
+    }
+
+    /// What environment `index`, which is `env`, needs to have these properties. `own` are those it has, as
+    /// [`Properties::own`] gives them.
+    pub(crate) fn make(&mut self, properties: &Properties, own: &OwnValues, index: usize, env: &Env) -> Result<Made> {
+        let drives = env.drives.table();
+        properties.check(index)?;
+        let mut damping: Vec<f64> = drives.damped.iter().map(|(_, damping)| *damping).collect();
+        let is_nominal = own.iter().all(Option::is_none);
+        self.editor.load(&self.base);
+        if !is_nominal && self.edit(properties, drives, &mut damping, index)? {
+            self.editor.set_constants()?;
+        }
+        let had_none =
+            env.data().model().own_arrays().next().is_none() && env.data().model().gravity() == self.base.gravity();
+        let model = (!(is_nominal && had_none)).then(|| self.editor.model(env.data().model()));
+        let values = |property: Property| &properties.values[property as usize];
+        let places = &properties.tables.get(Property::Stiffness).places;
+        let gains = places.iter().enumerate().map(|(element, &drive)| {
+            let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
+            (drive, gains.map(|of| values(of)[element]))
+        });
+        Ok(Made { model, gains: gains.collect(), damping })
+    }
+
+    /// Writes what differs from the nominal values; gives whether constants follow from it.
+    fn edit(
+        &mut self,
+        properties: &Properties,
+        drives: &DriveTable,
+        damping: &mut [f64],
+        env: usize,
+    ) -> Result<bool, RandomizationError> {
+        let (editor, base) = (&mut self.editor, &self.base);
+        let damped = |dof: usize| drives.damped.iter().position(|(of, _)| *of == dof);
+        let mut constants = false;
+        // Before armatures, which hold a part of it.
+        for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
+            let (table, width) = (properties.tables.get(property), property.width());
+            for (element, &place) in table.places.iter().enumerate() {
+                let at = element * width..(element + 1) * width;
+                let value = &properties.values[property as usize][at.clone()];
+                let dofs = || dofs_of(base, place);
+                let with_more_damping = property == Property::Armature
+                    && dofs().any(|dof| damped(dof).is_some_and(|k| damping[k] != drives.damped[k].1));
+                if *value == table.nominal[at] && !with_more_damping {
+                    continue;
+                }
+                match property {
+                    Property::Mass => editor.body_mass_mut()[place] = value[0],
+                    Property::CenterOfMass => {
+                        let com = [value[0], value[1], value[2]];
+                        editor.set_center_of_mass(place, com).map_err(|DiagonalInertia| {
+                            RandomizationError::DiagonalInertia { env, name: table.names[element].clone() }
+                        })?;
+                    }
+                    Property::Inertia => editor.body_inertia_mut()[3 * place..3 * place + 3].copy_from_slice(value),
+                    Property::Friction => editor.geom_friction_mut()[3 * place] = value[0],
+                    Property::TorsionalFriction => editor.geom_friction_mut()[3 * place + 1] = value[0],
+                    Property::RollingFriction => editor.geom_friction_mut()[3 * place + 2] = value[0],
+                    Property::JointDamping => {
+                        for dof in dofs() {
+                            match damped(dof) {
+                                Some(k) => damping[k] = value[0],
+                                None => editor.dof_damping_mut()[dof] = value[0],
+                            }
+                        }
+                    }
+                    Property::Armature => {
+                        for dof in dofs() {
+                            // The half of the implicit damping that is in the armature: see `drive::implicit`.
+                            let implicit = damped(dof).map_or(0.0, |k| base.timestep() * damping[k]);
+                            editor.dof_armature_mut()[dof] = value[0] + implicit;
+                        }
+                    }
+                    Property::DryFriction => match friction_place(base, drives, place) {
+                        Some(FrictionPlace::Tendon(tendon)) => editor.tendon_frictionloss_mut()[tendon] = value[0],
+                        Some(FrictionPlace::Joint) => {
+                            dofs().for_each(|dof| editor.dof_frictionloss_mut()[dof] = value[0]);
+                        }
+                        None => {}
+                    },
+                    Property::Gravity => editor.set_gravity([value[0], value[1], value[2]]),
+                    Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {}
+                }
+                constants |= matches!(
+                    property,
+                    Property::Mass | Property::CenterOfMass | Property::Inertia | Property::Armature
+                );
+            }
+        }
+        Ok(constants)
+    }
+}
+
+impl Made {
+    /// Gives it to the environment.
+    pub(crate) fn give(self, env: &mut Env) {
+        for (drive, gains) in self.gains {
+            env.drives.set_gains(drive, gains);
+        }
+        env.drives.set_damping(&self.damping);
+        if let Some(model) = self.model {
+            env.set_model(model);
+        }
+    }
+}

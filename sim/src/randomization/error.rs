@@ -1,0 +1,68 @@
+//! What can be wrong with properties of environments.
+
+use crate::pattern::PatternError;
+
+/// A property cannot be drawn or set.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RandomizationError {
+    /// The patterns of a property match nothing, or one name twice.
+    #[error("{property}: {error}")]
+    Pattern {
+        /// The property.
+        property: &'static str,
+        /// What is wrong.
+        #[source]
+        error: Box<PatternError>,
+    },
+    /// The ends of a range are not finite, or the first is the larger one.
+    #[error("{property} of {pattern:?}: the range {low}..{high} must have finite ends, the smaller one first")]
+    Range {
+        /// The property.
+        property: &'static str,
+        /// Whose.
+        pattern: String,
+        /// First end.
+        low: f64,
+        /// Second end.
+        high: f64,
+    },
+    /// A value is not one that the property can have.
+    #[error("environment {env}: {property} of {name:?} would be {value:?}; {expected}")]
+    Value {
+        /// The environment.
+        env: usize,
+        /// The property.
+        property: &'static str,
+        /// Whose.
+        name: String,
+        /// The value.
+        value: Vec<f64>,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// Another number of numbers than the property has.
+    #[error("{property} of {name:?} is {expected} numbers, not {found}")]
+    Width {
+        /// The property.
+        property: &'static str,
+        /// Whose.
+        name: String,
+        /// How many were given.
+        found: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// MuJoCo 4.x keeps only the diagonal of the inertia matrix of a body that moves freely with its centre of mass in its
+    /// origin: there is no room for another centre of mass.
+    #[error(
+        "environment {env}: the centre of mass of {name:?} cannot be moved: it is nominally in the origin, and MuJoCo 4.x \
+         keeps only the diagonal of such a body's inertia matrix; give the body a nominal centre of mass beside its origin"
+    )]
+    DiagonalInertia {
+        /// The environment.
+        env: usize,
+        /// The body.
+        name: String,
+    },
+}

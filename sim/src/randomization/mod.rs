@@ -1,0 +1,201 @@
+//! Properties of single environments: masses, friction, gravity, gains and more, drawn at random or set.
+//!
+//! The environments of a simulation share one compiled model. One that has properties of its own gets a shallow copy of the
+//! model's struct, in which only the arrays that differ are its own memory; what follows from masses (MuJoCo's
+//! `mj_setConst`) is computed for it. Environments that were not touched share everything.
+//!
+//! Random numbers are keyed by the seed of the simulation, the global index of the environment, how often that environment
+//! was drawn for, and the property and name they are for. So they depend neither on the number of environments and
+//! processes, nor on what other environments do, nor on what else is random.
+//!
+//! Properties stay until they are drawn or set again: [`reset`](SimulationManager::reset) and
+//! [`restore`](SimulationManager::restore) leave them alone, and when more is added to the scene they are carried over by
+//! name. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
+//! `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
+
+mod apply;
+mod error;
+mod properties;
+mod property;
+mod tables;
+mod terms;
+
+pub(crate) use apply::Maker;
+pub use error::RandomizationError;
+pub(crate) use properties::OwnValues;
+pub use properties::Properties;
+pub use property::Property;
+pub(crate) use tables::Tables;
+pub use terms::{Draw, Randomization, Term};
+
+use crate::compile::Simulation;
+use crate::env::Env;
+use crate::error::Result;
+use crate::manager::{EnvId, SimulationManager, env_mask};
+use scene::Random;
+use std::sync::Arc;
+
+impl Simulation {
+    /// Where properties are; found out when somebody first asks.
+    pub(crate) fn tables(&self) -> &Arc<Tables> {
+        self.tables.get_or_init(|| {
+            let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
+            Arc::new(Tables::of(self.batch.model(), &drives))
+        })
+    }
+
+    fn properties_of(&self, tables: &Arc<Tables>, index: usize, env: &Env) -> Properties {
+        let own = self.own_values[index].as_deref().unwrap_or(&NOTHING);
+        Properties::new(tables, own, &env.drives)
+    }
+
+    /// Changes the properties of environments; on an error none has changed.
+    fn change_properties(
+        &mut self,
+        envs: &[usize],
+        mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
+    ) -> Result<()> {
+        let mut maker = match self.maker.take() {
+            Some(maker) => maker,
+            None => Maker::new(self.batch.model())?,
+        };
+        // Before an environment is locked: it looks at one.
+        let tables = Arc::clone(self.tables());
+        let made: Result<Vec<_>> = envs
+            .iter()
+            .map(|&index| {
+                self.batch.read(index, |env| {
+                    let mut properties = self.properties_of(&tables, index, env);
+                    change(index, &mut properties)?;
+                    let own = properties.own();
+                    let made = maker.make(&properties, &own, index, env)?;
+                    Ok((index, own, made))
+                })
+            })
+            .collect();
+        self.maker = Some(maker);
+        for (index, own, made) in made? {
+            self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
+            self.batch.write(index, |env| made.give(env));
+        }
+        Ok(())
+    }
+
+    /// Takes over, by name, what environments of `old` have for themselves.
+    pub(crate) fn carry_properties(&mut self, old: &Self) -> Result<()> {
+        let envs: Vec<usize> = (0..old.own_values.len()).filter(|&env| old.own_values[env].is_some()).collect();
+        if envs.is_empty() {
+            return Ok(());
+        }
+        let tables = Arc::clone(self.tables());
+        self.change_properties(&envs, |env, properties| {
+            if let Some(own) = &old.own_values[env] {
+                let own = Properties::carried_to(own, old.tables(), &tables);
+                for (values, own) in properties.values.iter_mut().zip(own) {
+                    if let Some(own) = own {
+                        *values = own.into();
+                    }
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// No values of its own.
+const NOTHING: OwnValues = [const { None }; Property::ALL.len()];
+
+impl SimulationManager {
+    /// The properties of an environment.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn properties(&self, env: EnvId) -> Result<Properties> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        let tables = self.simulation.tables();
+        Ok(self.simulation.batch.read(env.0, |here| self.simulation.properties_of(tables, env.0, here)))
+    }
+
+    /// Draws properties for environments, all of them where `env_ids` is `None`. Properties that no term names stay as they
+    /// are; a forward pass follows.
+    ///
+    /// # Errors
+    /// An environment does not exist, a pattern matches nothing or one name twice, a range is none, or a value cannot be,
+    /// such as a negative mass; then nothing changes.
+    pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let resolved = randomization.resolve(&self.properties(EnvId(0))?)?;
+        let keys = self.keys();
+        self.draw(env_ids, |env, properties| {
+            resolved.draw(properties, |property, name| keys(env, &format!("/{}/{name}", property.name())));
+            Ok(())
+        })
+    }
+
+    /// As [`randomize`](Self::randomize), by a function that gets random numbers of the environment, its number in this
+    /// manager, and its properties to change. To set properties it need not use the random numbers.
+    ///
+    /// # Errors
+    /// An environment does not exist, the function fails, or a value cannot be; then nothing changes.
+    pub fn randomize_with(
+        &mut self,
+        env_ids: Option<&[EnvId]>,
+        mut change: impl FnMut(&mut Random, EnvId, &mut Properties) -> Result<()>,
+    ) -> Result<()> {
+        let keys = self.keys();
+        self.draw(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
+    }
+
+    /// Gives environments the nominal properties again, gains of drives included; they share the whole model then.
+    ///
+    /// # Errors
+    /// An environment does not exist.
+    pub fn reset_properties(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.change(env_ids, |_, properties| {
+            properties.values = Property::ALL.map(|property| properties.tables.get(property).nominal.clone());
+            Ok(())
+        })
+    }
+
+    /// Memory that an environment's properties take \[bytes\]: the struct and the arrays of the model that it does not share,
+    /// and the values as they were set; 0 where they are nominal. One whole copy of the model is kept beside, for all.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn property_bytes(&self, env: EnvId) -> Result<usize> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        let Some(own) = &self.simulation.own_values[env.0] else { return Ok(0) };
+        let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
+        let model = self.simulation.batch.read(env.0, |env| env.data().model().own_bytes());
+        Ok(model + size_of::<OwnValues>() + values)
+    }
+
+    /// The random numbers of the next draw for an environment, and what they are for.
+    fn keys(&self) -> impl Fn(usize, &str) -> Random + use<> {
+        let (seed, first, draws) = (self.cfg.seed, self.cfg.first_env(), self.draws.clone());
+        move |env, what| Random::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
+    }
+
+    /// Changes properties by random numbers: counts the draws.
+    fn draw(
+        &mut self,
+        env_ids: Option<&[EnvId]>,
+        change: impl FnMut(usize, &mut Properties) -> Result<()>,
+    ) -> Result<()> {
+        let chosen = env_mask(env_ids, self.num_envs())?;
+        self.change(env_ids, change)?;
+        self.draws.iter_mut().zip(chosen).for_each(|(draws, chosen)| *draws += u64::from(chosen));
+        Ok(())
+    }
+
+    fn change(
+        &mut self,
+        env_ids: Option<&[EnvId]>,
+        change: impl FnMut(usize, &mut Properties) -> Result<()>,
+    ) -> Result<()> {
+        let chosen = env_mask(env_ids, self.num_envs())?;
+        let envs: Vec<usize> = (0..chosen.len()).filter(|&env| chosen[env]).collect();
+        self.simulation.change_properties(&envs, change)?;
+        self.sensors.refresh(&envs, &mut self.simulation);
+        Ok(())
+    }
+}

@@ -1,0 +1,161 @@
+//! Where the properties of a compiled scene are, what they are called, and what they nominally are.
+
+use super::Property;
+use crate::drive::table::{DriveTable, Realization};
+use crate::mj::{self, Model, ObjectKind};
+
+/// All that has one property.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Table {
+    /// What each element is called; shapes of one body are called alike.
+    pub(super) names: Vec<String>,
+    /// Where each element is in MuJoCo's arrays, or among the drives.
+    pub(super) places: Vec<usize>,
+    /// Nominal values, element by element.
+    pub(super) nominal: Vec<f64>,
+}
+
+/// The properties of a compiled scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Tables {
+    /// In the order of [`Property::ALL`].
+    tables: [Table; Property::ALL.len()],
+}
+
+impl Tables {
+    /// The properties of a model with its drives.
+    pub(crate) fn of(model: &Model, drives: &DriveTable) -> Self {
+        Self { tables: Property::ALL.map(|property| table(property, model, drives)) }
+    }
+
+    pub(super) fn get(&self, property: Property) -> &Table {
+        &self.tables[property as usize]
+    }
+}
+
+impl Table {
+    fn push(&mut self, name: String, place: usize, values: &[f64]) {
+        self.names.push(name);
+        self.places.push(place);
+        self.nominal.extend_from_slice(values);
+    }
+}
+
+fn table(property: Property, model: &Model, drives: &DriveTable) -> Table {
+    let mut table = Table::default();
+    match property {
+        Property::Mass => bodies(model, &mut table, |body| &model.body_mass()[body..=body]),
+        Property::CenterOfMass => bodies(model, &mut table, |body| &model.body_ipos()[3 * body..3 * body + 3]),
+        Property::Inertia => bodies(model, &mut table, |body| &model.body_inertia()[3 * body..3 * body + 3]),
+        Property::Friction => shapes(model, &mut table, 0),
+        Property::TorsionalFriction => shapes(model, &mut table, 1),
+        Property::RollingFriction => shapes(model, &mut table, 2),
+        Property::JointDamping => joints(model, &mut table, |joint| {
+            let dof = model.jnt_dofadr()[joint] as usize;
+            let moved = drives.damped.iter().find(|(of, _)| *of == dof).map(|(_, damping)| *damping);
+            Some(moved.unwrap_or(model.dof_damping()[dof])).filter(|damping| *damping > 0.0)
+        }),
+        Property::Armature => joints(model, &mut table, |joint| {
+            let dof = model.jnt_dofadr()[joint] as usize;
+            Some(user_armature(model, drives, dof))
+        }),
+        Property::DryFriction => joints(model, &mut table, |joint| {
+            let friction = match friction_place(model, drives, joint)? {
+                FrictionPlace::Joint => model.dof_frictionloss()[model.jnt_dofadr()[joint] as usize],
+                FrictionPlace::Tendon(tendon) => model.tendon_frictionloss()[tendon],
+            };
+            Some(friction).filter(|friction| *friction > 0.0)
+        }),
+        Property::Gravity => table.push("gravity".into(), 0, &model.gravity()),
+        Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {
+            for (index, drive) in drives.drives.iter().enumerate() {
+                if drive.realization != Realization::Actuator {
+                    let joint = usize::try_from(model.dof_jntid()[drive.dof]).unwrap_or(0);
+                    let name = model.name(ObjectKind::Joint, joint).unwrap_or_default();
+                    let gains = drive.initial;
+                    let value = match property {
+                        Property::Stiffness => gains.kp,
+                        Property::DriveDamping => gains.kd,
+                        _ => gains.max_effort,
+                    };
+                    table.push(name, index, &[value]);
+                }
+            }
+        }
+    }
+    table
+}
+
+/// Bodies that can move and have a mass.
+fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m [f64]) {
+    for body in 1..model.nbody() {
+        if model.body_weldid()[body] != 0
+            && model.body_mass()[body] > 0.0
+            && let Some(name) = model.name(ObjectKind::Body, body)
+        {
+            table.push(name, body, values(body));
+        }
+    }
+}
+
+/// Geoms that collide, called as their body, or, in the world, as themselves.
+fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
+    for geom in 0..model.ngeom() {
+        if model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0 {
+            continue;
+        }
+        let name = match usize::try_from(model.geom_bodyid()[geom]) {
+            Ok(body) if body > 0 => model.name(ObjectKind::Body, body),
+            _ => model.name(ObjectKind::Geom, geom),
+        };
+        if let Some(name) = name {
+            table.push(name, geom, &[model.geom_friction()[3 * geom + coefficient]]);
+        }
+    }
+}
+
+/// Joints but free ones, where `value` gives one; all degrees of freedom of a joint have the same.
+fn joints(model: &Model, table: &mut Table, value: impl Fn(usize) -> Option<f64>) {
+    for joint in 0..model.njnt() {
+        if model.jnt_type()[joint] as u32 != mj::mjJNT_FREE
+            && let (Some(name), Some(value)) = (model.name(ObjectKind::Joint, joint), value(joint))
+        {
+            table.push(name, joint, &[value]);
+        }
+    }
+}
+
+/// Degrees of freedom of a joint that is not free.
+pub(super) fn dofs_of(model: &Model, joint: usize) -> std::ops::Range<usize> {
+    let first = model.jnt_dofadr()[joint] as usize;
+    first..first + if model.jnt_type()[joint] as u32 == mj::mjJNT_BALL { 3 } else { 1 }
+}
+
+/// The armature without what implicit damping adds to it: `h B`, see [`crate::drive::implicit`].
+pub(super) fn user_armature(model: &Model, drives: &DriveTable, dof: usize) -> f64 {
+    match drives.damped.iter().find(|(of, _)| *of == dof) {
+        // Rounding may leave a hair below 0.
+        Some((_, damping)) => (model.dof_armature()[dof] - model.timestep() * damping).max(0.0),
+        None => model.dof_armature()[dof],
+    }
+}
+
+/// Where the dry friction of a joint is.
+pub(super) enum FrictionPlace {
+    /// Its own.
+    Joint,
+    /// A fixed tendon's: the joint's own row carries its drive.
+    Tendon(usize),
+}
+
+/// Where the dry friction of a joint is; `None` where its drive takes the place and there is none.
+pub(super) fn friction_place(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionPlace> {
+    let dof = model.jnt_dofadr()[joint] as usize;
+    let driven =
+        |drive: &crate::drive::table::Drive| drive.dof == dof && matches!(drive.realization, Realization::Row { .. });
+    if !drives.drives.iter().any(driven) {
+        return Some(FrictionPlace::Joint);
+    }
+    let tendon = format!("{}/friction", model.name(ObjectKind::Joint, joint)?);
+    model.id(ObjectKind::Tendon, &tendon).map(FrictionPlace::Tendon)
+}

@@ -1,0 +1,136 @@
+//! Randomisations as data.
+
+use super::Property;
+use super::error::RandomizationError;
+use super::properties::Properties;
+use crate::pattern;
+use scene::Random;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What is drawn, uniformly from a range, and what it does to the nominal value, not to what was drawn before.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Draw {
+    /// One factor of all numbers of the property.
+    Scale([f64; 2]),
+    /// A summand of each number.
+    Add([f64; 2]),
+    /// A value of each number.
+    Set([f64; 2]),
+}
+
+impl Draw {
+    fn range(self) -> [f64; 2] {
+        match self {
+            Self::Scale(range) | Self::Add(range) | Self::Set(range) => range,
+        }
+    }
+}
+
+/// One property of all names that a pattern matches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Term {
+    /// The property.
+    pub property: Property,
+    /// Whose: a regular expression that matches the whole name (see [`Properties`]).
+    pub pattern: String,
+    /// What is drawn. What has one name draws once.
+    pub draw: Draw,
+}
+
+/// Properties to draw for an environment.
+///
+/// ```
+/// use sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+///
+/// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
+/// let shape = ObjectShape::cube(0.1);
+/// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape, mass: Some(2.0), ..Default::default() })?;
+/// let randomization = Randomization::new()
+///     .with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]))
+///     .with(Property::Friction, "cube|ground", Draw::Set([0.4, 1.0]))
+///     .with(Property::Gravity, "gravity", Draw::Add([-0.1, 0.1]));
+/// sim.randomize(&randomization, None)?;
+/// let mass = sim.properties(sim::EnvId(3))?.get(Property::Mass, "cube")?[0];
+/// assert!((1.6..2.4).contains(&mass));
+/// # Ok::<(), sim::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Randomization {
+    /// The terms; no two of one property may match the same name.
+    pub terms: Vec<Term>,
+}
+
+impl Randomization {
+    /// Nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// This and one more term.
+    #[must_use]
+    pub fn with(mut self, property: Property, pattern: impl Into<String>, draw: Draw) -> Self {
+        self.terms.push(Term { property, pattern: pattern.into(), draw });
+        self
+    }
+
+    /// What is drawn for each element, property by property.
+    pub(super) fn resolve(&self, properties: &Properties) -> Result<Resolved, RandomizationError> {
+        for Term { property, pattern, draw } in &self.terms {
+            let [low, high] = draw.range();
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                let (property, pattern) = (property.name(), pattern.clone());
+                return Err(RandomizationError::Range { property, pattern, low, high });
+            }
+        }
+        let mut resolved = Vec::new();
+        for property in Property::ALL {
+            let terms = self.terms.iter().filter(|term| term.property == property);
+            let entries: Vec<(String, Draw)> = terms.map(|term| (term.pattern.clone(), term.draw)).collect();
+            if entries.is_empty() {
+                continue;
+            }
+            let names = properties.names(property);
+            let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.owner())
+                .map_err(|error| RandomizationError::Pattern { property: property.name(), error: Box::new(error) })?;
+            let chosen = names.iter().zip(draws).filter_map(|(name, draw)| Some((name.to_string(), draw?)));
+            resolved.push((property, chosen.collect()));
+        }
+        Ok(Resolved(resolved))
+    }
+}
+
+/// A randomisation of a scene: the draws of each property by name.
+pub(super) struct Resolved(Vec<(Property, BTreeMap<String, Draw>)>);
+
+impl Resolved {
+    /// Draws for an environment. `random` makes the generator of a property and a name.
+    pub(super) fn draw(&self, properties: &mut Properties, random: impl Fn(Property, &str) -> Random) {
+        let tables = std::sync::Arc::clone(&properties.tables);
+        for (property, draws) in &self.0 {
+            let (table, width) = (tables.get(*property), property.width());
+            for (element, name) in table.names.iter().enumerate() {
+                let Some(draw) = draws.get(name) else { continue };
+                let mut value = table.nominal[element * width..(element + 1) * width].to_vec();
+                if *property == Property::Inertia {
+                    value.copy_from_slice(&properties.proportional_moments(element));
+                }
+                let mut random = random(*property, name);
+                let [low, high] = draw.range();
+                let mut next = || low + (high - low) * random.uniform();
+                match draw {
+                    Draw::Scale(_) => {
+                        let factor = next();
+                        value.iter_mut().for_each(|number| *number *= factor);
+                    }
+                    Draw::Add(_) => value.iter_mut().for_each(|number| *number += next()),
+                    Draw::Set(_) => value.iter_mut().for_each(|number| *number = next()),
+                }
+                properties.set_element(*property, element, &value);
+            }
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Rollouts: what would happen under given controls, for planners that try many and keep one.
+//!
+//! As MuJoCo's own `rollout`: initial states and controls in, states out, many rows in parallel. A rollout steps copies of
+//! the environments on threads of its own: the environments and their sensors stay as they are, to the last bit. What it
+//! gives is what stepping by hand would give: `set_qpos` and `set_ctrl` with the controls of a step, `update(1)`, read.
+
+use crate::compile::Simulation;
+use crate::contents::Contents;
+use crate::drive::table::DriveState;
+use crate::env::{Env, EnvState, EnvStatus};
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManager, env_list};
+use crate::mj::{self, ObjectKind};
+use crate::snapshot::{Entry, Snapshot};
+use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
+use std::sync::{Mutex, PoisonError};
+
+/// What came of a [rollout](SimulationManager::rollout). Row k is the k-th environment that was asked for.
+#[derive(Clone, Debug)]
+pub struct Rollout {
+    /// Positions, then velocities, after every step, shape (N, T, nq + nv); the columns are called as
+    /// [`state_names`](SimulationManager::state_names) says. A row that diverges stays in its last good state.
+    pub states: Array3<f64>,
+    /// The states at the end; [`restore`](SimulationManager::restore) makes them the present ones.
+    pub end: Snapshot,
+    /// Rows that diverged, each with the reason.
+    pub diverged: Vec<(usize, String)>,
+}
+
+/// What a column of controls does.
+#[derive(Clone, Copy, Debug)]
+enum Column {
+    /// The target of a drive, clamped to these limits.
+    Target { drive: usize, low: f64, high: f64 },
+    /// Nothing: the joint follows another, or has no drive.
+    Ignored,
+    /// A control of an MJCF part.
+    Control { place: usize },
+}
+
+/// One row of a rollout before it starts.
+struct Row {
+    env: usize,
+    model: mj::Model,
+    drives: DriveState,
+    start: EnvState,
+}
+
+/// The columns of controls: joints of all robots, then actuators of all MJCF parts.
+fn columns(contents: &Contents, simulation: &Simulation) -> Vec<Column> {
+    let mut columns = Vec::new();
+    for (data, index) in contents.robots.iter().zip(&simulation.robots) {
+        columns.extend(data.plans().iter().zip(&index.joints).map(|(plan, joint)| match joint.drive {
+            Some(drive) => Column::Target { drive, low: plan.usable[0], high: plan.usable[1] },
+            None => Column::Ignored,
+        }));
+    }
+    for part in &simulation.parts {
+        columns.extend(part.controls.iter().map(|&place| Column::Control { place }));
+    }
+    columns
+}
+
+fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>) {
+    let mut controls = Vec::new();
+    for (column, value) in columns.iter().zip(values) {
+        match *column {
+            Column::Target { drive, low, high } => env.drives.position[drive] = value.clamp(low, high),
+            Column::Ignored => {}
+            Column::Control { place } => controls.push((place, value)),
+        }
+    }
+    if !controls.is_empty() {
+        env.set_controls(|all| controls.iter().for_each(|&(place, value)| all[place] = value));
+    }
+}
+
+/// Does one row in `env`, whose model is the row's.
+fn roll(
+    env: &mut Env,
+    row: &Row,
+    columns: &[Column],
+    substeps: u32,
+    controls: ArrayView2<'_, f64>,
+    mut states: ArrayViewMut2<'_, f64>,
+) -> (Entry, Option<String>) {
+    env.drives = row.drives.clone();
+    env.recall(&row.start);
+    for (values, mut state) in controls.rows().into_iter().zip(states.rows_mut()) {
+        control(env, columns, values.iter().copied());
+        env.step(substeps);
+        let now = env.data().qpos().iter().chain(env.data().qvel());
+        state.iter_mut().zip(now).for_each(|(to, from)| *to = *from);
+    }
+    let reason = match env.status() {
+        EnvStatus::Running => None,
+        EnvStatus::Diverged { step, reason } => Some(format!("step {step}: {reason}")),
+    };
+    (Entry { env: row.env, state: env.remember() }, reason)
+}
+
+impl SimulationManager {
+    /// Names of the columns of a [rollout](Self::rollout)'s controls: the movable joints of all robots (`uid/joint`), in the
+    /// order in which they were added, then the actuators of all MJCF parts (`uid/actuator`).
+    pub fn control_names(&self) -> Vec<String> {
+        let parts = self.contents.parts.iter();
+        let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.full(name)));
+        self.contents.joint_names().iter().cloned().chain(actuators).collect()
+    }
+
+    /// Names of the columns of a [rollout](Self::rollout)'s states: `qpos uid/joint` for each position, then
+    /// `qvel uid/joint` for each velocity, with a number in brackets where a joint has several: position and quaternion
+    /// w x y z of a free joint \[m\], its velocity in the environment \[m/s\] and its angular velocity in the body \[rad/s\].
+    pub fn state_names(&self) -> Vec<String> {
+        let model = self.simulation.batch.model();
+        let list = |what: &str, first: &[i32], count: usize| {
+            let mut names = Vec::with_capacity(count);
+            for joint in 0..model.njnt() {
+                let name = model.name(ObjectKind::Joint, joint).unwrap_or_default();
+                let end = first.get(joint + 1).map_or(count, |&next| next as usize);
+                let width = end - first[joint] as usize;
+                let one = |k| if width == 1 { format!("{what} {name}") } else { format!("{what} {name}[{k}]") };
+                names.extend((0..width).map(one));
+            }
+            names
+        };
+        let mut names = list("qpos", model.jnt_qposadr(), model.nq());
+        names.extend(list("qvel", model.jnt_dofadr(), model.nv()));
+        names
+    }
+
+    /// What would happen under `controls`, shape (N, T, columns of [`control_names`](Self::control_names)): N rows, each
+    /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
+    /// limits as [`set_qpos`](crate::RobotMut::set_qpos) does (columns of joints that follow others or have no drive are
+    /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and
+    /// inputs stay as they are in the initial state.
+    ///
+    /// Row k is done in the k-th of `env_ids` (all environments where `None`), with its model; an environment may be named
+    /// many times, to try many controls from its state. A single row of controls is for all. Rows start in the states of
+    /// `start` (the k-th in the k-th, a single one for all), or in the present ones.
+    ///
+    /// The environments stay as they are, to the last bit: rollouts are done in copies. To go on from where they ended,
+    /// [`restore`](Self::restore) [`Rollout::end`].
+    ///
+    /// # Errors
+    /// Wrong shape, a control that is not finite, an environment that does not exist, a snapshot of another scene or with
+    /// another number of states, or no memory for a copy.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn rollout<'c>(
+        &self,
+        controls: impl AsArray<'c, f64, Ix3>,
+        start: Option<&Snapshot>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rollout> {
+        let controls: ArrayView3<'_, f64> = controls.into();
+        let envs = env_list(env_ids, self.num_envs())?;
+        let columns = columns(&self.contents, &self.simulation);
+        self.check_controls(controls, envs.len(), columns.len())?;
+        let rows = self.rows(&envs, start)?;
+        let (steps, substeps, model) = (controls.shape()[1], self.cfg.substeps, self.simulation.batch.model());
+        let mut states = Array3::zeros((envs.len(), steps, model.nq() + model.nv()));
+        let mut results: Vec<Option<(Entry, Option<String>)>> = vec![None; envs.len()];
+        let threads = self.threads().clamp(1, envs.len().max(1));
+        let work = Mutex::new(rows.iter().zip(states.outer_iter_mut()).zip(&mut results).enumerate());
+        let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let run = || -> Result<()> {
+            let mut copy: Option<Env> = None;
+            while let Some((k, ((row, states), result))) = next() {
+                let mut env = match copy.take().filter(|env| env.data().model().is(&row.model)) {
+                    Some(env) => env,
+                    None => Env::with_drives(&row.model, row.drives.clone())?,
+                };
+                let mine = controls.index_axis(ndarray::Axis(0), if controls.shape()[0] == 1 { 0 } else { k });
+                *result = Some(roll(&mut env, row, &columns, substeps, mine, states));
+                // A row that needed more room leaves a copy with a model of its own: `is` tells.
+                copy = Some(env);
+            }
+            Ok(())
+        };
+        std::thread::scope(|scope| -> Result<()> {
+            let others: Vec<_> = (1..threads).map(|_| scope.spawn(run)).collect();
+            let mine = run();
+            others.into_iter().try_for_each(|other| match other.join() {
+                Ok(done) => done,
+                Err(panic) => std::panic::resume_unwind(panic),
+            })?;
+            mine
+        })?;
+        let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
+        for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
+            entries.push(entry);
+            diverged.extend(reason.map(|reason| (k, reason)));
+        }
+        Ok(Rollout { states, end: Snapshot::new(&self.simulation, entries), diverged })
+    }
+
+    fn check_controls(&self, controls: ArrayView3<'_, f64>, rows: usize, columns: usize) -> Result<()> {
+        let (found, steps) = (controls.shape().to_vec(), controls.shape()[1]);
+        if found[2] != columns || (found[0] != rows && found[0] != 1) {
+            let meaning = "rows, steps, control_names";
+            return Err(Error::Shape { argument: "rollout", found, expected: vec![rows, steps, columns], meaning });
+        }
+        match controls.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            None => Ok(()),
+            Some(((row, step, column), &value)) => {
+                let of = format!("control {:?} of step {step}", self.control_names()[column]);
+                Err(Error::NotFinite { argument: "rollout", row, column, of, value })
+            }
+        }
+    }
+
+    fn rows(&self, envs: &[usize], start: Option<&Snapshot>) -> Result<Vec<Row>> {
+        let states = start.map(|start| start.states_for(envs.len(), &self.simulation)).transpose()?;
+        let row = |(k, &env): (usize, &usize)| {
+            self.simulation.batch.read(env, |here| {
+                let start = match (start, &states) {
+                    (Some(start), Some(states)) => start.entries()[states[k]].state.clone(),
+                    _ => here.remember(),
+                };
+                Row { env, model: here.data().model().clone(), drives: here.drives.clone(), start }
+            })
+        };
+        Ok(envs.iter().enumerate().map(row).collect())
+    }
+}

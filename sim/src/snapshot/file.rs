@@ -1,0 +1,293 @@
+//! Snapshots as files.
+//!
+//! ```text
+//! magic (8 bytes) | length of the file (u64) | format (u32) | content | SHA-256 of all before (32 bytes)
+//! ```
+//!
+//! All numbers are little-endian. Magic, length and checksum stand in these places in every format, so that a damaged file
+//! is told from one of another version. The content of format 1: MuJoCo's version, the lines of the layout, the
+//! environments.
+
+use super::bytes::{Malformed, Reader, Writer};
+use super::layout::Layout;
+use super::{Entry, Snapshot, SnapshotError};
+use crate::env::{Divergence, EnvState, EnvStatus};
+use crate::error::{Error, Result};
+use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning};
+use crate::wrenches::Wrenches;
+use sha2::{Digest, Sha256};
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+/// As PNG's: a byte that is no text, a name, and ends of lines that programs which treat files as text change.
+const MAGIC: [u8; 8] = *b"\x89KTS\r\n\x1a\n";
+const FORMAT: u32 = 1;
+const CHECKSUM: usize = 32;
+/// Magic, length, format.
+const HEADER: usize = 8 + 8 + 4;
+
+impl Snapshot {
+    /// Writes the snapshot to a file: all of it, or, on an error, nothing (a file that was there stays).
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let failed = |error| Error::File { path: path.into(), error };
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            // As any other file: the user's umask decides, not the secrecy of temporary files.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut temporary = builder.tempfile_in(folder).map_err(failed)?;
+        temporary.write_all(&self.encode(FORMAT, &mj::version_string())).map_err(failed)?;
+        // Before its name: a machine that stops in between leaves the old file, not an empty one.
+        temporary.as_file().sync_all().map_err(failed)?;
+        temporary.persist(path).map_err(|error| failed(error.error))?;
+        Ok(())
+    }
+
+    /// Reads a file that [`save`](Self::save) wrote.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not a whole, undamaged snapshot of this format and this MuJoCo: each of these is a
+    /// [`SnapshotError`] of its own.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|error| Error::File { path: path.into(), error })?;
+        Ok(Self::decode(&bytes, path)?)
+    }
+
+    fn encode(&self, format: u32, mujoco: &str) -> Vec<u8> {
+        let mut out = Writer::default();
+        out.0.extend_from_slice(&MAGIC);
+        out.u64(0);
+        out.u32(format);
+        out.text(mujoco);
+        out.u64(self.layout.lines().len() as u64);
+        self.layout.lines().iter().for_each(|line| out.text(line));
+        out.u64(self.entries.len() as u64);
+        for entry in self.entries.iter() {
+            write_entry(entry, &mut out);
+        }
+        let mut bytes = out.0;
+        let length = (bytes.len() + CHECKSUM) as u64;
+        bytes[8..16].copy_from_slice(&length.to_le_bytes());
+        let sum = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&sum);
+        bytes
+    }
+
+    fn decode(bytes: &[u8], path: &Path) -> Result<Self, SnapshotError> {
+        let known = bytes.len().min(MAGIC.len());
+        if bytes[..known] != MAGIC[..known] {
+            return Err(SnapshotError::Foreign { path: path.into() });
+        }
+        let damaged = || SnapshotError::Damaged { path: path.into() };
+        let length = bytes.get(8..16).and_then(|b| b.first_chunk::<8>()).map(|b| u64::from_le_bytes(*b));
+        let least = (HEADER + CHECKSUM) as u64;
+        let expected = length.unwrap_or(least);
+        if (bytes.len() as u64) < expected {
+            return Err(SnapshotError::Truncated { path: path.into(), bytes: bytes.len() as u64, expected });
+        }
+        if bytes.len() as u64 > expected || expected < least {
+            return Err(damaged());
+        }
+        let (content, sum) = bytes.split_last_chunk::<CHECKSUM>().ok_or_else(damaged)?;
+        if Sha256::digest(content)[..] != sum[..] {
+            return Err(damaged());
+        }
+        let malformed = |Malformed(what)| SnapshotError::Malformed { path: path.into(), what };
+        let mut reader = Reader(&content[16..]);
+        let found = reader.u32().map_err(malformed)?;
+        if found != FORMAT {
+            return Err(SnapshotError::Format { path: path.into(), found, supported: FORMAT });
+        }
+        let (found, running) = (reader.text().map_err(malformed)?, mj::version_string());
+        if found != running {
+            return Err(SnapshotError::Mujoco { path: path.into(), found, running });
+        }
+        read_content(&mut reader).map_err(malformed)
+    }
+}
+
+fn read_content(reader: &mut Reader<'_>) -> Result<Snapshot, Malformed> {
+    // The length of a text takes 8 bytes.
+    let lines = (0..reader.count(8)?).map(|_| reader.text()).collect::<Result<Vec<_>, _>>()?;
+    let entries = (0..reader.count(8)?).map(|_| read_entry(reader)).collect::<Result<Vec<_>, _>>()?;
+    if !reader.0.is_empty() {
+        return Err(Malformed("something stands after the last environment"));
+    }
+    if !entries.iter().all(|entry| entry.state.fits(&entries[0].state)) {
+        return Err(Malformed("environments have different numbers of numbers"));
+    }
+    Ok(Snapshot { layout: Arc::new(Layout::from_lines(lines)), entries: entries.into() })
+}
+
+fn write_entry(entry: &Entry, out: &mut Writer) {
+    let EnvState { motion, inputs, drives, wrenches, steps, diverged } = &entry.state;
+    let (values, active) = inputs.values();
+    out.u64(entry.env as u64);
+    out.u64(*steps);
+    out.numbers(motion.values());
+    out.numbers(values);
+    out.flags(active);
+    out.numbers(drives);
+    out.numbers(&wrenches.numbers());
+    let Some(EnvStatus::Diverged { step, reason }) = diverged.as_deref() else { return out.u8(0) };
+    match reason {
+        Divergence::Warning(warning) => {
+            out.u8(1);
+            out.text(warning.name());
+        }
+        Divergence::Engine(error) => {
+            out.u8(2);
+            out.text(&error.message);
+        }
+        Divergence::BuffersExhausted(Buffers { contacts, constraints, arena_bytes }) => {
+            out.u8(3);
+            [contacts, constraints, arena_bytes].iter().for_each(|size| out.u64(**size as u64));
+        }
+    }
+    out.u64(*step);
+}
+
+fn read_entry(reader: &mut Reader<'_>) -> Result<Entry, Malformed> {
+    let size = |reader: &mut Reader<'_>| {
+        usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))
+    };
+    let env = size(reader)?;
+    let steps = reader.u64()?;
+    let motion = Motion::from_values(reader.numbers()?);
+    let (values, active) = (reader.numbers()?, reader.flags()?);
+    let drives = reader.numbers()?;
+    let wrenches = Wrenches::from_numbers(&reader.numbers()?).ok_or(Malformed("a wrench has not all its numbers"))?;
+    let reason = match reader.u8()? {
+        0 => None,
+        1 => {
+            let name = reader.text()?;
+            let warning = Warning::ALL.into_iter().find(|warning| warning.name() == name);
+            Some(Divergence::Warning(warning.ok_or(Malformed("a warning is unknown"))?))
+        }
+        2 => Some(Divergence::Engine(EngineError { message: reader.text()? })),
+        3 => {
+            let (contacts, constraints, arena_bytes) = (size(reader)?, size(reader)?, size(reader)?);
+            Some(Divergence::BuffersExhausted(Buffers { contacts, constraints, arena_bytes }))
+        }
+        _ => return Err(Malformed("a status is unknown")),
+    };
+    let diverged = match reason {
+        None => None,
+        Some(reason) => Some(Box::new(EnvStatus::Diverged { step: reader.u64()?, reason })),
+    };
+    let inputs = Inputs::from_values(values, active);
+    let state = EnvState { motion, inputs, drives, wrenches, steps, diverged };
+    Ok(Entry { env, state })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::env::Env;
+
+    /// Two environments of a small model, one of which has diverged for `reason`.
+    fn snapshot(reason: Divergence) -> Snapshot {
+        let model = mj::compile(
+            r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/></body></worldbody></mujoco>"#,
+            &[],
+        )
+        .expect("compiles")
+        .into_model();
+        let mut env = Env::new(&model, &Arc::default()).expect("small");
+        env.write(|data| data.qvel_mut()[1] = 0.3);
+        env.step(7);
+        let mut entries = vec![Entry { env: 3, state: env.remember() }, Entry { env: 0, state: env.remember() }];
+        entries[1].state.diverged = Some(Box::new(EnvStatus::Diverged { step: 7, reason }));
+        let layout = Layout::of(&model, &crate::drive::table::DriveTable::default());
+        Snapshot { layout: Arc::new(layout), entries: entries.into() }
+    }
+
+    fn decode(bytes: &[u8]) -> Result<Snapshot, SnapshotError> {
+        Snapshot::decode(bytes, Path::new("file"))
+    }
+
+    fn bytes() -> Vec<u8> {
+        snapshot(Divergence::Warning(Warning::BadVelocity)).encode(FORMAT, &mj::version_string())
+    }
+
+    #[test]
+    fn what_is_written_is_what_is_read() {
+        let buffers = Buffers { contacts: 1, constraints: 2, arena_bytes: 3 };
+        for reason in [
+            Divergence::Warning(Warning::BadAcceleration),
+            Divergence::Engine(EngineError { message: "stäck".into() }),
+            Divergence::BuffersExhausted(buffers),
+        ] {
+            let snapshot = snapshot(reason);
+            let read = decode(&snapshot.encode(FORMAT, &mj::version_string())).expect("whole");
+            assert_eq!(read.entries, snapshot.entries);
+            assert_eq!(read.layout, snapshot.layout);
+        }
+    }
+
+    #[test]
+    fn every_file_that_ends_early_says_so() {
+        let bytes = bytes();
+        for end in 0..bytes.len() {
+            let error = decode(&bytes[..end]).expect_err("too short");
+            assert!(matches!(error, SnapshotError::Truncated { bytes, .. } if bytes == end as u64), "{end}: {error}");
+        }
+        let mut longer = bytes.clone();
+        longer.push(0);
+        assert!(matches!(decode(&longer), Err(SnapshotError::Damaged { .. })));
+    }
+
+    #[test]
+    fn every_bit_that_flips_is_noticed() {
+        let good = bytes();
+        for bit in 0..8 * good.len() {
+            let mut bytes = good.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            let error = decode(&bytes).expect_err("damaged");
+            match (bit / 8, &error) {
+                (0..8, SnapshotError::Foreign { .. }) => {}
+                // A length that grew cannot be told from a file that was cut.
+                (8..16, SnapshotError::Truncated { .. } | SnapshotError::Damaged { .. }) => {}
+                (16.., SnapshotError::Damaged { .. }) => {}
+                _ => panic!("bit {bit}: {error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn other_files_formats_and_engines_are_told_apart() {
+        assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::Foreign { .. })));
+        let snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
+        let other = decode(&snapshot.encode(2, &mj::version_string()));
+        assert!(matches!(other, Err(SnapshotError::Format { found: 2, supported: 1, .. })));
+        let other = decode(&snapshot.encode(FORMAT, "3.9.9"));
+        assert!(matches!(other, Err(SnapshotError::Mujoco { found, .. }) if found == "3.9.9"));
+    }
+
+    /// Every byte of the content is changed, and the checksum made right again: an error or another snapshot, never a panic
+    /// or an allocation beyond the file.
+    #[test]
+    fn a_right_checksum_over_wrong_content_harms_nobody() {
+        let good = bytes();
+        let mut refused = 0;
+        for at in HEADER..good.len() - CHECKSUM {
+            for value in [0, 1, 0x7f, 0xff] {
+                let mut bytes = good[..good.len() - CHECKSUM].to_vec();
+                bytes[at] = value;
+                let sum = Sha256::digest(&bytes);
+                bytes.extend_from_slice(&sum);
+                refused += usize::from(matches!(decode(&bytes), Err(SnapshotError::Malformed { .. })));
+            }
+        }
+        assert!(refused > 100, "{refused}");
+    }
+}

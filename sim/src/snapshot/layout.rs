@@ -1,0 +1,61 @@
+//! Which numbers a state has: sizes and names of a compiled scene, to tell one scene from another.
+
+use crate::drive::table::DriveTable;
+use crate::mj::{Model, ObjectKind, words};
+
+/// Sizes and names of everything that has numbers in a state, one line each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Layout(Vec<String>);
+
+impl Layout {
+    /// The layout of a model with its drives.
+    pub(crate) fn of(model: &Model, drives: &DriveTable) -> Self {
+        let sizes = [
+            ("positions", model.nq()),
+            ("degrees of freedom", model.nv()),
+            ("controls", model.nu()),
+            ("activations", model.na()),
+            ("bodies", model.nbody()),
+            ("equalities", model.neq()),
+        ];
+        let mut lines: Vec<String> = sizes.map(|(what, count)| format!("{count} {what}")).into();
+        let name = |kind, index| model.name(kind, index).unwrap_or_default();
+        for joint in 0..model.njnt() {
+            let word = words::joint(model.jnt_type()[joint]).unwrap_or("joint");
+            lines.push(format!("{word} joint {:?}", name(ObjectKind::Joint, joint)));
+        }
+        for body in 0..model.nbody() {
+            let by_hand = if model.body_mocapid()[body] >= 0 { " moved by hand" } else { "" };
+            lines.push(format!("body {:?}{by_hand}", name(ObjectKind::Body, body)));
+        }
+        for actuator in 0..model.nactuator() {
+            lines.push(format!("actuator {:?}", name(ObjectKind::Actuator, actuator)));
+        }
+        for drive in &drives.drives {
+            let joint = usize::try_from(model.dof_jntid()[drive.dof]).unwrap_or(0);
+            lines.push(format!("drive of {:?}", name(ObjectKind::Joint, joint)));
+        }
+        Self(lines)
+    }
+
+    /// The lines, as they stand in a file.
+    pub(super) fn lines(&self) -> &[String] {
+        &self.0
+    }
+
+    /// What [`lines`](Self::lines) gave.
+    pub(super) fn from_lines(lines: Vec<String>) -> Self {
+        Self(lines)
+    }
+
+    /// The first thing in which a snapshot's layout (this one) differs from that of a scene.
+    pub(super) fn difference(&self, scene: &Self) -> Option<String> {
+        if self == scene {
+            return None;
+        }
+        let count = self.0.len().max(scene.0.len());
+        let at = |lines: &[String], i: usize| lines.get(i).cloned().unwrap_or_else(|| "nothing more".into());
+        let first = (0..count).find(|&i| self.0.get(i) != scene.0.get(i)).unwrap_or(0);
+        Some(format!("it has {}, this scene has {}", at(&self.0, first), at(&scene.0, first)))
+    }
+}

@@ -1,0 +1,8 @@
+//! Work with single environments: states to go back to, rollouts, properties of their own, shares of several processes.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod randomize;
+mod rollout;
+mod shard;
+mod snapshot;
+mod worlds;

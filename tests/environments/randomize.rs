@@ -1,0 +1,512 @@
+//! Properties of single environments: held against the laws of physics, shared where nothing differs, kept by name.
+
+use super::worlds::{all_bits, arm, cfg, cube, world};
+use kinetoscope::ndarray::{Array2, Array3, array, s};
+use kinetoscope::prelude::*;
+use kinetoscope::sim::Cone;
+use kinetoscope::sim::mj::{TARGET, Target};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+const ALL: Option<&[EnvId]> = None;
+const G: f64 = 9.81;
+
+/// Sets properties of single environments.
+fn set(sim: &mut SimulationManager, values: &[(usize, Property, &str, &[f64])]) {
+    for &(env, property, name, value) in values {
+        sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| properties.set(property, name, value)).unwrap();
+    }
+}
+
+fn get(sim: &SimulationManager, env: usize, property: Property, name: &str) -> Vec<f64> {
+    sim.properties(EnvId(env)).unwrap().get(property, name).unwrap().to_vec()
+}
+
+/// A physical pendulum: T = 2 pi sqrt((I + m d² + armature) / (m g d)). The amplitude of 0.02 rad makes it longer by
+/// a² / 16 = 2.5e-5, the step of 1 ms by (omega h)² / 24 < 2e-6.
+#[test]
+fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
+    let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0"/>
+        <inertial pos="0 0 -0.5" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody></mujoco>"#;
+    let settings = SimulationManagerCfg { physics_dt: 0.001, ground: None, ..cfg(6, 2) };
+    let mut sim = SimulationManager::new(settings).unwrap();
+    let id = sim.add_mjcf(MjcfCfg::text("p", text)).unwrap();
+    let envs: [(usize, Property, &str, &[f64]); 5] = [
+        (1, Property::Gravity, "gravity", &[0.0, 0.0, -3.7]),
+        (2, Property::CenterOfMass, "p/rod", &[0.0, 0.0, -0.7]),
+        (3, Property::Mass, "p/rod", &[3.0]),
+        (4, Property::Inertia, "p/rod", &[0.1, 0.1, 0.1]),
+        (5, Property::Armature, "p/hinge", &[0.3]),
+    ];
+    set(&mut sim, &envs);
+    // Mass, moment, distance, gravity, armature. Moments go with the mass: the period stays.
+    let laws = [
+        (1.0, 0.02, 0.5, G, 0.0),
+        (1.0, 0.02, 0.5, 3.7, 0.0),
+        (1.0, 0.02, 0.7, G, 0.0),
+        (3.0, 0.06, 0.5, G, 0.0),
+        (1.0, 0.1, 0.5, G, 0.0),
+        (1.0, 0.02, 0.5, G, 0.3),
+    ];
+    assert_eq!(get(&sim, 3, Property::Inertia, "p/rod"), [0.06; 3]);
+    sim.mjcf_part_mut(id).write_qpos(&array![[0.02]], ALL).unwrap();
+    let (mut crossings, mut before) = (vec![Vec::new(); 6], sim.mjcf_part(id).get_qpos());
+    for step in 1..=8000 {
+        sim.update(1);
+        let now = sim.mjcf_part(id).get_qpos();
+        for env in 0..6 {
+            let (a, b) = (before[(env, 0)], now[(env, 0)]);
+            if a > 0.0 && b <= 0.0 {
+                crossings[env].push((f64::from(step) - b / (b - a)) * 0.001);
+            }
+        }
+        before = now;
+    }
+    let periods = crossings.iter().map(|times| (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64);
+    for (env, (period, (m, moment, d, g, armature))) in periods.zip(laws).enumerate() {
+        let expected = TAU * ((moment + m * d * d + armature) / (m * g * d)).sqrt();
+        assert!((period / expected - 1.0).abs() < 4e-5, "environment {env}: {period} instead of {expected}");
+    }
+}
+
+/// Sliding on the ground, the momentum that is lost is mu times that of the normal force, m (g t + dv_z), whatever bounces
+/// there are. MuJoCo's friction creeps a little instead of being exactly at its limit: 1 %.
+#[test]
+fn boxes_slide_as_their_own_friction_says() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(3, 2) }).unwrap();
+    let id = sim.add_rigid_object(cube("cube", 1.0, [0.0, 0.0, 0.05])).unwrap();
+    for (env, mu) in [(1, 0.1), (2, 0.25)] {
+        sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| {
+            properties.set(Property::Friction, "cube", &[mu])?;
+            properties.set(Property::Friction, "ground", &[mu])
+        })
+        .unwrap();
+    }
+    sim.update(100);
+    sim.rigid_object_mut(id).write_velocity(&array![[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]], ALL).unwrap();
+    sim.update(10);
+    let before = sim.rigid_object(id).get_velocity();
+    sim.update(30);
+    let after = sim.rigid_object(id).get_velocity();
+    for (env, mu) in [(1, 0.1), (2, 0.25)] {
+        let lost = before[(env, 0)] - after[(env, 0)];
+        let pressed = G * 0.3 + after[(env, 2)] - before[(env, 2)];
+        assert!((lost / (mu * pressed) - 1.0).abs() < 0.01, "environment {env}: {lost} {pressed}");
+    }
+    let lost = |env| before[(env, 0)] - after[(env, 0)];
+    assert!(lost(2) > 1.5 * lost(1), "{} {}", lost(1), lost(2));
+}
+
+/// A wheel about its centre, with damping B and moment I.
+fn wheel(dir: &Path, drive: DriveCfg) -> RobotCfg {
+    let urdf = r#"<robot name="wheel"><link name="post"/>
+      <joint name="spin" type="continuous"><parent link="post"/><child link="disc"/><axis xyz="0 1 0"/>
+        <dynamics damping="0.2" friction="0.05"/></joint>
+      <link name="disc"><inertial><mass value="1"/>
+        <inertia ixx="0.5" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.5"/></inertial></link></robot>"#;
+    let path = dir.join("wheel.urdf");
+    std::fs::write(&path, urdf).unwrap();
+    RobotCfg { uid: "wheel".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() }
+}
+
+/// With damping inside the solve: v' = v - h (B v + f) / (I + A + h B), f the dry friction while it turns.
+#[test]
+fn wheels_slow_down_as_their_own_damping_friction_and_armature_say() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sim = SimulationManager::new(cfg(4, 1)).unwrap();
+    let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
+    let id = sim.add_robot(wheel(dir.path(), drive)).unwrap();
+    set(
+        &mut sim,
+        &[
+            (1, Property::JointDamping, "wheel/spin", &[0.7]),
+            (2, Property::DryFriction, "wheel/spin", &[0.11]),
+            (3, Property::Armature, "wheel/spin", &[0.4]),
+            (3, Property::JointDamping, "wheel/spin", &[0.1]),
+        ],
+    );
+    sim.robot_mut(id).write_qvel(&array![[10.0]], None, ALL).unwrap();
+    let before = 10.0;
+    sim.update(1);
+    let after = sim.robot(id).get_qvel();
+    let h = 0.01;
+    for (env, (b, f, a)) in [(0.2, 0.05, 0.0), (0.7, 0.05, 0.0), (0.2, 0.11, 0.0), (0.1, 0.05, 0.4)].iter().enumerate()
+    {
+        let expected = before - h * (b * before + f) / (0.5 + a + h * b);
+        // MuJoCo's friction rows are hard to 1 in 10⁴ (impedance 0.9999).
+        assert!(
+            (after[(env, 0)] - expected).abs() < 1e-6,
+            "environment {env}: {} instead of {expected}",
+            after[(env, 0)]
+        );
+    }
+}
+
+/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
+#[test]
+fn drives_have_gains_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let urdf = r#"<robot name="lever"><link name="post"/>
+      <joint name="hinge" type="revolute"><parent link="post"/><child link="bar"/><axis xyz="0 1 0"/>
+        <limit lower="-3" upper="3" effort="100" velocity="10"/></joint>
+      <link name="bar"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>
+        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link></robot>"#;
+    let path = dir.path().join("lever.urdf");
+    std::fs::write(&path, urdf).unwrap();
+    let drive = DriveCfg { stiffness: 500.0.into(), damping: 100.0.into(), ..Default::default() };
+    let robot = RobotCfg { uid: "lever".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() };
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(3, 1) }).unwrap();
+    let id = sim.add_robot(robot).unwrap();
+    set(
+        &mut sim,
+        &[
+            (1, Property::Stiffness, "lever/hinge", &[200.0]),
+            (1, Property::Mass, "lever/bar", &[3.0]),
+            (2, Property::MaxEffort, "lever/hinge", &[4.0]),
+        ],
+    );
+    assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
+    sim.update(1500);
+    let (q, effort) = (sim.robot(id).get_qpos(), sim.robot(id).get_qf());
+    for (env, kp, m) in [(0, 500.0, 2.0), (1, 200.0, 3.0)] {
+        let q = q[(env, 0)];
+        let weight = m * G * 0.5 * q.cos();
+        assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
+    }
+    assert!((effort[(2, 0)].abs() - 4.0).abs() < 1e-9, "{effort}");
+    // Gains are of the state as well as of the properties.
+    let snapshot = sim.snapshot(Some(&[EnvId(2)])).unwrap();
+    sim.restore(&snapshot, Some(&[EnvId(0)])).unwrap();
+    assert_eq!(get(&sim, 0, Property::MaxEffort, "lever/hinge"), [4.0]);
+}
+
+/// Everything at once.
+fn all_properties() -> Randomization {
+    Randomization::new()
+        .with(Property::Mass, "arm/.*|cube|machine/.*", Draw::Scale([0.8, 1.2]))
+        .with(Property::CenterOfMass, "arm/link[1-6]|machine/tip", Draw::Add([-0.01, 0.01]))
+        .with(Property::Inertia, "arm/.*", Draw::Scale([0.9, 1.1]))
+        .with(Property::Friction, "cube|pile.|ground", Draw::Set([0.4, 1.1]))
+        .with(Property::JointDamping, "machine/hinge", Draw::Scale([0.5, 2.0]))
+        .with(Property::Armature, "arm/.*", Draw::Set([0.0, 0.1]))
+        .with(Property::Gravity, "gravity", Draw::Add([-0.2, 0.2]))
+        .with(Property::Stiffness, "arm/JOINT[1-3]", Draw::Scale([0.7, 1.3]))
+        .with(Property::MaxEffort, "arm/JOINT4", Draw::Scale([0.5, 1.0]))
+}
+
+/// Names and values of all properties.
+fn values(sim: &SimulationManager, env: usize) -> Vec<(Property, String, Vec<u64>)> {
+    let properties = sim.properties(EnvId(env)).unwrap();
+    let bits = |property, name: &str| properties.get(property, name).unwrap().iter().map(|x| x.to_bits()).collect();
+    let of = |property| properties.names(property).into_iter().map(move |name| (property, name.to_string()));
+    let mut all: Vec<(Property, String, Vec<u64>)> =
+        Property::ALL.into_iter().flat_map(of).map(|(p, name)| (p, name.clone(), bits(p, &name))).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn draws_stay_in_their_ranges_and_leave_the_rest_nominal() {
+    let (mut sim, _) = world(cfg(4, 2));
+    sim.randomize(&all_properties(), ALL).unwrap();
+    for env in 0..4 {
+        let properties = sim.properties(EnvId(env)).unwrap();
+        let ratio = |p, name| properties.get(p, name).unwrap()[0] / properties.nominal(p, name).unwrap()[0];
+        for name in ["arm/link3", "cube", "machine/tip"] {
+            assert!((0.8..1.2).contains(&ratio(Property::Mass, name)));
+        }
+        // The moments of the arm have a factor of their own on top of that of the mass.
+        let own = ratio(Property::Inertia, "arm/link3") / ratio(Property::Mass, "arm/link3");
+        assert!((0.9..1.1).contains(&own) && own != 1.0, "{own}");
+        assert_eq!(ratio(Property::Inertia, "cube"), ratio(Property::Mass, "cube"));
+        let (com, nominal) = (
+            properties.get(Property::CenterOfMass, "arm/link2"),
+            properties.nominal(Property::CenterOfMass, "arm/link2"),
+        );
+        let moved: Vec<f64> = com.unwrap().iter().zip(nominal.unwrap()).map(|(a, b)| a - b).collect();
+        assert!(moved.iter().all(|d| d.abs() <= 0.01) && moved[0] != moved[1], "{moved:?}");
+        assert!((0.4..1.1).contains(&properties.get(Property::Friction, "ground").unwrap()[0]));
+        assert_eq!(ratio(Property::TorsionalFriction, "cube"), 1.0);
+        assert_eq!(ratio(Property::Stiffness, "arm/JOINT5"), 1.0);
+        assert!((0.5..1.0).contains(&ratio(Property::MaxEffort, "arm/JOINT4")));
+        assert_eq!(get(&sim, env, Property::Mass, "pile1"), [0.2]);
+        // What MuJoCo steps with is what was drawn.
+        sim.batch().read(env, |env| {
+            let model = env.data().model();
+            let cube = model.id(kinetoscope::sim::mj::ObjectKind::Body, "cube").unwrap();
+            assert_eq!(model.body_mass()[cube], properties.get(Property::Mass, "cube").unwrap()[0]);
+            assert_eq!(model.gravity()[..], *properties.get(Property::Gravity, "gravity").unwrap());
+        });
+    }
+    // Draws are for the nominal values: they do not drift. They differ from draw to draw, too.
+    let first = get(&sim, 1, Property::Mass, "cube");
+    for _ in 0..50 {
+        sim.randomize(&all_properties(), ALL).unwrap();
+    }
+    let last = get(&sim, 1, Property::Mass, "cube");
+    assert!(last != first && (0.8..1.2).contains(&(last[0] / 0.5)), "{first:?} {last:?}");
+    sim.update(200);
+    assert!(sim.diverged().is_empty());
+}
+
+#[test]
+fn draws_depend_on_seed_environment_and_their_number_only() {
+    let draw = |num_envs, threads, seed| {
+        let (mut sim, _) = world(SimulationManagerCfg { seed, ..cfg(num_envs, threads) });
+        sim.randomize(&all_properties(), ALL).unwrap();
+        sim
+    };
+    let (mut eight, mut three) = (draw(8, 2, 5), draw(3, 1, 5));
+    for env in 0..3 {
+        assert_eq!(values(&eight, env), values(&three, env));
+        assert_ne!(values(&eight, env), values(&eight, env + 1));
+    }
+    assert_ne!(values(&draw(3, 1, 6), 0), values(&three, 0), "another seed");
+    // An environment's second draw does not depend on what others drew in between, nor on what else is drawn.
+    three.randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
+    eight.randomize(&all_properties(), Some(&[EnvId(0), EnvId(4)])).unwrap();
+    assert_ne!(values(&eight, 1), values(&three, 1));
+    eight.randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
+    assert_eq!(values(&eight, 1), values(&three, 1));
+    let only = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]));
+    three.randomize(&only, Some(&[EnvId(0)])).unwrap();
+    assert_eq!(get(&three, 0, Property::Mass, "cube"), get(&eight, 0, Property::Mass, "cube"));
+    // By a function: one stream of numbers for each environment and draw.
+    let mut streams = Vec::new();
+    for sim in [&mut eight, &mut three] {
+        let mut numbers = Vec::new();
+        sim.randomize_with(Some(&[EnvId(1)]), |random, env, _| {
+            numbers.push((env, random.uniform()));
+            Ok(())
+        })
+        .unwrap();
+        streams.push(numbers);
+    }
+    assert_eq!(streams[0], streams[1]);
+}
+
+#[test]
+fn what_is_not_changed_is_shared_and_what_is_changed_is_small() {
+    let (mut sim, _) = world(cfg(4, 1));
+    let random = Randomization::new().with(Property::Mass, "arm/.*", Draw::Scale([0.8, 1.2])).with(
+        Property::Friction,
+        "ground",
+        Draw::Set([0.5, 1.5]),
+    );
+    sim.randomize(&random, Some(&[EnvId(1)])).unwrap();
+    let base = sim.batch().model().clone();
+    let model = |sim: &SimulationManager, env| sim.batch().read(env, |env| env.data().model().clone());
+    for env in [0, 2, 3] {
+        assert!(model(&sim, env).arrays_apart(&base).is_empty() && sim.property_bytes(EnvId(env)).unwrap() == 0);
+    }
+    let own = model(&sim, 1);
+    let mut apart = own.arrays_apart(&base);
+    assert_eq!(own.own_arrays().map(|(name, _)| name).collect::<Vec<_>>(), apart);
+    apart.retain(|name| !["tendon_invweight0", "actuator_acc0", "light_poscom0"].contains(name));
+    let expected = [
+        "body_inertia",
+        "body_invweight0",
+        "body_mass",
+        "body_subtreemass",
+        "dof_M0",
+        "dof_invweight0",
+        "geom_friction",
+    ];
+    assert_eq!(apart, expected);
+    // Counted array by array: 8 bytes a number.
+    let (bodies, dofs, geoms) = (base.nbody(), base.nv(), base.ngeom());
+    let at_least = 8 * (bodies * (3 + 2 + 1 + 1) + dofs * 2 + geoms * 3);
+    let bytes = sim.property_bytes(EnvId(1)).unwrap();
+    let arrays: usize = own.own_arrays().map(|(_, bytes)| bytes).sum();
+    let small = 8 * (base.ntendon() + base.nactuator() + 3 * base.nlight());
+    assert!(arrays >= at_least && arrays <= at_least + small, "{arrays} {at_least}");
+    // Beside the arrays: the struct, and the values as they were set.
+    assert!(bytes > arrays && bytes < 3 * arrays + (16 << 10), "{bytes} for {arrays}");
+    assert!(bytes < base.shared_bytes(), "{bytes} of {}", base.shared_bytes());
+
+    // Nominal again: all is shared, and goes on as if nothing had been.
+    sim.reset_properties(ALL).unwrap();
+    assert!(model(&sim, 1).arrays_apart(&base).is_empty() && sim.property_bytes(EnvId(1)).unwrap() == 0);
+    let (mut other, _) = world(cfg(4, 1));
+    sim.update(200);
+    other.update(200);
+    assert!(all_bits(&sim) == all_bits(&other));
+}
+
+#[test]
+fn buffers_that_grow_and_resets_leave_properties_alone() {
+    let (mut sim, ids) = world(cfg(3, 2));
+    for k in 0..6 {
+        sim.add_rigid_object(cube(&format!("more{k}"), 0.2, [1.0, 0.2 * f64::from(k), 0.2])).unwrap();
+    }
+    sim.randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
+    let drawn: Vec<_> = (0..3).map(|env| values(&sim, env)).collect();
+    let own = |sim: &SimulationManager, env| {
+        sim.batch().read(env, |env| env.data().model().own_arrays().map(|(name, _)| name).collect::<Vec<_>>())
+    };
+    let (arrays, growths) = (own(&sim, 0), sim.buffer_growths());
+    assert!(arrays.len() > 8);
+    let gravity = get(&sim, 0, Property::Gravity, "gravity");
+    sim.update(150);
+    assert!(sim.buffer_growths() > growths || TARGET == Target::V4, "the arena of 4.x is large enough");
+    sim.reset(None).unwrap();
+    for (env, drawn) in drawn.iter().enumerate() {
+        assert_eq!(values(&sim, env), *drawn);
+    }
+    assert_eq!(own(&sim, 0), arrays);
+    // And it is what is stepped with: one step of free fall.
+    let before = sim.rigid_object(ids.cube).get_velocity();
+    sim.update(1);
+    let after = sim.rigid_object(ids.cube).get_velocity();
+    for k in 0..3 {
+        assert!((after[(0, k)] - before[(0, k)] - 0.01 * gravity[k]).abs() < 1e-12);
+    }
+    assert!((after[(1, 2)] - before[(1, 2)] + 0.01 * G).abs() < 1e-12);
+}
+
+#[test]
+fn what_is_added_later_changes_no_property_and_no_state() {
+    let (mut sim, ids) = world(cfg(3, 1));
+    sim.randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
+    sim.update(100);
+    let state = |sim: &SimulationManager| {
+        let arm = sim.robot(ids.arm);
+        let machine = sim.mjcf_part(ids.machine);
+        (arm.get_qpos(), arm.get_qvel(), sim.rigid_object(ids.cube).get_pose(), machine.get_qpos(), machine.get_qvel())
+    };
+    let (before, drawn) = (state(&sim), (0..3).map(|env| values(&sim, env)).collect::<Vec<_>>());
+    sim.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
+    sim.add_robot(RobotCfg { uid: "second".into(), init_pose: Pose::translation(3.0, 0.0, 0.0), ..arm() }).unwrap();
+    assert!(state(&sim) == before, "bit for bit");
+    for (env, drawn) in drawn.iter().enumerate() {
+        let mut now = values(&sim, env);
+        now.retain(|(_, name, _)| !name.starts_with("late") && !name.starts_with("second/"));
+        assert_eq!(now, *drawn, "environment {env}");
+        assert_eq!(get(&sim, env, Property::Mass, "late"), [1.0]);
+    }
+    assert_eq!(sim.property_bytes(EnvId(0)).unwrap(), 0);
+    // The same as drawn after everything was there: names are keys.
+    let (mut other, _) = world(cfg(3, 1));
+    other.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
+    other.randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
+    assert_eq!(get(&other, 2, Property::Mass, "arm/link4"), get(&sim, 2, Property::Mass, "arm/link4"));
+    sim.update(50);
+    assert!(sim.diverged().is_empty());
+}
+
+#[test]
+fn snapshots_and_rollouts_go_on_with_the_properties_of_their_environment() {
+    let build = || {
+        let (mut sim, ids) = world(cfg(2, 2));
+        sim.randomize(&all_properties(), ALL).unwrap();
+        (sim, ids)
+    };
+    let (mut sim, ids) = build();
+    sim.update(120);
+    let snapshot = sim.snapshot(ALL).unwrap();
+    let controls = Array3::from_shape_fn((2, 40, 7), |(n, t, k)| (0.5 * n as f64 + 0.1 * t as f64 + k as f64).sin());
+    let rollout = sim.rollout(&controls, None, ALL).unwrap();
+    for t in 0..40 {
+        sim.robot_mut(ids.arm).set_qpos(controls.slice(s![.., t, ..6]), None, None).unwrap();
+        sim.mjcf_part_mut(ids.machine).set_ctrl(controls.slice(s![.., t, 6..]), None, None).unwrap();
+        sim.update(1);
+    }
+    let end = all_bits(&sim);
+    let (mut fresh, _) = build();
+    fresh.restore(&rollout.end, ALL).unwrap();
+    assert!(all_bits(&fresh) == end);
+    fresh.restore(&snapshot, ALL).unwrap();
+    let again = fresh.rollout(&controls, None, ALL).unwrap();
+    assert!(again.states == rollout.states);
+    // Control: with nominal properties it goes elsewhere.
+    fresh.reset_properties(ALL).unwrap();
+    assert!(fresh.rollout(&controls, Some(&snapshot), ALL).unwrap().states != rollout.states);
+}
+
+#[test]
+fn values_that_cannot_be_are_named() {
+    let (mut sim, _) = world(cfg(2, 1));
+    let cases = [
+        (Property::Mass, "cube", Draw::Add([-2.0, -1.0]), "kg"),
+        (Property::Inertia, "cube", Draw::Add([-1.0, -1.0]), "positive"),
+        (Property::Friction, "ground", Draw::Set([-0.1, -0.1]), ">= 0"),
+        (Property::JointDamping, "machine/hinge", Draw::Set([-1.0, -1.0]), ">= 0"),
+        (Property::Armature, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
+        (Property::MaxEffort, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
+    ];
+    for (property, pattern, draw, expected) in cases {
+        let done = sim.randomize(&Randomization::new().with(property, pattern, draw), ALL);
+        let Err(Error::Randomization(fault)) = done else { panic!("{property:?}: {done:?}") };
+        assert!(matches!(&fault, RandomizationError::Value { env: 0, name, .. } if name == pattern), "{fault}");
+        assert!(fault.to_string().contains(expected), "{fault}");
+    }
+    let long = sim.randomize_with(ALL, |_, _, p| p.set(Property::Inertia, "cube", &[1.0, 1.0, 2.1]));
+    assert!(long.unwrap_err().to_string().contains("sum of the others"));
+}
+
+#[test]
+fn wrong_names_ranges_and_widths_are_refused() {
+    let (mut sim, _) = world(cfg(2, 1));
+    let bits = all_bits(&sim);
+    let fault = |sim: &mut SimulationManager, randomization: Randomization| match sim.randomize(&randomization, ALL) {
+        Err(Error::Randomization(fault)) => fault,
+        other => panic!("{other:?}"),
+    };
+    let mass = |pattern: &str, draw| Randomization::new().with(Property::Mass, pattern, draw);
+    let unknown = fault(&mut sim, mass("cub", Draw::Scale([1.0, 1.0])));
+    assert!(
+        matches!(&unknown, RandomizationError::Pattern { .. }) && unknown.to_string().contains("\"cube\""),
+        "{unknown}"
+    );
+    let twice = mass("cube", Draw::Scale([1.0, 1.0])).with(Property::Mass, "c.*", Draw::Add([0.0, 1.0]));
+    assert!(fault(&mut sim, twice).to_string().contains("both"));
+    for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
+        assert!(matches!(fault(&mut sim, mass("cube", Draw::Set(range))), RandomizationError::Range { .. }));
+    }
+    // A joint that nominally has no damping, and the free joint of an object, are none to draw for.
+    let none = Randomization::new().with(Property::DryFriction, "machine/hinge", Draw::Set([1.0, 1.0]));
+    assert!(matches!(fault(&mut sim, none), RandomizationError::Pattern { property: "dry_friction", .. }));
+    let width = sim.randomize_with(ALL, |_, _, p| p.set(Property::Gravity, "gravity", &[0.0]));
+    assert!(matches!(width, Err(Error::Randomization(RandomizationError::Width { expected: 3, found: 1, .. }))));
+    let name = sim.randomize_with(ALL, |_, _, p| p.set(Property::Mass, "kube", &[0.0]));
+    assert!(matches!(name, Err(Error::UnknownName { candidates, .. }) if candidates[0] == "cube"));
+    assert!(matches!(sim.properties(EnvId(2)), Err(Error::UnknownIndex { .. })));
+    assert!(matches!(sim.randomize(&Randomization::new(), Some(&[EnvId(7)])), Err(Error::UnknownIndex { .. })));
+    // The first environment was good, the second not: neither changes.
+    let half = sim.randomize_with(ALL, |_, env, p| p.set(Property::Mass, "cube", &[1.0 - 2.0 * env.0 as f64]));
+    assert!(matches!(half, Err(Error::Randomization(RandomizationError::Value { env: 1, .. }))));
+    assert_eq!(get(&sim, 0, Property::Mass, "cube"), [0.5]);
+    assert_eq!(all_bits(&sim), bits);
+    // Failed draws are no draws.
+    let (mut other, _) = world(cfg(2, 1));
+    for sim in [&mut sim, &mut other] {
+        sim.randomize(&all_properties(), ALL).unwrap();
+    }
+    assert_eq!(values(&sim, 1), values(&other, 1));
+}
+
+#[test]
+fn a_centred_object_has_no_other_centre_of_mass_on_4() {
+    let (mut sim, ids) = world(cfg(2, 1));
+    let moved =
+        sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::CenterOfMass, "cube", &[0.03, 0.0, 0.0]));
+    if TARGET == Target::V4 {
+        let Err(Error::Randomization(fault)) = moved else { panic!("{moved:?}") };
+        assert!(matches!(&fault, RandomizationError::DiagonalInertia { env: 1, name } if name == "cube"));
+        return;
+    }
+    moved.unwrap();
+    // Free fall without spin: a force in the centre of mass turns nothing, and the origin turns about the centre.
+    sim.rigid_object_mut(ids.cube).write_velocity(&Array2::zeros((1, 6)), ALL).unwrap();
+    sim.update(10);
+    let fallen = sim.rigid_object(ids.cube).get_velocity();
+    assert!(fallen.row(1).iter().zip(&fallen.row(0)).all(|(a, b)| (a - b).abs() < 1e-12), "{fallen}");
+    // With a spin about z the origin is accelerated to the centre: |a| = w² d.
+    sim.rigid_object_mut(ids.cube).write_velocity(&array![[0.0, 0.0, 0.0, 0.0, 0.0, 2.0]], ALL).unwrap();
+    let before = sim.rigid_object(ids.cube).get_velocity();
+    sim.update(1);
+    let change = sim.rigid_object(ids.cube).get_velocity() - before;
+    let sideways = (change[(1, 0)].powi(2) + change[(1, 1)].powi(2)).sqrt() / 0.01;
+    assert!((sideways - 4.0 * 0.03).abs() < 2e-3, "{sideways}");
+    assert!(change[(0, 0)].abs() + change[(0, 1)].abs() < 1e-9);
+}

@@ -1,0 +1,139 @@
+//! A rollout gives what stepping by hand gives, and changes nothing.
+
+use super::worlds::{all_bits, cfg, world};
+use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
+use kinetoscope::prelude::*;
+
+const ALL: Option<&[EnvId]> = None;
+const STEPS: usize = 60;
+
+fn controls(rows: usize) -> Array3<f64> {
+    Array3::from_shape_fn((rows, STEPS, 7), |(n, t, k)| (0.7 * n as f64 + 0.05 * t as f64 + k as f64).sin() * 2.0)
+}
+
+/// Positions and velocities of all environments.
+fn states(sim: &SimulationManager) -> Array2<f64> {
+    let model = sim.batch().model();
+    let mut states = Array2::zeros((sim.num_envs(), model.nq() + model.nv()));
+    sim.batch().for_each(|i, env| {
+        let now: Vec<f64> = env.data().qpos().iter().chain(env.data().qvel()).copied().collect();
+        states.row_mut(i).assign(&kinetoscope::ndarray::ArrayView1::from(&now));
+    });
+    states
+}
+
+#[test]
+fn a_rollout_is_stepping_by_hand_and_disturbs_nothing() {
+    for (settings, threads) in [(cfg(3, 2), 2), (SimulationManagerCfg { substeps: 3, ..cfg(3, 1) }, 1)] {
+        let (mut sim, ids) = world(settings);
+        assert_eq!(sim.threads(), threads);
+        sim.update(200);
+        let (before, warnings) = (all_bits(&sim), sim.warning_counts());
+        let forces = sim.mjcf_part(ids.machine).get_actuator_force();
+        let controls = controls(3);
+        let rollout = sim.rollout(&controls, None, ALL).unwrap();
+        assert_eq!(all_bits(&sim), before, "the present stays");
+        assert_eq!((sim.warning_counts(), sim.mjcf_part(ids.machine).get_actuator_force()), (warnings, forces));
+        assert!(rollout.diverged.is_empty());
+
+        let present = sim.snapshot(ALL).unwrap();
+        for t in 0..STEPS {
+            let now = controls.index_axis(Axis(1), t);
+            sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
+            sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
+            sim.update(1);
+            assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
+        }
+        let end = all_bits(&sim);
+        // The end is a state to go on from.
+        sim.restore(&rollout.end, ALL).unwrap();
+        assert_eq!(all_bits(&sim), end);
+
+        // From a snapshot, whatever is present; and many rows in one environment.
+        let again = sim.rollout(&controls, Some(&present), ALL).unwrap();
+        assert!(again.states == rollout.states);
+        sim.restore(&present, ALL).unwrap();
+        let many = sim.rollout(&controls, None, Some(&[EnvId(1); 3])).unwrap();
+        assert!(many.states.index_axis(Axis(0), 1) == rollout.states.index_axis(Axis(0), 1));
+        assert!(many.states.index_axis(Axis(0), 0) != rollout.states.index_axis(Axis(0), 0), "another start");
+        assert_eq!(many.end.env_ids(), [EnvId(1); 3]);
+        // One row of controls for all.
+        let one = sim.rollout(controls.slice(s![..1, .., ..]), None, ALL).unwrap();
+        assert!(one.states.index_axis(Axis(0), 0) == rollout.states.index_axis(Axis(0), 0));
+        let copies = concatenate(Axis(0), &[controls.slice(s![..1, .., ..]); 3]).unwrap();
+        assert!(one.states == sim.rollout(&copies, None, ALL).unwrap().states);
+    }
+}
+
+#[test]
+fn columns_have_names() {
+    let (sim, _) = world(cfg(1, 1));
+    let names = sim.control_names();
+    assert_eq!((names.len(), names[0].as_str(), names[6].as_str()), (7, "arm/JOINT1", "machine/motor"));
+    let states = sim.state_names();
+    let model = sim.batch().model();
+    assert_eq!(states.len(), model.nq() + model.nv());
+    let rollout = sim.rollout(&Array3::zeros((1, 1, 7)), None, ALL).unwrap();
+    let column = |name: &str| states.iter().position(|n| n == name).unwrap();
+    // Free fall of one step from rest but for what the world wrote; the height is where the name says.
+    let height = rollout.states[(0, 0, column("qpos cube/free[2]"))];
+    let velocity = rollout.states[(0, 0, column("qvel cube/free[2]"))];
+    let first = 2.0 * 2.0_f64.sin() - 9.81 * 0.01;
+    assert!((velocity - first).abs() < 1e-12 && (height - (0.4 + 0.01 * first)).abs() < 1e-12, "{height} {velocity}");
+    assert_eq!(states[0], "qpos arm/JOINT1");
+    assert!(
+        states.contains(&"qvel machine/ball[2]".to_string()) && states.contains(&"qpos machine/ball[3]".to_string())
+    );
+}
+
+#[test]
+fn targets_are_clamped_as_those_of_robots_are() {
+    let (mut sim, ids) = world(cfg(1, 1));
+    let rollout = sim.rollout(&Array3::from_elem((1, 5, 7), 100.0), None, ALL).unwrap();
+    sim.restore(&rollout.end, ALL).unwrap();
+    let limits = sim.robot(ids.arm).qpos_limits();
+    assert_eq!(sim.robot(ids.arm).get_target_qpos().row(0), limits.slice(s![0, .., 1]));
+}
+
+#[test]
+fn a_row_that_diverges_stays_where_it_was_and_the_others_go_on() {
+    // A slide without damping and a force of 1e12 newtons on 1 kg: beyond MuJoCo's largest acceleration.
+    let text = r#"<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>
+        </worldbody><actuator><motor name="push" joint="x" gear="1000000"/></actuator></mujoco>"#;
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(2, 2) }).unwrap();
+    sim.add_mjcf(MjcfCfg::text("slider", text)).unwrap();
+    let mut controls = Array3::from_elem((2, 6, 1), 1e-6);
+    controls[(0, 3, 0)] = 1e6;
+    let rollout = sim.rollout(&controls, None, ALL).unwrap();
+    assert_eq!(rollout.diverged.len(), 1);
+    assert!(rollout.diverged[0].0 == 0 && rollout.diverged[0].1.contains("step 3"), "{:?}", rollout.diverged);
+    for t in 3..6 {
+        assert_eq!(rollout.states.slice(s![0, t, ..]), rollout.states.slice(s![0, 2, ..]));
+    }
+    // Semi-implicit Euler under 1 N on 1 kg: v = k h, x = h² k (k + 1) / 2 after k steps.
+    assert!((rollout.states[(1, 5, 1)] - 0.06).abs() < 1e-12);
+    assert!((rollout.states[(1, 5, 0)] - 21.0 * 1e-4).abs() < 1e-12);
+    assert!(sim.diverged().is_empty());
+    sim.restore(&rollout.end, ALL).unwrap();
+    assert_eq!(sim.diverged().len(), 1);
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    let (sim, _) = world(cfg(2, 1));
+    let shape = |controls: &Array3<f64>| match sim.rollout(controls, None, ALL) {
+        Err(Error::Shape { expected, .. }) => expected,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(shape(&Array3::zeros((2, 4, 6))), [2, 4, 7]);
+    assert_eq!(shape(&Array3::zeros((3, 4, 7))), [2, 4, 7]);
+    let mut controls = Array3::zeros((2, 4, 7));
+    controls[(1, 2, 6)] = f64::NAN;
+    let error = sim.rollout(&controls, None, ALL).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { row: 1, column: 6, .. }));
+    assert!(error.to_string().contains("machine/motor") && error.to_string().contains("step 2"), "{error}");
+    let unknown = sim.rollout(&Array3::zeros((1, 1, 7)), None, Some(&[EnvId(2)]));
+    assert!(matches!(unknown, Err(Error::UnknownIndex { index: 2, .. })));
+    let none = sim.rollout(&Array3::zeros((1, 0, 7)), None, ALL).unwrap();
+    assert_eq!(none.states.shape()[1], 0);
+}

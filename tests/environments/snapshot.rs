@@ -1,0 +1,249 @@
+//! Going on from a snapshot is going on: the same bits, wherever it is restored; and wrong ones are told apart.
+
+use super::worlds::{all_bits, arm, bits_of, cfg, cube, fewest_contacts, world};
+use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::prelude::*;
+
+const ALL: Option<&[EnvId]> = None;
+
+/// A snapshot after 500 steps, and the bits there and 300 steps later.
+fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<u64>>, Vec<Vec<u64>>) {
+    let (mut sim, _) = world(settings);
+    sim.update(500);
+    assert!(fewest_contacts(&sim) > 3 && sim.diverged().is_empty(), "the world is what this test is about");
+    let (snapshot, there) = (sim.snapshot(ALL).unwrap(), all_bits(&sim));
+    sim.update(300);
+    let end = all_bits(&sim);
+    assert!(end.iter().zip(&there).all(|(end, there)| end != there), "everything moves on");
+    (sim, snapshot, there, end)
+}
+
+#[test]
+fn going_on_from_a_snapshot_gives_the_same_bits() {
+    for settings in
+        [cfg(3, 2), SimulationManagerCfg { cone: kinetoscope::sim::Cone::Elliptic, substeps: 2, ..cfg(3, 1) }]
+    {
+        let (mut sim, snapshot, there, end) = run(settings.clone());
+        sim.restore(&snapshot, ALL).unwrap();
+        assert!(all_bits(&sim) == there, "the state is back");
+        assert!((snapshot.time()[0] - 5.0).abs() < 1e-9 && sim.time() == snapshot.time());
+        sim.update(300);
+        assert!(all_bits(&sim) == end, "and goes on as before");
+
+        // A manager that the same program built, with another number of threads, which has never been there.
+        let (mut fresh, _) = world(SimulationManagerCfg { threads: Some(3), ..settings });
+        fresh.restore(&snapshot, ALL).unwrap();
+        assert!(all_bits(&fresh) == there);
+        fresh.update(300);
+        assert!(all_bits(&fresh) == end);
+
+        // Control: without it the manager is somewhere else.
+        let (mut other, _) = world(fresh.cfg().clone());
+        other.update(300);
+        assert!(all_bits(&other) != end);
+    }
+}
+
+#[test]
+fn a_state_may_go_to_other_environments_and_the_rest_stays() {
+    let (mut sim, snapshot, there, end) = run(cfg(3, 2));
+    // The first to the last, the last to the first.
+    sim.restore(&snapshot, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
+    assert_eq!(all_bits(&sim), [there[2].clone(), there[1].clone(), there[0].clone()]);
+    sim.update(300);
+    assert_eq!(all_bits(&sim), [end[2].clone(), end[1].clone(), end[0].clone()]);
+    // One to all, and into a manager of one.
+    sim.restore(&snapshot, ALL).unwrap();
+    let one = sim.snapshot(Some(&[EnvId(1)])).unwrap();
+    assert_eq!((one.len(), one.env_ids()), (1, vec![EnvId(1)]));
+    sim.restore(&one, Some(&[EnvId(0), EnvId(2)])).unwrap();
+    assert_eq!(all_bits(&sim), vec![there[1].clone(); 3]);
+    let (mut single, _) = world(cfg(1, 1));
+    single.restore(&one, Some(&[EnvId(0)])).unwrap();
+    single.update(300);
+    assert_eq!(all_bits(&single)[0], end[1]);
+    // A subset leaves the others alone.
+    sim.update(10);
+    let before = all_bits(&sim);
+    sim.restore(&one, Some(&[EnvId(2)])).unwrap();
+    assert_eq!(all_bits(&sim), [before[0].clone(), before[1].clone(), there[1].clone()]);
+}
+
+#[test]
+fn a_file_holds_the_same_bits() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.kts");
+    let (_, snapshot, there, end) = run(cfg(2, 2));
+    std::fs::write(&path, "an older file").unwrap();
+    snapshot.save(&path).unwrap();
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing temporary is left");
+    let (mut sim, _) = world(cfg(2, 1));
+    sim.restore(&Snapshot::load(&path).unwrap(), ALL).unwrap();
+    assert!(all_bits(&sim) == there);
+    sim.update(300);
+    assert!(all_bits(&sim) == end);
+}
+
+#[test]
+fn files_that_are_no_snapshots_of_this_are_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.kts");
+    let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+    sim.add_robot(arm()).unwrap();
+    sim.snapshot(ALL).unwrap().save(&path).unwrap();
+    let good = std::fs::read(&path).unwrap();
+    let fault = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        match Snapshot::load(&path) {
+            Err(Error::Snapshot(fault)) => fault,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert!(matches!(fault(&good[..good.len() / 2]), SnapshotError::Truncated { .. }));
+    assert!(matches!(fault(b"{\"json\": true}"), SnapshotError::Foreign { .. }));
+    let mut bytes = good.clone();
+    bytes[good.len() / 2] ^= 0x10;
+    assert!(matches!(fault(&bytes), SnapshotError::Damaged { .. }));
+    let message = fault(&bytes).to_string();
+    assert!(message.contains("state.kts"), "{message}");
+    assert!(matches!(Snapshot::load(dir.path().join("nowhere")), Err(Error::File { .. })));
+    let unwritable = sim.snapshot(ALL).unwrap().save(dir.path().join("no/such/folder/file"));
+    assert!(matches!(unwritable, Err(Error::File { .. })));
+}
+
+#[test]
+fn another_scene_or_number_is_refused_and_nothing_changes() {
+    let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
+    sim.add_robot(arm()).unwrap();
+    sim.update(5);
+    let snapshot = sim.snapshot(ALL).unwrap();
+    let before = all_bits(&sim);
+    let mut other = SimulationManager::new(cfg(3, 1)).unwrap();
+    other.add_robot(RobotCfg { uid: "leg".into(), ..arm() }).unwrap();
+    let Err(Error::Snapshot(fault)) = other.restore(&snapshot, ALL) else { panic!("accepted") };
+    assert!(matches!(fault, SnapshotError::OtherScene { .. }));
+    assert!(fault.to_string().contains("arm/") && fault.to_string().contains("leg/"), "{fault}");
+    let two = Some(&[EnvId(0), EnvId(1)][..]);
+    let count = sim.restore(&snapshot, two);
+    assert!(matches!(count, Err(Error::Snapshot(SnapshotError::Count { held: 3, wanted: 2 }))), "{count:?}");
+    let unknown = sim.snapshot(Some(&[EnvId(3)]));
+    assert!(matches!(unknown, Err(Error::UnknownIndex { index: 3, .. })));
+    let mut few = SimulationManager::new(cfg(2, 1)).unwrap();
+    few.add_robot(arm()).unwrap();
+    assert!(matches!(few.restore(&snapshot, ALL), Err(Error::UnknownIndex { index: 2, .. })));
+    assert_eq!(all_bits(&sim), before);
+    // Something was added: what was taken before is of another scene.
+    sim.add_rigid_object(cube("late", 1.0, [1.0, 1.0, 1.0])).unwrap();
+    assert!(matches!(sim.restore(&snapshot, ALL), Err(Error::Snapshot(SnapshotError::OtherScene { .. }))));
+}
+
+#[test]
+fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
+    let dir = tempfile::tempdir().unwrap();
+    let urdf = r#"<robot name="wheel"><link name="post"/>
+      <joint name="spin" type="continuous"><parent link="post"/><child link="disc"/><axis xyz="0 1 0"/></joint>
+      <link name="disc"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link></robot>"#;
+    let path = dir.path().join("wheel.urdf");
+    std::fs::write(&path, urdf).unwrap();
+    let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
+    let wheel = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(path), ..Default::default() }).unwrap();
+    sim.update(20);
+    let good = sim.snapshot(ALL).unwrap();
+    sim.robot_mut(wheel).write_qpos(&array![[1e11]], None, Some(&[EnvId(1)])).unwrap();
+    sim.update(5);
+    let reason = sim.diverged();
+    assert_eq!(reason.len(), 1);
+    let bad = sim.snapshot(ALL).unwrap();
+    bad.save(dir.path().join("bad")).unwrap();
+    sim.restore(&good, ALL).unwrap();
+    assert!(sim.diverged().is_empty(), "revived");
+    sim.update(25);
+    assert!(sim.time().iter().all(|time| (time - 0.45).abs() < 1e-9), "and it goes on");
+    sim.restore(&Snapshot::load(dir.path().join("bad")).unwrap(), ALL).unwrap();
+    assert_eq!(sim.diverged(), reason);
+    let before = sim.batch().read(1, bits_of);
+    sim.update(5);
+    assert_eq!(sim.batch().read(1, bits_of), before, "it stands still");
+    assert!((sim.time()[0] - 0.30).abs() < 1e-9 && (sim.time()[1] - 0.20).abs() < 1e-9);
+}
+
+#[test]
+fn sensors_start_again_and_show_the_restored_state() {
+    let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+    let robot = sim.add_robot(arm()).unwrap();
+    sim.robot_mut(robot).set_qpos(&Array2::from_elem((1, 6), 0.4), None, None).unwrap();
+    let sampling = SamplingCfg { history_length: 4, ..SamplingCfg::every(0.05) };
+    let id = sim.add_sensor("joints", JointStateCfg { sampling, ..Default::default() }).unwrap();
+    sim.update(23);
+    let (snapshot, there) = (sim.snapshot(Some(&[EnvId(1)])).unwrap(), sim.robot(robot).get_qpos());
+    sim.update(40);
+    let other = sim.sensor(id).unwrap().positions().row(0).to_owned();
+    sim.restore(&snapshot, ALL).unwrap();
+    let sensor = sim.sensor(id).unwrap();
+    assert_eq!(sensor.positions().row(1), there.row(1), "at once");
+    assert_eq!(sensor.positions().row(0), other, "the other environment's are its own");
+    assert_eq!(sensor.sample_counts().to_vec(), [12, 0]);
+    sim.update(4);
+    assert_eq!(sim.sensor(id).unwrap().sample_counts()[1], 0, "periods count from the restored state");
+    sim.update(1);
+    let sensor = sim.sensor(id).unwrap();
+    assert_eq!(sensor.sample_counts()[1], 1);
+    assert_eq!(sensor.positions().row(1), sim.robot(robot).get_qpos().row(1));
+}
+
+/// Delay lines, drives that were changed and wrenches are part of it, in memory and in a file.
+#[test]
+fn delays_changed_drives_and_wrenches_go_on() {
+    let delayed = DelayedPd { delay: 4, max_delay: 9 }.into();
+    let drive = DriveCfg {
+        actuators: vec![("JOINT[12]".into(), delayed)],
+        stiffness: 200.0.into(),
+        damping: 20.0.into(),
+        ..Default::default()
+    };
+    let build = || {
+        let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+        let id = sim.add_robot(RobotCfg { drive: drive.clone(), ..arm() }).unwrap();
+        (sim, id)
+    };
+    let command = |sim: &mut SimulationManager, id: RobotId, n: u32| {
+        let n = f64::from(n);
+        let targets = Array2::from_shape_fn((2, 6), |(e, k)| 0.3 * (0.2 * n + k as f64 + 0.5 * e as f64).sin());
+        sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    };
+    let go = |sim: &mut SimulationManager, id: RobotId, from: u32| {
+        (from..from + 60).for_each(|n| {
+            command(sim, id, n);
+            sim.update(1);
+        });
+        all_bits(sim)
+    };
+    let (mut sim, id) = build();
+    let first = sim.robot(id).find_joints(&["JOINT[12]"]).unwrap();
+    let links = sim.robot(id).link_names().len();
+    let force = kinetoscope::ndarray::Array3::from_elem((1, links, 3), 0.7);
+    let mut arm = sim.robot_mut(id);
+    arm.set_delay(&array![[2_u32, 9]], Some(&first), Some(&[EnvId(1)])).unwrap();
+    arm.set_drive_type(DriveType::Acceleration, Some(&[JointIndex(3)]), None).unwrap();
+    arm.set_qf_limits(&array![[11.0]], Some(&[JointIndex(2)]), None).unwrap();
+    arm.set_external_wrench(&force, &force, WrenchFrame::Link, None, Some(&[EnvId(0)])).unwrap();
+    arm.set_gravity_compensation(true, None, Some(&[EnvId(1)])).unwrap();
+    go(&mut sim, id, 0);
+    let snapshot = sim.snapshot(ALL).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    snapshot.save(file.path()).unwrap();
+    let end = go(&mut sim, id, 60);
+    let (mut fresh, its) = build();
+    fresh.restore(&Snapshot::load(file.path()).unwrap(), ALL).unwrap();
+    assert_eq!(fresh.robot(its).get_delay(), sim.robot(id).get_delay());
+    assert_eq!(fresh.robot(its).get_drive_types(), sim.robot(id).get_drive_types());
+    assert_eq!(fresh.robot(its).get_gravity_compensation(), sim.robot(id).get_gravity_compensation());
+    assert!(go(&mut fresh, its, 60) == end, "the same bits from a file");
+    sim.restore(&snapshot, ALL).unwrap();
+    assert!(go(&mut sim, id, 60) == end, "and from memory");
+    // Control: without any of these, it goes elsewhere.
+    let (mut other, its) = build();
+    go(&mut other, its, 0);
+    assert!(go(&mut other, its, 60) != end);
+}

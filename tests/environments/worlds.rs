@@ -1,0 +1,93 @@
+//! A world with everything that has a state: drives that bind, contacts, raw quaternions, activations, bodies moved by hand.
+
+use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::prelude::*;
+use kinetoscope::sim::env::Env;
+
+pub(crate) fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() }
+}
+
+pub(crate) fn arm() -> RobotCfg {
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    RobotCfg { uid: "arm".into(), urdf, ..Default::default() }
+}
+
+pub(crate) fn cube(uid: &str, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
+    RigidObjectCfg {
+        uid: uid.into(),
+        shape: ObjectShape::cube(0.1),
+        mass: Some(mass),
+        init_pose: Pose::translation(at[0], at[1], at[2]),
+        ..Default::default()
+    }
+}
+
+/// A pendulum with a filtered motor, which has an activation, and a hand that is moved.
+const MACHINE: &str = r#"<mujoco><worldbody>
+    <body name="hand" mocap="true" pos="0 2 0.5"><geom size="0.05" contype="0" conaffinity="0"/></body>
+    <body name="rod" pos="0 2 0.4"><joint name="ball" type="ball" damping="0.01"/>
+      <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
+      <body name="tip" pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01"/>
+        <geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
+  </worldbody>
+  <equality><connect body1="hand" body2="tip" anchor="0 0 0.1"/></equality>
+  <actuator><general name="motor" joint="hinge" dyntype="filter" dynprm="0.2" gainprm="0.3"/></actuator></mujoco>"#;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ids {
+    pub(crate) arm: RobotId,
+    pub(crate) cube: ObjectId,
+    pub(crate) machine: MjcfId,
+}
+
+/// Every environment has commands of its own.
+pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) {
+    let mut sim = SimulationManager::new(settings).unwrap();
+    let ids = Ids {
+        arm: sim.add_robot(arm()).unwrap(),
+        cube: sim.add_rigid_object(cube("cube", 0.5, [0.3, 0.5, 0.4])).unwrap(),
+        machine: sim.add_mjcf(MjcfCfg::text("machine", MACHINE)).unwrap(),
+    };
+    for k in 0..4 {
+        sim.add_rigid_object(cube(&format!("pile{k}"), 0.2, [-1.0, 0.2 * f64::from(k), 0.06])).unwrap();
+    }
+    let n = sim.num_envs();
+    let per_env =
+        |width, scale: f64| Array2::from_shape_fn((n, width), |(e, k)| scale * (1.3 * e as f64 + k as f64).sin());
+    // Down to the ground: the drives bind.
+    let targets = Array2::from_shape_fn((n, 6), |(e, k)| if k == 1 { 1.7 } else { 0.2 + 0.05 * e as f64 });
+    let mut arm = sim.robot_mut(ids.arm);
+    arm.set_qpos(&targets, None, None).unwrap();
+    arm.set_qvel(&per_env(6, 0.2), None, None).unwrap();
+    arm.set_qf(&per_env(6, 3.0), None, None).unwrap();
+    sim.rigid_object_mut(ids.cube).write_velocity(&per_env(6, 2.0), None).unwrap();
+    sim.mjcf_part_mut(ids.machine).set_ctrl(&per_env(1, 1.0), None, None).unwrap();
+    let hand = array![[0.05, 2.0, 0.55, 2.0, 0.1, 0.0, 0.3]];
+    sim.mjcf_part_mut(ids.machine).write_mocap_pose("hand", &hand, Some(&[EnvId(n - 1)])).unwrap();
+    (sim, ids)
+}
+
+/// Bits of everything that decides the next step, and of what the drives gave.
+pub(crate) fn bits_of(env: &Env) -> Vec<u64> {
+    let (data, drives) = (env.data(), &env.drives);
+    let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart()];
+    let inputs = [data.ctrl(), data.xfrc_applied(), data.mocap_pos(), data.mocap_quat()];
+    let driven = [&drives.position[..], &drives.velocity, &drives.feedforward, &drives.effort, &drives.applied];
+    let gains = drives.gains.iter().flat_map(|g| [g.kp, g.kd, g.max_effort]);
+    let numbers = state.into_iter().chain(inputs).chain(driven).flatten().copied().chain(gains);
+    numbers.map(f64::to_bits).chain([env.steps(), data.contact().len() as u64]).collect()
+}
+
+pub(crate) fn all_bits(sim: &SimulationManager) -> Vec<Vec<u64>> {
+    let mut bits = Vec::new();
+    sim.batch().for_each(|_, env| bits.push(bits_of(env)));
+    bits
+}
+
+/// The fewest contacts of any environment.
+pub(crate) fn fewest_contacts(sim: &SimulationManager) -> usize {
+    let mut fewest = usize::MAX;
+    sim.batch().for_each(|_, env| fewest = fewest.min(env.data().contact().len()));
+    fewest
+}
