@@ -23,11 +23,11 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        ActuatorIndex, BodyType, ComponentCfg, Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg,
-        EntityTypes, EnvId, Error, GroundCfg, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex,
-        LightCfg, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties,
-        Property, Randomization, RandomizationError, Result, RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg,
-        SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
-        TerrainCfg, TerrainId, Tip, UrdfCfg,
+        ActuatorIndex, ActuatorModel, BodyType, ComponentCfg, DcMotor, DelayedPd, Diagnostic, Draw, DriveCfg,
+        DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, IdealPd, IkCfg, IkResult, IkTask,
+        Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg,
+        ObjectId, ObjectShape, PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result,
+        RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError, SimulationManager,
+        SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WrenchFrame,
     };
 }

@@ -18,6 +18,7 @@ use crate::objects::rigid_object::RigidObjectData;
 use crate::randomization::{Maker, OwnValues, Tables};
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
+use crate::wrenches::Wrenches;
 use ::scene::Pose;
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -353,7 +354,7 @@ fn set_up_drives(
     let mut indices = Vec::new();
     let mut start = Start::default();
     let mut row_drives: Vec<(usize, usize)> = Vec::new();
-    let (mut row_actuators, mut native_actuators) = (Vec::new(), Vec::new());
+    let (mut row_actuators, mut native_actuators, mut effort_sources) = (Vec::new(), Vec::new(), Vec::new());
     for (data, layout) in contents.robots.iter().zip(layouts) {
         let implicit = data.cfg().drive.model == DriveModel::Implicit;
         let mut joints = Vec::new();
@@ -364,12 +365,17 @@ fn set_up_drives(
             let mut drive = None;
             if let Some(actuator) = plan.actuator {
                 let ctrl = compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing("actuator", &name))?;
-                let gains = Gains { kp: actuator.kp, kd: actuator.kd, max_effort: plan.max_effort };
+                let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+                let initial = Gains { kp: actuator.kp, kd: actuator.kd, max_effort, max_velocity };
+                let (realization, setting, range) = (Realization::Actuator, plan.setting, plan.usable);
                 let index = table.drives.len();
-                table.drives.push(Drive { qpos, dof, ctrl, realization: Realization::Actuator, initial: gains });
+                table.drives.push(Drive { qpos, dof, ctrl, realization, initial, setting, range });
                 start.targets.push((index, plan.initial));
                 drive = Some(index);
-                if implicit {
+                if let Some(model) = plan.model {
+                    table.push_model(index, model);
+                    effort_sources.push(ctrl);
+                } else if implicit {
                     row_drives.push((dof, index));
                     row_actuators.push(ctrl);
                 } else {
@@ -407,6 +413,7 @@ fn set_up_drives(
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
     implicit::prepare(&mut compiled, &dofs, &row_actuators);
     compiled.unlimit_controls(&native_actuators);
+    compiled.make_effort_sources(&effort_sources);
     compiled.prepare_for_stepping(!row_drives.is_empty());
     let model = compiled.into_model();
     // Friction rows come in the order of degrees of freedom, one for each with friction.
@@ -504,7 +511,8 @@ impl Simulation {
                         data.qpos_mut()[address] = position;
                     }
                     for &(drive, target) in &start.targets {
-                        drives.position[drive] = target;
+                        let [low, high] = drives.ranges[drive];
+                        drives.position[drive] = target.clamp(low, high);
                     }
                 });
             }
@@ -535,11 +543,15 @@ impl Simulation {
             .flat_map(|(old, new)| old.joints.iter().zip(&new.joints))
             .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
             .collect();
+        let bodies: Vec<Option<usize>> = (0..old_model.nbody())
+            .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
+            .collect();
         let parts = PartTransfer::new(old, self);
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
                 old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
+            let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -558,6 +570,9 @@ impl Simulation {
                     parts.write(&part_state, data);
                     data.set_time(time);
                 });
+                if wrenches != Wrenches::default() {
+                    env.set_wrenches(|mine| *mine = wrenches);
+                }
                 env.take_history(&history);
             });
         }

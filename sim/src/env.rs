@@ -13,6 +13,7 @@
 use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts};
+use crate::wrenches::Wrenches;
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -68,6 +69,8 @@ pub struct Env {
     /// Whether what MuJoCo solves was last solved for the present state, not for the one before the last step.
     solved_now: bool,
     seldom: Box<Seldom>,
+    /// What a user applies to bodies; most environments have none.
+    wrenches: Option<Box<Wrenches>>,
 }
 
 /// What a good step does not touch.
@@ -100,6 +103,7 @@ impl Env {
             raw_quats: RawQuats::new(model),
             solved_now: true,
             seldom: Box::default(),
+            wrenches: None,
         };
         let initial = env.saved();
         env.refresh(&initial);
@@ -138,16 +142,46 @@ impl Env {
         self.seldom.inputs.save(&self.data);
     }
 
+    /// What a user applies to bodies.
+    pub(crate) fn wrenches(&self) -> &Wrenches {
+        static NONE: Wrenches = Wrenches { list: Vec::new(), weightless: Vec::new() };
+        self.wrenches.as_deref().unwrap_or(&NONE)
+    }
+
+    /// Changes what a user applies to bodies; it is no state: what was computed of the state stays right.
+    pub(crate) fn set_wrenches(&mut self, change: impl FnOnce(&mut Wrenches)) {
+        let wrenches = self.wrenches.get_or_insert_default();
+        wrenches.clear(&mut self.data);
+        change(wrenches);
+        wrenches.apply(&mut self.data);
+        if **wrenches == Wrenches::default() {
+            self.wrenches = None;
+        }
+        self.seldom.inputs.save(&self.data);
+    }
+
+    /// Makes drives and wrenches act on the next `mj_step2`.
+    fn apply_inputs(&mut self) {
+        self.drives.apply(&mut self.data);
+        if let Some(wrenches) = &self.wrenches {
+            wrenches.apply(&mut self.data);
+        }
+    }
+
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.data.reset();
         self.data.take_warnings();
         self.drives.reset();
+        if let Some(wrenches) = &mut self.wrenches {
+            wrenches.list.clear();
+        }
         self.diverged = None;
         self.steps = 0;
         self.solved_now = true;
         let initial = self.saved();
         change(&mut self.data, &mut self.drives);
+        self.drives.start();
         self.refresh(&initial);
     }
 
@@ -197,13 +231,17 @@ impl Env {
         self.save_present(&mut motion);
         inputs.save(&self.data);
         let (drives, diverged) = (self.drives.numbers(), self.diverged.clone());
-        EnvState { motion, inputs, drives, steps: self.steps, diverged }
+        EnvState { motion, inputs, drives, wrenches: self.wrenches().clone(), steps: self.steps, diverged }
     }
 
     /// Goes on from `state`, which is of an environment of a model with the same layout, and which
     /// [fits](EnvState::fits).
     pub(crate) fn recall(&mut self, state: &EnvState) {
         self.drives.set_numbers(&state.drives);
+        // A file that was made by hand may name any body.
+        let bodies = self.data.model().nbody();
+        let wrenches = state.wrenches.moved(|body| (body < bodies).then_some(body));
+        self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
         self.diverged.clone_from(&state.diverged);
         self.steps = state.steps;
         self.solved_now = true;
@@ -290,7 +328,7 @@ impl Env {
                     if raised != WarningCounts::default() {
                         self.seldom.warnings.add(&raised);
                     }
-                    self.drives.effort.copy_from_slice(efforts);
+                    self.drives.finish_step(efforts);
                     self.steps += 1;
                     self.solved_now = false;
                     return;
@@ -315,7 +353,7 @@ impl Env {
         efforts: &mut Vec<f64>,
         capture: Option<&Capture>,
     ) -> Result<(), EngineError> {
-        self.drives.apply(&mut self.data);
+        self.apply_inputs();
         if self.data.model().integrator() == mj::mjINT_RK4 {
             // mj_step2 would integrate with Euler, whatever the model says.
             self.data.step()?;
@@ -349,7 +387,7 @@ impl Env {
         let before = &mut scratch.before;
         self.save_present(before);
         loop {
-            self.drives.apply(&mut self.data);
+            self.apply_inputs();
             let done = self.data.step2().and_then(|()| self.capture(before, capture));
             match judge(done, &self.data.take_warnings()) {
                 Verdict::Good => break,
@@ -450,6 +488,7 @@ pub(crate) struct EnvState {
     pub inputs: Inputs,
     /// As [`DriveState::numbers`] gives them.
     pub drives: Vec<f64>,
+    pub wrenches: Wrenches,
     pub steps: u64,
     pub diverged: Option<Box<EnvStatus>>,
 }

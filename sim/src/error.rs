@@ -264,6 +264,68 @@ pub enum Error {
         /// The value.
         value: f64,
     },
+    /// A value is not one of those that are allowed.
+    #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be {expected}")]
+    OutOfRange {
+        /// The argument.
+        argument: &'static str,
+        /// Row of the array.
+        row: usize,
+        /// Column of the array.
+        column: usize,
+        /// Whose value it is: `joint "a"`.
+        of: String,
+        /// The value.
+        value: f64,
+        /// What would be right.
+        expected: String,
+    },
+    /// A joint has no drive to change.
+    #[error(
+        "{argument}: joint {joint:?} of robot {robot:?} has no drive in the model, since the robot was added with the drive \
+         type none; add it with another one, and call set_drive_type where joints shall be passive"
+    )]
+    NotDriven {
+        /// The method.
+        argument: &'static str,
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
+    /// The gains of a drive are in MuJoCo's model.
+    #[error(
+        "{argument}: joint {joint:?} of robot {robot:?} is driven by DriveModel::Actuator, whose gains and limits are in the \
+         model that all environments share; use DriveModel::Implicit or an explicit actuator model to change them"
+    )]
+    GainsInModel {
+        /// The method.
+        argument: &'static str,
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
+    /// A joint's drive delays nothing.
+    #[error(
+        "set_delay: joint {joint:?} of robot {robot:?} is not driven by the actuator model delayed_pd; name it for this joint \
+         in drive.actuators"
+    )]
+    NoDelay {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
+    /// Patterns of names of a robot match nothing, or are none.
+    #[error("robot {robot:?}: {error}")]
+    RobotNames {
+        /// The robot.
+        robot: String,
+        /// What is wrong.
+        #[source]
+        error: Box<PatternError>,
+    },
     /// A sensor's configuration is wrong.
     #[error("sensor {sensor:?}: {error}")]
     Sensor {

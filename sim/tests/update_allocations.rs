@@ -47,3 +47,34 @@ fn updates_allocate_nothing() {
     let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
     assert_eq!(control, 1, "the control: the counter counts");
 }
+
+/// Actuator models compute and remember without allocating.
+#[test]
+fn actuator_models_allocate_nothing() {
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("robot.urdf");
+    let (mut urdf, mut actuators) = (String::from("<robot name=\"r\"><link name=\"base\"/>"), Vec::new());
+    for (i, model) in sim::ActuatorModel::all().into_iter().enumerate() {
+        urdf += &format!(
+            "<link name=\"l{i}\"><inertial><mass value=\"1\"/><inertia ixx=\".1\" ixy=\"0\" ixz=\"0\" iyy=\".1\" iyz=\"0\" \
+             izz=\".1\"/></inertial></link><joint name=\"j{i}\" type=\"continuous\"><parent link=\"base\"/>\
+             <child link=\"l{i}\"/><axis xyz=\"0 1 0\"/></joint>"
+        );
+        let model = match model {
+            sim::ActuatorModel::DelayedPd(_) => sim::DelayedPd { delay: 3, max_delay: 0 }.into(),
+            other => other,
+        };
+        actuators.push((format!("j{i}"), model));
+    }
+    std::fs::write(&path, urdf + "</robot>").unwrap();
+    let drive = sim::DriveCfg {
+        actuators,
+        stiffness: 10.0.into(),
+        damping: 1.0.into(),
+        max_velocity: Some(5.0.into()),
+        ..Default::default()
+    };
+    let mut sim = world(1);
+    sim.add_robot(sim::RobotCfg { urdf: sim::UrdfCfg::single(&path), drive, ..Default::default() }).unwrap();
+    assert_eq!(allocations(&mut sim), 0);
+}

@@ -1,6 +1,7 @@
 //! Drives: what a joint does when it is told to, law by law.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod actuators;
 mod damping;
 mod export;
 mod friction;
@@ -11,6 +12,7 @@ mod mimic;
 mod modes;
 mod native;
 mod robots;
+mod run_time;
 mod soft;
 mod tutorial;
 mod worlds;

@@ -5,8 +5,12 @@
 //! less. Control: MuJoCo's default impedance 0.9 and time constant 20 ms lag by more.
 
 use crate::worlds::*;
+use kinetoscope::ndarray::Array3;
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
+
+/// Force on a follower's link \[N\].
+const LOAD: f64 = 5.0;
 
 fn hand(gravity: Vector3<f64>) -> World {
     let urdf = UrdfCfg::single(assets::path("revo1_left/revo1_left.urdf").unwrap());
@@ -46,6 +50,36 @@ fn followers_stay_with_their_drivers() {
         assert!(moving < 0.02 && resting < 0.001, "{moving} {resting}");
         assert!(fastest > 3.0, "a fast step");
     }
+}
+
+/// A force on each link that a follower moves, along each of its axes: 5 N on links of 20 g and less.
+#[test]
+fn followers_stay_with_their_drivers_under_load() {
+    let mut world = hand(EARTH);
+    let followers: Vec<LinkId> = {
+        let view = world.view();
+        let moved = view.description().drivable_joints().enumerate();
+        moved.filter(|(i, _)| view.is_mimic(JointIndex(*i))).map(|(_, (_, joint))| joint.child).collect()
+    };
+    assert!(followers.len() >= 4, "{followers:?}");
+    let mut worst = 0.0_f64;
+    for axis in 0..3 {
+        for newtons in [LOAD, -LOAD] {
+            let at = |(_, _, k): (usize, usize, usize)| if k == axis { newtons } else { 0.0 };
+            let forces = Array3::from_shape_fn((1, followers.len(), 3), at);
+            let torques = Array3::zeros((1, followers.len(), 3));
+            let mut robot = world.sim.robot_mut(world.robot);
+            robot.set_external_wrench(&forces, &torques, WrenchFrame::Link, Some(&followers), None).unwrap();
+            for _ in 0..100 {
+                world.step(1);
+                worst = worst.max(lag(&world));
+            }
+        }
+    }
+    world.assert_well();
+    println!("followers lag by {:.2} mrad under {LOAD} N", 1e3 * worst);
+    assert!(worst < 0.02, "{worst}");
+    assert!(worst > 1e-6, "the control: the load is felt, {worst}");
 }
 
 #[test]

@@ -191,3 +191,59 @@ fn sensors_start_again_and_show_the_restored_state() {
     assert_eq!(sensor.sample_counts()[1], 1);
     assert_eq!(sensor.positions().row(1), sim.robot(robot).get_qpos().row(1));
 }
+
+/// Delay lines, drives that were changed and wrenches are part of it, in memory and in a file.
+#[test]
+fn delays_changed_drives_and_wrenches_go_on() {
+    let delayed = DelayedPd { delay: 4, max_delay: 9 }.into();
+    let drive = DriveCfg {
+        actuators: vec![("JOINT[12]".into(), delayed)],
+        stiffness: 200.0.into(),
+        damping: 20.0.into(),
+        ..Default::default()
+    };
+    let build = || {
+        let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+        let id = sim.add_robot(RobotCfg { drive: drive.clone(), ..arm() }).unwrap();
+        (sim, id)
+    };
+    let command = |sim: &mut SimulationManager, id: RobotId, n: u32| {
+        let n = f64::from(n);
+        let targets = Array2::from_shape_fn((2, 6), |(e, k)| 0.3 * (0.2 * n + k as f64 + 0.5 * e as f64).sin());
+        sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    };
+    let go = |sim: &mut SimulationManager, id: RobotId, from: u32| {
+        (from..from + 60).for_each(|n| {
+            command(sim, id, n);
+            sim.update(1);
+        });
+        all_bits(sim)
+    };
+    let (mut sim, id) = build();
+    let first = sim.robot(id).find_joints(&["JOINT[12]"]).unwrap();
+    let links = sim.robot(id).link_names().len();
+    let force = kinetoscope::ndarray::Array3::from_elem((1, links, 3), 0.7);
+    let mut arm = sim.robot_mut(id);
+    arm.set_delay(&array![[2_u32, 9]], Some(&first), Some(&[EnvId(1)])).unwrap();
+    arm.set_drive_type(DriveType::Acceleration, Some(&[JointIndex(3)]), None).unwrap();
+    arm.set_qf_limits(&array![[11.0]], Some(&[JointIndex(2)]), None).unwrap();
+    arm.set_external_wrench(&force, &force, WrenchFrame::Link, None, Some(&[EnvId(0)])).unwrap();
+    arm.set_gravity_compensation(true, None, Some(&[EnvId(1)])).unwrap();
+    go(&mut sim, id, 0);
+    let snapshot = sim.snapshot(ALL).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    snapshot.save(file.path()).unwrap();
+    let end = go(&mut sim, id, 60);
+    let (mut fresh, its) = build();
+    fresh.restore(&Snapshot::load(file.path()).unwrap(), ALL).unwrap();
+    assert_eq!(fresh.robot(its).get_delay(), sim.robot(id).get_delay());
+    assert_eq!(fresh.robot(its).get_drive_types(), sim.robot(id).get_drive_types());
+    assert_eq!(fresh.robot(its).get_gravity_compensation(), sim.robot(id).get_gravity_compensation());
+    assert!(go(&mut fresh, its, 60) == end, "the same bits from a file");
+    sim.restore(&snapshot, ALL).unwrap();
+    assert!(go(&mut sim, id, 60) == end, "and from memory");
+    // Control: without any of these, it goes elsewhere.
+    let (mut other, its) = build();
+    go(&mut other, its, 0);
+    assert!(go(&mut other, its, 60) != end);
+}

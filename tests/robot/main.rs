@@ -4,3 +4,5 @@
 mod quadruped;
 mod root;
 mod standing;
+mod state;
+mod wrenches;

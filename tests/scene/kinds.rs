@@ -52,6 +52,8 @@ fn a_robot_of_components_is_beside_the_file() {
         model = "actuator"
         stiffness = { "z.*" = 2, arm = 1e3 }
         max_effort = inf
+        actuators."f.*".dc_motor.saturation_effort = 120
+        actuators.arm.delayed_pd = { delay = 2 }
 
         [entities.arm.urdf]
         name_case.joint = "upper"
@@ -77,6 +79,8 @@ fn a_robot_of_components_is_beside_the_file() {
     assert_eq!(robot.drive.damping, DriveCfg::default().damping);
     assert_eq!(robot.drive.max_effort, Some(PerJoint::All(f64::INFINITY)));
     assert_eq!((robot.drive.drive_type, robot.drive.model), (DriveType::Acceleration, DriveModel::Actuator));
+    let (motor, delayed) = (DcMotor { saturation_effort: 120.0 }.into(), DelayedPd { delay: 2, max_delay: 0 }.into());
+    assert_eq!(robot.drive.actuators, [("f.*".to_string(), motor), ("arm".to_string(), delayed)]);
     assert_eq!((robot.hull.max_vertices, robot.hull.min_thickness), (32, None));
     assert!(robot.self_collision && robot.fix_base);
     assert_eq!(robot.payload, [("ee.*".to_string(), 0.5)]);

@@ -19,7 +19,19 @@ fn every_kind() -> SceneCfg {
         friction: Some([third, 0.0, 0.1]),
         ..Default::default()
     };
+    let motors = DriveCfg {
+        actuators: vec![
+            (".*KFE".into(), DcMotor { saturation_effort: third }.into()),
+            (".*HAA".into(), DelayedPd { delay: 2, max_delay: 5 }.into()),
+            (".*HFE".into(), IdealPd {}.into()),
+        ],
+        max_velocity: Some(third.into()),
+        ..Default::default()
+    };
+    let urdf = UrdfCfg::single(assets::path("quadruped/quadruped.urdf").unwrap());
+    let second = RobotCfg { urdf, drive: motors, soft_limit_factor: third, ..Default::default() };
     declared()
+        .with("second", second)
         .with("object", object)
         .with("imu", ImuCfg { offset, sampling, gravity_bias: Some([0.0, third, 0.0].into()), ..ImuCfg::on("base") })
         .with(

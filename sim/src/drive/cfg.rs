@@ -1,5 +1,6 @@
 //! Drive properties as users write them, and their resolution to one set per joint.
 
+use super::models::ActuatorModel;
 use super::{DriveModel, DriveType};
 use crate::pattern::{self, PatternError};
 use serde::{Deserialize, Serialize};
@@ -34,12 +35,22 @@ pub struct DriveCfg {
     pub drive_type: DriveType,
     /// Who evaluates the law.
     pub model: DriveModel,
+    /// Explicit actuator models by joint pattern or control part; joints that none matches are driven by `model`. They use
+    /// the gains and limits below; a joint that the drive type leaves passive has none. Exports have MuJoCo's actuators with
+    /// the same gains in their place.
+    #[serde(with = "scene::file_format::pairs")]
+    pub actuators: Vec<(String, ActuatorModel)>,
     /// Stiffness \[N m/rad or N/m\] (drive type `force`).
     pub stiffness: PerJoint,
     /// Damping \[N m s/rad or N s/m\] (drive type `force`).
     pub damping: PerJoint,
     /// Largest effort \[N m or N\]; where unset, the URDF's.
     pub max_effort: Option<PerJoint>,
+    /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; of the drive laws, only that of [`DcMotor`] knows
+    /// it.
+    ///
+    /// [`DcMotor`]: super::DcMotor
+    pub max_velocity: Option<PerJoint>,
     /// Dry friction \[N m or N\]; where unset, the URDF's.
     pub friction: Option<PerJoint>,
     /// Rotor inertia \[kg m² or kg\].
@@ -51,9 +62,11 @@ impl Default for DriveCfg {
         Self {
             drive_type: DriveType::Force,
             model: DriveModel::Implicit,
+            actuators: Vec::new(),
             stiffness: PerJoint::All(DEFAULT_STIFFNESS),
             damping: PerJoint::All(DEFAULT_DAMPING),
             max_effort: None,
+            max_velocity: None,
             friction: None,
             armature: PerJoint::All(0.0),
         }
@@ -74,10 +87,14 @@ pub struct JointGains {
     pub damping: f64,
     /// Largest effort, if the configuration sets one.
     pub max_effort: Option<f64>,
+    /// Largest speed, if the configuration sets one.
+    pub max_velocity: Option<f64>,
     /// Dry friction, if the configuration sets one.
     pub friction: Option<f64>,
     /// Rotor inertia.
     pub armature: f64,
+    /// Explicit actuator model, if the configuration names one.
+    pub actuator: Option<ActuatorModel>,
 }
 
 /// An error of drive properties.
@@ -107,7 +124,7 @@ pub enum DriveCfgError {
 ///
 /// # Errors
 /// A key that matches no joint, a joint matched by two keys, a negative or non-finite number (an infinite
-/// `max_effort` means unlimited and is allowed).
+/// `max_effort` or `max_velocity` means unlimited and is allowed).
 pub fn resolve(
     cfg: &DriveCfg,
     joints: &[&str],
@@ -120,7 +137,7 @@ pub fn resolve(
                 .map_err(|error| DriveCfgError::Pattern { property, error })?,
         };
         for value in assigned.iter().flatten() {
-            let unlimited = property == "max_effort" && *value == f64::INFINITY;
+            let unlimited = property.starts_with("max_") && *value == f64::INFINITY;
             if !(value.is_finite() && *value >= 0.0 || unlimited) {
                 return Err(DriveCfgError::Value { property, value: *value });
             }
@@ -131,9 +148,12 @@ pub fn resolve(
         Some(values) => each(property, values),
         None => Ok(vec![None; joints.len()]),
     };
+    let actuators = pattern::assign(&cfg.actuators, parts, joints, "joint")
+        .map_err(|error| DriveCfgError::Pattern { property: "actuators", error })?;
     let stiffness = each("stiffness", &cfg.stiffness)?;
     let damping = each("damping", &cfg.damping)?;
     let max_effort = optional("max_effort", &cfg.max_effort)?;
+    let max_velocity = optional("max_velocity", &cfg.max_velocity)?;
     let friction = optional("friction", &cfg.friction)?;
     let armature = each("armature", &cfg.armature)?;
     Ok((0..joints.len())
@@ -141,8 +161,10 @@ pub fn resolve(
             stiffness: stiffness[i].unwrap_or(DEFAULT_STIFFNESS),
             damping: damping[i].unwrap_or(DEFAULT_DAMPING),
             max_effort: max_effort[i],
+            max_velocity: max_velocity[i],
             friction: friction[i],
             armature: armature[i].unwrap_or(0.0),
+            actuator: actuators[i],
         })
         .collect())
 }

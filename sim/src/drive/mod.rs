@@ -9,6 +9,7 @@
 //! * [`DriveMode`] says what stiffness and damping mean (`force.rs`, `acceleration.rs`, `none.rs`, listed once below).
 //! * [`DriveModel`] says who evaluates the law: [`implicit`] (a constraint row, at the end of the step, any gains) or
 //!   MuJoCo's own actuator ([`actuator`], gains inside its domain of stability).
+//! * [`models`] has explicit laws of real motors for chosen joints: limits by speed, delays.
 
 mod acceleration;
 mod cfg;
@@ -17,10 +18,12 @@ mod none;
 
 pub mod actuator;
 pub mod implicit;
+pub mod models;
 pub mod plan;
 pub mod table;
 
 pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};
+pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,9 @@
 //! configuration. The stage between `RobotDescription` and MJCF.
 
 use super::cfg::{DriveCfg, DriveCfgError, resolve};
-use super::{ActuatorSpec, DriveType, JointInfo};
+use super::models::ActuatorModel;
+use super::table::{Gains, Setting};
+use super::{ActuatorSpec, DriveType};
 use crate::description::{Joint, JointId, JointKind, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::dynamics::{Configuration, DynamicsError, Kinematics};
@@ -17,10 +19,14 @@ pub struct JointPlan {
     pub joint: JointId,
     /// Its actuator; `None` for passive and mimic joints.
     pub actuator: Option<ActuatorSpec>,
+    /// The actuator's explicit model; `None` where it is driven as the robot is.
+    pub model: Option<ActuatorModel>,
+    /// What the actuator's gains are made of.
+    pub setting: Setting,
     /// Largest effort \[N m or N\]; infinite where there is none.
     pub max_effort: f64,
-    /// Speed limit of the file \[rad/s or m/s\]; reported, not enforced.
-    pub max_velocity: Option<f64>,
+    /// Largest speed \[rad/s or m/s\], infinite where there is none; reported, not enforced.
+    pub max_velocity: f64,
     /// Dry friction \[N m or N\].
     pub friction: f64,
     /// Rotor inertia \[kg m² or kg\].
@@ -56,6 +62,16 @@ pub enum PlanError {
         /// The value given.
         value: f64,
     },
+    /// An actuator model does not go with its joint.
+    #[error("drive.actuators: {model} of joint {joint:?}: {reason}")]
+    ActuatorModel {
+        /// The joint.
+        joint: String,
+        /// Name of the model.
+        model: &'static str,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
     /// The description's dynamics cannot be computed.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
@@ -83,12 +99,16 @@ pub fn plan(
         .zip(&gains)
         .map(|(&(id, joint), gains)| {
             let effort = joint.limit.as_ref().and_then(|l| l.effort).filter(|&e| e > 0.0);
+            let velocity = joint.limit.as_ref().and_then(|l| l.velocity).filter(|&v| v > 0.0);
             let limit = own_limit(joint);
+            let (drive_type, stiffness, damping) = (drive.drive_type, gains.stiffness, gains.damping);
             JointPlan {
                 joint: id,
                 actuator: None,
+                model: gains.actuator,
+                setting: Setting { drive_type, stiffness, damping, inertia: None },
                 max_effort: gains.max_effort.or(effort).unwrap_or(f64::INFINITY),
-                max_velocity: joint.limit.as_ref().and_then(|l| l.velocity),
+                max_velocity: gains.max_velocity.or(velocity).unwrap_or(f64::INFINITY),
                 friction: gains.friction.or(joint.friction).unwrap_or(0.0),
                 armature: gains.armature,
                 damping: joint.damping.unwrap_or(0.0),
@@ -102,17 +122,27 @@ pub fn plan(
     narrow_by_mimics(description, &mut plans, &mut diagnostics);
     set_initial_positions(description, &mut plans, &initial, &mut diagnostics)?;
 
-    let needs_inertia = drive.drive_type == DriveType::Acceleration;
-    let inertias = if needs_inertia {
-        effective_inertias(&mass_matrix_at_start(description, &plans, floating_base)?)
-    } else {
-        vec![f64::NAN; plans.len()]
-    };
-    for ((plan, gains), inertia) in plans.iter_mut().zip(&gains).zip(inertias) {
-        if plan.mimic.is_none() {
-            let info = JointInfo { effective_inertia: inertia };
-            plan.actuator = drive.drive_type.mode().actuator(gains.stiffness, gains.damping, &info);
+    if drive.drive_type == DriveType::Acceleration {
+        let inertias = effective_inertias(description, &plans, floating_base)?;
+        for (plan, inertia) in plans.iter_mut().zip(inertias) {
+            plan.setting.inertia = Some(inertia);
         }
+    }
+    for plan in plans.iter_mut().filter(|plan| plan.mimic.is_none()) {
+        plan.actuator = plan.setting.actuator();
+    }
+    for plan in &mut plans {
+        let (Some(actuator), Some(model)) = (plan.actuator, plan.model) else {
+            plan.model = None;
+            continue;
+        };
+        let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+        let gains = Gains { kp: actuator.kp, kd: actuator.kd, max_effort, max_velocity };
+        model.law().check(&gains).map_err(|reason| PlanError::ActuatorModel {
+            joint: description.joint(plan.joint).name.clone(),
+            model: model.law().name(),
+            reason,
+        })?;
     }
     Ok((plans, diagnostics))
 }
@@ -223,12 +253,18 @@ pub fn mass_matrix_at_start(
     Ok(StartInertia { matrix, columns })
 }
 
-/// `1 / (M⁻¹)_ii` of each drivable joint; the plain diagonal where the matrix is singular.
-fn effective_inertias(start: &StartInertia) -> Vec<f64> {
+/// The inertia that each drivable joint feels at the start positions, `1 / (M⁻¹)_ii` \[kg m² or kg\]; the plain diagonal
+/// where the matrix is singular.
+///
+/// # Errors
+/// The description's dynamics cannot be computed.
+pub fn effective_inertias(
+    description: &RobotDescription,
+    plans: &[JointPlan],
+    floating_base: bool,
+) -> Result<Vec<f64>, DynamicsError> {
+    let start = mass_matrix_at_start(description, plans, floating_base)?;
     let inverse = start.matrix.clone().cholesky().map(|factor| factor.inverse());
-    start
-        .columns
-        .iter()
-        .map(|&i| inverse.as_ref().map_or(start.matrix[(i, i)], |inverse| 1.0 / inverse[(i, i)]))
-        .collect()
+    let felt = |&i: &usize| inverse.as_ref().map_or(start.matrix[(i, i)], |inverse| 1.0 / inverse[(i, i)]);
+    Ok(start.columns.iter().map(felt).collect())
 }

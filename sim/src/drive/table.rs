@@ -1,8 +1,9 @@
 //! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
 
-use super::{actuator, implicit};
+use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
+use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
 use crate::mj;
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 
 /// How one drive acts in MuJoCo.
@@ -15,6 +16,11 @@ pub enum Realization {
     },
     /// MuJoCo's actuator.
     Actuator,
+    /// MuJoCo's actuator as a plain source of effort, whose control an explicit model computes.
+    Explicit {
+        /// Index among the explicit models.
+        model: usize,
+    },
 }
 
 /// One drive of a model.
@@ -28,11 +34,36 @@ pub struct Drive {
     pub ctrl: usize,
     /// How it acts.
     pub realization: Realization,
-    /// The gains and limit the model starts with.
+    /// The gains and limits the model starts with.
     pub initial: Gains,
+    /// Where the gains come from.
+    pub setting: Setting,
+    /// Positions a target may have \[rad or m\].
+    pub range: [f64; 2],
 }
 
-/// Gains and effort limit of one drive.
+/// What a user asks of one drive, in the user's units; the law takes [`Gains`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// What stiffness and damping mean.
+    pub drive_type: DriveType,
+    /// Stiffness, in the unit of the drive type.
+    pub stiffness: f64,
+    /// Damping, in the unit of the drive type.
+    pub damping: f64,
+    /// Inertia that the joint feels at the initial pose \[kg m² or kg\], once a drive type asked for it.
+    pub inertia: Option<f64>,
+}
+
+impl Setting {
+    /// Gains in torque units; `None` where the joint is to be passive.
+    pub fn actuator(&self) -> Option<ActuatorSpec> {
+        let info = JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) };
+        self.drive_type.mode().actuator(self.stiffness, self.damping, &info)
+    }
+}
+
+/// Gains and limits of one drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Proportional gain \[N m/rad or N/m\].
@@ -41,6 +72,8 @@ pub struct Gains {
     pub kd: f64,
     /// Largest effort \[N m or N\]; infinite where there is no limit.
     pub max_effort: f64,
+    /// Largest speed \[rad/s or m/s\]; infinite where there is no limit. Reported; it bounds nothing by itself.
+    pub max_velocity: f64,
 }
 
 /// All drives of a model, and the joints whose damping is integrated with them. Shared by all environments.
@@ -48,8 +81,39 @@ pub struct Gains {
 pub struct DriveTable {
     /// The drives, in the order in which they were added.
     pub drives: Vec<Drive>,
+    /// Explicit models of those drives that have one.
+    pub models: Vec<DriveActuator>,
     /// Degrees of freedom whose viscous damping moved from the model to [`implicit`], with its coefficient.
     pub damped: Vec<(usize, f64)>,
+}
+
+/// The explicit model of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveActuator {
+    /// The drive.
+    pub drive: usize,
+    /// Its model.
+    pub model: ActuatorModel,
+    /// Where in the memory of an environment the model keeps what it needs.
+    pub memory: Range<usize>,
+}
+
+impl DriveTable {
+    /// Gives a drive an explicit model.
+    pub fn push_model(&mut self, drive: usize, model: ActuatorModel) {
+        let first = self.models.last().map_or(0, |last| last.memory.end);
+        let memory = first..first + model.law().memory().len();
+        self.drives[drive].realization = Realization::Explicit { model: self.models.len() };
+        self.models.push(DriveActuator { drive, model, memory });
+    }
+
+    /// The explicit model of a drive.
+    pub fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
+        match self.drives[drive].realization {
+            Realization::Explicit { model } => Some(&self.models[model]),
+            Realization::Row { .. } | Realization::Actuator => None,
+        }
+    }
 }
 
 /// A list that environments share until one writes to its own. Nobody sets most of what a drive can be told, and memory
@@ -109,6 +173,10 @@ pub struct DriveState {
     initial: Arc<Initial>,
     /// Gains, one per drive.
     pub gains: Shared<Gains>,
+    /// What the gains were made of, one per drive.
+    pub settings: Shared<Setting>,
+    /// Positions a target may have \[rad or m\], one range per drive.
+    pub ranges: Shared<[f64; 2]>,
     /// Position targets \[rad or m\].
     pub position: Box<[f64]>,
     /// Velocity targets \[rad/s or m/s\].
@@ -119,6 +187,8 @@ pub struct DriveState {
     pub effort: Box<[f64]>,
     /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
     pub applied: Shared<f64>,
+    /// What explicit models keep from step to step.
+    pub memory: Box<[f64]>,
     /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
     /// the model holds the other half of it: they change together.
     damping: Shared<f64>,
@@ -131,25 +201,51 @@ impl DriveState {
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
         let no_targets = Shared(vec![0.0; n].into());
         let no_forces = Shared(vec![0.0; model.nv()].into());
-        Self {
+        let mut state = Self {
             gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
+            settings: Shared(table.drives.iter().map(|d| d.setting).collect()),
+            ranges: Shared(table.drives.iter().map(|d| d.range).collect()),
             position: position.clone(),
             velocity: no_targets.clone(),
             feedforward: no_targets.clone(),
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
+            memory: table.models.iter().flat_map(|drive| drive.model.law().memory()).collect(),
             damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
-        }
+        };
+        state.start();
+        state
     }
 
     /// Asks for the memory that is this environment's own, and waits for nothing.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(&self.position);
         mj::prefetch(&self.effort);
+        mj::prefetch(&self.memory);
     }
 
-    /// Back to rest at the model's initial positions; gains stay.
+    /// Explicit models forget what was: the present targets are those at the start.
+    pub(crate) fn start(&mut self) {
+        self.each_memory(|law, target, memory| law.start(target, memory));
+    }
+
+    /// What a drive is asked for.
+    fn target(&self, drive: usize) -> Target {
+        let (position, velocity, feedforward) = (self.position[drive], self.velocity[drive], self.feedforward[drive]);
+        Target { position, velocity, feedforward }
+    }
+
+    /// Each explicit model with what its drive is asked for and what it keeps.
+    fn each_memory(&mut self, act: impl Fn(&dyn ActuatorLaw, &Target, &mut [f64])) {
+        let mut memory = std::mem::take(&mut self.memory);
+        for explicit in &self.initial.table.models {
+            act(explicit.model.law(), &self.target(explicit.drive), &mut memory[explicit.memory.clone()]);
+        }
+        self.memory = memory;
+    }
+
+    /// Back to rest at the model's initial positions; gains and limits stay.
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;
         self.position.copy_from_slice(&initial.position);
@@ -159,13 +255,38 @@ impl DriveState {
         self.applied.clone_from(&initial.no_forces);
     }
 
-    /// Takes gains, targets and effort of drive `from` of `other` for drive `to`.
+    /// Changes what is asked of a drive, and with it its gains; limits stay.
+    pub fn set(&mut self, drive: usize, change: impl FnOnce(&mut Setting)) {
+        let mut setting = self.settings[drive];
+        change(&mut setting);
+        let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
+        self.settings.put(drive, setting);
+        self.gains.put(drive, Gains { kp, kd, ..self.gains[drive] });
+    }
+
+    /// Changes the limits of a drive.
+    pub fn set_limits(&mut self, drive: usize, change: impl FnOnce(Gains) -> Gains) {
+        self.gains.put(drive, change(self.gains[drive]));
+    }
+
+    /// Changes the positions that targets of a drive may have; the present target is clamped to them.
+    pub fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
+        self.ranges.put(drive, [low, high]);
+        self.position[drive] = self.position[drive].clamp(low, high);
+    }
+
+    /// Takes gains, limits, targets and effort of drive `from` of `other` for drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.put(to, other.gains[from]);
+        self.settings.put(to, other.settings[from]);
+        self.ranges.put(to, other.ranges[from]);
         self.position[to] = other.position[from];
         self.velocity.put(to, other.velocity[from]);
         self.feedforward.put(to, other.feedforward[from]);
         self.effort[to] = other.effort[from];
+        if let (Some(mine), Some(theirs)) = (self.initial.table.model_of(to), other.initial.table.model_of(from)) {
+            self.memory[mine.memory.clone()].copy_from_slice(&other.memory[theirs.memory.clone()]);
+        }
     }
 
     /// Takes the force applied to degree of freedom `from` of `other` for degree of freedom `to`.
@@ -173,9 +294,21 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
-    /// Sets the gains of a drive.
-    pub(crate) fn set_gains(&mut self, drive: usize, gains: Gains) {
-        self.gains.put(drive, gains);
+    /// Sets gains in torque units and the effort limit of a drive; its drive type stays, and gives them back in its unit.
+    pub(crate) fn set_gains(&mut self, drive: usize, [kp, kd, max_effort]: [f64; 3]) {
+        let old = self.gains[drive];
+        if [old.kp, old.kd, old.max_effort] == [kp, kd, max_effort] {
+            return;
+        }
+        let unit = match self.settings[drive] {
+            Setting { drive_type: DriveType::Acceleration, inertia: Some(inertia), .. } => inertia,
+            _ => 1.0,
+        };
+        self.set(drive, |setting| (setting.stiffness, setting.damping) = (kp / unit, kd / unit));
+        let passive = self.settings[drive].drive_type == DriveType::None;
+        self.set_limits(drive, |gains| {
+            if passive { Gains { max_effort, ..gains } } else { Gains { kp, kd, max_effort, ..gains } }
+        });
     }
 
     /// Sets coefficients of the damping that is integrated with the drives.
@@ -183,31 +316,49 @@ impl DriveState {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
     }
 
-    /// What [`restoring`](Self::set_numbers) a state brings back: three gains of each drive, its targets (position, velocity,
-    /// feed-forward) and its effort, then the applied forces.
+    /// What [`restoring`](Self::set_numbers) a state brings back: ten numbers of each drive (gains and limits, what they
+    /// were made of, range), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
+    /// explicit models keep.
     pub(crate) fn numbers(&self) -> Vec<f64> {
-        let gains = self.gains.iter().flat_map(|g| [g.kp, g.kd, g.max_effort]);
-        let targets = [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied];
-        gains.chain(targets.into_iter().flatten().copied()).collect()
+        let settings =
+            self.gains.iter().zip(&*self.settings).zip(&*self.ranges).flat_map(|((gains, setting), range)| {
+                let drive_type =
+                    DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
+                let Setting { stiffness, damping, inertia, .. } = *setting;
+                let Gains { kp, kd, max_effort, max_velocity } = *gains;
+                // No inertia is 0.
+                let inertia = inertia.unwrap_or(0.0);
+                [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, range[0], range[1]]
+            });
+        let targets =
+            [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied, &self.memory];
+        settings.chain(targets.into_iter().flatten().copied()).collect()
     }
 
     /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number.
     pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
         let n = self.position.len();
-        let (gains, rest) = numbers.split_at(3 * n);
-        for (i, &[kp, kd, max_effort]) in gains.as_chunks::<3>().0.iter().enumerate() {
-            self.gains.put(i, Gains { kp, kd, max_effort });
+        let (settings, rest) = numbers.split_at(10 * n);
+        for (i, &numbers) in settings.as_chunks::<10>().0.iter().enumerate() {
+            let [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] = numbers;
+            let drive_type = DriveType::ALL.get(drive_type as usize).copied().unwrap_or_default();
+            let inertia = Some(inertia).filter(|inertia| *inertia > 0.0);
+            self.gains.put(i, Gains { kp, kd, max_effort, max_velocity });
+            self.settings.put(i, Setting { drive_type, stiffness, damping, inertia });
+            self.ranges.put(i, [low, high]);
         }
         let (position, rest) = rest.split_at(n);
         let (velocity, rest) = rest.split_at(n);
         let (feedforward, rest) = rest.split_at(n);
-        let (effort, applied) = rest.split_at(n);
+        let (effort, rest) = rest.split_at(n);
+        let (applied, memory) = rest.split_at(self.applied.len());
         let initial = Arc::clone(&self.initial);
         self.position.copy_from_slice(position);
         self.velocity.take(velocity, &initial.no_targets);
         self.feedforward.take(feedforward, &initial.no_targets);
         self.effort.copy_from_slice(effort);
         self.applied.take(applied, &initial.no_forces);
+        self.memory.copy_from_slice(memory);
     }
 
     /// The model's drives.
@@ -221,12 +372,25 @@ impl DriveState {
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
         implicit::apply_damping(table, &self.damping, data);
         for (i, drive) in table.drives.iter().enumerate() {
-            let target =
-                Target { position: self.position[i], velocity: self.velocity[i], feedforward: self.feedforward[i] };
+            let target = self.target(i);
             match drive.realization {
                 Realization::Row { row } => implicit::apply(drive, row, &self.gains[i], &target, data),
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
+                Realization::Explicit { model } => {
+                    let DriveActuator { model, memory, .. } = &table.models[model];
+                    let now = JointMotion { position: data.qpos()[drive.qpos], velocity: data.qvel()[drive.dof] };
+                    let effort = model.law().effort(&now, &target, &self.gains[i], &self.memory[memory.clone()]);
+                    data.ctrl_mut()[drive.ctrl] = effort;
+                }
             }
+        }
+    }
+
+    /// After a step that stays: the efforts the drives gave in it, and what models keep of it.
+    pub(crate) fn finish_step(&mut self, efforts: &[f64]) {
+        self.effort.copy_from_slice(efforts);
+        if !self.memory.is_empty() {
+            self.each_memory(|law, target, memory| law.remember(target, memory));
         }
     }
 
@@ -235,7 +399,7 @@ impl DriveState {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
             Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
-            Realization::Actuator => data.actuator_force()[drive.ctrl],
+            Realization::Actuator | Realization::Explicit { .. } => data.actuator_force()[drive.ctrl],
         }));
     }
 }
@@ -263,9 +427,11 @@ mod tests {
         )
         .expect("compiles")
         .into_model();
-        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY };
-        let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization: Realization::Actuator, initial };
-        let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], damped: Vec::new() }), &model);
+        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: f64::INFINITY };
+        let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
+        let (realization, range) = (Realization::Actuator, [-1.0, 1.0]);
+        let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization, initial, setting, range };
+        let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], ..Default::default() }), &model);
         let (mut told, other) = (fresh.clone(), fresh.clone());
         assert!(std::ptr::eq(&*told.velocity, &*other.velocity));
         told.position[0] = 0.1;
@@ -273,6 +439,8 @@ mod tests {
         told.feedforward[0] = 0.3;
         told.applied[0] = 0.4;
         told.effort[0] = 0.5;
+        told.set_range(0, [0.2, 0.7]);
+        assert_eq!((told.position[0], other.ranges[0]), (0.2, range), "the target is inside of its range");
         assert_eq!(other, fresh);
         let mut copy = other.clone();
         copy.copy_from(&told, 0, 0);
@@ -285,10 +453,12 @@ mod tests {
         assert!(std::ptr::eq(&*copy.velocity, &*other.velocity) && copy == other, "shared again");
         copy.set_numbers(&other.numbers().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
         assert!(copy.feedforward[0].is_sign_negative() && copy.applied[0].is_sign_negative(), "to the last bit");
-        told.gains[0].kp = 7.0;
+        told.set(0, |setting| setting.stiffness = 7.0);
         told.reset();
         assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");
-        told.gains[0] = initial;
+        assert_eq!((told.gains[0].kd, told.ranges[0]), (1.0, [0.2, 0.7]), "limits stay");
+        told.set(0, |setting| setting.stiffness = 3.0);
+        told.set_range(0, range);
         assert_eq!(told, fresh);
         assert!(std::ptr::eq(&*told.velocity, &*other.velocity), "shared again");
     }

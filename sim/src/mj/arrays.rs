@@ -247,6 +247,7 @@ model_arrays_mut! {
     actuator_gainprm_mut = actuator_gainprm_mut: f64;
     actuator_biasprm_mut = actuator_biasprm_mut: f64;
     actuator_ctrllimited_mut = actuator_ctrllimited_mut: Flag;
+    actuator_forcelimited_mut = actuator_forcelimited_mut: Flag;
 }
 
 data_arrays! {

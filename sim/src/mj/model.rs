@@ -419,6 +419,15 @@ impl Compiled {
         self.unlimit_controls(actuators);
     }
 
+    /// `actuators` become plain sources of effort: the control is the force, and nothing is clamped.
+    pub fn make_effort_sources(&mut self, actuators: &[usize]) {
+        self.clear_actuator_gains(actuators);
+        for &i in actuators {
+            self.actuator_gainprm_mut()[i * mj::mjNGAIN as usize] = 1.0;
+            self.actuator_forcelimited_mut()[i] = Default::default();
+        }
+    }
+
     /// Controls of `actuators` are not clamped: the drive's targets are, and a control may also carry a feed-forward.
     pub fn unlimit_controls(&mut self, actuators: &[usize]) {
         for &i in actuators {

@@ -110,6 +110,18 @@ impl FreeBodyMut<'_> {
         velocities: ArrayView2<'_, f64>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
+        self.write_velocities_of(argument, velocities, env_ids, |_| Vector3::zeros())
+    }
+
+    /// As [`write_velocities`](Self::write_velocities) for a point of the body: `arm` is from it to the frame \[m\], in world
+    /// axes.
+    pub(super) fn write_velocities_of(
+        &mut self,
+        argument: &'static str,
+        velocities: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+        arm: impl Fn(&mj::Data) -> Vector3<f64>,
+    ) -> Result<()> {
         let (_, dof) = self.joint()?;
         let rows = self.check(argument, 6, "environments, vx vy vz wx wy wz", velocities, env_ids)?;
         for (env, v) in rows.arrays::<6>() {
@@ -117,8 +129,10 @@ impl FreeBodyMut<'_> {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| {
                     let rotation = body_pose(data, body).rotation;
-                    let angular = rotation.inverse() * Vector3::new(v[3], v[4], v[5]);
-                    data.qvel_mut()[dof..dof + 6].copy_from_slice(&[v[0], v[1], v[2], angular.x, angular.y, angular.z]);
+                    let turning = Vector3::new(v[3], v[4], v[5]);
+                    let angular = rotation.inverse() * turning;
+                    let [x, y, z] = (Vector3::new(v[0], v[1], v[2]) + turning.cross(&arm(data))).into();
+                    data.qvel_mut()[dof..dof + 6].copy_from_slice(&[x, y, z, angular.x, angular.y, angular.z]);
                 });
             });
         }

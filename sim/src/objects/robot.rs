@@ -11,7 +11,7 @@ use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
-use crate::objects::rows::{Rows, Table};
+use crate::objects::rows::{Numbers, Rows, Table};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::urdf::{UrdfCfg, assemble};
@@ -19,7 +19,7 @@ use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ::scene::pose::to_row;
 use nalgebra::Matrix3;
-use ndarray::{Array2, Array3, ArrayView2, AsArray, Ix2};
+use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,6 +50,9 @@ pub struct RobotCfg {
     /// the density of water in the origin of a link without mass.
     #[serde(with = "scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
+    /// Share of the range of each joint that is left between its soft limits, 0 to 1: see
+    /// [`Robot::soft_qpos_limits`].
+    pub soft_limit_factor: f64,
     /// Whether links of this robot collide with each other.
     pub self_collision: bool,
     /// How collision meshes become convex hulls.
@@ -67,6 +70,7 @@ impl Default for RobotCfg {
             init_pose: Pose::identity(),
             init_qpos: Vec::new(),
             payload: Vec::new(),
+            soft_limit_factor: 1.0,
             self_collision: false,
             hull: HullCfg::default(),
         }
@@ -99,6 +103,10 @@ impl RobotData {
     ) -> Result<Self> {
         check_integrator(&cfg, manager.integrator)?;
         check_pose("init_pose", &cfg.init_pose)?;
+        if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
+            let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
+            return Err(Error::Config { field: "soft_limit_factor", value, expected });
+        }
         for component in &cfg.urdf.components {
             check_pose("component transform", &component.transform)?;
         }
@@ -122,9 +130,10 @@ impl RobotData {
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
         found.append(&mut planned);
-        if cfg.drive.model == DriveModel::Actuator {
+        let explicit = explicitly_driven(&plans, cfg.drive.model);
+        if explicit.iter().any(|plan| plan.actuator.is_some()) {
             let dt = manager.physics_option().timestep;
-            found.extend(crate::drive::actuator::warn_if_unstable(&description, &plans, !cfg.fix_base, dt));
+            found.extend(crate::drive::actuator::warn_if_unstable(&description, &explicit, !cfg.fix_base, dt));
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
@@ -164,6 +173,12 @@ impl RobotData {
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
+}
+
+/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others.
+fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
+    let explicit = |plan: &JointPlan| model == DriveModel::Actuator || plan.model.is_some();
+    plans.iter().map(|plan| JointPlan { actuator: plan.actuator.filter(|_| explicit(plan)), ..plan.clone() }).collect()
 }
 
 /// Adds what links carry.
@@ -258,6 +273,11 @@ pub struct Robot<'a> {
 impl<'a> Robot<'a> {
     pub(crate) fn new(data: &'a Arc<RobotData>, simulation: &'a Simulation, index: usize) -> Self {
         Self { data, simulation, index }
+    }
+
+    /// Which of the simulation's robots it is.
+    pub(super) fn index(&self) -> usize {
+        self.index
     }
 
     pub(super) fn indexing(&self) -> &'a RobotIndex {
@@ -365,23 +385,6 @@ impl<'a> Robot<'a> {
         targets
     }
 
-    /// Positions that targets may have \[rad or m\], shape (N, dof, 2): own limits, narrowed by the limits of joints that
-    /// mimic this one; infinite where there are none.
-    pub fn qpos_limits(&self) -> Array3<f64> {
-        let n = self.simulation.batch.num_envs();
-        Array3::from_shape_fn((n, self.dof(), 2), |(_, joint, end)| self.data.plans[joint].usable[end])
-    }
-
-    /// Speed limits of the files \[rad/s or m/s\], infinite where there are none, shape (dof,). Reported, not enforced.
-    pub fn qvel_limits(&self) -> Vec<f64> {
-        self.data.plans.iter().map(|p| p.max_velocity.filter(|&v| v > 0.0).unwrap_or(f64::INFINITY)).collect()
-    }
-
-    /// Effort limits of the drives \[N m or N\], infinite where there are none, shape (N, dof).
-    pub fn qf_limits(&self) -> Array2<f64> {
-        self.gather(|env, joint| joint.drive.map_or(f64::INFINITY, |d| env.drives.gains[d].max_effort))
-    }
-
     /// Sum of the link masses in the files, and of payloads \[kg\].
     pub fn total_mass(&self) -> f64 {
         self.data.description.total_mass()
@@ -411,11 +414,15 @@ impl<'a> Robot<'a> {
         self.root().velocities()
     }
 
-    pub(super) fn link_id(&self, name: &str) -> Result<LinkId> {
+    /// Place of the link called `name` in [`link_names`](Self::link_names), fused ones included.
+    ///
+    /// # Errors
+    /// There is no such link; the error lists the nearest names.
+    pub fn link_id(&self, name: &str) -> Result<LinkId> {
         self.data.description.link_id(name).ok_or_else(|| unknown("link", name, self.link_names()))
     }
 
-    fn root(&self) -> FreeBody<'a> {
+    pub(super) fn root(&self) -> FreeBody<'a> {
         FreeBody { simulation: self.simulation, index: self.indexing().root }
     }
 
@@ -436,7 +443,7 @@ impl<'a> Robot<'a> {
         Ok(poses)
     }
 
-    fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {
+    pub(super) fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {
         let joints = &self.indexing().joints;
         let mut values = Vec::with_capacity(self.simulation.batch.num_envs() * joints.len());
         self.simulation.batch.for_each(|_, env| values.extend(joints.iter().map(|joint| read(env, joint))));
@@ -448,10 +455,10 @@ impl<'a> Robot<'a> {
 /// A robot, to command and to write.
 #[derive(Debug)]
 pub struct RobotMut<'a> {
-    data: &'a Arc<RobotData>,
-    simulation: &'a mut Simulation,
-    sensors: &'a mut SensorList,
-    index: usize,
+    pub(super) data: &'a Arc<RobotData>,
+    pub(super) simulation: &'a mut Simulation,
+    pub(super) sensors: &'a mut SensorList,
+    pub(super) index: usize,
 }
 
 impl<'a> RobotMut<'a> {
@@ -488,7 +495,7 @@ impl<'a> RobotMut<'a> {
             self.simulation.batch.write(env, |env| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
                     if let Some(drive) = robot.joints[joint].drive {
-                        let [low, high] = self.data.plans[joint].usable;
+                        let [low, high] = env.drives.ranges[drive];
                         env.drives.position[drive] = value.clamp(low, high);
                     }
                 }
@@ -626,7 +633,7 @@ impl<'a> RobotMut<'a> {
         self.root().write_velocities("write_root_velocity", velocities.into(), env_ids)
     }
 
-    fn root(&mut self) -> FreeBodyMut<'_> {
+    pub(super) fn root(&mut self) -> FreeBodyMut<'_> {
         let index = self.simulation.robots[self.index].root;
         FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
     }
@@ -642,31 +649,48 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Checks an argument of a writer before anything is written.
-    fn checked<'v>(
+    pub(super) fn checked<'v>(
         &self,
         argument: &'static str,
         values: ArrayView2<'v, f64>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<JointRows<'v>> {
+        self.checked_numbers(argument, Numbers::Finite, values, joint_ids, env_ids)
+    }
+
+    /// As [`checked`](Self::checked), of numbers of another kind.
+    pub(super) fn checked_numbers<'v>(
+        &self,
+        argument: &'static str,
+        numbers: Numbers,
+        values: ArrayView2<'v, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<JointRows<'v>> {
+        let joints = self.joint_columns(joint_ids)?;
+        let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
+        let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
+        let rows = Rows::check_numbers(table, numbers, values, env_ids, self.simulation.batch.num_envs())?;
+        Ok(JointRows { joints, rows })
+    }
+
+    /// The joints that are meant, in the order given; all of them where `None`.
+    pub(super) fn joint_columns(&self, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
         let count = self.data.plans.len();
         let exists =
             |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) };
-        let joints: Vec<usize> = match joint_ids {
-            None => (0..count).collect(),
-            Some(ids) => ids.iter().map(|&JointIndex(index)| exists(index)).collect::<Result<_>>()?,
-        };
-        let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
-        let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
-        let rows = Rows::check(table, values, env_ids, self.simulation.batch.num_envs())?;
-        Ok(JointRows { joints, rows })
+        match joint_ids {
+            None => Ok((0..count).collect()),
+            Some(ids) => ids.iter().map(|&JointIndex(index)| exists(index)).collect(),
+        }
     }
 }
 
 /// A checked argument: columns, and one row of values per environment.
-struct JointRows<'v> {
-    joints: Vec<usize>,
-    rows: Rows<'v>,
+pub(super) struct JointRows<'v> {
+    pub(super) joints: Vec<usize>,
+    pub(super) rows: Rows<'v>,
 }
 
 impl RobotData {

@@ -17,6 +17,39 @@ pub(super) struct Table<'a> {
     pub(super) of: &'a dyn Fn(usize) -> String,
 }
 
+/// Which numbers a table may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Numbers {
+    /// Finite ones.
+    Finite,
+    /// Finite ones that are not negative.
+    Gain,
+    /// Numbers above or at 0, and infinity for no limit.
+    Limit,
+    /// All but NaN: infinite where there is no end.
+    End,
+}
+
+impl Numbers {
+    fn allow(self, value: f64) -> bool {
+        match self {
+            Self::Finite => value.is_finite(),
+            Self::Gain => value.is_finite() && value >= 0.0,
+            Self::Limit => value >= 0.0,
+            Self::End => !value.is_nan(),
+        }
+    }
+
+    fn expected(self) -> &'static str {
+        match self {
+            Self::Finite => "finite",
+            Self::Gain => "a finite number >= 0",
+            Self::Limit => "a number >= 0, or infinite for no limit",
+            Self::End => "a number, or infinite for no limit",
+        }
+    }
+}
+
 /// A checked table: every number is finite, every environment exists.
 #[derive(Debug)]
 pub(super) struct Rows<'v> {
@@ -32,14 +65,29 @@ impl<'v> Rows<'v> {
         env_ids: Option<&[EnvId]>,
         num_envs: usize,
     ) -> Result<Self> {
+        Self::check_numbers(table, Numbers::Finite, values, env_ids, num_envs)
+    }
+
+    /// As [`check`](Self::check), of numbers of another kind.
+    pub(super) fn check_numbers(
+        table: Table<'_>,
+        numbers: Numbers,
+        values: ArrayView2<'v, f64>,
+        env_ids: Option<&[EnvId]>,
+        num_envs: usize,
+    ) -> Result<Self> {
         let Table { argument, meaning, columns, of } = table;
         let envs = env_list(env_ids, num_envs)?;
         if values.ncols() != columns || (values.nrows() != envs.len() && values.nrows() != 1) {
             let (found, expected) = (values.shape().to_vec(), vec![envs.len(), columns]);
             return Err(Error::Shape { argument, found, expected, meaning });
         }
-        if let Some(((row, column), &value)) = values.indexed_iter().find(|(_, v)| !v.is_finite()) {
-            return Err(Error::NotFinite { argument, row, column, of: of(column), value });
+        if let Some(((row, column), &value)) = values.indexed_iter().find(|(_, v)| !numbers.allow(**v)) {
+            let of = of(column);
+            return Err(match numbers {
+                Numbers::Finite => Error::NotFinite { argument, row, column, of, value },
+                _ => Error::OutOfRange { argument, row, column, of, value, expected: numbers.expected().into() },
+            });
         }
         Ok(Self { envs, values })
     }

@@ -4,7 +4,7 @@ use super::Property;
 use super::error::RandomizationError;
 use super::properties::{OwnValues, Properties};
 use super::tables::{FrictionPlace, dofs_of, friction_place};
-use crate::drive::table::{DriveTable, Gains};
+use crate::drive::table::DriveTable;
 use crate::env::Env;
 use crate::error::Result;
 use crate::mj::{DiagonalInertia, Editor, Model};
@@ -20,7 +20,8 @@ pub(crate) struct Maker {
 pub(crate) struct Made {
     /// `None` where the one it has will do.
     model: Option<Model>,
-    gains: Vec<(usize, Gains)>,
+    /// Of each drive: proportional and derivative gain, effort limit.
+    gains: Vec<(usize, [f64; 3])>,
     /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
     damping: Vec<f64>,
 }
@@ -48,9 +49,8 @@ impl Maker {
         let values = |property: Property| &properties.values[property as usize];
         let places = &properties.tables.get(Property::Stiffness).places;
         let gains = places.iter().enumerate().map(|(element, &drive)| {
-            let [kp, kd, max_effort] =
-                [Property::Stiffness, Property::DriveDamping, Property::MaxEffort].map(|of| values(of)[element]);
-            (drive, Gains { kp, kd, max_effort })
+            let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
+            (drive, gains.map(|of| values(of)[element]))
         });
         Ok(Made { model, gains: gains.collect(), damping })
     }

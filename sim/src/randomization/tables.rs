@@ -69,7 +69,7 @@ fn table(property: Property, model: &Model, drives: &DriveTable) -> Table {
         Property::Gravity => table.push("gravity".into(), 0, &model.gravity()),
         Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {
             for (index, drive) in drives.drives.iter().enumerate() {
-                if let Realization::Row { .. } = drive.realization {
+                if drive.realization != Realization::Actuator {
                     let joint = usize::try_from(model.dof_jntid()[drive.dof]).unwrap_or(0);
                     let name = model.name(ObjectKind::Joint, joint).unwrap_or_default();
                     let gains = drive.initial;

@@ -14,6 +14,7 @@ use super::{Entry, Snapshot, SnapshotError};
 use crate::env::{Divergence, EnvState, EnvStatus};
 use crate::error::{Error, Result};
 use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning};
+use crate::wrenches::Wrenches;
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
 use std::path::Path;
@@ -128,7 +129,7 @@ fn read_content(reader: &mut Reader<'_>) -> Result<Snapshot, Malformed> {
 }
 
 fn write_entry(entry: &Entry, out: &mut Writer) {
-    let EnvState { motion, inputs, drives, steps, diverged } = &entry.state;
+    let EnvState { motion, inputs, drives, wrenches, steps, diverged } = &entry.state;
     let (values, active) = inputs.values();
     out.u64(entry.env as u64);
     out.u64(*steps);
@@ -136,6 +137,7 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
     out.numbers(values);
     out.flags(active);
     out.numbers(drives);
+    out.numbers(&wrenches.numbers());
     let Some(EnvStatus::Diverged { step, reason }) = diverged.as_deref() else { return out.u8(0) };
     match reason {
         Divergence::Warning(warning) => {
@@ -163,6 +165,7 @@ fn read_entry(reader: &mut Reader<'_>) -> Result<Entry, Malformed> {
     let motion = Motion::from_values(reader.numbers()?);
     let (values, active) = (reader.numbers()?, reader.flags()?);
     let drives = reader.numbers()?;
+    let wrenches = Wrenches::from_numbers(&reader.numbers()?).ok_or(Malformed("a wrench has not all its numbers"))?;
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -181,7 +184,8 @@ fn read_entry(reader: &mut Reader<'_>) -> Result<Entry, Malformed> {
         None => None,
         Some(reason) => Some(Box::new(EnvStatus::Diverged { step: reader.u64()?, reason })),
     };
-    let state = EnvState { motion, inputs: Inputs::from_values(values, active), drives, steps, diverged };
+    let inputs = Inputs::from_values(values, active);
+    let state = EnvState { motion, inputs, drives, wrenches, steps, diverged };
     Ok(Entry { env, state })
 }
 

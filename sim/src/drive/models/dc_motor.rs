@@ -1,0 +1,66 @@
+//! Actuator model `dc_motor`: the effort of a motor falls with its speed.
+
+use super::{ActuatorLaw, JointMotion, proportional_derivative};
+use crate::drive::table::{Gains, Target};
+use serde::{Deserialize, Serialize};
+
+/// A direct-current motor with its gear, as Isaac Lab 2 has it: in all four quadrants of speed and effort the effort of
+/// [`IdealPd`](super::IdealPd) is between
+///
+/// ```text
+/// max(s (-1 - v / v_max), -max_effort)  and  min(s (1 - v / v_max), max_effort)
+/// ```
+///
+/// with the stall effort s ([`saturation_effort`](Self::saturation_effort)), the continuous limit `max_effort` and the speed
+/// without load `v_max`, which is the drive's `max_velocity` (`DriveCfg::max_velocity`, or the URDF's velocity limit). The
+/// speed in this formula is held within ±`v_max` (1 + `max_effort` / s), where the motor brakes with all of `max_effort`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DcMotor {
+    /// Effort at standstill \[N m or N\].
+    pub saturation_effort: f64,
+}
+
+impl Default for DcMotor {
+    /// 1 N m, or 1 N.
+    fn default() -> Self {
+        Self { saturation_effort: 1.0 }
+    }
+}
+
+impl DcMotor {
+    /// Least and largest effort at a speed.
+    fn range(&self, velocity: f64, gains: &Gains) -> [f64; 2] {
+        let (stall, limit) = (self.saturation_effort, gains.max_effort);
+        let fastest = 1.0 + limit / stall;
+        let speed = (velocity / gains.max_velocity).clamp(-fastest, fastest);
+        [(stall * (-1.0 - speed)).max(-limit), (stall * (1.0 - speed)).min(limit)]
+    }
+}
+
+impl ActuatorLaw for DcMotor {
+    fn name(&self) -> &'static str {
+        "dc_motor"
+    }
+
+    fn check(&self, gains: &Gains) -> Result<(), String> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if !positive(self.saturation_effort) {
+            return Err(format!("saturation_effort is {}; it must be finite and above 0", self.saturation_effort));
+        }
+        if !positive(gains.max_velocity) {
+            return Err(format!(
+                "max_velocity is {}; a dc_motor needs the speed it has without load, finite and above 0: set \
+                 drive.max_velocity, or the velocity limit of the joint in the URDF",
+                gains.max_velocity
+            ));
+        }
+        Ok(())
+    }
+
+    fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, _memory: &[f64]) -> f64 {
+        let [least, most] = self.range(now.velocity, gains);
+        // At the ends of the speed the two are equal, up to rounding: `clamp` would not have it.
+        proportional_derivative(now, target, gains).max(least).min(most)
+    }
+}

@@ -1,0 +1,244 @@
+//! Drives of a robot while it runs: gains and drive types per joint and per environment.
+//!
+//! Gains are in the memory of each environment, not in MuJoCo's model, so that environments may differ at no cost to those
+//! that do not. Friction and rotor inertia are in the model: they are set when the robot is added
+//! ([`DriveCfg`](crate::DriveCfg)).
+
+use crate::compile::JointIndexing;
+use crate::drive::plan::{PlanError, effective_inertias};
+use crate::drive::table::{DriveActuator, DriveState, Realization, Setting};
+use crate::drive::{ActuatorModel, DelayedPd, DriveType};
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, env_list};
+use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::rows::Numbers;
+use ndarray::{Array2, ArrayView2, AsArray, Ix2};
+use std::sync::Arc;
+
+impl Robot<'_> {
+    /// Stiffness of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
+    /// joints without a drive.
+    pub fn get_stiffness(&self) -> Array2<f64> {
+        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
+    }
+
+    /// Damping of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
+    /// joints without a drive. The viscous friction of the joint itself is not part of it.
+    pub fn get_damping(&self) -> Array2<f64> {
+        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
+    }
+
+    /// What stiffness and damping of each drive mean, shape (N, dof); `None` for joints without a drive.
+    pub fn get_drive_types(&self) -> Array2<DriveType> {
+        let joints = &self.indexing().joints;
+        let of = |env: &Env, joint: &JointIndexing| {
+            joint.drive.map_or(DriveType::None, |drive| env.drives.settings[drive].drive_type)
+        };
+        let n = self.simulation.batch.num_envs();
+        let mut types = Vec::with_capacity(n * joints.len());
+        self.simulation.batch.for_each(|_, env| types.extend(joints.iter().map(|joint| of(env, joint))));
+        // One value for each environment and joint was pushed.
+        Array2::from_shape_vec((n, joints.len()), types).unwrap_or_default()
+    }
+
+    /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints that [`DelayedPd`] does not drive.
+    pub fn get_delay(&self) -> Array2<u32> {
+        let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
+            Some(DriveActuator { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
+                f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
+            }
+            _ => 0.0,
+        });
+        delays.mapv(|steps| steps as u32)
+    }
+}
+
+impl RobotMut<'_> {
+    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; everything else about them stays, and so does
+    /// this through a reset. Rows are for `env_ids` (all where `None`; a single row is for all of them), columns for
+    /// `joint_ids` (all where `None`); columns of mimic joints are accepted and ignored.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use sim::{EnvId, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg};
+    /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-drives-{}.urdf", std::process::id()));
+    /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
+    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");
+    /// # std::fs::write(&urdf, format!("<robot name='r'>{}{}<joint name='knee' type='continuous'><parent link='a'/>
+    /// #   <child link='b'/><axis xyz='0 0 1'/></joint></robot>", link("a"), link("b")))?;
+    ///
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() })?;
+    /// let leg = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(&urdf), ..Default::default() })?;
+    /// # std::fs::remove_file(&urdf)?;
+    /// let knee = sim.robot(leg).joint_id("knee")?;
+    /// sim.robot_mut(leg).set_stiffness(&array![[40.0]], Some(&[knee]), Some(&[EnvId(1)]))?;
+    /// assert_eq!(sim.robot(leg).get_stiffness(), array![[1e4], [40.0]]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is negative or not finite; a joint that was added without a
+    /// drive, or is driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_stiffness<'t>(
+        &mut self,
+        values: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.set_drives("set_stiffness", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
+            drives.set(drive, |setting| setting.stiffness = value);
+        })
+    }
+
+    /// Sets the damping of drives \[N m s/rad or N s/m for drive type `force`\]; otherwise as
+    /// [`set_stiffness`](Self::set_stiffness). The viscous friction of the joint itself stays.
+    ///
+    /// # Errors
+    /// As [`set_stiffness`](Self::set_stiffness).
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_damping<'t>(
+        &mut self,
+        values: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.set_drives("set_damping", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
+            drives.set(drive, |setting| setting.damping = value);
+        })
+    }
+
+    /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
+    /// `env_ids` (all where `None`). Their numbers stay, and so does everything else. With `None` a drive gives nothing but
+    /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the inertia
+    /// that the joint feels at the robot's initial positions.
+    ///
+    /// # Errors
+    /// Unknown joint or environment; a joint that was added without a drive, or is driven by
+    /// [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    pub fn set_drive_type(
+        &mut self,
+        drive_type: DriveType,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let drives = self.drives_of("set_drive_type", &self.joint_columns(joint_ids)?)?;
+        let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
+        let inertias = if drive_type == DriveType::Acceleration { Some(self.inertias_at_start()?) } else { None };
+        for env in envs {
+            self.simulation.batch.write(env, |env| {
+                for &(_, joint, drive) in &drives {
+                    let inertia = inertias.as_ref().map(|inertias| inertias[joint]);
+                    let change =
+                        |old: &mut Setting| *old = Setting { drive_type, inertia: inertia.or(old.inertia), ..*old };
+                    env.drives.set(drive, change);
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset, and what is under way
+    /// stays in its order. Rows and columns as in [`set_stiffness`](Self::set_stiffness).
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment; a joint of another model, or a delay above the model's `max_delay`. Then
+    /// nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_delay<'t>(
+        &mut self,
+        steps: impl AsArray<'t, u32, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let argument = "set_delay";
+        let steps: ArrayView2<'_, u32> = steps.into();
+        let steps = steps.mapv(f64::from);
+        let write = self.checked_numbers(argument, Numbers::Gain, steps.view(), joint_ids, env_ids)?;
+        let drives = self.driven(argument, &write.joints)?;
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        let name = |joint: usize| self.data.joint_names()[joint].clone();
+        let mut memories = Vec::with_capacity(drives.len());
+        for &(column, joint, drive) in &drives {
+            let Some(DriveActuator { model: ActuatorModel::DelayedPd(model), memory, .. }) = table.model_of(drive)
+            else {
+                return Err(Error::NoDelay { robot: self.data.uid().into(), joint: name(joint) });
+            };
+            for (row, (_, steps)) in write.rows.iter().enumerate() {
+                let (value, longest) = (steps[column], model.longest());
+                if value > f64::from(longest) {
+                    let (of, expected) =
+                        (format!("joint {:?}", name(joint)), format!("at most {longest}, its max_delay"));
+                    return Err(Error::OutOfRange { argument, row, column, of, value, expected });
+                }
+            }
+            memories.push((column, memory.clone()));
+        }
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for (column, memory) in &memories {
+                    DelayedPd::set_delay(&mut env.drives.memory[memory.clone()], row[*column] as u32);
+                }
+            });
+        }
+        Ok(())
+    }
+
+    fn inertias_at_start(&self) -> Result<Vec<f64>> {
+        let data = self.data;
+        effective_inertias(data.description(), data.plans(), !data.cfg().fix_base)
+            .map_err(|error| Error::Plan { robot: data.uid().into(), error: Box::new(PlanError::Dynamics(error)) })
+    }
+
+    /// Changes drives by one number each, after everything was checked.
+    pub(super) fn set_drives(
+        &mut self,
+        argument: &'static str,
+        numbers: Numbers,
+        values: ArrayView2<'_, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+        change: impl Fn(&mut DriveState, usize, f64),
+    ) -> Result<()> {
+        let write = self.checked_numbers(argument, numbers, values, joint_ids, env_ids)?;
+        let drives = self.drives_of(argument, &write.joints)?;
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                drives.iter().for_each(|&(column, _, drive)| change(&mut env.drives, drive, row[column]));
+            });
+        }
+        Ok(())
+    }
+
+    /// `(column, joint, drive)` of the `joints` but the mimic ones, each with gains that may change.
+    fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+        let native = |drive: usize| {
+            self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
+        };
+        let drives = self.driven(argument, joints)?;
+        match drives.iter().find(|(_, _, drive)| native(*drive)) {
+            Some(&(_, joint, _)) => {
+                let joint = self.data.joint_names()[joint].clone();
+                Err(Error::GainsInModel { argument, robot: self.data.uid().into(), joint })
+            }
+            None => Ok(drives),
+        }
+    }
+
+    /// `(column, joint, drive)` of the `joints` but the mimic ones.
+    pub(super) fn driven(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+        let mut drives = Vec::with_capacity(joints.len());
+        for (column, &joint) in joints.iter().enumerate() {
+            if self.data.plans()[joint].mimic.is_some() {
+                continue;
+            }
+            let Some(drive) = self.simulation.robots[self.index].joints[joint].drive else {
+                let joint = self.data.joint_names()[joint].clone();
+                return Err(Error::NotDriven { argument, robot: self.data.uid().into(), joint });
+            };
+            drives.push((column, joint, drive));
+        }
+        Ok(drives)
+    }
+}

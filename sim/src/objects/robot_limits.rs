@@ -1,0 +1,210 @@
+//! Limits of a robot's joints: positions, speeds and efforts, per joint and per environment.
+
+use crate::drive::table::Gains;
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, env_list};
+use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::rows::{Numbers, Rows, Table};
+use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
+use std::sync::Arc;
+
+impl Robot<'_> {
+    /// Positions that targets may have \[rad or m\], shape (N, dof, 2): the joint's own limits, narrowed by the limits of
+    /// joints that mimic this one, or what [`set_qpos_limits`](RobotMut::set_qpos_limits) says; infinite where there are
+    /// none.
+    pub fn qpos_limits(&self) -> Array3<f64> {
+        self.ends(|range| range)
+    }
+
+    /// Soft limits \[rad or m\], shape (N, dof, 2): around the middle of [`qpos_limits`](Self::qpos_limits), the share
+    /// `soft_limit_factor` of the robot's configuration of its range. They bound nothing: they are for rewards and
+    /// planners to stay inside of. Infinite where there is no limit.
+    pub fn soft_qpos_limits(&self) -> Array3<f64> {
+        let factor = self.data.cfg().soft_limit_factor;
+        self.ends(|[low, high]| {
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * factor);
+            // An end that is missing is missing in the soft range, too.
+            if half.is_finite() && middle.is_finite() { [middle - half, middle + half] } else { [low, high] }
+        })
+    }
+
+    /// Speed limits \[rad/s or m/s\], infinite where there are none, shape (N, dof): the files', unless the configuration or
+    /// [`set_qvel_limits`](RobotMut::set_qvel_limits) says otherwise. Reported; see there.
+    pub fn qvel_limits(&self) -> Array2<f64> {
+        let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
+        for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
+            *limit = self.data.plans()[joint].max_velocity;
+        }
+        limits
+    }
+
+    /// Effort limits of the drives \[N m or N\], infinite where there are none, shape (N, dof). A passive joint has that of
+    /// its file or configuration, which bounds what [`set_qf`](RobotMut::set_qf) gives it; a mimic joint has none.
+    pub fn qf_limits(&self) -> Array2<f64> {
+        let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_effort));
+        for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
+            let plan = &self.data.plans()[joint];
+            *limit = if plan.mimic.is_some() { f64::INFINITY } else { plan.max_effort };
+        }
+        limits
+    }
+
+    /// Two numbers made of each joint's range.
+    fn ends(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
+        let joints = &self.indexing().joints;
+        let n = self.simulation.batch.num_envs();
+        let mut ends = Vec::with_capacity(n * joints.len() * 2);
+        self.simulation.batch.for_each(|_, env| {
+            for (joint, plan) in joints.iter().zip(self.data.plans()) {
+                ends.extend(of(joint.drive.map_or(plan.usable, |drive| env.drives.ranges[drive])));
+            }
+        });
+        // Two values for each environment and joint were pushed.
+        Array3::from_shape_vec((n, joints.len(), 2), ends).unwrap_or_default()
+    }
+}
+
+impl RobotMut<'_> {
+    /// Sets the positions that targets may have \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (all where
+    /// `None`; a single row is for all of them), joints as `joint_ids` (all where `None`). Present targets are clamped to
+    /// them at once. They may be tighter than the robot's own and be widened again, up to those. Mimic joints are accepted
+    /// and ignored.
+    ///
+    /// These are limits of what is asked for. The stops that a joint hits are in MuJoCo's model and stay where they are: a
+    /// load may push a joint beyond a tighter limit. [`compute_ik`](Robot::compute_ik) searches within the limits that the
+    /// robot was added with.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, NaN, a lower end above the upper one, an end beyond the robot's own
+    /// limits; a joint without a drive. Then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qpos_limits<'t>(
+        &mut self,
+        limits: impl AsArray<'t, f64, Ix3>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let argument = "set_qpos_limits";
+        let limits: ArrayView3<'_, f64> = limits.into();
+        let joints = self.joint_columns(joint_ids)?;
+        let num_envs = self.simulation.batch.num_envs();
+        let envs = env_list(env_ids, num_envs)?.len();
+        let (rows, columns, ends) = limits.dim();
+        let fits = [1, envs].contains(&rows) && columns == joints.len() && ends == 2;
+        let Some(flat) = limits.to_shape((rows, columns * ends)).ok().filter(|_| fits) else {
+            let expected = vec![envs, joints.len(), 2];
+            let (found, meaning) = (limits.shape().to_vec(), "environments, joints, lower and upper end");
+            return Err(Error::Shape { argument, found, expected, meaning });
+        };
+        let name = |joint: usize| &self.data.joint_names()[joint];
+        let of = |column: usize| {
+            let end = ["lower", "upper"][column % 2];
+            format!("{end} end of joint {:?}", name(joints[column / 2]))
+        };
+        let table =
+            Table { argument, meaning: "environments, lower and upper end of joints", columns: 2 * columns, of: &of };
+        let rows = Rows::check_numbers(table, Numbers::End, flat.view(), env_ids, num_envs)?;
+        let drives = self.driven(argument, &joints)?;
+        for (row, (_, ends)) in rows.iter().enumerate() {
+            for &(k, joint, _) in &drives {
+                let [first, last] = self.data.plans()[joint].usable;
+                let refuse = |column: usize, expected: String| {
+                    Err(Error::OutOfRange { argument, row, column, of: of(column), value: ends[column], expected })
+                };
+                let (low, high) = (2 * k, 2 * k + 1);
+                if let Some(column) = [low, high].into_iter().find(|&c| !(first..=last).contains(&ends[c])) {
+                    return refuse(column, format!("{first} to {last}, the limits that the robot was added with"));
+                }
+                if ends[low] > ends[high] {
+                    return refuse(low, format!("at most the upper end, {}", ends[high]));
+                }
+                // A target must be somewhere.
+                if ends[low] == f64::INFINITY {
+                    return refuse(low, "below infinity".into());
+                }
+                if ends[high] == f64::NEG_INFINITY {
+                    return refuse(high, "above minus infinity".into());
+                }
+            }
+        }
+        for (env, ends) in rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for &(k, _, drive) in &drives {
+                    env.drives.set_range(drive, [ends[2 * k], ends[2 * k + 1]]);
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets the speed limits of drives \[rad/s or m/s\], infinite for none; rows and columns as in
+    /// [`set_stiffness`](Self::set_stiffness), which also names the errors.
+    ///
+    /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive law
+    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is negative or NaN, or that its actuator model cannot take; a
+    /// joint without a drive. Then nothing is set.
+    #[doc(alias = "max_velocity")]
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qvel_limits<'t>(
+        &mut self,
+        limits: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked_numbers("set_qvel_limits", Numbers::Limit, limits.into(), joint_ids, env_ids)?;
+        let drives = self.driven("set_qvel_limits", &write.joints)?;
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        for (row, (_, values)) in write.rows.iter().enumerate() {
+            for &(column, joint, drive) in &drives {
+                let (value, gains) = (values[column], table.drives[drive].initial);
+                let checked = table
+                    .model_of(drive)
+                    .map_or(Ok(()), |explicit| explicit.model.law().check(&Gains { max_velocity: value, ..gains }));
+                checked.map_err(|expected| {
+                    let (argument, of) = ("set_qvel_limits", format!("joint {:?}", self.data.joint_names()[joint]));
+                    Error::OutOfRange {
+                        argument,
+                        row,
+                        column,
+                        of,
+                        value,
+                        expected: format!("right for its model: {expected}"),
+                    }
+                })?;
+            }
+        }
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for &(column, _, drive) in &drives {
+                    let max_velocity = row[column];
+                    env.drives.set_limits(drive, |gains| Gains { max_velocity, ..gains });
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Sets the effort limits of drives \[N m or N\], infinite for none; rows and columns as in
+    /// [`set_stiffness`](Self::set_stiffness). The sum that a drive gives, with the effort of [`set_qf`](Self::set_qf), is
+    /// clamped to them.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, a value that is negative or NaN; a joint without a drive, or one that is
+    /// driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    #[doc(alias = "max_effort")]
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_qf_limits<'t>(
+        &mut self,
+        limits: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let argument = "set_qf_limits";
+        self.set_drives(argument, Numbers::Limit, limits.into(), joint_ids, env_ids, |drives, drive, max_effort| {
+            drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
+        })
+    }
+}

@@ -1,0 +1,228 @@
+//! The state of a robot beside its joints' positions: accelerations, targets, root and links, and what is called how.
+
+use crate::capture::{body_velocity, link_pose};
+use crate::compile::RobotIndex;
+use crate::description::LinkId;
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::manager::EnvId;
+use crate::objects::free_body::body_pose;
+use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::pattern::{self, PatternError};
+use ::scene::Pose;
+use ::scene::pose::to_row;
+use nalgebra::Vector3;
+use ndarray::{Array1, Array2, Array3, AsArray, Axis, Ix2, concatenate};
+
+/// What joints are called, and which of them follow others.
+impl Robot<'_> {
+    /// Joints whose names match `patterns` (whole names, case counts): in their order within a pattern, patterns one after
+    /// the other.
+    ///
+    /// # Errors
+    /// A pattern that is wrong or matches nothing, with the nearest names; a joint that two patterns match.
+    pub fn find_joints<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<JointIndex>> {
+        let found = pattern::select(patterns, self.joint_names(), "joint").map_err(|error| self.name_error(error))?;
+        Ok(found.into_iter().map(JointIndex).collect())
+    }
+
+    /// Links whose names match `patterns`, fused ones too; otherwise as [`find_joints`](Self::find_joints). A [`LinkId`] is
+    /// the link's place in [`link_names`](Self::link_names) and on the second axis of
+    /// [`get_link_poses`](Self::get_link_poses).
+    ///
+    /// # Errors
+    /// As [`find_joints`](Self::find_joints).
+    pub fn find_links<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<LinkId>> {
+        let found = pattern::select(patterns, &self.link_names(), "link").map_err(|error| self.name_error(error))?;
+        Ok(found.into_iter().map(LinkId).collect())
+    }
+
+    /// The joints that follow no other joint, in the order of [`joint_names`](Self::joint_names).
+    pub fn active_joint_ids(&self) -> Vec<JointIndex> {
+        (0..self.dof()).map(JointIndex).filter(|&joint| !self.is_mimic(joint)).collect()
+    }
+
+    /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic ones.
+    pub fn active_dof(&self) -> usize {
+        self.active_joint_ids().len()
+    }
+
+    /// The joints of a control part that follow no other joint, in the order of its patterns.
+    ///
+    /// # Errors
+    /// There is no such part; the error lists those there are.
+    pub fn get_active_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
+        let mut joints = self.get_joint_ids(part)?;
+        joints.retain(|&joint| !self.is_mimic(joint));
+        Ok(joints)
+    }
+
+    fn name_error(&self, error: PatternError) -> Error {
+        Error::RobotNames { robot: self.uid().into(), error: Box::new(error) }
+    }
+}
+
+/// Joints.
+impl Robot<'_> {
+    /// Accelerations of the joints in the last step \[rad/s² or m/s²\], shape (N, dof); 0 before the first one. A write to
+    /// the state leaves them as they are until the next step.
+    pub fn get_qacc(&self) -> Array2<f64> {
+        // The warm start is the acceleration of the last step, and what an environment keeps when it is done again.
+        self.gather(|env, joint| env.data().qacc_warmstart()[joint.dof])
+    }
+
+    /// Velocity targets \[rad/s or m/s\], shape (N, dof); 0 for joints without a drive.
+    pub fn get_target_qvel(&self) -> Array2<f64> {
+        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
+    }
+
+    /// Efforts that [`set_qf`](RobotMut::set_qf) asked for \[N m or N\], shape (N, dof); 0 for mimic joints. A passive
+    /// joint has what it really gets, within its limit.
+    pub fn get_target_qf(&self) -> Array2<f64> {
+        self.gather(|env, joint| match joint.drive {
+            Some(drive) => env.drives.feedforward[drive],
+            None => env.drives.applied[joint.dof],
+        })
+    }
+}
+
+/// The root link.
+impl Robot<'_> {
+    /// Pose, velocity and angular velocity of the root link at the start, as [`get_root_state`](Self::get_root_state) has
+    /// them, shape (N, 13): the pose of the configuration, at rest.
+    pub fn get_default_root_state(&self) -> Array2<f64> {
+        let pose = to_row(&self.data.cfg().init_pose);
+        let n = self.simulation.batch.num_envs();
+        Array2::from_shape_fn((n, 13), |(_, k)| pose.get(k).copied().unwrap_or(0.0))
+    }
+
+    /// Pose of the root link in the environment, then the velocity of its frame and its angular velocity in world axes:
+    /// rows `[x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz]` \[m, m/s, rad/s\], shape (N, 13).
+    pub fn get_root_state(&self) -> Array2<f64> {
+        // Both have one row for each environment.
+        concatenate(Axis(1), &[self.get_root_pose().view(), self.get_root_velocity().view()]).unwrap_or_default()
+    }
+
+    /// Centre of mass of the root link and of what is fixed to it, in the environment \[m\], shape (N, 3).
+    pub fn get_root_com_position(&self) -> Array2<f64> {
+        self.rows(|env, robot| centre_of_mass(env, robot).into())
+    }
+
+    /// Velocity of the centre of mass of the root link and of what is fixed to it, then its angular velocity, in world axes
+    /// \[m/s, rad/s\], shape (N, 6); 0 where the base is fixed. [`get_root_velocity`](Self::get_root_velocity) has that of
+    /// the link's frame.
+    pub fn get_root_com_velocity(&self) -> Array2<f64> {
+        self.rows(|env, robot| {
+            let [v, w] = body_velocity(env.data(), robot.root.body, &centre_of_mass(env, robot));
+            [v.x, v.y, v.z, w.x, w.y, w.z]
+        })
+    }
+
+    /// Velocity of the root link's frame in its own axes \[m/s\], shape (N, 3): what a sensor of speed on the root would
+    /// measure.
+    pub fn get_root_lin_vel_b(&self) -> Array2<f64> {
+        self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[0])
+    }
+
+    /// Angular velocity of the root link in its own axes \[rad/s\], shape (N, 3): what an ideal gyroscope would measure.
+    pub fn get_root_ang_vel_b(&self) -> Array2<f64> {
+        self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[1])
+    }
+
+    /// Direction of gravity in the axes of the root link, a unit vector, shape (N, 3): (0, 0, -1) where it stands upright;
+    /// 0 where there is no gravity.
+    pub fn get_projected_gravity_b(&self) -> Array2<f64> {
+        self.in_root_axes(|env, _, _| {
+            let gravity = Vector3::from(env.data().model().gravity());
+            gravity.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+        })
+    }
+
+    /// Heading of the root link \[rad\], shape (N,): the angle about the world's z of its x axis, from -π to π.
+    pub fn get_root_heading(&self) -> Array1<f64> {
+        let headings = self.rows(|env, robot| {
+            let forward = body_pose(env.data(), robot.root.body).rotation * Vector3::x();
+            [forward.y.atan2(forward.x)]
+        });
+        headings.index_axis(Axis(1), 0).to_owned()
+    }
+
+    fn in_root_axes(&self, of: impl Fn(&Env, &RobotIndex, &Pose) -> Vector3<f64>) -> Array2<f64> {
+        self.rows(|env, robot| {
+            let root = body_pose(env.data(), robot.root.body);
+            root.rotation.inverse_transform_vector(&of(env, robot, &root)).into()
+        })
+    }
+
+    fn rows<const K: usize>(&self, read: impl Fn(&Env, &RobotIndex) -> [f64; K]) -> Array2<f64> {
+        let n = self.simulation.batch.num_envs();
+        let mut values = Vec::with_capacity(n * K);
+        self.simulation.batch.for_each(|_, env| values.extend(read(env, self.indexing())));
+        // K values for each environment were pushed.
+        Array2::from_shape_vec((n, K), values).unwrap_or_default()
+    }
+}
+
+/// Links.
+impl Robot<'_> {
+    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names): rows
+    /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
+    pub fn get_link_poses(&self) -> Array3<f64> {
+        self.of_links(|env, link| to_row(&link_pose(env.data(), link)))
+    }
+
+    /// Velocities of the frames of all links, fused ones too, then their angular velocities, in world axes \[m/s, rad/s\],
+    /// shape (N, links, 6).
+    pub fn get_link_velocities(&self) -> Array3<f64> {
+        self.of_links(link_velocity)
+    }
+
+    /// Velocity of the frame of a link, fused ones included, then its angular velocity, in world axes \[m/s, rad/s\], shape
+    /// (N, 6).
+    ///
+    /// # Errors
+    /// There is no such link; the error lists the nearest names.
+    pub fn link_velocity(&self, name: &str) -> Result<Array2<f64>> {
+        let link = self.link_id(name)?;
+        Ok(self.rows(|env, robot| link_velocity(env, &robot.links[link.0])))
+    }
+
+    fn of_links<const K: usize>(&self, read: impl Fn(&Env, &(usize, Pose)) -> [f64; K]) -> Array3<f64> {
+        let (n, links) = (self.simulation.batch.num_envs(), &self.indexing().links);
+        let mut values = Vec::with_capacity(n * links.len() * K);
+        self.simulation.batch.for_each(|_, env| values.extend(links.iter().flat_map(|link| read(env, link))));
+        // K values for each environment and link were pushed.
+        Array3::from_shape_vec((n, links.len(), K), values).unwrap_or_default()
+    }
+}
+
+fn link_velocity(env: &Env, link: &(usize, Pose)) -> [f64; 6] {
+    let [v, w] = body_velocity(env.data(), link.0, &link_pose(env.data(), link).translation.vector);
+    [v.x, v.y, v.z, w.x, w.y, w.z]
+}
+
+fn centre_of_mass(env: &Env, robot: &RobotIndex) -> Vector3<f64> {
+    Vector3::from_column_slice(&env.data().xipos()[3 * robot.root.body..3 * robot.root.body + 3])
+}
+
+impl RobotMut<'_> {
+    /// Sets the velocity of the centre of mass of the root link and of what is fixed to it, and its angular velocity, in
+    /// world axes: rows of 6 \[m/s, rad/s\], as in [`write_root_velocity`](Self::write_root_velocity), which takes that of
+    /// the link's frame.
+    ///
+    /// # Errors
+    /// As [`write_root_pose`](Self::write_root_pose).
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_root_com_velocity<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let body = self.simulation.robots[self.index].root.body;
+        // The frame's origin is at `arm` from the centre of mass: v_frame = v_com + w x arm.
+        self.root().write_velocities_of("write_root_com_velocity", velocities.into(), env_ids, |data| {
+            let com = Vector3::from_column_slice(&data.xipos()[3 * body..3 * body + 3]);
+            body_pose(data, body).translation.vector - com
+        })
+    }
+}

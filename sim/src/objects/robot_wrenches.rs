@@ -1,0 +1,167 @@
+//! Forces and torques on links of a robot, and gravity compensation, per environment.
+
+use crate::description::LinkId;
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, env_list};
+use crate::objects::robot::{Robot, RobotMut};
+use crate::objects::rows::{Rows, Table};
+use crate::wrenches::{Wrench, WrenchFrame};
+use nalgebra::Vector3;
+use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix3};
+
+impl Robot<'_> {
+    /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes with the links where they
+    /// are \[N, N m\], shape (N, links, 6). Gravity compensation is not among them.
+    pub fn get_external_wrenches(&self) -> Array3<f64> {
+        let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
+        let mut wrenches = Array3::zeros((n, links, 6));
+        self.simulation.batch.for_each(|i, env| {
+            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of.0 == self.index()) {
+                let [force, torque] = wrench.in_world(env.data());
+                for (k, value) in force.iter().chain(&torque).enumerate() {
+                    wrenches[(i, wrench.of.1, k)] = *value;
+                }
+            }
+        });
+        wrenches
+    }
+
+    /// Whether gravity is compensated for each link, shape (N, links).
+    pub fn get_gravity_compensation(&self) -> Array2<bool> {
+        let links = &self.indexing().links;
+        let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
+        self.simulation.batch.for_each(|i, env| {
+            for (l, (body, _)) in links.iter().enumerate() {
+                weightless[(i, l)] = env.wrenches().weightless.contains(body);
+            }
+        });
+        weightless
+    }
+}
+
+impl RobotMut<'_> {
+    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the environment is
+    /// reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (all where `None`; a single
+    /// row is for all of them), links as `link_ids` (all where `None`). Other links keep what they have.
+    ///
+    /// A force acts in the centre of mass of the link's body: of the link and of all that is fixed to it. Links that are
+    /// fused to one body add up. To push at a point that is `r` away from there, add `r x F` to the torque. With
+    /// [`WrenchFrame::Link`] both are in the axes of the link and turn with it, from step to step.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use sim::{RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg, WrenchFrame};
+    /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-wrench-{}.urdf", std::process::id()));
+    /// # std::fs::write(&urdf, "<robot name='r'><link name='puck'><inertial><mass value='2'/>
+    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link></robot>")?;
+    ///
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg { gravity: [0.0; 3].into(), ..Default::default() })?;
+    /// let id = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(&urdf), fix_base: false, ..Default::default() })?;
+    /// # std::fs::remove_file(&urdf)?;
+    /// let puck = sim.robot(id).link_id("puck")?;
+    /// let (force, torque) = (array![[[3.0, 0.0, 0.0]]], array![[[0.0, 0.0, 0.0]]]);
+    /// sim.robot_mut(id).set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[puck]), None)?;
+    /// sim.update(100);
+    /// // 3 N on 2 kg for a second.
+    /// assert!((sim.robot(id).get_root_velocity()[(0, 0)] - 1.5).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Wrong shape, unknown link or environment, a value that is not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_external_wrench<'f, 't>(
+        &mut self,
+        forces: impl AsArray<'f, f64, Ix3>,
+        torques: impl AsArray<'t, f64, Ix3>,
+        frame: WrenchFrame,
+        link_ids: Option<&[LinkId]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let links = self.links(link_ids)?;
+        let forces = self.vectors("set_external_wrench (forces)", forces.into(), &links, env_ids)?;
+        let torques = self.vectors("set_external_wrench (torques)", torques.into(), &links, env_ids)?;
+        let robot = self.index;
+        let bodies = &self.simulation.robots[robot].links;
+        let vector = |row: &[f64], k: usize| Vector3::new(row[3 * k], row[3 * k + 1], row[3 * k + 2]);
+        for (i, env) in env_list(env_ids, self.simulation.batch.num_envs())?.into_iter().enumerate() {
+            // A single row is for all environments.
+            let [force_row, torque_row] = [&forces, &torques].map(|rows| &rows[i.min(rows.len() - 1)]);
+            self.simulation.batch.write(env, |env| {
+                env.set_wrenches(|wrenches| {
+                    for (k, &link) in links.iter().enumerate() {
+                        let (body, body_from_link) = bodies[link];
+                        let axes = (frame == WrenchFrame::Link).then_some(body_from_link.rotation);
+                        let (force, torque) = (vector(force_row, k), vector(torque_row, k));
+                        let wrench = Wrench { of: (robot, link), body, axes, force, torque };
+                        let acts = force != Vector3::zeros() || torque != Vector3::zeros();
+                        wrenches.replace((robot, link), acts.then_some(wrench));
+                    }
+                });
+            });
+        }
+        Ok(())
+    }
+
+    /// Switches gravity compensation of links on or off, for `link_ids` (all where `None`) in `env_ids` (all where `None`);
+    /// off at first. It stays through a reset.
+    ///
+    /// A compensated link is held by the force `-m g` in its centre of mass: the drives do not feel its weight, while its
+    /// inertia stays. A link that is fused to another takes all of their body with it. Gravity itself stays as it is, for
+    /// objects and for what the robot holds.
+    ///
+    /// # Errors
+    /// Unknown link or environment; then nothing is changed.
+    pub fn set_gravity_compensation(
+        &mut self,
+        on: bool,
+        link_ids: Option<&[LinkId]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let links = self.links(link_ids)?;
+        let mut bodies: Vec<usize> =
+            links.iter().map(|&link| self.simulation.robots[self.index].links[link].0).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        for env in env_list(env_ids, self.simulation.batch.num_envs())? {
+            self.simulation.batch.write(env, |env| {
+                env.set_wrenches(|wrenches| wrenches.set_weightless(&bodies, on));
+            });
+        }
+        Ok(())
+    }
+
+    /// The links that are meant, in the order given; all of them where `None`.
+    fn links(&self, link_ids: Option<&[LinkId]>) -> Result<Vec<usize>> {
+        let count = self.data.description().links.len();
+        let exists =
+            |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "link", index, count }) };
+        match link_ids {
+            None => Ok((0..count).collect()),
+            Some(ids) => ids.iter().map(|&LinkId(index)| exists(index)).collect(),
+        }
+    }
+
+    /// One row of vectors per environment, or one for all, after everything was checked.
+    fn vectors(
+        &self,
+        argument: &'static str,
+        vectors: ArrayView3<'_, f64>,
+        links: &[usize],
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Vec<Vec<f64>>> {
+        let meaning = "environments, links, x y z";
+        let num_envs = self.simulation.batch.num_envs();
+        let envs = env_list(env_ids, num_envs)?.len();
+        let (rows, columns, axes) = vectors.dim();
+        let fits = [1, envs].contains(&rows) && columns == links.len() && axes == 3;
+        let Some(flat) = vectors.to_shape((rows, columns * axes)).ok().filter(|_| fits) else {
+            let (found, expected) = (vectors.shape().to_vec(), vec![envs, links.len(), 3]);
+            return Err(Error::Shape { argument, found, expected, meaning });
+        };
+        let name = |link: usize| &self.data.description().links[link].name;
+        let of = |column: usize| format!("{} of link {:?}", ["x", "y", "z"][column % 3], name(links[column / 3]));
+        Rows::check(Table { argument, meaning, columns: 3 * columns, of: &of }, flat.view(), env_ids, num_envs)?;
+        Ok(flat.rows().into_iter().map(|row| row.to_vec()).collect())
+    }
+}
