@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
-use crate::select::select;
+use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use nalgebra::Vector3;
@@ -64,7 +64,7 @@ impl SensorCfg for JointWrenchCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, a link that is fused to another one (the error names it), and what is wrong with the
+    /// A pattern that matches nothing, neither `links` nor `frames`, a link that is fused to another one (the error names it), and what is wrong with the
     /// sampling.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
@@ -75,6 +75,7 @@ impl SensorCfg for JointWrenchCfg {
             }
         }
         let frames = select(&self.frames, &context.bodies, "link")?;
+        at_least_one(links.len() + frames.len(), ("joint wrench", "links and frames", "link"), &context.bodies)?;
         let names = links.iter().chain(&frames).map(|&link| context.bodies[link].clone()).collect();
         let in_frame = |frame: usize| {
             let link = context.carriers.get(frame).copied().unwrap_or(frame);

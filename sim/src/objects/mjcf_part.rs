@@ -9,7 +9,7 @@ use crate::manager::EnvId;
 use crate::mj::{self, LoadError, Model, words};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, compare};
 use crate::objects::robot::check_pose;
-use crate::objects::rows::{Rows, Table};
+use crate::objects::rows::{Rows, Table, check_distinct};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::source::Source;
@@ -463,7 +463,8 @@ impl<'a> MjcfPartMut<'a> {
     /// row is for all of them), columns for `actuators` (all where `None`). MuJoCo clamps them to the ranges of the file.
     ///
     /// # Errors
-    /// Wrong shape, unknown actuator or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown actuator or environment, an actuator that is named twice, a value that is not finite; then nothing
+    /// is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_ctrl<'t>(
         &mut self,
@@ -482,6 +483,7 @@ impl<'a> MjcfPartMut<'a> {
         };
         let places: Vec<usize> = chosen.iter().map(|&index| all[index]).collect();
         let of = |column: usize| format!("actuator {:?}", self.data.names.actuators[chosen[column]]);
+        check_distinct("set_ctrl", &chosen, &of)?;
         let table = Table { argument: "set_ctrl", meaning: "environments, actuators", columns: chosen.len(), of: &of };
         let rows = Rows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
         for (env, row) in rows.iter() {

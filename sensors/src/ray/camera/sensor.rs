@@ -22,7 +22,8 @@ use std::fmt;
 /// metres. Nothing is ever NaN.
 ///
 /// What is measured is the distance along the ray of each pixel: noise of the channel `distances` is added to it, and depth
-/// and points follow, so that all three stay on the ray. Normals, masks, poses and lenses are exact.
+/// and points follow, so that all three stay on the ray. Noisy distances are from 0 to the largest that rays reach, and
+/// misses stay misses. Normals, masks, poses and lenses are exact.
 ///
 /// Setters ([`set_local_pose`](Self::set_local_pose), [`look_at`](Self::look_at),
 /// [`set_intrinsics`](Self::set_intrinsics)...) act from the next picture on, and stay over a reset until

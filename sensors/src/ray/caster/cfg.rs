@@ -60,7 +60,8 @@ pub struct RayCasterCfg {
     /// in group 3 or above.
     pub groups: u32,
     /// Rate, history, latency and noise; the channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
-    /// `distances` may have noise. Points are along the ray at the noisy distance.
+    /// `distances` may have noise. Points are along the ray at the noisy distance, which is from 0 to `max_distance` still;
+    /// misses stay misses.
     pub sampling: SamplingCfg,
 }
 
@@ -117,7 +118,7 @@ impl SensorCfg for RayCasterCfg {
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let channels = [
-            Channel::new("distances", rays.len()),
+            Channel::within("distances", rays.len(), [0.0, self.max_distance]),
             Channel::exact("normals", 3 * rays.len()),
             Channel::exact("ids", rays.len()),
             Channel::exact("pos_w", 3),
