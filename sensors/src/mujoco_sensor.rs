@@ -239,7 +239,8 @@ mod tests {
     fn mistakes_are_errors() {
         let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
         // An empty list was taken as it stood: a sensor of no numbers, which no reader notices.
-        let nothing = "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
+        let nothing =
+            "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
         assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));
         let nobody = SensorContext { engine_sensors: [].into(), ..context() };
         let error = MujocoSensorCfg::default().build(&nobody).unwrap_err();

@@ -327,6 +327,11 @@ impl Sampler {
         self.quantities.iter().any(|q| q.name == channel)
     }
 
+    /// Names of its channels, in their order.
+    pub fn channels(&self) -> impl Iterator<Item = &'static str> {
+        self.quantities.iter().map(|q| q.name)
+    }
+
     #[track_caller]
     fn quantity(&self, channel: &str) -> &Quantity {
         let found = self.quantities.iter().find(|q| q.name == channel);

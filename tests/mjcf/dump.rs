@@ -67,9 +67,8 @@ fn what_2_2_2_does_not_know_is_left_out_of_its_file() {
     ];
     let mut said: Vec<&str> = left_out.iter().map(|d| d.message.as_str()).collect();
     for what in expected {
-        let message = format!(
-            "part \"new\": {what}: MuJoCo 2.2.2 does not know it, and it is left out of robot.mjcf2.xml"
-        );
+        let message =
+            format!("part \"new\": {what}: MuJoCo 2.2.2 does not know it, and it is left out of robot.mjcf2.xml");
         let at = said.iter().position(|m| *m == message).unwrap_or_else(|| panic!("not said: {message}: {said:#?}"));
         said.swap_remove(at);
         assert!(read("robot.mjcf2.xml").contains(&format!("<!-- {message} -->")), "a comment, too");

@@ -3,6 +3,7 @@
 
 mod contact;
 mod contact_pairs;
+mod every_kind;
 mod frames;
 mod imu;
 mod same_bits;

@@ -46,6 +46,8 @@ pub struct Camera {
     phases: Phases,
     captures: Captures,
     frame_counts: Array1<u64>,
+    /// Rows that are due, between updates without meaning: its memory is kept.
+    due: Vec<usize>,
     /// The pictures of what was captured, once somebody looked.
     drawn: OnceLock<Canvas>,
     desk: Mutex<Desk>,
@@ -115,12 +117,14 @@ impl Canvas {
 impl Sensor for Camera {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let due: Vec<usize> =
-            (0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])).collect();
+        let mut due = std::mem::take(&mut self.due);
+        due.clear();
+        due.extend((0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])));
         for &row in &due {
             self.frame_counts[row] += 1;
         }
         self.capture(&due, state);
+        self.due = due;
         Ok(())
     }
 
@@ -188,6 +192,7 @@ impl Camera {
             phases: schedule.phases(rows),
             captures,
             frame_counts: Array1::zeros(rows),
+            due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
             desk: Mutex::new(Desk { rasterizer, canvas: Some(Canvas::new(pictures, rows)) }),
             draws: AtomicU64::new(0),
@@ -441,7 +446,7 @@ impl Camera {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
         };
         let envs = self.row_of_env.len();
-        let mut counts = vec![
+        let counts = [
             ("environments", envs, state.num_envs()),
             ("environments with a time", envs, state.time.len()),
             ("environments with instances", envs, instance_poses.nrows()),
@@ -449,14 +454,15 @@ impl Camera {
             ("environments with lamps", envs, lights.nrows()),
             ("lamps", self.scene.lights.len(), lights.ncols()),
         ];
-        if let Some(poses) = state.body_poses.as_ref().filter(|_| self.is_attached()) {
-            counts.extend([
-                ("environments with bodies", envs, poses.dim().0),
-                ("bodies", self.num_bodies, poses.dim().1),
-                ("numbers per body pose", 7, poses.dim().2),
-            ]);
-        }
-        match counts.into_iter().find(|(_, expected, found)| expected != found) {
+        let of_bodies = state.body_poses.as_ref().filter(|_| self.is_attached()).map(|poses| {
+            let (found, bodies, numbers) = poses.dim();
+            [
+                ("environments with bodies", envs, found),
+                ("bodies", self.num_bodies, bodies),
+                ("numbers per body pose", 7, numbers),
+            ]
+        });
+        match counts.into_iter().chain(of_bodies.into_iter().flatten()).find(|(_, expected, found)| expected != found) {
             Some((what, expected, found)) => Err(SensorError::WrongShape { what, expected, found }),
             None => Ok(()),
         }

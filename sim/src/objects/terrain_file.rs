@@ -89,7 +89,9 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
         let mut keys = Keys { map: &mut map, any: false };
         let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut keys));
         if !keys.any {
-            return Err(A::Error::custom("no generator is named; name one, such as { rough = { seed = 7 } }: `rough`, `slope` or `pyramid_stairs`"));
+            return Err(A::Error::custom(
+                "no generator is named; name one, such as { rough = { seed = 7 } }: `rough`, `slope` or `pyramid_stairs`",
+            ));
         }
         let generator = generator?;
         match map.next_key::<IgnoredAny>()? {

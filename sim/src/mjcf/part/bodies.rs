@@ -88,7 +88,11 @@ impl Writing<'_> {
             element = element.attr("mocap", "true");
         }
         let lifted = m.body_gravity_compensation(body);
-        if lifted != 0.0 && self.newer("body", body, &format!("gravcomp {lifted}")) { element.attr("gravcomp", number(lifted)) } else { element }
+        if lifted != 0.0 && self.newer("body", body, &format!("gravcomp {lifted}")) {
+            element.attr("gravcomp", number(lifted))
+        } else {
+            element
+        }
     }
 
     fn content(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
