@@ -57,7 +57,7 @@ fn updates_allocate_nothing() {
         let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("own", MujocoSensorCfg { sensors: None, sampling: sampling() }).unwrap();
         let frames = vec!["m/tip".into()];
-        let wrench = JointWrenchCfg { links: vec!["m/rod".into()], frames, sampling: sampling() };
+        let wrench = JointWrenchCfg { links: vec!["m/rod".into()], frames, sampling: sampling(), debug_vis: true };
         sim.add_sensor("wrench", wrench).unwrap();
         let targets = vec![TargetFrameCfg::of(".*")];
         let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("m/tip", targets) };

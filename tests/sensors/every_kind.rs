@@ -93,6 +93,7 @@ fn world(threads: usize, seed: u64) -> (SimulationManager, Ids) {
         links: vec!["link[36]".into()],
         frames: vec!["m/tip".into()],
         sampling: sampling("torques", 0.01),
+        debug_vis: true,
     };
     let own = MujocoSensorCfg {
         sensors: Some(["acc", "gyro", "force"].map(String::from).into()),

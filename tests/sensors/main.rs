@@ -3,6 +3,7 @@
 
 mod contact;
 mod contact_pairs;
+mod debug_vis;
 mod every_kind;
 mod frames;
 mod imu;

@@ -4,6 +4,7 @@ use super::cfg::{CameraCfg, DepthMiss};
 use super::channel::{Channels, Listed, PictureView, Pictures};
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
+use super::frustum::frustum;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::mounts::{Mount, Mounts, chosen_rows};
 use super::parallel::ParallelRasterizer;
@@ -14,7 +15,7 @@ use crate::sensor::{Requires, Sensor, SensorContext};
 use crate::visibility::{RenderError, View};
 use ndarray::{Array1, Array2, Array3, ArrayView1, Axis};
 use scene::pose::{from_row, to_row};
-use scene::{Light, Pose, PoseF32, RenderScene, SceneState, VisibleState};
+use scene::{Light, Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -148,6 +149,14 @@ impl Sensor for Camera {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.phases.due_in(self.env_ids.iter().map(|&env| step[env]))
+    }
+
+    /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
+    /// environment that it does not look into.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let row = self.row_of_env.get(env).copied().flatten();
+        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.mounts.row(row).pixels)));
+        placed.map_or_else(Vec::new, |(pose, lens)| frustum(&pose, &lens, self.image_shape()))
     }
 }
 

@@ -44,6 +44,9 @@ pub struct RayCasterCameraCfg {
     /// at `max_distance` from a [`DepthMiss::Far`]. The numbers of the history and of pictures on their way are in double
     /// precision: 40 bytes for each pixel and picture.
     pub sampling: SamplingCfg,
+    /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    pub debug_vis: bool,
 }
 
 impl Default for RayCasterCameraCfg {
@@ -59,6 +62,7 @@ impl Default for RayCasterCameraCfg {
             targets: HitTargets::default(),
             groups: 0b111,
             sampling: SamplingCfg::default(),
+            debug_vis: false,
         }
     }
 }
@@ -69,6 +73,10 @@ impl SensorCfg for RayCasterCameraCfg {
     /// Where things are; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
         if self.extrinsics.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors

@@ -63,6 +63,9 @@ pub struct RayCasterCfg {
     /// `distances` may have noise. Points are along the ray at the noisy distance, which is from 0 to `max_distance` still;
     /// misses stay misses.
     pub sampling: SamplingCfg,
+    /// Show a red ball where a ray hits
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    pub debug_vis: bool,
 }
 
 impl Default for RayCasterCfg {
@@ -78,6 +81,7 @@ impl Default for RayCasterCfg {
             targets: HitTargets::default(),
             groups: 0b111,
             sampling: SamplingCfg::default(),
+            debug_vis: false,
         }
     }
 }
@@ -88,6 +92,10 @@ impl SensorCfg for RayCasterCfg {
     /// Where things are; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
         if self.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
