@@ -86,7 +86,7 @@ fn frames_and_rays_show_where_they_are() {
     let grid = Grid { resolution: 0.5, size: [0.5; 2], ..Grid::default() };
     let rays = shown(|debug_vis| RayCasterCfg {
         offset: Pose::translation(5.0, 5.0, 1.0),
-        pattern: grid.clone().into(),
+        pattern: grid.into(),
         debug_vis,
         ..Default::default()
     });
@@ -101,7 +101,7 @@ fn frames_and_rays_show_where_they_are() {
 #[test]
 fn cameras_show_what_their_pictures_cover() {
     let placement = Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] };
-    let extrinsics = || Extrinsics { placement: placement.clone(), ..Default::default() };
+    let extrinsics = || Extrinsics { placement, ..Default::default() };
     let intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 40.0, cx: 20.0, cy: 15.0 };
     let raster = shown(|debug_vis| CameraCfg {
         width: 40,
