@@ -41,14 +41,16 @@ impl SensorCfg for JointStateCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing or a joint that two match, no joint at all (nor one that there is), and what is wrong
-    /// with the sampling.
+    /// A pattern that matches nothing or a joint that two match, an empty list of them, and what is wrong with the sampling.
+    /// All joints of a scene without any are none.
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
         let joints = match &self.joints {
             Some(patterns) => select(patterns, &context.joints, "joint")?,
             None => (0..context.joints.len()).collect(),
         };
-        at_least_one(joints.len(), ("joint state", "joints", "joint"), &context.joints)?;
+        if self.joints.is_some() {
+            at_least_one(joints.len(), ("joint state", "joints", "joint"), &context.joints)?;
+        }
         let channels = ["positions", "velocities", "efforts"].map(|name| Channel::new(name, joints.len()));
         Ok(JointState {
             names: joints.iter().map(|&joint| context.joints[joint].clone()).collect(),

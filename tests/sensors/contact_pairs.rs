@@ -7,11 +7,10 @@ use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
 use nalgebra::Vector3;
 
 /// How far forces at rest may be from their closed form, relative. Contacts forget motion with their time constant of 20 ms:
-/// after five seconds e^-250 of it is left. What is not exact then is rounding: positions of 1 m have 1e-16 m, which contacts
-/// of k = 1 / (0.95 * 0.02)² = 2770 /s² make 3e-13 m/s² of, 3e-14 of gravity; a hundred such, for corners and iterations.
-const REST: f64 = 3e-12;
+/// after five seconds e^-250 of it is left. What is not exact then is the solver, which stops at its tolerance of 1e-8.
+const REST: f64 = 1e-8;
 /// How far contact points, which are in the middle of the overlap, may be from the face \[m\]. At rest MuJoCo's contact has
-/// `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 * 2770 /s²: r is 0.44 mm at most, half of it 0.22 mm.
+/// `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 / (0.95 * 0.02)² = 2490 /s²: r is 0.44 mm at most, half of it 0.22 mm.
 const OVERLAP: f64 = 2.2e-4;
 
 fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
