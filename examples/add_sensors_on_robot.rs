@@ -169,6 +169,7 @@ fn scanner_cfg() -> RayCasterCfg {
         pattern: Grid { resolution: 0.1, size: [1.6, 1.0], ..Grid::default() }.into(),
         targets: HitTargets::Named(vec!["ground".into()]),
         sampling: SamplingCfg::every(0.02),
+        debug_vis: true,
         ..Default::default()
     }
 }
@@ -176,8 +177,8 @@ fn scanner_cfg() -> RayCasterCfg {
 /// Forces on the feet in every step, and in the five before.
 fn contacts_cfg() -> ContactSensorCfg {
     ContactSensorCfg {
-        track_pose: true,
         sampling: SamplingCfg { history_length: 6, ..Default::default() },
+        debug_vis: true,
         ..ContactSensorCfg::of(".*_FOOT")
     }
 }

@@ -126,14 +126,12 @@ fn frames_cfg(args: &Args) -> FrameTransformerCfg {
     let foot = Pose::translation(FOOT[0], FOOT[1], FOOT[2]);
     let on_shank =
         |name: &str, offset| TargetFrameCfg { name: Some(name.into()), offset, ..TargetFrameCfg::of("LF_SHANK") };
-    FrameTransformerCfg::from(
-        &args.source,
-        vec![
-            TargetFrameCfg::of(&args.targets),
-            on_shank("LF_FOOT_USER", quarter * foot),
-            on_shank("LF_FOOT_URDF", foot),
-        ],
-    )
+    let targets = vec![
+        TargetFrameCfg::of(&args.targets),
+        on_shank("LF_FOOT_USER", quarter * foot),
+        on_shank("LF_FOOT_URDF", foot),
+    ];
+    FrameTransformerCfg { debug_vis: true, ..FrameTransformerCfg::from(&args.source, targets) }
 }
 
 /// One frame of environment 0.

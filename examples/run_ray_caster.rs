@@ -174,6 +174,7 @@ fn scanner_cfg(args: &Args) -> RayCasterCfg {
         alignment: RayAlignment::Yaw,
         pattern: Grid { resolution: args.resolution, size: [2.0; 2], ..Grid::default() }.into(),
         targets: HitTargets::Named(vec!["terrain".into()]),
+        debug_vis: true,
         ..RayCasterCfg::default()
     }
 }

@@ -33,9 +33,11 @@ struct Shared {
     done: Condvar,
 }
 
-/// What is to be done now.
+/// What is to be done now. It is one caller's at a time, from its call until its dismissal is over.
 #[derive(Default)]
 struct Board {
+    /// Whose it is: somebody's who has not dismissed everybody yet.
+    taken: bool,
     work: Option<Arc<dyn Work>>,
     /// The next desk to take, and how many there are.
     desk: usize,
@@ -82,10 +84,11 @@ impl Owner {
     fn call<W: Work + 'static>(&self, threads: usize, work: &Arc<W>) -> bool {
         let helpers = self.helpers(threads - 1);
         let mut board = lock(&self.shared.board);
-        if helpers == 0 || board.work.is_some() || board.helping > 0 {
+        if helpers == 0 || board.taken {
             return false;
         }
         let work: Arc<dyn Work> = Arc::<W>::clone(work);
+        board.taken = true;
         (board.work, board.desk, board.desks) = (Some(work), 1, 1 + helpers);
         drop(board);
         for _ in 0..helpers {
@@ -120,14 +123,15 @@ impl Drop for Owner {
 }
 
 impl Shared {
-    /// Takes the work from the board and waits for those who are at it; gives whether one of them panicked. Who has not
-    /// woken up by now is not waited for.
+    /// Takes the work from the board, waits for those who are at it, and leaves the board to others; gives whether one of
+    /// them panicked. Who has not woken up by now is not waited for.
     fn dismiss(&self) -> bool {
         let mut board = lock(&self.board);
         board.work = None;
         while board.helping > 0 {
             board = self.done.wait(board).unwrap_or_else(PoisonError::into_inner);
         }
+        board.taken = false;
         std::mem::take(&mut board.panicked)
     }
 
@@ -268,5 +272,61 @@ mod tests {
         let work = Arc::new(Numbers { count: 10, ..Numbers::default() });
         crew.run(3, &work);
         assert_eq!(lock(&work.taken).len(), 10);
+    }
+
+    /// Root cause: whoever dismissed next took the panic. A caller that waited for its helper had already taken its work
+    /// from the board, so that another caller could put up its own there before the first one woke: that one's dismissal
+    /// then took the note of the panic. The board is one caller's now until that caller has dismissed everybody.
+    #[test]
+    fn a_panic_reaches_its_own_caller_only() {
+        let crew = Crew::default();
+        for round in 0..300 {
+            let fails = Arc::new(FailsLate::default());
+            std::thread::scope(|scope| {
+                let first = scope.spawn(|| catch_unwind(AssertUnwindSafe(|| crew.run(2, &fails))).is_err());
+                // The helper is at its desk, and its caller waits for it.
+                while !fails.there.load(Ordering::Relaxed) || lock(&crew.0.shared.board).work.is_some() {
+                    std::thread::yield_now();
+                }
+                fails.now.store(true, Ordering::Relaxed);
+                while !first.is_finished() {
+                    let other = Arc::new(Nothing);
+                    let run = catch_unwind(AssertUnwindSafe(|| crew.run(2, &other)));
+                    assert!(run.is_ok(), "round {round}: the panic of another caller's work");
+                }
+                assert!(first.join().unwrap_or(false), "round {round}: its own panic did not reach it");
+            });
+        }
+    }
+
+    /// Fails at any desk but the first, when told.
+    #[derive(Default)]
+    struct FailsLate {
+        there: AtomicBool,
+        now: AtomicBool,
+    }
+
+    impl Work for FailsLate {
+        fn work(&self, desk: usize) {
+            if desk == 0 {
+                // Until a helper came: who is late is not waited for.
+                while !self.there.load(Ordering::Relaxed) {
+                    std::thread::yield_now();
+                }
+                return;
+            }
+            self.there.store(true, Ordering::Relaxed);
+            while !self.now.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            // Without the words that a panic hook prints 300 times.
+            resume_unwind(Box::new("told to fail"));
+        }
+    }
+
+    struct Nothing;
+
+    impl Work for Nothing {
+        fn work(&self, _desk: usize) {}
     }
 }

@@ -102,6 +102,18 @@ pub enum SensorError {
         /// Bodies that exist.
         candidates: Vec<String>,
     },
+    /// A sensor that is told to measure nothing at all.
+    #[error("the {sensor} sensor would measure nothing: {field}: there is no {what}; {}", known(.candidates))]
+    NothingChosen {
+        /// The kind of sensor.
+        sensor: &'static str,
+        /// Which field of its configuration.
+        field: &'static str,
+        /// What it names.
+        what: &'static str,
+        /// Names that exist, the first of them.
+        candidates: Vec<String>,
+    },
     /// A contact sensor of one body that looks for contacts of that body with itself.
     #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
     OwnFilter {

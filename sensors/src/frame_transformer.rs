@@ -27,6 +27,9 @@ pub struct FrameTransformerCfg {
     /// `target_pos_source`.
     #[serde(default)]
     pub sampling: SamplingCfg,
+    /// Show the axes of source and targets ([`Sensor::markers`]).
+    #[serde(default)]
+    pub debug_vis: bool,
 }
 
 /// One target frame, or one on each of several bodies.
@@ -53,7 +56,7 @@ impl FrameTransformerCfg {
     /// Targets seen from a body.
     pub fn from(source: impl Into<String>, targets: Vec<TargetFrameCfg>) -> Self {
         let sampling = SamplingCfg::default();
-        Self { source: source.into(), source_offset: Pose::identity(), targets, sampling }
+        Self { source: source.into(), source_offset: Pose::identity(), targets, sampling, debug_vis: false }
     }
 }
 
@@ -72,6 +75,10 @@ impl SensorCfg for FrameTransformerCfg {
 
     fn requires(&self) -> Requires {
         Requires::POSES
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors

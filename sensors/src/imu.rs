@@ -7,8 +7,8 @@ use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use nalgebra::Vector3;
 use ndarray::ArrayView2;
-use scene::pose::to_wxyz;
-use scene::{Pose, SceneState};
+use scene::pose::{from_row, to_wxyz};
+use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -27,6 +27,8 @@ pub struct ImuCfg {
     /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
     /// `ang_acc_b`.
     pub sampling: SamplingCfg,
+    /// Show its frame, and an arrow of what it reads as acceleration, 1 m for 20 m/s² ([`Sensor::markers`]).
+    pub debug_vis: bool,
 }
 
 impl ImuCfg {
@@ -40,7 +42,7 @@ impl Default for ImuCfg {
     /// At the origin of no body yet.
     fn default() -> Self {
         let sampling = SamplingCfg::default();
-        Self { body: String::new(), offset: Pose::identity(), gravity_bias: None, sampling }
+        Self { body: String::new(), offset: Pose::identity(), gravity_bias: None, sampling, debug_vis: false }
     }
 }
 
@@ -69,6 +71,10 @@ impl SensorCfg for ImuCfg {
 
     fn requires(&self) -> Requires {
         Requires::ACCELERATIONS
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
@@ -139,6 +145,15 @@ impl Sensor for Imu {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+
+    /// Its frame, and an arrow of the acceleration that it reads, 1 m for 20 m/s²: at rest upwards.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let (p, q, a) = (self.pos_w(), self.quat_w(), self.lin_acc_b());
+        let place = from_row(&std::array::from_fn(|k| if k < 3 { p[(env, k)] } else { q[(env, k - 3)] }));
+        let acceleration = place.rotation * Vector3::from_fn(|k, _| a[(env, k)]) / 20.0;
+        let arrow = Marker::arrow(place.translation.vector.into(), acceleration.into(), [0.2, 0.8, 0.9, 1.0]);
+        std::iter::once(Marker::axes(place, 0.1)).chain(arrow).collect()
     }
 }
 

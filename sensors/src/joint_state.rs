@@ -5,7 +5,7 @@
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
-use crate::select::select;
+use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
@@ -39,11 +39,18 @@ impl SensorCfg for JointStateCfg {
         Requires::JOINT_STATE | Requires::JOINT_EFFORTS
     }
 
+    /// # Errors
+    ///
+    /// A pattern that matches nothing or a joint that two match, an empty list of them, and what is wrong with the sampling.
+    /// All joints of a scene without any are none.
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
         let joints = match &self.joints {
             Some(patterns) => select(patterns, &context.joints, "joint")?,
             None => (0..context.joints.len()).collect(),
         };
+        if self.joints.is_some() {
+            at_least_one(joints.len(), ("joint state", "joints", "joint"), &context.joints)?;
+        }
         let channels = ["positions", "velocities", "efforts"].map(|name| Channel::new(name, joints.len()));
         Ok(JointState {
             names: joints.iter().map(|&joint| context.joints[joint].clone()).collect(),

@@ -3,12 +3,13 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
-use crate::select::select;
+use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use nalgebra::Vector3;
 use ndarray::ArrayView3;
-use scene::{Pose, SceneState};
+use scene::pose::{from_row, to_row};
+use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -25,6 +26,9 @@ pub struct JointWrenchCfg {
     pub frames: Vec<String>,
     /// Rate, history, latency and noise; the channels are `forces` and `torques`.
     pub sampling: SamplingCfg,
+    /// Show arrows of every force, 1 m for 500 N, and of every torque, 1 m for 50 N m, where they are measured
+    /// ([`Sensor::markers`]).
+    pub debug_vis: bool,
 }
 
 /// What the joint of each link exerts on it, in all environments: the force and the torque with which its parent holds,
@@ -59,12 +63,17 @@ impl SensorCfg for JointWrenchCfg {
     type Sensor = JointWrench;
 
     fn requires(&self) -> Requires {
-        if self.frames.is_empty() { Requires::JOINT_WRENCHES } else { Requires::JOINT_WRENCHES | Requires::POSES }
+        let poses = self.debug_vis || !self.frames.is_empty();
+        if poses { Requires::JOINT_WRENCHES | Requires::POSES } else { Requires::JOINT_WRENCHES }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, a link that is fused to another one (the error names it), and what is wrong with the
+    /// A pattern that matches nothing, neither `links` nor `frames`, a link that is fused to another one (the error names it), and what is wrong with the
     /// sampling.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
@@ -75,6 +84,7 @@ impl SensorCfg for JointWrenchCfg {
             }
         }
         let frames = select(&self.frames, &context.bodies, "link")?;
+        at_least_one(links.len() + frames.len(), ("joint wrench", "links and frames", "link"), &context.bodies)?;
         let names = links.iter().chain(&frames).map(|&link| context.bodies[link].clone()).collect();
         let in_frame = |frame: usize| {
             let link = context.carriers.get(frame).copied().unwrap_or(frame);
@@ -82,7 +92,10 @@ impl SensorCfg for JointWrenchCfg {
         };
         let in_links = links.into_iter().map(|link| Measured { link, frame: None });
         let measured: Vec<Measured> = in_links.chain(frames.into_iter().map(in_frame)).collect();
-        let channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len()));
+        let mut channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len())).to_vec();
+        if self.debug_vis {
+            channels.push(Channel::exact(PLACES, 7 * measured.len()));
+        }
         Ok(JointWrench {
             names,
             measured,
@@ -91,10 +104,14 @@ impl SensorCfg for JointWrenchCfg {
     }
 }
 
+/// Where the wrenches are measured: poses, only there to be shown.
+const PLACES: &str = "places_w";
+
 /// Writes what the sensor measures in environment `env` to `row`.
 fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(wrenches) = &state.joint_wrenches else { return };
-    let (mut forces, mut torques) = row.split_at_mut(3 * measured.len());
+    let (mut forces, row) = row.split_at_mut(3 * measured.len());
+    let (mut torques, mut places) = row.split_at_mut(3 * measured.len());
     for Measured { link, frame } in measured {
         let (mut force, mut torque) = (vector(wrenches, env, *link, 0), vector(wrenches, env, *link, 3));
         if let (Some(frame), Some(poses)) = (frame, &state.body_poses) {
@@ -103,6 +120,9 @@ fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) 
         }
         forces = put(forces, force.as_slice());
         torques = put(torques, torque.as_slice());
+        if let Some(poses) = state.body_poses.as_ref().filter(|_| !places.is_empty()) {
+            places = put(places, &to_row(&pose(poses, env, frame.unwrap_or(*link))));
+        }
     }
 }
 
@@ -128,6 +148,25 @@ impl Sensor for JointWrench {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+
+    /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) where they are measured; none without
+    /// [`JointWrenchCfg::debug_vis`].
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        if !self.sampler.has(PLACES) {
+            return Vec::new();
+        }
+        let (places, forces, torques) = (self.sampler.values(PLACES), self.forces(), self.torques());
+        let arrows = |b: usize| {
+            let place = from_row(&std::array::from_fn(|k| places[(env, 7 * b + k)]));
+            let arrow = |values: &ArrayView3<'_, f64>, per_metre: f64, rgba| {
+                let vector = place.rotation * Vector3::from_fn(|k, _| values[(env, b, k)]) / per_metre;
+                Marker::arrow(place.translation.vector.into(), vector.into(), rgba)
+            };
+            let force = arrow(&forces, 500.0, [0.95, 0.6, 0.1, 1.0]);
+            force.into_iter().chain(arrow(&torques, 50.0, [0.6, 0.2, 0.9, 1.0]))
+        };
+        (0..self.measured.len()).flat_map(arrows).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
-use crate::select::select;
+use crate::select::{at_least_one, select};
 use crate::sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView2, ArrayView3, Axis, Slice};
@@ -46,7 +46,7 @@ impl SensorCfg for MujocoSensorCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing or a sensor that two match, and what is wrong with the sampling: noise of quaternions
+    /// A pattern that matches nothing or a sensor that two match, no sensor at all (nor one that there is), and what is wrong with the sampling: noise of quaternions
     /// too.
     fn build(&self, context: &SensorContext) -> Result<MujocoSensor, SensorError> {
         let known: Vec<String> = context.engine_sensors.iter().map(|s| s.name.clone()).collect();
@@ -54,6 +54,7 @@ impl SensorCfg for MujocoSensorCfg {
             Some(patterns) => select(patterns, &known, "MuJoCo sensor")?,
             None => (0..known.len()).collect(),
         };
+        at_least_one(chosen.len(), ("MuJoCo", "sensors", "MuJoCo sensor"), &known)?;
         let sensors: Vec<EngineSensor> = chosen.iter().map(|&s| context.engine_sensors[s].clone()).collect();
         let mut columns = Vec::with_capacity(sensors.len());
         let mut width = 0;
@@ -62,7 +63,7 @@ impl SensorCfg for MujocoSensorCfg {
             width += sensor.width;
         }
         let noisy = !sensors.iter().any(|s| s.quaternion);
-        let channels = [Channel { name: "values", width, noisy }];
+        let channels = [Channel { noisy, ..Channel::new("values", width) }];
         Ok(MujocoSensor {
             names: sensors.iter().map(|s| s.name.clone()).collect(),
             sensors,
@@ -237,6 +238,13 @@ mod tests {
     #[test]
     fn mistakes_are_errors() {
         let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
+        // An empty list was taken as it stood: a sensor of no numbers, which no reader notices.
+        let nothing =
+            "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
+        assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));
+        let nobody = SensorContext { engine_sensors: [].into(), ..context() };
+        let error = MujocoSensorCfg::default().build(&nobody).unwrap_err();
+        assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if candidates.is_empty()), "{error}");
         assert!(wrong(cfg(&["pso"])).starts_with("there is no MuJoCo sensor \"pso\"; known are \"pos\""));
         assert!(wrong(cfg(&["a/.*", "pos"])).contains("matched by both"));
         let noise = BTreeMap::from([("values".to_string(), NoiseCfg::default())]);

@@ -9,7 +9,11 @@ use scene::pattern::closest;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Errors of the numbers of one channel, each number for itself: `round(value + bias + std * n)`, n normal.
+/// Largest number of a [`NoiseCfg`]: what is made of them stays finite, however long biases wander.
+const MAX_NOISE: f64 = 1e100;
+
+/// Errors of the numbers of one channel, each number for itself: `round(value + bias + std * n)`, n normal, from 0 to 1e100
+/// each. A channel of what has bounds, such as distances, saturates there. What is infinite (nothing was hit) stays so.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoiseCfg {
@@ -31,10 +35,19 @@ impl NoiseCfg {
     }
 }
 
+/// The noise of a channel.
+#[derive(Clone, Debug)]
+struct Noisy {
+    columns: Range<usize>,
+    /// Smallest and largest value.
+    range: [f64; 2],
+    noise: NoiseCfg,
+}
+
 /// The noise of a sensor in all environments.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
-    channels: Vec<(Range<usize>, NoiseCfg)>,
+    channels: Vec<Noisy>,
     dropout: f64,
     /// Square root of the time between measurements.
     sqrt_period: f64,
@@ -57,15 +70,16 @@ impl Noise {
         }
         let mut wanted = Vec::new();
         for (name, noise) in &cfg.noise {
-            wanted.push((columns(name, channels)?, *noise));
+            let (columns, range) = columns(name, channels)?;
+            wanted.push(Noisy { columns, range, noise: *noise });
             for (field, value) in [
                 ("std", noise.std),
                 ("bias_std", noise.bias_std),
                 ("bias_walk", noise.bias_walk),
                 ("resolution", noise.resolution),
             ] {
-                if !(value >= 0.0 && value.is_finite()) {
-                    let (field, expected) = (format!("{field} of the noise of {name:?}"), "it must be 0 or positive");
+                if !(0.0..=MAX_NOISE).contains(&value) {
+                    let (field, expected) = (format!("{field} of the noise of {name:?}"), "it must be 0 to 1e100");
                     return Err(SensorError::OutOfRange { field, value, expected });
                 }
             }
@@ -87,7 +101,7 @@ impl Noise {
     /// Draws the biases of environment `env` anew.
     pub(crate) fn reset(&mut self, env: usize) {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
-        for (columns, noise) in &self.channels {
+        for Noisy { columns, noise, .. } in &self.channels {
             for column in columns.clone().filter(|_| noise.bias_std > 0.0 || noise.bias_walk > 0.0) {
                 biases[column] = noise.bias_std * self.randoms[env].normal();
             }
@@ -98,7 +112,7 @@ impl Noise {
     /// does not depend on what they are.
     pub(crate) fn measure(&mut self, env: usize, row: &mut [f64]) -> bool {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
-        for (columns, noise) in self.channels.iter().filter(|(_, noise)| noise.bias_walk > 0.0) {
+        for Noisy { columns, noise, .. } in self.channels.iter().filter(|c| c.noise.bias_walk > 0.0) {
             for column in columns.clone() {
                 biases[column] += noise.bias_walk * self.sqrt_period * self.randoms[env].normal();
             }
@@ -110,27 +124,33 @@ impl Noise {
     /// Adds the noise of environment `env` to true values; biases stay where they are.
     pub(crate) fn disturb(&mut self, env: usize, row: &mut [f64]) {
         let biases = self.biases.index_axis(Axis(0), env);
-        for (columns, noise) in &self.channels {
+        for Noisy { columns, range: [least, most], noise } in &self.channels {
             for column in columns.clone() {
+                let normal = if noise.std > 0.0 { self.randoms[env].normal() } else { 0.0 };
                 let value = &mut row[column];
+                // Nothing was hit: noise does not make a hit of it, nor a NaN.
+                if !value.is_finite() {
+                    continue;
+                }
                 *value += biases[column];
-                if noise.std > 0.0 {
-                    *value += noise.std * self.randoms[env].normal();
+                *value += noise.std * normal;
+                let steps = *value / noise.resolution;
+                // Steps that are finer than the value's own digits round nothing.
+                if noise.resolution > 0.0 && steps.is_finite() {
+                    *value = steps.round() * noise.resolution;
                 }
-                if noise.resolution > 0.0 {
-                    *value = (*value / noise.resolution).round() * noise.resolution;
-                }
+                *value = value.max(*least).min(*most);
             }
         }
     }
 }
 
-/// Columns of the channel called `name`.
-fn columns(name: &str, channels: &[Channel]) -> Result<Range<usize>, SensorError> {
+/// Columns of the channel called `name`, and its smallest and largest value.
+fn columns(name: &str, channels: &[Channel]) -> Result<(Range<usize>, [f64; 2]), SensorError> {
     let mut first = 0;
     for channel in channels {
         if channel.name == name && channel.noisy {
-            return Ok(first..first + channel.width);
+            return Ok((first..first + channel.width, channel.range));
         }
         first += channel.width;
     }

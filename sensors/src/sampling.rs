@@ -44,7 +44,7 @@ impl SamplingCfg {
 }
 
 /// Numbers of one kind in a measurement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channel {
     /// What they are called, in [`SamplingCfg::noise`] too.
     pub name: &'static str,
@@ -52,17 +52,24 @@ pub struct Channel {
     pub width: usize,
     /// Whether noise may be added: not to counts, nor to quaternions, which would no longer have length 1.
     pub noisy: bool,
+    /// Smallest and largest value that can be measured: with noise, values beyond become these. Infinite for no bound.
+    pub range: [f64; 2],
 }
 
 impl Channel {
     /// `width` numbers that may have noise.
     pub const fn new(name: &'static str, width: usize) -> Self {
-        Self { name, width, noisy: true }
+        Self { name, width, noisy: true, range: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// `width` numbers that may have noise, and are from `range[0]` to `range[1]` with it too.
+    pub const fn within(name: &'static str, width: usize, range: [f64; 2]) -> Self {
+        Self { name, width, noisy: true, range }
     }
 
     /// `width` numbers without noise.
     pub const fn exact(name: &'static str, width: usize) -> Self {
-        Self { name, width, noisy: false }
+        Self { noisy: false, ..Self::new(name, width) }
     }
 }
 
@@ -321,6 +328,11 @@ impl Sampler {
     /// Whether the sampler was built with a channel.
     pub fn has(&self, channel: &str) -> bool {
         self.quantities.iter().any(|q| q.name == channel)
+    }
+
+    /// Names of its channels, in their order.
+    pub fn channels(&self) -> impl Iterator<Item = &'static str> {
+        self.quantities.iter().map(|q| q.name)
     }
 
     #[track_caller]

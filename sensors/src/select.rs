@@ -1,7 +1,7 @@
 //! Bodies and joints by name patterns.
 
 use crate::error::SensorError;
-use scene::pattern::{Pattern, PatternError, closest, in_every_env};
+use scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
 
 /// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
 ///
@@ -25,6 +25,23 @@ pub fn select<P: AsRef<str>>(patterns: &[P], names: &[String], what: &'static st
         }
     }
     Ok(selected)
+}
+
+/// Refuses to choose nothing: `field` of the kind of sensor called `sensor` chose `count` of `names`.
+///
+/// # Errors
+///
+/// [`SensorError::NothingChosen`] with the first of the names.
+pub(crate) fn at_least_one(
+    count: usize,
+    (sensor, field, what): (&'static str, &'static str, &'static str),
+    names: &[String],
+) -> Result<(), SensorError> {
+    if count > 0 {
+        return Ok(());
+    }
+    let candidates = names.iter().take(MAX_CANDIDATES).cloned().collect();
+    Err(SensorError::NothingChosen { sensor, field, what, candidates })
 }
 
 /// Indices of the names that one pattern matches, at least one.

@@ -19,6 +19,12 @@ pub trait SensorCfg {
     /// What the sensor needs to see. The simulation gathers the union over all sensors, and nothing else.
     fn requires(&self) -> Requires;
 
+    /// Whether the simulation shows the sensor's [`markers`](Sensor::markers) among its own. Built-in sensors have a field
+    /// `debug_vis` for it, off by default as in Isaac Lab; a sensor that has no such switch shows what it has.
+    fn debug_vis(&self) -> bool {
+        true
+    }
+
     /// The sensor, with all its buffers allocated.
     ///
     /// # Errors
@@ -58,7 +64,8 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     /// As [`reset`](Self::reset); nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
-    /// What it shows people of its last measurement in environment `env`: drawn in overviews, never measured.
+    /// What it shows people of its last measurement in environment `env`: drawn in overviews, never measured. Whether they
+    /// are drawn is [`SensorCfg::debug_vis`].
     fn markers(&self, env: usize) -> Vec<Marker> {
         let _ = env;
         Vec::new()

@@ -47,7 +47,7 @@ mod tests {
         let expected = ["Imu", "  environments     : 3", "  update period (s): 0.02", "  history length   : 4"];
         assert_eq!(imu.lines().take(4).collect::<Vec<_>>(), expected);
         assert_eq!(imu.lines().last(), Some("  body             : arm/tip"));
-        let wrench = JointWrenchCfg { links: vec!["tip".into()], frames: vec![], sampling: sampling.clone() };
+        let wrench = JointWrenchCfg { links: vec!["tip".into()], sampling: sampling.clone(), ..Default::default() };
         let wrench = wrench.build(&context).expect("good").to_string();
         assert!(wrench.starts_with("Joint wrench\n") && wrench.ends_with("links            : arm/tip"), "{wrench}");
         let joints = JointStateCfg { sampling, ..JointStateCfg::default() }.build(&context).expect("good").to_string();

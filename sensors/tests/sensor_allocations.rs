@@ -51,7 +51,12 @@ fn no_sensor_allocates_when_it_measures() {
         sampling: sampling.clone(),
         ..FrameTransformerCfg::from("a", vec![TargetFrameCfg::of(".*")])
     };
-    let wrench = JointWrenchCfg { links: vec!["[ab]".into()], frames: vec!["c".into()], sampling: sampling.clone() };
+    let wrench = JointWrenchCfg {
+        links: vec!["[ab]".into()],
+        frames: vec!["c".into()],
+        sampling: sampling.clone(),
+        debug_vis: true,
+    };
     let own = MujocoSensorCfg { sensors: Some(vec!["own".into()]), sampling };
     let mut sensors: Vec<Box<dyn Sensor>> = vec![
         Box::new(contact.build(&context).expect("good")),

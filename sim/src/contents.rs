@@ -82,7 +82,7 @@ impl Contents {
         let mut sensors = Vec::new();
         for part in &self.parts {
             sensors.extend(part.sensors().iter().map(|s| EngineSensor { first: first + s.first, ..s.clone() }));
-            first += part.model().nsensordata();
+            first += part.sensors().iter().map(|s| s.width).sum::<usize>();
         }
         sensors.into()
     }

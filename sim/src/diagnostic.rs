@@ -46,6 +46,8 @@ pub enum DiagnosticKind {
     ColorClamped,
     /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
     SettingIgnored,
+    /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
+    ExportReduced,
 }
 
 impl DiagnosticKind {
@@ -71,6 +73,7 @@ impl DiagnosticKind {
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",
             Self::SettingIgnored => "setting-ignored",
+            Self::ExportReduced => "export-reduced",
         }
     }
 }

@@ -238,6 +238,18 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+    /// Two columns of an array are of one thing.
+    #[error("{argument} has two columns for {of} (columns {first} and {second}); give it one")]
+    RepeatedColumn {
+        /// The argument.
+        argument: &'static str,
+        /// Whose columns they are: `actuator "a"`.
+        of: String,
+        /// The first column of it.
+        first: usize,
+        /// The second one.
+        second: usize,
+    },
     /// An array has the wrong shape.
     #[error("{argument} has shape {found:?}; expected {expected:?} ({meaning}), or one row for all environments")]
     Shape {

@@ -10,6 +10,7 @@ use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
 use crate::mjcf::robot::{MeshKey, Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
+use crate::objects::mjcf_part::MjcfData;
 use crate::objects::robot::RobotData;
 use crate::urdf::write_urdf;
 use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
@@ -49,15 +50,33 @@ pub(crate) fn dump(
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
     let mut left_out = Vec::new();
     let assets = export_meshes(robots, &mut empty, dir, &mut left_out)?;
-    let text: String = diagnostics.iter().chain(&left_out).map(|d| format!("{d}\n")).collect();
-    write_file(&dir.join("diagnostics.txt"), &text)?;
     for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
         prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
+        let reduced = reduced(contents, target, file);
+        mjcf.comments.extend(reduced.iter().map(|diagnostic| diagnostic.message.clone()));
+        left_out.extend(reduced);
         write_file(&dir.join(file), &write::write(&mjcf, target).xml)?;
     }
+    let text: String = diagnostics.iter().chain(&left_out).map(|d| format!("{d}\n")).collect();
+    write_file(&dir.join("diagnostics.txt"), &text)?;
     Ok(left_out)
+}
+
+/// What of the parts is not in a file for a line of MuJoCo that does not know it.
+fn reduced(contents: &Contents, target: Target, file: &str) -> Vec<Diagnostic> {
+    let version = if target == Target::V2 { "2.2.2" } else { "4.x" };
+    let of_part = |part: &Arc<MjcfData>| {
+        let lines = part.document().lines(target);
+        let message = |left_out| {
+            let uid = part.uid();
+            format!("part {uid:?}: {left_out}: MuJoCo {version} does not know it, and it is left out of {file}")
+        };
+        let say = |left_out| Diagnostic::new(DiagnosticKind::ExportReduced, lines.source.clone(), message(left_out));
+        lines.left_out.iter().map(say).collect::<Vec<_>>()
+    };
+    contents.parts.iter().flat_map(of_part).collect()
 }
 
 fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {

@@ -387,8 +387,9 @@ impl SimulationManager {
     /// objects collide with every geom whose `contype` is not 0, robots with every geom that has the lowest bit in its
     /// `contype`, as MuJoCo's default has.
     ///
-    /// Settings of the file for its whole model, keyframes and skins are not taken over:
-    /// [`diagnostics`](Self::diagnostics) names each.
+    /// Settings of the file for its whole model, keyframes and skins are not taken over, nor are sensors that a part cannot
+    /// have (those of the whole world, of a user's own type, and what only 4.x has and nobody writes back): nothing moves
+    /// otherwise without them. [`diagnostics`](Self::diagnostics) names each.
     ///
     /// # Errors
     /// The name is taken, MuJoCo refuses the file (with its words, which name element and line), or the file has something
@@ -740,8 +741,9 @@ impl SimulationManager {
     }
 
     /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both
-    /// MuJoCo lines with its meshes. Returns what had to be left out: visual meshes and textures that cannot be read
-    /// (`diagnostics.txt` in `dir` has it too, after everything that was said before).
+    /// MuJoCo lines with its meshes. Returns what had to be left out: visual meshes and textures that cannot be read, and
+    /// what MJCF files compiled by MuJoCo 4.x have that 2.2.2 does not know (a comment in `robot.mjcf2.xml` says it too, and
+    /// `diagnostics.txt` in `dir` has everything, after what was said before).
     ///
     /// # Errors
     /// A file cannot be written.

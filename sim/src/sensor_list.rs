@@ -37,6 +37,8 @@ type Builder = Box<dyn Fn(&SensorContext) -> Result<Box<dyn Sensor>, SensorError
 struct Entry {
     uid: String,
     requires: Requires,
+    /// Whether its markers are shown.
+    debug_vis: bool,
     build: Builder,
     sensor: Box<dyn Sensor>,
     /// Why it is not updated any more.
@@ -101,7 +103,7 @@ impl SensorList {
     where
         C: SensorCfg + Send + 'static,
     {
-        let requires = cfg.requires();
+        let (requires, debug_vis) = (cfg.requires(), cfg.debug_vis());
         let build: Builder = Box::new(move |context| Ok(Box::new(cfg.build(context)?) as Box<dyn Sensor>));
         let mut sensor =
             build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
@@ -112,7 +114,7 @@ impl SensorList {
         gather::gather(simulation, self.substeps, all, &mut state);
         sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
         self.state = state;
-        self.entries.push(Entry { uid, requires, build, sensor, fault: None });
+        self.entries.push(Entry { uid, requires, debug_vis, build, sensor, fault: None });
         Ok(SensorId { index: self.entries.len() - 1, sensor: PhantomData })
     }
 
@@ -191,8 +193,8 @@ impl SensorList {
 
     /// What they show of their last measurements.
     pub(crate) fn markers(&self, num_envs: usize) -> Vec<(EnvId, Marker)> {
-        let running = || self.entries.iter().filter(|e| e.fault.is_none());
-        let of = |env| running().flat_map(move |e| e.sensor.markers(env)).map(move |marker| (EnvId(env), marker));
+        let shown = || self.entries.iter().filter(|e| e.debug_vis && e.fault.is_none());
+        let of = |env| shown().flat_map(move |e| e.sensor.markers(env)).map(move |marker| (EnvId(env), marker));
         (0..num_envs).flat_map(of).collect()
     }
 

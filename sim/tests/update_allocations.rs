@@ -1,9 +1,18 @@
 //! After the first steps, stepping and measuring allocates nothing on the calling thread.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use sensors::camera::{CameraCfg, Extrinsics};
 use sensors::ray::pattern::Grid;
-use sensors::{ContactSensorCfg, ImuCfg, RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg};
-use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use sensors::{
+    ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
+    Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
+};
+use sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+
+/// A pendulum with sensors of its own.
+const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint axis="0 1 0"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0"/><site name="tip" pos="0.4 0 0"/></body></worldbody>
+  <sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
 
 /// Four environments with a box that lies and a ball that stands a little off the ground.
 fn world(threads: usize) -> SimulationManager {
@@ -43,6 +52,26 @@ fn updates_allocate_nothing() {
         sim.add_sensor("scanner", scanner).unwrap();
         sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
         assert_eq!(allocations(&mut sim), 0, "{threads} threads, rays");
+        // MuJoCo's own sensors and what joints exert, of a part and of a robot; a camera captures what there is to see.
+        sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
+        let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
+        sim.add_sensor("own", MujocoSensorCfg { sensors: None, sampling: sampling() }).unwrap();
+        let frames = vec!["m/tip".into()];
+        let wrench = JointWrenchCfg { links: vec!["m/rod".into()], frames, sampling: sampling(), debug_vis: true };
+        sim.add_sensor("wrench", wrench).unwrap();
+        let targets = vec![TargetFrameCfg::of(".*")];
+        let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("m/tip", targets) };
+        sim.add_sensor("frames", frames).unwrap();
+        let camera = CameraCfg {
+            width: 64,
+            height: 48,
+            extrinsics: Extrinsics { parent: Some("m/rod".into()), ..Extrinsics::default() },
+            ..CameraCfg::default()
+        };
+        let camera = sim.add_sensor("camera", camera).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, every kind of sensor");
+        let captured = sim.sensor(camera).unwrap();
+        assert_eq!((captured.frame_counts()[0], captured.draws()), (40, 0), "it saw all of it, and drew nothing yet");
     }
     let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
     assert_eq!(control, 1, "the control: the counter counts");

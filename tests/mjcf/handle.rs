@@ -98,5 +98,11 @@ fn mistakes_are_errors_and_nothing_is_written() {
     assert!(write.write_qvel(&Array2::zeros((1, nv)), Some(&[EnvId(2)])).is_err());
     let text = write.set_ctrl(&array![[0.0]], Some(&[ActuatorIndex(3)]), None).unwrap_err().to_string();
     assert!(text.contains("actuator 3"), "{text}");
+    // Of two columns for one actuator the last one held, and nothing was said.
+    let twice = [ActuatorIndex(1), ActuatorIndex(0), ActuatorIndex(1)];
+    let error = write.set_ctrl(&array![[0.1, 0.2, 0.3]], Some(&twice), None).unwrap_err();
+    assert!(matches!(error, Error::RepeatedColumn { first: 0, second: 2, .. }), "{error}");
+    assert!(error.to_string().contains("set_ctrl has two columns for actuator \"pull\""), "{error}");
+    assert!(write.read().get_ctrl().iter().all(|c| *c == 0.0), "nothing was set");
     assert_eq!(sim.mjcf_part(part).get_qpos(), before);
 }

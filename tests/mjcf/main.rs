@@ -11,6 +11,7 @@ mod refused;
 mod samples;
 mod twins;
 mod visible;
+mod wrench;
 
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{self, Model};

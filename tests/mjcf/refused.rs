@@ -36,18 +36,56 @@ fn a_bad_file_is_named_with_element_and_line() {
     }
 }
 
-/// The world holds the whole scene: what a file measures of its own world would be something else here.
+/// Root cause: the first sensor that cannot be written refused the whole file, of which everything else could be used.
+/// Sensors move nothing: those that a part cannot have are left out and named with their line, the others measure on, with
+/// their own numbers: in the scene, other columns stand before theirs.
 #[test]
-fn sensors_of_the_whole_world_are_no_part() {
-    for (sensor, what) in
-        [("<subtreecom name=\"all\" body=\"world\"/>", "subtreecom"), ("<force name=\"all\" site=\"s\"/>", "force")]
-    {
-        let text = format!(
-            "<mujoco><worldbody><site name=\"s\"/><geom size=\"1\"/></worldbody><sensor>{sensor}</sensor></mujoco>"
-        );
-        let said = refused(MjcfCfg::text("part", text));
-        assert!(said.contains("sensor \"all\" has") && said.contains(what), "{said}");
+fn sensors_that_no_part_can_have_are_left_out_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("odd.xml");
+    let text = r#"<mujoco><worldbody><site name="s"/><geom size="1" contype="0" conaffinity="0"/>
+    <body name="b"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/><site name="t"/></body></worldbody>
+    <sensor>
+        <framepos name="seen" objtype="site" objname="t"/>
+        <subtreecom name="all" body="world"/>
+        <jointvel name="speed" joint="j"/>
+        <user name="u" objtype="site" objname="t" datatype="real" needstage="pos" dim="3"/>
+        <force site="s"/>
+        <jointpos name="angle" joint="j"/>
+    </sensor></mujoco>"#;
+    std::fs::write(&path, text).unwrap();
+    let mut sim = empty(2);
+    let uids = ["first", "second"];
+    let parts = uids.map(|uid| sim.add_mjcf(MjcfCfg::file(uid, &path)).unwrap());
+    let said: Vec<String> = sim.diagnostics().iter().map(ToString::to_string).collect();
+    for uid in uids {
+        for (line, name, what) in [
+            (5, "all", "subtreecom of the world, which holds the whole scene"),
+            (7, "u", "the type user"),
+            (8, "sensor4", "force of the world"),
+        ] {
+            let words = [&format!("odd.xml:{line}: part {uid:?}: sensor {name:?}: {what}"), "[element-ignored]"];
+            assert_eq!(said.iter().filter(|d| words.iter().all(|w| d.contains(w))).count(), 1, "{name}: {said:#?}");
+        }
     }
+    assert_eq!(said.iter().filter(|d| d.contains("sensor ")).count(), 6, "and no other: {said:#?}");
+    assert_eq!(sim.mjcf_part(parts[1]).sensor_names(), ["seen", "speed", "angle"]);
+    let id = sim.add_sensor("own", MujocoSensorCfg::default()).unwrap();
+    let start = kinetoscope::ndarray::array![[0.1], [0.2]];
+    sim.mjcf_part_mut(parts[1]).write_qpos(&start, None).unwrap();
+    sim.update(50);
+    for (part, uid) in parts.into_iter().zip(uids) {
+        let part = sim.mjcf_part(part);
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.value(&format!("{uid}/angle")).unwrap(), part.get_qpos());
+        assert_eq!(sensor.value(&format!("{uid}/speed")).unwrap(), part.get_qvel());
+        assert_eq!(sensor.value(&format!("{uid}/seen")).unwrap(), kinetoscope::ndarray::Array2::<f64>::zeros((2, 3)));
+    }
+    let sensor = sim.sensor(id).unwrap();
+    assert_ne!(sensor.value("first/angle").unwrap(), sensor.value("second/angle").unwrap(), "the control");
+    let named = MujocoSensorCfg { sensors: Some(vec!["first/all".into()]), ..Default::default() };
+    let error = sim.add_sensor("none", named).unwrap_err().to_string();
+    assert!(error.contains("no MuJoCo sensor \"first/all\"; known are \"first/"), "{error}");
 }
 
 #[test]
@@ -65,7 +103,7 @@ fn names_are_unique_in_the_scene() {
     assert!(error.contains("known are \"m\""), "{error}");
 }
 
-/// What only 4.x has and nobody writes back is refused by name, never left out.
+/// What only 4.x has and nobody writes back is refused by name, never left out; sensors are left out.
 #[test]
 fn what_cannot_be_written_back_is_refused() {
     let part = |inside: &str, after: &str| {
@@ -74,27 +112,33 @@ fn what_cannot_be_written_back_is_refused() {
              </worldbody>{after}</mujoco>"
         );
         let mut sim = empty(1);
-        sim.add_mjcf(MjcfCfg::text("part", text)).map(|_| ())
+        sim.add_mjcf(MjcfCfg::text("part", text)).map(|_| sim.diagnostics().to_vec())
     };
-    part("stiffness=\"1\"", "").unwrap();
-    let own = "<sensor><user name=\"u\" objtype=\"site\" objname=\"s\" datatype=\"real\" needstage=\"pos\" dim=\"1\"/></sensor>";
-    let mut cases = vec![("", own, ["sensor \"u\"", "user"])];
-    if mj::TARGET == mj::Target::V4 {
-        let delayed = "<actuator><motor name=\"a\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/></actuator>";
-        let contact = "<sensor><contact name=\"c\" geom1=\"g\"/></sensor>";
-        let cloth = "<worldbody><body name=\"c\" pos=\"0 0 3\"><flexcomp name=\"f\" type=\"grid\" count=\"3 3 1\" spacing=\"0.1 0.1 0.1\" \
-                     dim=\"2\" mass=\"1\" radius=\"0.01\"/></body></worldbody>";
-        cases.push(("", cloth, ["flex \"0\"", "deforms"]));
-        cases.push(("stiffness=\"1 2 3\"", "", ["joint \"j\"", "stiffness of higher order"]));
-        cases.push(("damping=\"1 -2 0\"", "", ["joint \"j\"", "damping of higher order"]));
-        cases.push(("", delayed, ["actuator \"a\"", "delay"]));
-        cases.push(("", contact, ["sensor \"c\"", "contact"]));
+    assert_eq!(part("stiffness=\"1\"", "").unwrap(), []);
+    if mj::TARGET == mj::Target::V2 {
+        return;
     }
-    for (inside, after, parts) in cases {
+    let delayed = "<actuator><motor name=\"a\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/></actuator>";
+    let cloth = "<worldbody><body name=\"c\" pos=\"0 0 3\"><flexcomp name=\"f\" type=\"grid\" count=\"3 3 1\" spacing=\"0.1 0.1 0.1\" \
+                 dim=\"2\" mass=\"1\" radius=\"0.01\"/></body></worldbody>";
+    for (inside, after, parts) in [
+        ("", cloth, ["flex \"0\"", "deforms"]),
+        ("stiffness=\"1 2 3\"", "", ["joint \"j\"", "stiffness of higher order"]),
+        ("damping=\"1 -2 0\"", "", ["joint \"j\"", "damping of higher order"]),
+        ("", delayed, ["actuator \"a\"", "delay"]),
+    ] {
         let error = part(inside, after).unwrap_err();
         assert!(matches!(error, Error::MjcfPart { .. }), "{error}");
         let text = error.to_string();
         assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+    }
+    for (sensor, what) in [
+        ("<contact name=\"x\" geom1=\"g\"/>", "the type contact"),
+        ("<jointpos name=\"x\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/>", "delay"),
+        ("<rangefinder name=\"x\" site=\"s\" data=\"dist dir\"/>", "rangefinder data other than a distance"),
+    ] {
+        let said = part("", &format!("<sensor>{sensor}</sensor>")).unwrap();
+        assert!(said.len() == 1 && said[0].to_string().contains(&format!("sensor \"x\": {what}")), "{said:#?}");
     }
 }
 

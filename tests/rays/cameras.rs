@@ -48,9 +48,11 @@ fn compare(lens: Intrinsics) -> (usize, usize) {
                     continue;
                 }
                 compared += 1;
-                let close = (rays.depth()[at] / depth[at] - 1.0).abs() < 1e-4;
+                // The rasterizer's planes of 1/z are in single precision: ten roundings of 6e-8, where a surface is seen at a
+                // slant of up to 80 degrees six times that. Points have that error along their ray, in three numbers.
+                let close = (rays.depth()[at] / depth[at] - 1.0).abs() < 5e-6;
                 let apart: f32 = (0..3).map(|k| (a[(v, u, k)] - b[(v, u, k)]).abs()).sum();
-                let same = rays.mask()[at] == mask[at] && close && apart <= 2e-4 * rays.distance()[at];
+                let same = rays.mask()[at] == mask[at] && close && apart <= 1e-5 * rays.distance()[at];
                 differing += usize::from(!same);
             }
         }
@@ -62,8 +64,9 @@ fn compare(lens: Intrinsics) -> (usize, usize) {
 fn cameras_that_are_moved_alike_see_alike() {
     let (compared, differing) = compare(LENSES[1]);
     println!("{differing} of {compared} pixels differ");
-    // The outlines of a box, a wall and a ball: coverage of the rasterizer is snapped to 1/256 pixel or so.
-    assert!(compared > 15_000 && differing < 40, "{differing} of {compared} pixels differ");
+    // Coverage is snapped to 1/256 pixel, so that outlines are off by 1/512 at most: of the some 1500 pixels on those of a
+    // box, a wall and a ball in two pictures, 1500 / 256 = 6 have their centre as near as that. Twice as many are too many.
+    assert!(compared > 15_000 && differing < 12, "{differing} of {compared} pixels differ");
 }
 
 /// The control: a lens that is half a percent longer is found out.

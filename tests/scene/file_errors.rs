@@ -43,6 +43,15 @@ fn a_mistake_is_named_with_its_line() {
         ("[entities.r]\ntype = \"robot\"\nurdf = 3", 3, &["3", "URDF"]),
         ("[entities.r]\ntype = \"robot\"\nurdf.components = [{ name = \"arm\" }]", 3, &["urdf"]),
         ("[entities.o]\ntype = \"rigid_object\"\ninit_pose = [0, 0, 0, 0, 0, 0, 0]", 3, &["no rotation"]),
+        // A terrain of no generator, of two, of one that nobody knows, of nothing.
+        (
+            "[entities.t]\ntype = \"terrain\"\nheights = {}",
+            3,
+            &["no generator is named", "`rough`", "`slope`", "`pyramid_stairs`"],
+        ),
+        ("[entities.t]\ntype = \"terrain\"\nheights = { rough = {}, slope = {} }", 3, &["one generator", "two"]),
+        ("[entities.t]\ntype = \"terrain\"\nheights.hills = {}", 3, &["hills", "`rough`"]),
+        ("[entities.t]\ntype = \"terrain\"\nheights = 3", 3, &["rows of heights", "generator"]),
         // Names stand in one place only.
         ("[entities.o]\ntype = \"rigid_object\"\nuid = \"o\"", 3, &["\"o\"", "uid"]),
         // What is no TOML.

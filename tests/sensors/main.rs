@@ -3,6 +3,8 @@
 
 mod contact;
 mod contact_pairs;
+mod debug_vis;
+mod every_kind;
 mod frames;
 mod imu;
 mod same_bits;

@@ -185,6 +185,9 @@ fn fused_links_have_no_joint_to_measure() {
     let links = vec!["ee_link".into()];
     let text = sim.add_sensor("w", JointWrenchCfg { links, ..Default::default() }).unwrap_err().to_string();
     assert!(text.contains("\"robot/ee_link\" is fused to \"robot/link6\""), "{text}");
+    // Nothing at all was taken as it stood.
+    let text = sim.add_sensor("w", JointWrenchCfg::default()).unwrap_err().to_string();
+    assert!(text.contains("would measure nothing: links and frames") && text.contains("\"robot/link1\""), "{text}");
     let links = vec!["link7".into()];
     let text = sim.add_sensor("w", JointWrenchCfg { links, ..Default::default() }).unwrap_err().to_string();
     assert!(text.contains("no link \"link7\"") && text.contains("link6"), "{text}");

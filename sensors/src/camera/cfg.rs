@@ -78,6 +78,9 @@ pub struct CameraCfg {
     /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
     /// to see is kept when it is due.
     pub lazy: bool,
+    /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    pub debug_vis: bool,
 }
 
 impl Default for CameraCfg {
@@ -98,6 +101,7 @@ impl Default for CameraCfg {
             raster: RasterCfg::of_cameras(),
             env_ids: None,
             lazy: true,
+            debug_vis: false,
         }
     }
 }
@@ -108,6 +112,10 @@ impl SensorCfg for CameraCfg {
     /// What can be seen; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
         Camera::requires(self.extrinsics.parent.is_some())
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors

@@ -5,6 +5,7 @@ pub mod channel;
 pub mod colormap;
 pub mod error;
 pub mod extrinsics;
+pub(crate) mod frustum;
 pub mod intrinsics;
 pub(crate) mod mounts;
 pub mod parallel;

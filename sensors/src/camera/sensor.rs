@@ -4,6 +4,7 @@ use super::cfg::{CameraCfg, DepthMiss};
 use super::channel::{Channels, Listed, PictureView, Pictures};
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
+use super::frustum::frustum;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::mounts::{Mount, Mounts, chosen_rows};
 use super::parallel::ParallelRasterizer;
@@ -14,7 +15,7 @@ use crate::sensor::{Requires, Sensor, SensorContext};
 use crate::visibility::{RenderError, View};
 use ndarray::{Array1, Array2, Array3, ArrayView1, Axis};
 use scene::pose::{from_row, to_row};
-use scene::{Light, Pose, PoseF32, RenderScene, SceneState, VisibleState};
+use scene::{Light, Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -46,6 +47,8 @@ pub struct Camera {
     phases: Phases,
     captures: Captures,
     frame_counts: Array1<u64>,
+    /// Rows that are due, between updates without meaning: its memory is kept.
+    due: Vec<usize>,
     /// The pictures of what was captured, once somebody looked.
     drawn: OnceLock<Canvas>,
     desk: Mutex<Desk>,
@@ -115,12 +118,14 @@ impl Canvas {
 impl Sensor for Camera {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let due: Vec<usize> =
-            (0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])).collect();
+        let mut due = std::mem::take(&mut self.due);
+        due.clear();
+        due.extend((0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])));
         for &row in &due {
             self.frame_counts[row] += 1;
         }
         self.capture(&due, state);
+        self.due = due;
         Ok(())
     }
 
@@ -144,6 +149,14 @@ impl Sensor for Camera {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.phases.due_in(self.env_ids.iter().map(|&env| step[env]))
+    }
+
+    /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
+    /// environment that it does not look into.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let row = self.row_of_env.get(env).copied().flatten();
+        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.mounts.row(row).pixels)));
+        placed.map_or_else(Vec::new, |(pose, lens)| frustum(&pose, &lens, self.image_shape()))
     }
 }
 
@@ -188,6 +201,7 @@ impl Camera {
             phases: schedule.phases(rows),
             captures,
             frame_counts: Array1::zeros(rows),
+            due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
             desk: Mutex::new(Desk { rasterizer, canvas: Some(Canvas::new(pictures, rows)) }),
             draws: AtomicU64::new(0),
@@ -441,7 +455,7 @@ impl Camera {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
         };
         let envs = self.row_of_env.len();
-        let mut counts = vec![
+        let counts = [
             ("environments", envs, state.num_envs()),
             ("environments with a time", envs, state.time.len()),
             ("environments with instances", envs, instance_poses.nrows()),
@@ -449,14 +463,15 @@ impl Camera {
             ("environments with lamps", envs, lights.nrows()),
             ("lamps", self.scene.lights.len(), lights.ncols()),
         ];
-        if let Some(poses) = state.body_poses.as_ref().filter(|_| self.is_attached()) {
-            counts.extend([
-                ("environments with bodies", envs, poses.dim().0),
-                ("bodies", self.num_bodies, poses.dim().1),
-                ("numbers per body pose", 7, poses.dim().2),
-            ]);
-        }
-        match counts.into_iter().find(|(_, expected, found)| expected != found) {
+        let of_bodies = state.body_poses.as_ref().filter(|_| self.is_attached()).map(|poses| {
+            let (found, bodies, numbers) = poses.dim();
+            [
+                ("environments with bodies", envs, found),
+                ("bodies", self.num_bodies, bodies),
+                ("numbers per body pose", 7, numbers),
+            ]
+        });
+        match counts.into_iter().chain(of_bodies.into_iter().flatten()).find(|(_, expected, found)| expected != found) {
             Some((what, expected, found)) => Err(SensorError::WrongShape { what, expected, found }),
             None => Ok(()),
         }

@@ -34,6 +34,9 @@ pub struct ContactSensorCfg {
     /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
+    /// Show a red ball at every body that is touched, and an arrow of its net normal force, 1 m for 500 N
+    /// ([`Sensor::markers`](crate::Sensor::markers)). Poses are tracked for that.
+    pub debug_vis: bool,
 }
 
 impl Default for ContactSensorCfg {
@@ -48,6 +51,7 @@ impl Default for ContactSensorCfg {
             track_friction_forces: false,
             force_threshold: 1.0,
             sampling: SamplingCfg::default(),
+            debug_vis: false,
         }
     }
 }
@@ -63,7 +67,11 @@ impl SensorCfg for ContactSensorCfg {
     type Sensor = ContactSensor;
 
     fn requires(&self) -> Requires {
-        if self.track_pose { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
+        if self.track_pose || self.debug_vis { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
@@ -91,7 +99,7 @@ impl SensorCfg for ContactSensorCfg {
             groups: m,
             friction: self.track_friction_forces,
             points: self.track_contact_points,
-            poses: self.track_pose,
+            poses: self.track_pose || self.debug_vis,
             air: self.track_air_time,
         };
         let mut channels =

@@ -122,3 +122,13 @@ fn mistakes_are_typed_errors_and_change_nothing() {
     assert!(matches!(sensor.update(&SceneState::new(3)), Err(SensorError::MissingFields { .. })));
     assert_eq!(sensor.positions(), before);
 }
+
+/// An empty list was taken as it stood: a sensor of no numbers, which no reader notices.
+#[test]
+fn nothing_to_measure_is_an_error() {
+    let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };
+    let error = nothing.build(&context()).unwrap_err();
+    assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if *candidates == *context().joints));
+    let nobody = SensorContext { joints: [].into(), ..context() };
+    assert_eq!(JointStateCfg::default().build(&nobody).unwrap().joint_names(), [""; 0], "all of none");
+}

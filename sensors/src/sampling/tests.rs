@@ -271,7 +271,7 @@ fn mistakes_are_typed_errors() {
     let text = wrong(with_noise("force", NoiseCfg::white(1.0))).to_string();
     assert_eq!(text, "there is no channel that can have noise \"force\"; known are \"forces\"");
     assert!(matches!(wrong(with_noise("count", NoiseCfg::white(1.0))), SensorError::UnknownName { .. }));
-    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+    for bad in [-1.0, f64::NAN, f64::INFINITY, 1e101] {
         for noise in [
             NoiseCfg::white(bad),
             NoiseCfg { bias_std: bad, ..NoiseCfg::default() },

@@ -52,8 +52,6 @@ impl Model {
             ("actuator", array!(actuator_damping), self.nactuator(), "damping"),
             ("actuator", array!(actuator_dampingpoly), self.nactuator(), "a damping of higher order"),
             ("actuator", array!(actuator_armature), self.nactuator(), "armature"),
-            ("sensor", array!(sensor_delay), self.nsensor(), "delay"),
-            ("sensor", array!(sensor_interval), self.nsensor(), "interval"),
         ];
         for (element, values, count, what) in numbers {
             // Infinite yields are none.
@@ -74,11 +72,8 @@ impl Model {
         if let Some(index) = array!(actuator_actnum).iter().position(|n| *n > 1) {
             return Some(Beyond { element: "actuator", index, what: "several activations" });
         }
-        let histories = [("actuator", array!(actuator_history)), ("sensor", array!(sensor_history))];
-        for (element, values) in histories {
-            if let Some(at) = values.iter().step_by(2).position(|n| *n > 0) {
-                return Some(Beyond { element, index: at, what: "nsample" });
-            }
+        if let Some(index) = array!(actuator_history).iter().step_by(2).position(|n| *n > 0) {
+            return Some(Beyond { element: "actuator", index, what: "nsample" });
         }
         let flags = [
             ("joint", array!(jnt_actgravcomp), "actuatorgravcomp"),
@@ -89,12 +84,45 @@ impl Model {
                 return Some(Beyond { element, index, what });
             }
         }
-        // A rangefinder of 4.x may give more than a distance.
-        let several = (0..self.nsensor()).find(|&s| {
-            super::words::sensor(self.sensor_type()[s])
-                .is_some_and(|word| word.word == "rangefinder" && self.sensor_dim()[s] != 1)
-        });
-        several.map(|index| Beyond { element: "sensor", index, what: "rangefinder data other than a distance" })
+        None
+    }
+
+    /// What a sensor has that 2.2.2 does not know and that nobody here writes back as MJCF.
+    ///
+    /// # Panics
+    /// There is no such sensor.
+    pub fn sensor_beyond(&self, sensor: usize) -> Option<&'static str> {
+        #[cfg(mj4)]
+        {
+            use mujoco_sys::fields::model as fields;
+            /// The numbers of this sensor in an array of the model.
+            macro_rules! numbers {
+                ($name:ident) => {{
+                    // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
+                    let values = unsafe { fields::$name(self.raw()) };
+                    let width = values.len() / self.nsensor();
+                    &values[width * sensor..width * (sensor + 1)]
+                }};
+            }
+            if numbers!(sensor_delay).iter().any(|x| *x != 0.0) {
+                return Some("delay");
+            }
+            if numbers!(sensor_interval).iter().any(|x| *x != 0.0) {
+                return Some("interval");
+            }
+            if numbers!(sensor_history)[0] > 0 {
+                return Some("nsample");
+            }
+            // A rangefinder of 4.x may give more than a distance.
+            let word = super::words::sensor(self.sensor_type()[sensor]);
+            let several = word.is_some_and(|word| word.word == "rangefinder") && self.sensor_dim()[sensor] != 1;
+            several.then_some("rangefinder data other than a distance")
+        }
+        #[cfg(not(mj4))]
+        {
+            assert!(sensor < self.nsensor(), "sensor {sensor} of {}", self.nsensor());
+            None
+        }
     }
 
     /// Gravity compensation of a body, 0..=1 and more (4.x).

@@ -9,7 +9,7 @@ use crate::manager::EnvId;
 use crate::mj::{self, LoadError, Model, words};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, compare};
 use crate::objects::robot::check_pose;
-use crate::objects::rows::{Rows, Table};
+use crate::objects::rows::{Rows, Table, check_distinct};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::source::Source;
@@ -104,6 +104,7 @@ pub struct MjcfData {
     files: Vec<mj::Asset>,
     frames: Vec<Frame>,
     sensors: Vec<EngineSensor>,
+    sensor_names: Vec<String>,
     first_mask_id: i32,
 }
 
@@ -136,10 +137,24 @@ impl MjcfData {
         let source = Source::new(&cfg.path, 1);
         let (document, files) = PartDocument::new(&model, &names, &cfg.uid, &cfg.init_pose, &stem, &source)
             .map_err(|error| Error::MjcfPart { part: cfg.uid.clone(), file, error: Box::new(error) })?;
-        diagnostics.extend(compare(&cfg.uid, &text, &cfg.path, &model, scene));
+        let left_out = document.sensors_left_out();
+        diagnostics.extend(compare(&cfg.uid, &text, &cfg.path, &model, scene, left_out));
         let frames = frames(&cfg.uid, &model, &names, diagnostics);
-        let sensors = engine_sensors(&cfg.uid, &model, &names);
-        Ok(Self { cfg, model, names, document: Arc::new(document), files, frames, sensors, first_mask_id })
+        let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
+        let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
+        let sensors = engine_sensors(&cfg.uid, &model, &names, &kept);
+        let sensor_names = kept.iter().map(|&s| names.sensors[s].clone()).collect();
+        Ok(Self {
+            cfg,
+            model,
+            names,
+            document: Arc::new(document),
+            files,
+            frames,
+            sensors,
+            sensor_names,
+            first_mask_id,
+        })
     }
 
     /// Name of the part.
@@ -176,7 +191,7 @@ impl MjcfData {
         &self.frames
     }
 
-    /// MuJoCo's own sensors; the first value is that of the part alone.
+    /// MuJoCo's own sensors that the scene has; the first value is that among those of the part.
     pub(crate) fn sensors(&self) -> &[EngineSensor] {
         &self.sensors
     }
@@ -227,10 +242,11 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
     frames
 }
 
-/// MuJoCo's own sensors of a file.
-fn engine_sensors(uid: &str, model: &Model, names: &PartNames) -> Vec<EngineSensor> {
-    (0..model.nsensor())
-        .filter_map(|s| {
+/// MuJoCo's own sensors of a file, those of `kept`.
+fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: &[usize]) -> Vec<EngineSensor> {
+    let mut next = 0;
+    kept.iter()
+        .filter_map(|&s| {
             let word = words::sensor(model.sensor_type()[s])?;
             // Angles and lengths have different units; what is observed decides.
             let hinge = || {
@@ -243,12 +259,15 @@ fn engine_sensors(uid: &str, model: &Model, names: &PartNames) -> Vec<EngineSens
                 "jointlimitfrc" | "jointactuatorfrc" => hinge().map(|hinge| if hinge { "N m" } else { "N" }),
                 _ => word.unit,
             };
+            let width = model.sensor_dim()[s] as usize;
+            let first = next;
+            next += width;
             Some(EngineSensor {
                 name: format!("{uid}/{}", names.sensors[s]),
                 kind: word.word.into(),
                 unit: unit.map(Into::into),
-                first: model.sensor_adr()[s] as usize,
-                width: model.sensor_dim()[s] as usize,
+                first,
+                width,
                 solved: words::is_solved(model.sensor_needstage()[s]),
                 quaternion: word.quaternion,
             })
@@ -308,9 +327,9 @@ impl<'a> MjcfPart<'a> {
         &self.data.names.actuators
     }
 
-    /// Names of MuJoCo's own sensors in it.
+    /// Names of MuJoCo's own sensors in it, without those that a part cannot have (a diagnostic names each).
     pub fn sensor_names(&self) -> &'a [String] {
-        &self.data.names.sensors
+        &self.data.sensor_names
     }
 
     /// Numbers of the actuators that patterns match, in the order of the patterns.
@@ -463,7 +482,8 @@ impl<'a> MjcfPartMut<'a> {
     /// row is for all of them), columns for `actuators` (all where `None`). MuJoCo clamps them to the ranges of the file.
     ///
     /// # Errors
-    /// Wrong shape, unknown actuator or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown actuator or environment, an actuator that is named twice, a value that is not finite; then nothing
+    /// is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_ctrl<'t>(
         &mut self,
@@ -482,6 +502,7 @@ impl<'a> MjcfPartMut<'a> {
         };
         let places: Vec<usize> = chosen.iter().map(|&index| all[index]).collect();
         let of = |column: usize| format!("actuator {:?}", self.data.names.actuators[chosen[column]]);
+        check_distinct("set_ctrl", &chosen, &of)?;
         let table = Table { argument: "set_ctrl", meaning: "environments, actuators", columns: chosen.len(), of: &of };
         let rows = Rows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
         for (env, row) in rows.iter() {

@@ -50,6 +50,17 @@ impl Numbers {
     }
 }
 
+/// Refuses lists that choose something twice: which of its columns would hold is nobody's to guess.
+pub(super) fn check_distinct(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
+    let mut columns = vec![None; chosen.iter().max().map_or(0, |most| most + 1)];
+    for (second, &index) in chosen.iter().enumerate() {
+        if let Some(first) = columns[index].replace(second) {
+            return Err(Error::RepeatedColumn { argument, of: of(second), first, second });
+        }
+    }
+    Ok(())
+}
+
 /// A checked table: every number is finite, every environment exists.
 #[derive(Debug)]
 pub(super) struct Rows<'v> {

@@ -5,7 +5,7 @@ use ::scene::Pose;
 use ::scene::terrain::TerrainGenerator;
 use ndarray::Array2;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::ser::Serializer;
 use std::fmt;
 
@@ -86,10 +86,38 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Heights, A::Error> {
-        let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut map))?;
+        let mut keys = Keys { map: &mut map, any: false };
+        let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut keys));
+        if !keys.any {
+            return Err(A::Error::custom(
+                "no generator is named; name one, such as { rough = { seed = 7 } }: `rough`, `slope` or `pyramid_stairs`",
+            ));
+        }
+        let generator = generator?;
         match map.next_key::<IgnoredAny>()? {
             None => Ok(Heights::Generated(generator)),
             Some(_) => Err(A::Error::custom("heights come from one generator, and here are two")),
         }
+    }
+}
+
+/// A table that remembers whether it had a key at all.
+struct Keys<'a, A> {
+    map: &'a mut A,
+    any: bool,
+}
+
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for Keys<'_, A> {
+    type Error = A::Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, A::Error> {
+        let key = self.map.next_key_seed(seed);
+        // A key that nobody knows is one, too.
+        self.any |= !matches!(key, Ok(None));
+        key
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, A::Error> {
+        self.map.next_value_seed(seed)
     }
 }

@@ -39,9 +39,14 @@ pub struct RayCasterCameraCfg {
     /// Geom groups that are hit: bit k is group k.
     pub groups: u32,
     /// Rate, history, latency and noise. The channel that may have noise is `distances`: the distance along the ray of each
-    /// pixel \[m\], from which depth and points follow. Normals, masks and misses are exact. The numbers of the history and of
-    /// pictures on their way are in double precision: 40 bytes for each pixel and picture.
+    /// pixel \[m\], from which depth and points follow. With noise it is from 0 to `max_distance` still: what comes out beyond
+    /// saturates. Normals, masks and misses are exact: what is hit stays a hit, what is missed a miss, and the mask tells a hit
+    /// at `max_distance` from a [`DepthMiss::Far`]. The numbers of the history and of pictures on their way are in double
+    /// precision: 40 bytes for each pixel and picture.
     pub sampling: SamplingCfg,
+    /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    pub debug_vis: bool,
 }
 
 impl Default for RayCasterCameraCfg {
@@ -57,6 +62,7 @@ impl Default for RayCasterCameraCfg {
             targets: HitTargets::default(),
             groups: 0b111,
             sampling: SamplingCfg::default(),
+            debug_vis: false,
         }
     }
 }
@@ -67,6 +73,10 @@ impl SensorCfg for RayCasterCameraCfg {
     /// Where things are; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
         if self.extrinsics.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
@@ -96,7 +106,7 @@ impl SensorCfg for RayCasterCameraCfg {
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let channels = [
-            Channel::new("distances", pixels),
+            Channel::within("distances", pixels, [0.0, self.max_distance]),
             Channel::exact("normals", 3 * pixels),
             Channel::exact("ids", pixels),
             Channel::exact("poses", 7),

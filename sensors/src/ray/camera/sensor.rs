@@ -2,6 +2,7 @@
 
 use super::cfg::RayCasterCameraCfg;
 use super::pixels::Pixels;
+use crate::camera::frustum::frustum;
 use crate::camera::mounts::Mounts;
 use crate::camera::{CameraConvention, DepthMiss, PixelIntrinsics};
 use crate::error::SensorError;
@@ -13,7 +14,7 @@ use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
 use scene::pose::{from_row, to_row};
-use scene::{Pose, PoseF64, SceneState};
+use scene::{Marker, Pose, PoseF64, SceneState};
 use std::fmt;
 
 /// A camera in every environment that casts one ray per pixel; [`Sampled`] has the stamps and counts of its pictures.
@@ -22,7 +23,8 @@ use std::fmt;
 /// metres. Nothing is ever NaN.
 ///
 /// What is measured is the distance along the ray of each pixel: noise of the channel `distances` is added to it, and depth
-/// and points follow, so that all three stay on the ray. Normals, masks, poses and lenses are exact.
+/// and points follow, so that all three stay on the ray. Noisy distances are from 0 to the largest that rays reach, and
+/// misses stay misses. Normals, masks, poses and lenses are exact.
 ///
 /// Setters ([`set_local_pose`](Self::set_local_pose), [`look_at`](Self::look_at),
 /// [`set_intrinsics`](Self::set_intrinsics)...) act from the next picture on, and stay over a reset until
@@ -314,6 +316,12 @@ impl Sensor for RayCasterCamera {
 
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
+    }
+
+    /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
+    fn markers(&self, env: usize) -> Vec<Marker> {
+        let taken = self.shown.taken.get(env);
+        taken.map_or_else(Vec::new, |taken| frustum(&taken.world_from_camera, &taken.lens, self.image_shape()))
     }
 }
 

@@ -293,6 +293,38 @@ fn noise_moves_points_along_their_rays() {
     assert!((spread - 0.05).abs() < 5.0 * 0.05 / (2.0 * f64::from(hits)).sqrt(), "{spread} of {hits}");
 }
 
+/// Root cause: noise was added to distances and nothing held the sum against what a ray can measure, so that a near wall
+/// came out behind the camera, a far one beyond `max_distance`, and huge noise made infinite depths of hits.
+#[test]
+fn noisy_distances_stay_between_zero_and_the_largest() {
+    let exact = built(&RayCasterCameraCfg { max_distance: 3.0, ..cfg() }, 1);
+    for (std, resolution) in [(2.0, 0.0), (2.0, 0.7), (1e100, 0.0), (2.0, 1e-320)] {
+        let noise = [("distances".to_string(), NoiseCfg { std, resolution, bias_std: std, bias_walk: std })].into();
+        let sampling = SamplingCfg { noise, history_length: 1, ..SamplingCfg::default() };
+        let cfg = RayCasterCameraCfg { max_distance: 3.0, sampling, ..cfg() };
+        let mut camera = built(&cfg, 1);
+        camera.update(&state(&[1])).unwrap();
+        assert_eq!(camera.mask(), exact.mask(), "misses stay misses, hits stay hits");
+        let (mut at_zero, mut at_most, mut between) = (0, 0, 0);
+        for (k, (at, id)) in camera.mask().indexed_iter().enumerate() {
+            let (depth, distance) = (camera.depth()[at], camera.distance()[at]);
+            let kept = camera.distance_history()[(0, 0, k)];
+            if *id == 0 {
+                assert!([depth, distance] == [f32::INFINITY; 2] && kept == f64::INFINITY);
+                continue;
+            }
+            assert!((0.0..=3.0).contains(&distance) && (0.0..=distance).contains(&depth), "{depth} {distance}");
+            assert!((0.0..=3.0).contains(&kept), "{kept}");
+            at_zero += usize::from(distance == 0.0);
+            at_most += usize::from(distance == 3.0);
+            between += usize::from(distance > 0.0 && distance < 3.0);
+        }
+        // The control: noise as large as the distances does reach both ends.
+        assert!(at_zero > 50 && at_most > 50, "{at_zero} {at_most}");
+        assert!(between > 50 || std > 2.0, "{between}");
+    }
+}
+
 /// A picture that is late keeps its stamp, its pose and its lens.
 #[test]
 fn late_pictures_keep_where_they_were_taken() {

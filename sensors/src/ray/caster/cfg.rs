@@ -60,8 +60,12 @@ pub struct RayCasterCfg {
     /// in group 3 or above.
     pub groups: u32,
     /// Rate, history, latency and noise; the channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
-    /// `distances` may have noise. Points are along the ray at the noisy distance.
+    /// `distances` may have noise. Points are along the ray at the noisy distance, which is from 0 to `max_distance` still;
+    /// misses stay misses.
     pub sampling: SamplingCfg,
+    /// Show a red ball where a ray hits
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    pub debug_vis: bool,
 }
 
 impl Default for RayCasterCfg {
@@ -77,6 +81,7 @@ impl Default for RayCasterCfg {
             targets: HitTargets::default(),
             groups: 0b111,
             sampling: SamplingCfg::default(),
+            debug_vis: false,
         }
     }
 }
@@ -87,6 +92,10 @@ impl SensorCfg for RayCasterCfg {
     /// Where things are; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
         if self.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
     }
 
     /// # Errors
@@ -117,7 +126,7 @@ impl SensorCfg for RayCasterCfg {
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let channels = [
-            Channel::new("distances", rays.len()),
+            Channel::within("distances", rays.len(), [0.0, self.max_distance]),
             Channel::exact("normals", 3 * rays.len()),
             Channel::exact("ids", rays.len()),
             Channel::exact("pos_w", 3),

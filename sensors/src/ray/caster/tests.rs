@@ -294,6 +294,29 @@ fn noise_moves_points_along_their_rays() {
     assert!((0..187).all(|k| caster.hits()[(0, k, 0)] == exact.hits()[(0, k, 0)]));
 }
 
+/// As for cameras of rays: noise added to distances and nothing held the sum against what a ray can measure.
+#[test]
+fn noisy_distances_stay_between_zero_and_the_largest() {
+    let caster = built_in(&RayCasterCfg { max_distance: 25.0, ..noisy(30.0) }, &context(1, 1), &state(&[0]));
+    let mut ends = [0, 0];
+    for distance in caster.distances() {
+        assert!((0.0..=25.0).contains(distance), "{distance}");
+        ends[0] += usize::from(*distance == 0.0);
+        ends[1] += usize::from(*distance == 25.0);
+    }
+    assert!(caster.hit_mask().iter().all(|hit| *hit));
+    assert!(ends.iter().all(|count| *count > 10), "the control: the noise reaches both ends: {ends:?}");
+    // From below the ground nothing is hit, whatever the noise.
+    let away = RayCasterCfg { offset: Pose::translation(0.0, 0.0, -20.0), ..noisy(30.0) };
+    let caster = built_in(&away, &context(1, 1), &state(&[0]));
+    assert!(caster.distances().iter().all(|d| *d == f64::INFINITY) && !caster.hit_mask().iter().any(|hit| *hit));
+}
+
+fn noisy(std: f64) -> RayCasterCfg {
+    let noise = [("distances".to_string(), NoiseCfg::white(std))].into();
+    RayCasterCfg { sampling: SamplingCfg { noise, ..SamplingCfg::default() }, ..scanner() }
+}
+
 /// Somebody moves what does not move by itself, in one environment.
 #[test]
 fn what_is_fixed_is_found_where_it_was_put() {

@@ -23,6 +23,11 @@ impl Writing<'_> {
         let dynamics = words::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
         let gain = words::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
         let bias = words::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
+        let dynamics = match dynamics {
+            // The same filter, which 2.2.2 integrates with Euler's rule.
+            "filterexact" if !self.newer("actuator", a, "dyntype filterexact, for which filter stands") => "filter",
+            known => known,
+        };
         let ids = row(m.actuator_trnid(), 2, a);
         let site = |id: usize| self.full(&self.names.sites[id]);
         let names = &self.names;

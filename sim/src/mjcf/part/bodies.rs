@@ -88,7 +88,11 @@ impl Writing<'_> {
             element = element.attr("mocap", "true");
         }
         let lifted = m.body_gravity_compensation(body);
-        if lifted != 0.0 { element.attr("gravcomp", number(lifted)) } else { element }
+        if lifted != 0.0 && self.newer("body", body, &format!("gravcomp {lifted}")) {
+            element.attr("gravcomp", number(lifted))
+        } else {
+            element
+        }
     }
 
     fn content(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
@@ -154,7 +158,9 @@ impl Writing<'_> {
             true => element.attr("limited", "true").numbers("range", row(m.jnt_range(), 2, joint)),
             false => element.attr("limited", "false"),
         };
-        if let Some(range) = m.joint_actuator_force(joint) {
+        if let Some(range) = m.joint_actuator_force(joint)
+            && self.newer("joint", joint, &format!("actuatorfrcrange {range:?}"))
+        {
             element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
         }
         Ok(element

@@ -2,8 +2,8 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, Writing, row, row_of, singles, some};
+use crate::mj::Target;
 use crate::mj::words::{self, PathPoint};
-use crate::mj::{TARGET, Target};
 
 impl Writing<'_> {
     /// Pairs of geoms with parameters of their own, and pairs of bodies that never collide.
@@ -31,10 +31,11 @@ impl Writing<'_> {
     }
 
     pub(super) fn equalities(&self) -> Result<Vec<String>, PartError> {
-        (0..self.model.neq()).map(|e| self.equality(e)).collect()
+        (0..self.model.neq()).filter_map(|e| self.equality(e).transpose()).collect()
     }
 
-    fn equality(&self, e: usize) -> Result<String, PartError> {
+    /// An equality; none where it couples sites and the document's line of MuJoCo only knows bodies.
+    fn equality(&self, e: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
         let kind = words::equality(m.eq_type()[e])
             .ok_or_else(|| self.beyond("equality", e, "a type that is not connect, weld, joint or tendon"))?;
@@ -42,6 +43,9 @@ impl Writing<'_> {
         let data = row_of(m.eq_data(), m.neq(), e);
         let element = Element::new(kind).attr("name", self.full(&self.names.equalities[e]));
         let between_sites = m.equality_is_between_sites(e);
+        if between_sites && !self.newer("equality", e, &format!("the whole {kind}, which is between sites")) {
+            return Ok(None);
+        }
         let site = |id: usize| self.full(&self.names.sites[id]);
         let element = match kind {
             "joint" => element
@@ -67,7 +71,7 @@ impl Writing<'_> {
             .attr("active", m.equality_is_active(e))
             .numbers("solref", row_of(m.eq_solref(), m.neq(), e))
             .numbers("solimp", row_of(m.eq_solimp(), m.neq(), e));
-        Ok(element.leaf())
+        Ok(Some(element.leaf()))
     }
 
     pub(super) fn tendons(&self) -> Result<Vec<String>, PartError> {
@@ -105,13 +109,14 @@ impl Writing<'_> {
             .numbers("solimplimit", row_of(m.tendon_solimp_lim(), m.ntendon(), t))
             .numbers("solreffriction", row_of(m.tendon_solref_fri(), m.ntendon(), t))
             .numbers("solimpfriction", row_of(m.tendon_solimp_fri(), m.ntendon(), t));
-        if TARGET == Target::V4 {
-            if m.tendon_inertia(t) != 0.0 {
-                element = element.attr("armature", number(m.tendon_inertia(t)));
-            }
-            if let Some(range) = m.tendon_actuator_force(t) {
-                element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
-            }
+        let inertia = m.tendon_inertia(t);
+        if inertia != 0.0 && self.newer("tendon", t, &format!("armature {inertia}")) {
+            element = element.attr("armature", number(inertia));
+        }
+        if let Some(range) = m.tendon_actuator_force(t)
+            && self.newer("tendon", t, &format!("actuatorfrcrange {range:?}"))
+        {
+            element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
         }
         if !fixed {
             let material = some(m.tendon_matid()[t]).map(|id| self.full(&self.names.materials[id]));

@@ -19,12 +19,16 @@ pub(crate) use settings::compare;
 use crate::mj::{Asset, Model, Target};
 use crate::source::Source;
 use scene::Pose;
+use std::cell::RefCell;
+use std::fmt;
 
 /// Lines of a part for both lines of MuJoCo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfPart {
     v2: PartLines,
     v4: PartLines,
+    /// Sensors of the file that are in neither, by their numbers.
+    sensors_left_out: Vec<(usize, LeftOut)>,
 }
 
 /// Lines of a part, by the section of the document where they belong.
@@ -48,6 +52,26 @@ pub struct PartLines {
     pub actuators_with_state: Vec<String>,
     /// Sensors.
     pub sensors: Vec<String>,
+    /// What these lines do not say of the file, because this line of MuJoCo does not know it.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Something of a file that is not written, and that the rest is written without.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The kind of element, as MJCF calls it.
+    pub element: &'static str,
+    /// Its name in the file, or one made up for it.
+    pub name: String,
+    /// What of it, and why.
+    pub what: String,
+}
+
+/// `body "arm": gravcomp`.
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {:?}: {}", self.element, self.name, self.what)
+    }
 }
 
 /// Something of a file that cannot be written back.
@@ -70,7 +94,10 @@ struct Writing<'a> {
     pose: &'a Pose,
     /// Beginning of the names of its files.
     stem: &'a str,
+    /// The line of MuJoCo that is to read it, which need not be the one that compiled the file.
     target: Target,
+    sensors_left_out: &'a [(usize, LeftOut)],
+    left_out: RefCell<Vec<LeftOut>>,
 }
 
 impl MjcfPart {
@@ -90,9 +117,26 @@ impl MjcfPart {
             let name = names.of(beyond.element, beyond.index);
             return Err(PartError { element: beyond.element, name, what: beyond.what.into() });
         }
-        let of = |target| Writing { model, names, uid, pose, stem, target };
+        let sensors_left_out = sensors::left_out(model, names);
+        let sensors = &sensors_left_out[..];
+        let of = |target| Writing {
+            model,
+            names,
+            uid,
+            pose,
+            stem,
+            target,
+            sensors_left_out: sensors,
+            left_out: RefCell::default(),
+        };
         let (v2, v4) = (of(Target::V2).lines(source)?, of(Target::V4).lines(source)?);
-        Ok((Self { v2, v4 }, of(Target::V2).files()?))
+        let files = of(Target::V2).files()?;
+        Ok((Self { v2, v4, sensors_left_out }, files))
+    }
+
+    /// Sensors of the file that a scene has without them, by their numbers.
+    pub fn sensors_left_out(&self) -> &[(usize, LeftOut)] {
+        &self.sensors_left_out
     }
 
     /// The lines for a line of MuJoCo.
@@ -105,9 +149,9 @@ impl MjcfPart {
 }
 
 impl Writing<'_> {
-    fn lines(&self, source: &Source) -> Result<PartLines, PartError> {
+    fn lines(self, source: &Source) -> Result<PartLines, PartError> {
         let [actuators, actuators_with_state] = self.actuators()?;
-        Ok(PartLines {
+        let lines = PartLines {
             source: source.clone(),
             assets: self.assets(),
             bodies: self.bodies()?,
@@ -117,7 +161,18 @@ impl Writing<'_> {
             actuators,
             actuators_with_state,
             sensors: self.sensors()?,
-        })
+            left_out: Vec::new(),
+        };
+        Ok(PartLines { left_out: self.left_out.into_inner(), ..lines })
+    }
+
+    /// Whether 4.x is to read what is written. If not, notes that `what` of something is left out: only models of 4.x have it.
+    fn newer(&self, element: &'static str, index: usize, what: &str) -> bool {
+        if self.target == Target::V2 {
+            let (name, what) = (self.names.of(element, index), what.into());
+            self.left_out.borrow_mut().push(LeftOut { element, name, what });
+        }
+        self.target == Target::V4
     }
 
     /// Name in the scene of something of the file.

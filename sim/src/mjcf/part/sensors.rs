@@ -1,30 +1,58 @@
 //! MuJoCo's own sensors.
+//!
+//! Nothing moves otherwise because of a sensor: a file is a part without those that cannot be written.
 
 use super::super::write::{Element, number};
-use super::{PartError, Writing, some};
+use super::{LeftOut, PartError, PartNames, Writing, some};
+use crate::mj::Model;
 use crate::mj::words::{self, SensorObjects};
+
+/// Sensors that only 4.x knows.
+const NEWER: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_potential", "e_kinetic"];
+
+/// The sensors of a file that a part cannot have, by their numbers.
+pub(super) fn left_out(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
+    let reason = |s: usize| {
+        let what = obstacle(model, s)?;
+        Some((s, LeftOut { element: "sensor", name: names.of("sensor", s), what }))
+    };
+    (0..model.nsensor()).filter_map(reason).collect()
+}
+
+/// Why a sensor cannot be written.
+fn obstacle(m: &Model, s: usize) -> Option<String> {
+    let code = m.sensor_type()[s];
+    let Some(word) = words::sensor(code) else {
+        return Some(format!("the type {}", words::other_sensor(code).map_or_else(|| code.to_string(), String::from)));
+    };
+    let id = some(m.sensor_objid()[s]).unwrap_or(0);
+    let of_the_world = match word.word {
+        "subtreecom" | "subtreelinvel" | "subtreeangmom" => id == 0,
+        "force" | "torque" => m.site_bodyid()[id] == 0,
+        _ => false,
+    };
+    if of_the_world {
+        return Some(format!("{} of the world, which holds the whole scene", word.word));
+    }
+    let observed = [(m.sensor_objtype()[s], m.sensor_objid()[s]), (m.sensor_reftype()[s], m.sensor_refid()[s])];
+    if observed.into_iter().any(|(kind, id)| id >= 0 && kind != 0 && words::observed(kind).is_none()) {
+        return Some("an object of a kind that has no frame".into());
+    }
+    m.sensor_beyond(s).map(Into::into)
+}
 
 impl Writing<'_> {
     pub(super) fn sensors(&self) -> Result<Vec<String>, PartError> {
-        (0..self.model.nsensor()).map(|s| self.sensor(s)).collect()
+        let is_kept = |s: &usize| self.sensors_left_out.iter().all(|(left_out, _)| left_out != s);
+        (0..self.model.nsensor()).filter(is_kept).filter_map(|s| self.sensor(s).transpose()).collect()
     }
 
-    fn sensor(&self, s: usize) -> Result<String, PartError> {
+    /// A sensor; none where the document's line of MuJoCo does not know its type.
+    fn sensor(&self, s: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
-        let code = m.sensor_type()[s];
-        let word = words::sensor(code).ok_or_else(|| {
-            let word = words::other_sensor(code).map_or_else(|| code.to_string(), String::from);
-            self.beyond("sensor", s, format!("the type {word}"))
-        })?;
-        let id = some(m.sensor_objid()[s]).unwrap_or(0);
-        let of_the_world = match word.word {
-            "subtreecom" | "subtreelinvel" | "subtreeangmom" => id == 0,
-            "force" | "torque" => m.site_bodyid()[id] == 0,
-            _ => false,
-        };
-        if of_the_world {
-            let what = format!("{} of the world, which holds the whole scene", word.word);
-            return Err(self.beyond("sensor", s, what));
+        let word = words::sensor(m.sensor_type()[s]).ok_or_else(|| self.beyond("sensor", s, "an unknown type"))?;
+        if NEWER.contains(&word.word) && !self.newer("sensor", s, &format!("the type {}", word.word)) {
+            return Ok(None);
         }
         let object = self.observed(s, m.sensor_objtype()[s], m.sensor_objid()[s])?;
         let reference = self.observed(s, m.sensor_reftype()[s], m.sensor_refid()[s])?;
@@ -47,7 +75,7 @@ impl Writing<'_> {
                 element = element.attr(attribute, number(value));
             }
         }
-        Ok(element.leaf())
+        Ok(Some(element.leaf()))
     }
 
     /// Kind and name of an object that a sensor observes; `None` for no object.

@@ -1,5 +1,6 @@
 //! What a file says of the whole model, which is the scene's to say: found again in the text, to name file and line.
 
+use super::LeftOut;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj::Model;
 use crate::source::Source;
@@ -9,7 +10,10 @@ use std::sync::Arc;
 /// Most files that include each other; MuJoCo refuses a file that is included twice.
 const MOST_FILES: usize = 100;
 
-/// An element at the top of a file.
+/// Before the kind of each sensor of a file.
+const SENSOR: &str = "sensor ";
+
+/// An element at the top of a file, or a sensor.
 #[derive(Clone, Debug)]
 struct Stated {
     element: String,
@@ -37,20 +41,43 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
         let attributes = node.attributes().map(|a| a.name().to_string());
         let attributes =
             attributes.chain(flags.flat_map(|flag| flag.attributes()).map(|a| format!("flag {}", a.name())));
-        let line = document.text_pos_at(node.range().start).row;
+        let source = |node: roxmltree::Node<'_, '_>| {
+            let line = document.text_pos_at(node.range().start).row;
+            Source { file: Arc::clone(&shared), line }
+        };
         found.push(Stated {
             element: node.tag_name().name().to_string(),
             attributes: attributes.collect(),
-            source: Source { file: Arc::clone(&shared), line },
+            source: source(node),
         });
+        let of_sensors = node.children().filter(|child| child.is_element() && node.has_tag_name("sensor"));
+        found.extend(of_sensors.map(|sensor| Stated {
+            element: format!("{SENSOR}{}", sensor.tag_name().name()),
+            attributes: Vec::new(),
+            source: source(sensor),
+        }));
     }
 }
 
-/// Says what of a file's settings is not taken over: the scene's hold for all of its parts.
-pub(crate) fn compare(uid: &str, text: &str, file: &Path, model: &Model, scene: &Model) -> Vec<Diagnostic> {
+/// Says what of a file is not taken over: settings, for the scene's hold for all of its parts, and sensors.
+pub(crate) fn compare(
+    uid: &str,
+    text: &str,
+    file: &Path,
+    model: &Model,
+    scene: &Model,
+    sensors_left_out: &[(usize, LeftOut)],
+) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     stated(text, file, file.parent().unwrap_or(Path::new("")), &mut found, &mut 0);
     let mut diagnostics = Vec::new();
+    // Sensors stand in the model in the order of the file.
+    let sensors: Vec<&Stated> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
+    for (index, left_out) in sensors_left_out {
+        let at = sensors.get(*index).filter(|_| sensors.len() == model.nsensor()).map(|s| s.source.clone());
+        let message = format!("part {uid:?}: {left_out}: it is left out, the rest of the file is not");
+        diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
+    }
     for difference in model.option_differences(scene) {
         let options = found.iter().rev().filter(|s| s.element == "option");
         let at = options.into_iter().find(|s| s.attributes.iter().any(|a| a == difference.name));

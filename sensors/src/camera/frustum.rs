@@ -1,0 +1,28 @@
+//! What a camera shows of itself.
+
+use super::PixelIntrinsics;
+use nalgebra::Vector3;
+use scene::{Marker, Pose};
+
+/// Depth at which the arrows along the edges end \[m\].
+const DEPTH: f64 = 0.3;
+/// Length of the axes \[m\].
+const AXES: f32 = 0.1;
+const COLOR: [f32; 4] = [0.95, 0.8, 0.1, 1.0];
+
+/// The optical frame (blue is where it looks), and arrows from the eye along the four edges of what the picture shows, to a
+/// depth of 0.3 m.
+pub(crate) fn frustum(
+    world_from_camera: &Pose,
+    lens: &PixelIntrinsics,
+    (height, width): (usize, usize),
+) -> Vec<Marker> {
+    let (w, h) = (width as f64, height as f64);
+    let eye = world_from_camera.translation.vector;
+    let edge = |[u, v]: [f64; 2]| {
+        let ray = Vector3::new((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0) * DEPTH;
+        Marker::arrow(eye.into(), (world_from_camera.rotation * ray).into(), COLOR)
+    };
+    let edges = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].into_iter().filter_map(edge);
+    std::iter::once(Marker::axes(*world_from_camera, AXES)).chain(edges).collect()
+}

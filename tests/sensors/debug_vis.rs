@@ -1,0 +1,127 @@
+//! What sensors show, against closed forms, and the switch for it.
+
+use crate::worlds::{G, cfg, cube, joint, link, robot};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::{Marker, MarkerKind};
+use kinetoscope::sensors::SensorCfg;
+use kinetoscope::sensors::ray::pattern::Grid;
+use nalgebra::Vector3;
+
+/// A load that hangs from a crane, and a box that has come to rest on the ground.
+fn world() -> SimulationManager {
+    let files = tempfile::tempdir().unwrap();
+    let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("load", 3.0, 0.01, [0.0, 0.0, -0.4], "");
+    content += &joint("pivot", "continuous", "load", [0.0, 0.0, 2.0], "0 1 0");
+    let mut sim = SimulationManager::new(cfg(2)).unwrap();
+    sim.add_robot(robot(files.path(), "crane", &content, true)).unwrap();
+    sim.add_rigid_object(cube("box", 2.0, 0.2, [1.0, 0.5, 0.1])).unwrap();
+    sim.update(400);
+    sim
+}
+
+/// What one sensor shows in environment 1; nothing where it is not told to.
+fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> {
+    let mut sim = world();
+    sim.add_sensor("quiet", cfg(false)).unwrap();
+    sim.update(4);
+    assert_eq!(sim.markers(), [], "off is off");
+    sim.add_sensor("shown", cfg(true)).unwrap();
+    sim.update(4);
+    let [first, second] = [0, 1].map(|env| {
+        let markers = sim.markers();
+        markers.into_iter().filter(|(of, _)| *of == EnvId(env)).map(|(_, m)| m).collect::<Vec<Marker>>()
+    });
+    assert_eq!(first.len(), second.len());
+    second
+}
+
+/// An arrow's tail and what it points out.
+fn arrow(marker: &Marker) -> (Vector3<f64>, Vector3<f64>) {
+    let MarkerKind::Arrow { length, .. } = marker.kind else { panic!("{marker:?} is no arrow") };
+    (marker.pose.translation.vector, marker.pose.rotation * (Vector3::z() * f64::from(length)))
+}
+
+/// Lengths are in single precision: 2 m times 6e-8.
+#[track_caller]
+fn near((tail, vector): (Vector3<f64>, Vector3<f64>), at: [f64; 3], expected: [f64; 3], tolerance: f64) {
+    let apart = (tail - Vector3::from(at)).norm().max((vector - Vector3::from(expected)).norm());
+    assert!(apart < tolerance, "{tail} {vector}, not {at:?} {expected:?}");
+}
+
+#[test]
+fn an_imu_shows_its_frame_and_what_it_feels() {
+    let on = |debug_vis| {
+        let offset = Pose::translation(0.1, 0.2, 0.3);
+        ImuCfg { offset, debug_vis, ..ImuCfg::on("base") }
+    };
+    let markers = shown(on);
+    assert!(markers.len() == 2 && matches!(markers[0].kind, MarkerKind::Axes { .. }), "{markers:?}");
+    near(arrow(&markers[1]), [0.1, 0.2, 0.3], [0.0, 0.0, G / 20.0], 1e-6);
+}
+
+#[test]
+fn a_wrench_shows_what_carries_the_load() {
+    let on = |debug_vis| JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() };
+    let markers = shown(on);
+    // The load hangs: a force of its weight in the pivot, and no torque but what rounding leaves.
+    near(arrow(&markers[0]), [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
+    assert!(markers[1..].iter().all(|torque| arrow(torque).1.norm() < 1e-6), "{markers:?}");
+}
+
+#[test]
+fn a_contact_sensor_shows_who_is_touched() {
+    let markers = shown(|debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box|load") });
+    // Nothing touches the load.
+    assert!(markers.len() == 2 && matches!(markers[0].kind, MarkerKind::Sphere { .. }), "{markers:?}");
+    // The box has sunk into its soft contact by less than a millimetre, and rests to a thousandth of its weight.
+    near(arrow(&markers[1]), [1.0, 0.5, 0.1], [0.0, 0.0, 2.0 * G / 500.0], 1e-3);
+}
+
+#[test]
+fn frames_and_rays_show_where_they_are() {
+    let targets = || vec![TargetFrameCfg::of("box"), TargetFrameCfg::of("load")];
+    let frames = shown(|debug_vis| FrameTransformerCfg { debug_vis, ..FrameTransformerCfg::from("base", targets()) });
+    assert_eq!(frames.iter().filter(|m| matches!(m.kind, MarkerKind::Axes { .. })).count(), 3);
+    assert!((frames[2].pose.translation.vector - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-9);
+    let grid = Grid { resolution: 0.5, size: [0.5; 2], ..Grid::default() };
+    let rays = shown(|debug_vis| RayCasterCfg {
+        offset: Pose::translation(5.0, 5.0, 1.0),
+        pattern: grid.into(),
+        debug_vis,
+        ..Default::default()
+    });
+    let mut places: Vec<[f64; 3]> = rays.iter().map(|m| m.pose.translation.vector.into()).collect();
+    places.iter_mut().flatten().for_each(|x| *x = (*x * 1e6).round() / 1e6);
+    places.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    assert_eq!(places, [[4.75, 4.75, 0.0], [4.75, 5.25, 0.0], [5.25, 4.75, 0.0], [5.25, 5.25, 0.0]]);
+}
+
+/// From (1, 0, 1) along -x, with a lens whose corners are half as far to the sides and three eighths as far up and down as
+/// they are away: the arrows end 0.3 m before the eye.
+#[test]
+fn cameras_show_what_their_pictures_cover() {
+    let placement = Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] };
+    let extrinsics = || Extrinsics { placement, ..Default::default() };
+    let intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 40.0, cx: 20.0, cy: 15.0 };
+    let raster = shown(|debug_vis| CameraCfg {
+        width: 40,
+        height: 30,
+        intrinsics,
+        extrinsics: extrinsics(),
+        debug_vis,
+        ..Default::default()
+    });
+    let rays = shown(|debug_vis| RayCasterCameraCfg {
+        width: 40,
+        height: 30,
+        intrinsics,
+        extrinsics: extrinsics(),
+        debug_vis,
+        ..Default::default()
+    });
+    assert_eq!(raster, rays, "placed alike, shown alike");
+    assert!(raster.len() == 5 && matches!(raster[0].kind, MarkerKind::Axes { .. }));
+    for (marker, (y, z)) in raster[1..].iter().zip([(-0.5, 0.375), (0.5, 0.375), (0.5, -0.375), (-0.5, -0.375)]) {
+        near(arrow(marker), [1.0, 0.0, 1.0], [-0.3, 0.3 * y, 0.3 * z], 1e-6);
+    }
+}
