@@ -84,6 +84,7 @@ impl Brush {
         for item in &list.opaque {
             painter.draw(s, tile, projection, shot.scene, &list.placed, item);
         }
+        tile.settle();
         let context = plan.context(shot, projection);
         let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
         if veils {

@@ -279,6 +279,7 @@ impl ShadowBand<'_> {
             for item in &list.opaque {
                 painter.draw(s, tile, projection, scene, &list.placed, item);
             }
+            tile.settle();
             s.vectorize(
                 #[inline(always)]
                 || unfold(s, tile, nearness, range),

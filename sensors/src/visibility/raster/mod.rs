@@ -17,7 +17,7 @@ use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
 pub(crate) use draw_list::{DrawList, Item, Layer, Placed};
 use scene::{RenderScene, Shape};
-use tile::{BLOCK, SAMPLES, Tile};
+use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 
 /// Draws things into a visibility buffer.
 #[derive(Clone, Debug, Default)]
@@ -104,10 +104,13 @@ fn draw_floor<S: Simd>(
     if height <= 0.0 {
         return;
     }
-    let (nearest, zero, id) = (splat(s, projection.nearest()), splat(s, 0.0), splat_u(s, first_id));
+    let (nearest, zero) = (splat(s, projection.nearest()), splat(s, 0.0));
+    let (id, nothing) = (splat_u(s, first_id), splat_u(s, NOTHING));
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
+            // Most of a floor is drawn where nothing else is: then there is nothing to compare.
+            let empty = tile.take_fresh(block);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);
@@ -120,7 +123,16 @@ fn draw_floor<S: Simd>(
                     let down = across + (v - projection.cy) * camera.inverse_f[1] * down + forward;
                     let q = primitive::plane_nearness(down, height);
                     let hit = down.simd_lt(zero) & q.simd_le(nearest);
-                    drawn |= keep(s, tile, samples + row * LANES, hit, q, id);
+                    let at = samples + row * LANES;
+                    let Some(empty) = empty else {
+                        drawn |= keep(s, tile, at, hit, q, id);
+                        continue;
+                    };
+                    let empty = splat(s, empty);
+                    let nearer = hit & q.simd_gt(empty);
+                    store(select(nearer, q, empty), &mut tile.nearness[at..]);
+                    store_u(select_u(nearer, id, nothing), &mut tile.id[at..]);
+                    drawn = true;
                 }
             }
             if drawn {
@@ -163,6 +175,7 @@ fn draw_primitive<S: Simd>(
             if tile.hidden(block, item.nearness) {
                 continue;
             }
+            tile.open(block);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);

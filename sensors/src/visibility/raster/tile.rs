@@ -29,6 +29,11 @@ pub(crate) struct Tile {
     farthest: Vec<f32>,
     /// Whether the block was drawn into since `farthest` was taken.
     stale: Vec<bool>,
+    /// Whether the block is empty whatever its memory holds: it is cleared when something is drawn into it, while it is on
+    /// its way through the cache anyway.
+    fresh: Vec<bool>,
+    /// The nearness where nothing is.
+    empty: f32,
 }
 
 impl Tile {
@@ -39,24 +44,53 @@ impl Tile {
         self.id.reserve_exact(samples.saturating_sub(self.id.len()));
         self.farthest.reserve_exact(blocks.saturating_sub(self.farthest.len()));
         self.stale.reserve_exact(blocks.saturating_sub(self.stale.len()));
+        self.fresh.reserve_exact(blocks.saturating_sub(self.fresh.len()));
     }
 
-    /// Moves the tile and empties it.
+    /// Moves the tile and empties it. What is left of it must be [settled](Self::settle) before it is read.
     pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
         [self.x0, self.y0] = origin;
         [self.blocks_x, self.blocks_y] = blocks;
         self.planes = planes;
+        self.empty = farthest;
         let count = blocks[0] * blocks[1];
-        let fill = |v: &mut Vec<f32>, n: usize| {
-            v.clear();
-            v.resize(n, farthest);
-        };
-        fill(&mut self.nearness, count * planes * AREA);
-        fill(&mut self.farthest, count);
-        self.id.clear();
+        self.nearness.resize(count * planes * AREA, farthest);
         self.id.resize(count * planes * AREA, NOTHING);
-        self.stale.clear();
-        self.stale.resize(count, false);
+        for (flags, value) in [(&mut self.stale, false), (&mut self.fresh, true)] {
+            flags.clear();
+            flags.resize(count, value);
+        }
+        self.farthest.clear();
+        self.farthest.resize(count, farthest);
+    }
+
+    /// Readies a block to be drawn into.
+    #[inline(always)]
+    pub(crate) fn open(&mut self, block: usize) {
+        if self.fresh[block] {
+            self.empty_block(block);
+        }
+    }
+
+    #[inline(never)]
+    fn empty_block(&mut self, block: usize) {
+        let samples = self.samples(block, 0)..self.samples(block + 1, 0);
+        self.nearness[samples.clone()].fill(self.empty);
+        self.id[samples].fill(NOTHING);
+        self.fresh[block] = false;
+    }
+
+    /// Readies a block of which every sample is about to be written, and says what they all hold, if nothing was drawn yet.
+    #[inline(always)]
+    pub(crate) fn take_fresh(&mut self, block: usize) -> Option<f32> {
+        std::mem::take(&mut self.fresh[block]).then_some(self.empty)
+    }
+
+    /// Readies the tile to be read, when all is drawn.
+    pub(crate) fn settle(&mut self) {
+        for block in 0..self.fresh.len() {
+            self.open(block);
+        }
     }
 
     /// Takes over the depths of another tile, with nothing in it.
@@ -73,11 +107,15 @@ impl Tile {
         self.id.clone_from(&other.id);
         self.farthest.clone_from(&other.farthest);
         self.stale.clone_from(&other.stale);
+        self.fresh.clone_from(&other.fresh);
+        self.empty = other.empty;
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity()) + self.stale.capacity()
+        4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
+            + self.stale.capacity()
+            + self.fresh.capacity()
     }
 
     /// The block with the pixel (8 bx, 8 by) of the picture.

@@ -77,6 +77,7 @@ pub(crate) fn draw<S: Simd>(
         for bx in x0 >> 3..=x1 >> 3 {
             let (x, y) = (bx * 8, by * 8);
             let block = tile.block(bx as usize, by as usize);
+            tile.open(block);
             let first_row = ((y0.max(y) - y) >> 1) as usize;
             let last_row = ((y1.min(y + 7) - y) >> 1) as usize;
             let corner = g.at[2] + g.step[0] * (x as f32 + 0.5 - g.at[0]) + g.step[1] * (y as f32 + 0.5 - g.at[1]);
@@ -154,6 +155,7 @@ fn few_pixels(
                 let q = if q < g.high { q } else { g.high };
                 let block = tile.block(bx as usize / BLOCK, by as usize / BLOCK);
                 let here = tile.samples(block, plane) + (row * 8 + column) as usize;
+                tile.open(block);
                 if q > tile.nearness[here] && q <= nearest {
                     tile.nearness[here] = q;
                     tile.id[here] = id;
