@@ -90,7 +90,7 @@ impl Packet {
     }
 
     /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` where no ray does. A
-    /// radius of +inf is met by all. To the bit what [`Ray::seen_from`] gives.
+    /// radius of +inf is met by all. To the bit what one ray alone is in that frame.
     #[inline(always)]
     pub(super) fn seen_from<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));

@@ -144,7 +144,7 @@ fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64
 }
 
 impl Bvh {
-    /// Visits the leaves that the rays of a beam may meet up to its limits, the near ones first, until more than `budget`
+    /// Visits the leaves that the rays of a beam may meet up to its limits, those of near nodes first, until more than `budget`
     /// things were visited. `leaf` is given the things of a leaf; it returns new limits, where there are.
     #[inline(always)]
     pub(crate) fn walk_beam<S: Simd>(
@@ -160,34 +160,36 @@ impl Bvh {
         }
         let mut deepest = beam.deepest(limits);
         stack.clear();
-        let mut entry = Entry { near: f32::NEG_INFINITY, child: 0, count: 0 };
+        let mut index = 0;
         loop {
-            if entry.near <= deepest {
-                let first = entry.child as usize;
-                let count = entry.count as usize;
+            let node = &self.nodes[index];
+            let (near, mut met) = beam.meets(node, deepest);
+            let bottom = stack.len();
+            while met != 0 {
+                let k = met.trailing_zeros() as usize & (WIDE - 1);
+                met &= met - 1;
+                let (child, count) = (node.child[k], node.count[k]);
+                if count == 0 {
+                    insert(stack, bottom, Entry { near: near[k], child, count });
+                    continue;
+                }
+                // Things at once: their order among neighbours is worth less than keeping it.
+                let (first, count) = (child as usize, count as usize);
                 if count > budget {
                     return Walked::Part;
                 }
-                if count > 0 {
-                    budget -= count;
-                    if let Some(limits) = leaf(first..first + count) {
-                        deepest = beam.deepest(limits);
-                    }
-                } else {
-                    let node = &self.nodes[first];
-                    let (near, mut met) = beam.meets(node, deepest);
-                    let bottom = stack.len();
-                    while met != 0 {
-                        let k = met.trailing_zeros() as usize & (WIDE - 1);
-                        met &= met - 1;
-                        insert(stack, bottom, Entry { near: near[k], child: node.child[k], count: node.count[k] });
-                    }
+                budget -= count;
+                if let Some(limits) = leaf(first..first + count) {
+                    deepest = beam.deepest(limits);
                 }
             }
-            match stack.pop() {
-                Some(next) => entry = next,
-                None => return Walked::All,
-            }
+            index = loop {
+                match stack.pop() {
+                    Some(next) if next.near <= deepest => break next.child as usize,
+                    Some(_) => {}
+                    None => return Walked::All,
+                }
+            };
         }
     }
 }

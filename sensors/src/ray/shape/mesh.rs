@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
 /// about as much as these.
-const BUDGET: usize = 160;
+const BUDGET: usize = 320;
 
 /// Triangles in a tree, one for each asset.
 #[derive(Clone, Debug)]

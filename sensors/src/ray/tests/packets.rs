@@ -153,13 +153,13 @@ fn terrain_in_packets_is_terrain_one_by_one() {
         // Nearly straight down from above, some at points and along edges of the grid.
         for k in 0..200 * WIDTH {
             let mut ray = Ray { origin: dice.point(2.5), direction: [0.0, 0.0, -1.0] };
-            if k / WIDTH % 3 == 0 {
+            if (k / WIDTH).is_multiple_of(3) {
                 ray.origin = ray.origin.map(|x| (8.0 * x).round() / 8.0);
             }
-            ray.origin[2] = if k % 11 == 0 { dice.number(-0.5, 1.0) } else { 3.0 };
-            if k / WIDTH % 4 > 0 {
+            ray.origin[2] = if k.is_multiple_of(11) { dice.number(-0.5, 1.0) } else { 3.0 };
+            if !(k / WIDTH).is_multiple_of(4) {
                 let [x, y, _] = dice.point(0.3);
-                ray.direction = unit([x, if k % 13 == 0 { 0.0 } else { y }, -1.0]).unwrap();
+                ray.direction = unit([x, if k.is_multiple_of(13) { 0.0 } else { y }, -1.0]).unwrap();
             }
             rays.push(ray);
         }
@@ -248,7 +248,7 @@ fn the_world_is_every_ray_against_every_shape() {
     for fixed in 0..3 {
         let instance = |k: usize| {
             let instance = Instance::new(shapes[k % shapes.len()].clone(), Material::default(), k as i32 + 1);
-            if fixed == 2 || fixed == 1 && k % 2 == 0 { instance.fixed() } else { instance }
+            if fixed == 2 || fixed == 1 && k.is_multiple_of(2) { instance.fixed() } else { instance }
         };
         let scene = RenderScene::new((0..count).map(instance).collect()).unwrap();
         let targets = Arc::new(RayTargets::new(&scene, 0..count, &RayAssets::default()));
