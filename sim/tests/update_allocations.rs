@@ -100,6 +100,7 @@ fn actuator_models_allocate_nothing() {
         actuators,
         stiffness: 10.0.into(),
         damping: 1.0.into(),
+        max_effort: Some(50.0.into()),
         max_velocity: Some(5.0.into()),
         ..Default::default()
     };

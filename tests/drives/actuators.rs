@@ -112,7 +112,8 @@ fn a_dc_motor_gives_less_the_faster_it_turns() {
 #[test]
 fn speeds_without_load_differ_between_environments() {
     let cfg = SimulationManagerCfg { num_envs: 2, ..weightless() };
-    let mut world = world(&[Joint::wheel("j", M)], with(DcMotor { saturation_effort: 6.0 }, 0.0, 0.0), cfg);
+    let wheel = Joint::wheel("j", M).effort(100.0);
+    let mut world = world(&[wheel], with(DcMotor { saturation_effort: 6.0 }, 0.0, 0.0), cfg);
     let mut robot = world.sim.robot_mut(world.robot);
     robot.set_qvel_limits(&array![[3.0]], None, Some(&[EnvId(1)])).unwrap();
     robot.write_qvel(&array![[1.5]], None, None).unwrap();
@@ -127,6 +128,47 @@ fn speeds_without_load_differ_between_environments() {
         assert!(matches!(error, Error::OutOfRange { argument: "set_qvel_limits", .. }), "{error}");
         assert!(error.to_string().contains("dc_motor"), "{error}");
         assert_eq!(world.view().qvel_limits(), before);
+    }
+    // A motor without a continuous limit would brake without end.
+    let before = world.view().qf_limits();
+    let error = world.sim.robot_mut(world.robot).set_qf_limits(&array![[f64::INFINITY]], None, None).unwrap_err();
+    assert!(matches!(error, Error::OutOfRange { argument: "set_qf_limits", row: 0, column: 0, .. }), "{error}");
+    assert!(error.to_string().contains("dc_motor") && error.to_string().contains("joint \"j\""), "{error}");
+    assert_eq!(world.view().qf_limits(), before);
+    world.sim.robot_mut(world.robot).set_qf_limits(&array![[2.0]], None, None).unwrap();
+    world.sim.robot_mut(world.robot).write_qvel(&array![[1.5]], None, None).unwrap();
+    world.step(1);
+    assert_eq!(world.view().get_qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
+}
+
+/// With full throttle from rest tau = s (1 - v / v_max) in every step: with r = 1 - h s / (M v_max),
+/// v_n = v_max (1 - r^n) and q_n = h (v_1 + ... + v_n) = h v_max (n - r (1 - r^n) / (1 - r)). That settles while |r| < 1;
+/// beyond, the motor overshoots until its limit holds it, and `add_robot` has warned.
+#[test]
+fn a_dc_motor_runs_up_its_line_and_warns_where_that_is_not_stable() {
+    let stall = 6.0;
+    for (slope, stable) in [(0.8, true), (10.0, true), (39.0, true), (41.0, false)] {
+        let top = stall / slope;
+        let drive = with(DcMotor { saturation_effort: stall }, 0.0, 0.0);
+        let drive = DriveCfg { max_velocity: Some(top.into()), ..drive };
+        let mut world = world(&[Joint::wheel("j", M).effort(1.5 * stall)], drive, weightless());
+        let warned = world.sim.warning_counts().keys().any(|name| name.contains("unstable"));
+        assert_eq!(warned, !stable, "slope {slope}");
+        world.sim.robot_mut(world.robot).set_qf(&array![[1e4]], None, None).unwrap();
+        let r = 1.0 - H * slope / M;
+        for n in 1..=200 {
+            world.step(1);
+            let power = r.powi(n);
+            if stable {
+                let q = H * top * (f64::from(n) - r * (1.0 - power) / (1.0 - r));
+                assert_close(world.v()[0], top * (1.0 - power), EXACT, &format!("velocity, slope {slope}, step {n}"));
+                assert_close(world.q()[0], q, EXACT, &format!("position, slope {slope}, step {n}"));
+            }
+        }
+        let off = (world.v()[0] / top - 1.0).abs();
+        // 0.96^200 is 3e-4, 0.95^200 3e-5; the oscillation ends at the limit, 1.5 of v_max away.
+        assert_eq!(off < 1e-3, stable, "slope {slope}: {off}");
+        assert!(stable || off > 1.0, "slope {slope}: {off}");
     }
 }
 
@@ -232,7 +274,7 @@ fn every_model_answers_a_step_with_the_solution_of_second_order() {
         let delay = if let ActuatorModel::DelayedPd(model) = model { model.delay } else { 0 };
         let error = |h: f64| {
             let drive = DriveCfg { max_velocity: Some(1e6.into()), ..with(model, kp, kd) };
-            let mut world = world(&[Joint::wheel("j", m)], drive, at_dt(h, weightless()));
+            let mut world = world(&[Joint::wheel("j", m).effort(100.0)], drive, at_dt(h, weightless()));
             world.aim(&[aim]);
             let mut worst = 0.0_f64;
             for n in 1..=(1.0 / h).round() as u32 {
@@ -301,6 +343,10 @@ fn models_that_do_not_go_with_their_joints_are_refused() {
     };
     let cases: Vec<(DriveCfg, &[&str])> = vec![
         (plain(), &["dc_motor of joint \"j\"", "max_velocity is inf", "velocity limit"]),
+        (
+            with(DcMotor { saturation_effort: 5.0 }, 1.0, 0.1),
+            &["dc_motor of joint \"j\"", "max_effort is inf", "effort limit"],
+        ),
         (with(DcMotor { saturation_effort: 0.0 }, 1.0, 0.1), &["saturation_effort is 0", "above 0"]),
         (with(DcMotor { saturation_effort: f64::NAN }, 1.0, 0.1), &["saturation_effort is NaN"]),
         (with(DelayedPd { delay: 10_001, max_delay: 0 }, 1.0, 0.1), &["delayed_pd", "10001", "10000"]),

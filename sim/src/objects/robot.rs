@@ -4,7 +4,8 @@ use crate::compile::{JointIndexing, RobotIndex, Simulation};
 use crate::description::{Inertial, JointKind, LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
-use crate::drive::{DriveCfg, DriveModel};
+use crate::drive::table::Gains;
+use crate::drive::{ActuatorSpec, DriveCfg, DriveModel};
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManagerCfg};
 use crate::mj;
@@ -175,10 +176,21 @@ impl RobotData {
     }
 }
 
-/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others.
+/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others; the damping is the
+/// largest that the model of the joint can show.
 fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
-    let explicit = |plan: &JointPlan| model == DriveModel::Actuator || plan.model.is_some();
-    plans.iter().map(|plan| JointPlan { actuator: plan.actuator.filter(|_| explicit(plan)), ..plan.clone() }).collect()
+    let explicit = |plan: &JointPlan| {
+        let spec = plan.actuator?;
+        match plan.model {
+            Some(law) => {
+                let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+                let kd = law.law().damping(&Gains { kp: spec.kp, kd: spec.kd, max_effort, max_velocity });
+                Some(ActuatorSpec { kd, ..spec })
+            }
+            None => Some(spec).filter(|_| model == DriveModel::Actuator),
+        }
+    };
+    plans.iter().map(|plan| JointPlan { actuator: explicit(plan), ..plan.clone() }).collect()
 }
 
 /// Adds what links carry.

@@ -212,7 +212,7 @@ impl RobotMut<'_> {
     }
 
     /// `(column, joint, drive)` of the `joints` but the mimic ones, each with gains that may change.
-    fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+    pub(super) fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
         let native = |drive: usize| {
             self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
         };

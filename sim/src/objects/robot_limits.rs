@@ -3,7 +3,7 @@
 use crate::drive::table::Gains;
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, env_list};
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
 use crate::objects::rows::{Numbers, Rows, Table};
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;
@@ -156,26 +156,8 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let write = self.checked_numbers("set_qvel_limits", Numbers::Limit, limits.into(), joint_ids, env_ids)?;
         let drives = self.driven("set_qvel_limits", &write.joints)?;
-        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
-        for (row, (_, values)) in write.rows.iter().enumerate() {
-            for &(column, joint, drive) in &drives {
-                let (value, gains) = (values[column], table.drives[drive].initial);
-                let checked = table
-                    .model_of(drive)
-                    .map_or(Ok(()), |explicit| explicit.model.law().check(&Gains { max_velocity: value, ..gains }));
-                checked.map_err(|expected| {
-                    let (argument, of) = ("set_qvel_limits", format!("joint {:?}", self.data.joint_names()[joint]));
-                    Error::OutOfRange {
-                        argument,
-                        row,
-                        column,
-                        of,
-                        value,
-                        expected: format!("right for its model: {expected}"),
-                    }
-                })?;
-            }
-        }
+        let change = |gains: Gains, max_velocity| Gains { max_velocity, ..gains };
+        self.check_models("set_qvel_limits", &write, &drives, change)?;
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 for &(column, _, drive) in &drives {
@@ -192,8 +174,9 @@ impl RobotMut<'_> {
     /// clamped to them.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is negative or NaN; a joint without a drive, or one that is
-    /// driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    /// Wrong shape, unknown joint or environment, a value that is negative or NaN, or that its actuator model cannot take
+    /// ([`DcMotor`](crate::DcMotor) needs a finite one); a joint without a drive, or one that is driven by
+    /// [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     #[doc(alias = "max_effort")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qf_limits<'t>(
@@ -203,8 +186,40 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let argument = "set_qf_limits";
-        self.set_drives(argument, Numbers::Limit, limits.into(), joint_ids, env_ids, |drives, drive, max_effort| {
-            drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
-        })
+        let write = self.checked_numbers(argument, Numbers::Limit, limits.into(), joint_ids, env_ids)?;
+        let drives = self.drives_of(argument, &write.joints)?;
+        self.check_models(argument, &write, &drives, |gains, max_effort| Gains { max_effort, ..gains })?;
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for &(column, _, drive) in &drives {
+                    let max_effort = row[column];
+                    env.drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the explicit models of `drives` can take what `change` makes of their limits.
+    fn check_models(
+        &self,
+        argument: &'static str,
+        write: &JointRows<'_>,
+        drives: &[(usize, usize, usize)],
+        change: impl Fn(Gains, f64) -> Gains,
+    ) -> Result<()> {
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        for (row, (_, values)) in write.rows.iter().enumerate() {
+            for &(column, joint, drive) in drives {
+                let Some(explicit) = table.model_of(drive) else { continue };
+                let value = values[column];
+                explicit.model.law().check(&change(table.drives[drive].initial, value)).map_err(|expected| {
+                    let of = format!("joint {:?}", self.data.joint_names()[joint]);
+                    let expected = format!("right for its model: {expected}");
+                    Error::OutOfRange { argument, row, column, of, value, expected }
+                })?;
+            }
+        }
+        Ok(())
     }
 }

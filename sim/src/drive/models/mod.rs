@@ -2,7 +2,8 @@
 //!
 //! A model sees position, velocity and targets of its joint as they are when the step begins, and its effort acts during the
 //! whole step (with RK4, too). It is therefore what a real controller at the rate of the simulation would do, with the same
-//! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with.
+//! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with. It takes the
+//! law's stiffness together with its steepest [damping](ActuatorLaw::damping), that of a motor's torque-speed line, too.
 //!
 //! A model is one file with an [`ActuatorLaw`], and one line in the list below.
 
@@ -44,6 +45,12 @@ pub trait ActuatorLaw: std::fmt::Debug {
 
     /// Forgets what was before: `target` is what the drive is asked for at the start.
     fn start(&self, _target: &Target, _memory: &mut [f64]) {}
+
+    /// How steeply the effort falls with the speed where that is steepest \[N m s/rad or N s/m\]: the damping that decides
+    /// whether the law is stable.
+    fn damping(&self, gains: &Gains) -> f64 {
+        gains.kd
+    }
 
     /// The effort in a step \[N m or N\].
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64;
