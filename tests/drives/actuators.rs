@@ -268,7 +268,7 @@ fn a_step_that_is_done_again_delays_nothing_twice() {
 fn every_model_answers_a_step_with_the_solution_of_second_order() {
     let (m, w, z, aim) = (0.1_f64, 10.0_f64, 0.5_f64, 0.05);
     let (kp, kd, d) = (m * w * w, 2.0 * m * z * w, w * (1.0 - z * z).sqrt());
-    let mut models = ActuatorModel::all();
+    let mut models = ActuatorModel::examples();
     models.push(DelayedPd { delay: 7, max_delay: 0 }.into());
     for model in models {
         let delay = if let ActuatorModel::DelayedPd(model) = model { model.delay } else { 0 };

@@ -18,17 +18,10 @@ use serde::{Deserialize, Serialize};
 /// On its line the motor is a damper of s / `v_max`, as explicit as the gains are: a joint of inertia M at the speed without
 /// load is stable while h s / `v_max` < 2 M. `add_robot` warns where s / `v_max` or the gains are too large for the time step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct DcMotor {
-    /// Effort at standstill \[N m or N\].
+    /// Effort at standstill \[N m or N\]. There is no motor whose number would do for others: it must be given.
     pub saturation_effort: f64,
-}
-
-impl Default for DcMotor {
-    /// 1 N m, or 1 N.
-    fn default() -> Self {
-        Self { saturation_effort: 1.0 }
-    }
 }
 
 impl DcMotor {

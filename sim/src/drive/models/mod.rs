@@ -59,9 +59,9 @@ pub trait ActuatorLaw: std::fmt::Debug {
     fn remember(&self, _target: &Target, _memory: &mut [f64]) {}
 }
 
-/// The list of actuator models: `Variant(its configuration and law)`.
+/// The list of actuator models: `Variant(its configuration and law) = one to try`.
 macro_rules! actuator_models {
-    ($($(#[$doc:meta])* $variant:ident($model:ty),)*) => {
+    ($($(#[$doc:meta])* $variant:ident($model:ty) = $example:expr,)*) => {
         /// An explicit actuator model and its numbers.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -70,9 +70,9 @@ macro_rules! actuator_models {
         }
 
         impl ActuatorModel {
-            /// One of each kind, with its default numbers.
-            pub fn all() -> Vec<Self> {
-                vec![$(Self::$variant(<$model>::default()),)*]
+            /// One of each kind, to try what holds for all of them; a motor of 1 N m, or 1 N.
+            pub fn examples() -> Vec<Self> {
+                vec![$(Self::$variant($example),)*]
             }
 
             /// The model's law.
@@ -95,11 +95,11 @@ macro_rules! actuator_models {
 
 actuator_models! {
     /// A controller that gives what its law asks for, up to the effort limit.
-    IdealPd(IdealPd),
+    IdealPd(IdealPd) = IdealPd {},
     /// A motor that gives less the faster it turns.
-    DcMotor(DcMotor),
+    DcMotor(DcMotor) = DcMotor { saturation_effort: 1.0 },
     /// A controller that hears of its targets some steps later.
-    DelayedPd(DelayedPd),
+    DelayedPd(DelayedPd) = DelayedPd::default(),
 }
 
 /// `kp (q* - q) + kd (v* - v) + tau_ff`, not clamped.
@@ -113,19 +113,25 @@ mod tests {
 
     #[test]
     fn every_model_has_a_name_of_its_own_that_files_know_it_by() {
-        let mut names: Vec<&str> = ActuatorModel::all().iter().map(|model| model.law().name()).collect();
-        for (model, name) in ActuatorModel::all().iter().zip(&names) {
+        let mut names: Vec<&str> = ActuatorModel::examples().iter().map(|model| model.law().name()).collect();
+        for (model, name) in ActuatorModel::examples().iter().zip(&names) {
             let text = serde_json::to_string(model).expect("numbers");
             assert!(text.starts_with(&format!("{{\"{name}\":{{")), "{text}");
             let again: ActuatorModel = serde_json::from_str(&text).expect("as written");
             assert_eq!(again, *model);
-            // Every number has a default.
-            let plain: ActuatorModel = serde_json::from_str(&format!("{{\"{name}\":{{}}}}")).expect("defaults");
-            assert_eq!(plain, *model);
+            // What has a default may be left out; the effort of a motor has none.
+            let plain = serde_json::from_str::<ActuatorModel>(&format!("{{\"{name}\":{{}}}}"));
+            match model {
+                ActuatorModel::IdealPd(_) | ActuatorModel::DelayedPd(_) => assert_eq!(plain.expect("defaults"), *model),
+                ActuatorModel::DcMotor(_) => {
+                    let message = plain.expect_err("no default").to_string();
+                    assert!(message.contains("missing field `saturation_effort`"), "{message}");
+                }
+            }
             assert!(serde_json::from_str::<ActuatorModel>(&format!("{{\"{name}\":{{\"x\":1}}}}")).is_err());
         }
         names.sort_unstable();
         names.dedup();
-        assert_eq!(names.len(), ActuatorModel::all().len());
+        assert_eq!(names.len(), ActuatorModel::examples().len());
     }
 }
