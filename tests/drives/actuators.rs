@@ -225,6 +225,38 @@ fn delayed_targets_arrive_in_their_order_in_each_environment() {
     }
 }
 
+/// A target that was set in a wide range and acts in a tight one acts at the end of the tight one, and one that waits until
+/// the range is wide again as it was set.
+#[test]
+fn targets_that_are_under_way_stay_inside_of_limits_that_are_set_later() {
+    let (kp, kd, delay) = (25.0, 1.0, 5);
+    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay, max_delay: 0 }, kp, kd), weightless());
+    let (wide, tight) = ([f64::NEG_INFINITY, f64::INFINITY], [-0.1, 0.15]);
+    let clamp = |[low, high]: [f64; 2], x: f64| x.max(low).min(high);
+    let (mut set, mut x, mut u) = (Vec::new(), 0.0_f64, 0.0_f64);
+    let (mut cut, mut spared) = (0, 0);
+    for n in 0..200 {
+        let range = if n % 40 >= 20 && n % 40 < 23 { tight } else { wide };
+        if [0, 20, 23].contains(&(n % 40)) {
+            world.sim.robot_mut(world.robot).set_qpos_limits(&array![[[range[0], range[1]]]], None, None).unwrap();
+        }
+        set_targets(&mut world, wobble(n));
+        world.step(1);
+        let [q, v, tau] = wobble(n);
+        set.push([clamp(range, q), v, tau]);
+        let heard = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
+        let aim = clamp(range, heard[0]);
+        cut += u32::from(aim != heard[0]);
+        // Set before the range was tight, it acts after.
+        spared += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
+        u += H / M * (kp * (aim - x) + kd * (heard[1] - u) + heard[2]);
+        x += H * u;
+        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
+        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+    }
+    assert!(cut > 3 && spared > 3, "the control: {cut} were clamped when they acted, {spared} were not");
+}
+
 /// A step that is done again, because its buffers were too small, is one step of the delay line.
 #[test]
 fn a_step_that_is_done_again_delays_nothing_twice() {

@@ -67,7 +67,7 @@ impl Robot<'_> {
 impl RobotMut<'_> {
     /// Sets the positions that targets may have \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (all where
     /// `None`; a single row is for all of them), joints as `joint_ids` (all where `None`). Present targets are clamped to
-    /// them at once. They may be tighter than the robot's own and be widened again, up to those. Mimic joints are accepted
+    /// them at once, and so is what [`DelayedPd`](crate::DelayedPd) has under way, when it acts. They may be tighter than the robot's own and be widened again, up to those. Mimic joints are accepted
     /// and ignored.
     ///
     /// These are limits of what is asked for. The stops that a joint hits are in MuJoCo's model and stay where they are: a

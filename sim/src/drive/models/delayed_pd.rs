@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 /// A target that is set before step n acts from step n + `delay` on. Until then, and after a reset, the targets are those at
 /// the start: the initial positions. Steps are MuJoCo's, `physics_dt / substeps` long. The delay may differ between
 /// environments and change while the simulation runs: [`RobotMut::set_delay`](crate::RobotMut::set_delay).
+///
+/// A position target is clamped to the range of targets twice: when it is set, and when it acts, as the range is then
+/// ([`RobotMut::set_qpos_limits`](crate::RobotMut::set_qpos_limits)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DelayedPd {
@@ -74,7 +77,9 @@ impl ActuatorLaw for DelayedPd {
             0 => *target,
             delay => {
                 let [position, velocity, feedforward] = ring[(memory[NEXT] as usize + ring.len() - delay) % ring.len()];
-                Target { position, velocity, feedforward }
+                // It was inside of the range when it was set; the range may be tighter by now.
+                let [low, high] = now.range;
+                Target { position: position.max(low).min(high), velocity, feedforward }
             }
         };
         proportional_derivative(now, &heard, gains).clamp(-gains.max_effort, gains.max_effort)

@@ -25,6 +25,9 @@ pub struct JointMotion {
     pub position: f64,
     /// Velocity \[rad/s or m/s\].
     pub velocity: f64,
+    /// Positions that a target may have now \[rad or m\], lower and upper end. The present target is among them; one that a
+    /// model remembers need not be.
+    pub range: [f64; 2],
 }
 
 /// The law of an actuator model.
