@@ -225,6 +225,34 @@ fn delayed_targets_arrive_in_their_order_in_each_environment() {
     }
 }
 
+/// Step n hears the targets of step n - d(n): the last ones again where the delay grows, some never where it falls.
+#[test]
+fn delays_that_change_in_motion_repeat_or_skip_targets() {
+    let (kp, kd) = (25.0, 1.0);
+    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay: 2, max_delay: 7 }, kp, kd), weightless());
+    // First step and delay from there on; the first one is longer than anything has been set for.
+    let changes = [(1, 7), (20, 2), (50, 5), (100, 1), (110, 0), (120, 7), (150, 0)];
+    let (mut delay, mut x, mut u) = (2, 0.0_f64, 0.0_f64);
+    let mut heard = Vec::new();
+    for n in 0..180 {
+        if let Some((_, changed)) = changes.iter().find(|(at, _)| *at == n) {
+            delay = *changed;
+            world.sim.robot_mut(world.robot).set_delay(&array![[delay as u32]], None, None).unwrap();
+        }
+        set_targets(&mut world, wobble(n));
+        world.step(1);
+        heard.push(n - delay);
+        let [aim, v_aim, ff] = if n < delay { [0.0; 3] } else { wobble(n - delay) };
+        u += H / M * (kp * (aim - x) + kd * (v_aim - u) + ff);
+        x += H * u;
+        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
+        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+    }
+    // What the documents say of it: from 2 to 5 steps three targets act again, from 5 to 1 four never do.
+    assert_eq!(heard[48..55], [46, 47, 45, 46, 47, 48, 49]);
+    assert_eq!(heard[98..102], [93, 94, 99, 100]);
+}
+
 /// A target that was set in a wide range and acts in a tight one acts at the end of the tight one, and one that waits until
 /// the range is wide again as it was set.
 #[test]

@@ -139,8 +139,9 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset, and what is under way
-    /// stays in its order. Rows and columns as in [`set_stiffness`](Self::set_stiffness).
+    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset. Step n hears the
+    /// targets of step n - delay, whatever the delay was before: where it grows by k, the last k targets that have acted act
+    /// once more, in their order; where it falls by k, the next k never act. Rows and columns as in [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment; a joint of another model, or a delay above the model's `max_delay`. Then

@@ -11,6 +11,10 @@ use serde::{Deserialize, Serialize};
 /// the start: the initial positions. Steps are MuJoCo's, `physics_dt / substeps` long. The delay may differ between
 /// environments and change while the simulation runs: [`RobotMut::set_delay`](crate::RobotMut::set_delay).
 ///
+/// Step n hears the targets of step n - delay, with the delay as it is in step n. Where the delay grows by k
+/// the last k targets that have acted act once more, in their order, and the line goes on from there; where it falls by k the
+/// next k targets never act.
+///
 /// A position target is clamped to the range of targets twice: when it is set, and when it acts, as the range is then
 /// ([`RobotMut::set_qpos_limits`](crate::RobotMut::set_qpos_limits)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,7 +45,7 @@ impl DelayedPd {
         memory[DELAY] as u32
     }
 
-    /// Changes the delay of a drive with this memory; what is under way stays in its order.
+    /// Changes the delay of a drive with this memory; the targets in it stay as they are.
     pub fn set_delay(memory: &mut [f64], steps: u32) {
         memory[DELAY] = f64::from(steps);
     }
