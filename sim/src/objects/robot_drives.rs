@@ -59,6 +59,10 @@ impl RobotMut<'_> {
     /// this through a reset. Rows are for `env_ids` (all where `None`; a single row is for all of them), columns for
     /// `joint_ids` (all where `None`); columns of mimic joints are accepted and ignored.
     ///
+    /// Rows of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator models
+    /// are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns of it: what is set here is not checked
+    /// against the time step. [`stable_timestep`](crate::drive::actuator::stable_timestep) computes the limit.
+    ///
     /// ```
     /// use ndarray::array;
     /// use sim::{EnvId, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg};
@@ -93,7 +97,8 @@ impl RobotMut<'_> {
     }
 
     /// Sets the damping of drives \[N m s/rad or N s/m for drive type `force`\]; otherwise as
-    /// [`set_stiffness`](Self::set_stiffness). The viscous friction of the joint itself stays.
+    /// [`set_stiffness`](Self::set_stiffness), also in that nothing warns where an explicit model becomes unstable. The
+    /// viscous friction of the joint itself stays.
     ///
     /// # Errors
     /// As [`set_stiffness`](Self::set_stiffness).
@@ -112,7 +117,8 @@ impl RobotMut<'_> {
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
     /// `env_ids` (all where `None`). Their numbers stay, and so does everything else. With `None` a drive gives nothing but
     /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the inertia
-    /// that the joint feels at the robot's initial positions.
+    /// that the joint feels at the robot's initial positions. Nothing warns where that makes an explicit model unstable: see
+    /// [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
     /// Unknown joint or environment; a joint that was added without a drive, or is driven by

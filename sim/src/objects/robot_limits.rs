@@ -141,7 +141,8 @@ impl RobotMut<'_> {
     /// [`set_stiffness`](Self::set_stiffness), which also names the errors.
     ///
     /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive law
-    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load.
+    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load;
+    /// nothing warns where that makes its torque-speed line too steep for the time step.
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, a value that is negative or NaN, or that its actuator model cannot take; a

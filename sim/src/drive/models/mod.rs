@@ -4,6 +4,8 @@
 //! whole step (with RK4, too). It is therefore what a real controller at the rate of the simulation would do, with the same
 //! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with. It takes the
 //! law's stiffness together with its steepest [damping](ActuatorLaw::damping), that of a motor's torque-speed line, too.
+//! Only `add_robot` looks: gains, drive types and speed limits that are set while the simulation runs are taken without a
+//! warning, stable or not.
 //!
 //! A model is one file with an [`ActuatorLaw`], and one line in the list below.
 
