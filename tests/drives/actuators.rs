@@ -29,9 +29,6 @@ fn ideal_pd_is_the_clamped_sum_at_the_start_of_the_step() {
     let (kp, kd, limit) = (30.0, 1.5, 4.0);
     for integrator in [Integrator::Euler, Integrator::Implicit, Integrator::Rk4] {
         for model in [DriveModel::Implicit, DriveModel::Actuator] {
-            if model == DriveModel::Implicit && integrator != Integrator::Euler {
-                continue;
-            }
             let drive = DriveCfg { model, ..with(IdealPd {}, kp, kd) };
             let cfg = SimulationManagerCfg { integrator, ..weightless() };
             let mut world = world(&[Joint::wheel("j", M).effort(limit)], drive, cfg);

@@ -137,6 +137,16 @@ fn row_drives_refuse_integrators_that_change_the_solution() {
         with(integrator, native(10.0, 1.0)).unwrap();
         with(integrator, DriveCfg { drive_type: DriveType::None, ..Default::default() }).unwrap();
     }
+    // A robot has rows only for joints without a model of their own (`actuators.rs` has the laws).
+    for integrator in [Integrator::Rk4, Integrator::Implicit] {
+        let of = |pattern: &str| {
+            let drive = DriveCfg { actuators: vec![(pattern.into(), IdealPd {}.into())], ..gains(10.0, 1.0) };
+            let joints = [Joint::wheel("a", 0.1), Joint::wheel("b", 0.1)];
+            try_world(&joints, drive, SimulationManagerCfg { integrator, ..weightless() })
+        };
+        of("[ab]").unwrap();
+        assert!(matches!(*of("a").unwrap_err(), Error::Integrator { .. }), "joint b is a row");
+    }
     let fast = with(Integrator::ImplicitFast, gains(10.0, 1.0));
     match mj::TARGET {
         mj::Target::V2 => assert!(matches!(*fast.unwrap_err(), Error::IntegratorUnknown { .. })),

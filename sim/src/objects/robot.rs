@@ -102,7 +102,6 @@ impl RobotData {
         first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
-        check_integrator(&cfg, manager.integrator)?;
         check_pose("init_pose", &cfg.init_pose)?;
         if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
             let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
@@ -130,6 +129,7 @@ impl RobotData {
         let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
+        check_integrator(&cfg, &plans, manager.integrator)?;
         found.append(&mut planned);
         let explicit = explicitly_driven(&plans, cfg.drive.model);
         if explicit.iter().any(|plan| plan.actuator.is_some()) {
@@ -237,14 +237,15 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
 }
 
 /// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
-fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
+fn check_integrator(cfg: &RobotCfg, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
         Integrator::Rk4 | Integrator::Implicit => false,
     };
-    let driven = cfg.drive.drive_type != crate::drive::DriveType::None;
-    if cfg.drive.model == DriveModel::Implicit && driven && !allowed {
+    // Joints that are passive, follow others or have an explicit model have no row.
+    let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
+    if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
         let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
         return Err(Error::Integrator { robot: cfg.uid.clone(), integrator: integrator.name(), also });
     }
