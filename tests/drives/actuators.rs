@@ -446,5 +446,7 @@ fn delays_that_cannot_be_are_refused_and_nothing_is_set() {
     refused(array![[1, 1]], None, None, "joint \"b\"");
     refused(array![[1]], None, None, "[1, 1]");
     refused(array![[1]], Some(&[JointIndex(7)]), None, "joint 7");
+    refused(array![[1, 3]], Some(&[JointIndex(0); 2]), None, "set_delay names joint \"a\" twice");
+    refused(array![[1], [3]], Some(&first), Some(&[EnvId(1); 2]), "set_delay names environment 1 twice");
     refused(array![[1]], Some(&first), Some(&[EnvId(2)]), "environment 2");
 }

@@ -12,7 +12,7 @@ use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
-use crate::objects::rows::{Numbers, Rows, Table};
+use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::urdf::{UrdfCfg, assemble};
@@ -681,21 +681,27 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<JointRows<'v>> {
-        let joints = self.joint_columns(joint_ids)?;
+        let joints = self.joint_columns(argument, joint_ids)?;
         let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
         let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
-        let rows = Rows::check_numbers(table, numbers, values, env_ids, self.simulation.batch.num_envs())?;
+        let num_envs = self.simulation.batch.num_envs();
+        distinct_envs(argument, env_ids, num_envs)?;
+        let rows = Rows::check_numbers(table, numbers, values, env_ids, num_envs)?;
         Ok(JointRows { joints, rows })
     }
 
-    /// The joints that are meant, in the order given; all of them where `None`.
-    pub(super) fn joint_columns(&self, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
+    /// The joints that are meant, each once, in the order given; all of them where `None`.
+    pub(super) fn joint_columns(&self, argument: &'static str, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
         let count = self.data.plans.len();
         let exists =
             |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) };
         match joint_ids {
             None => Ok((0..count).collect()),
-            Some(ids) => ids.iter().map(|&JointIndex(index)| exists(index)).collect(),
+            Some(ids) => {
+                let joints = ids.iter().map(|&JointIndex(index)| exists(index)).collect::<Result<Vec<_>>>()?;
+                check_named_once(argument, &joints, &|joint| format!("joint {:?}", self.data.joint_names[joint]))?;
+                Ok(joints)
+            }
         }
     }
 }
