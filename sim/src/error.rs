@@ -250,6 +250,18 @@ pub enum Error {
         /// The second one.
         second: usize,
     },
+    /// A list names one thing twice.
+    #[error("{argument} names {of} twice (places {first} and {second} of its list); name it once")]
+    Repeated {
+        /// The argument.
+        argument: &'static str,
+        /// What is named twice: `joint "a"`, `environment 3`.
+        of: String,
+        /// Its first place in the list.
+        first: usize,
+        /// The second one.
+        second: usize,
+    },
     /// An array has the wrong shape.
     #[error("{argument} has shape {found:?}; expected {expected:?} ({meaning}), or one row for all environments")]
     Shape {

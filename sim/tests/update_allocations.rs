@@ -83,7 +83,7 @@ fn actuator_models_allocate_nothing() {
     let files = tempfile::tempdir().unwrap();
     let path = files.path().join("robot.urdf");
     let (mut urdf, mut actuators) = (String::from("<robot name=\"r\"><link name=\"base\"/>"), Vec::new());
-    for (i, model) in sim::ActuatorModel::all().into_iter().enumerate() {
+    for (i, model) in sim::ActuatorModel::examples().into_iter().enumerate() {
         urdf += &format!(
             "<link name=\"l{i}\"><inertial><mass value=\"1\"/><inertia ixx=\".1\" ixy=\"0\" ixz=\"0\" iyy=\".1\" iyz=\"0\" \
              izz=\".1\"/></inertial></link><joint name=\"j{i}\" type=\"continuous\"><parent link=\"base\"/>\
@@ -100,6 +100,7 @@ fn actuator_models_allocate_nothing() {
         actuators,
         stiffness: 10.0.into(),
         damping: 1.0.into(),
+        max_effort: Some(50.0.into()),
         max_velocity: Some(5.0.into()),
         ..Default::default()
     };

@@ -29,9 +29,6 @@ fn ideal_pd_is_the_clamped_sum_at_the_start_of_the_step() {
     let (kp, kd, limit) = (30.0, 1.5, 4.0);
     for integrator in [Integrator::Euler, Integrator::Implicit, Integrator::Rk4] {
         for model in [DriveModel::Implicit, DriveModel::Actuator] {
-            if model == DriveModel::Implicit && integrator != Integrator::Euler {
-                continue;
-            }
             let drive = DriveCfg { model, ..with(IdealPd {}, kp, kd) };
             let cfg = SimulationManagerCfg { integrator, ..weightless() };
             let mut world = world(&[Joint::wheel("j", M).effort(limit)], drive, cfg);
@@ -112,7 +109,8 @@ fn a_dc_motor_gives_less_the_faster_it_turns() {
 #[test]
 fn speeds_without_load_differ_between_environments() {
     let cfg = SimulationManagerCfg { num_envs: 2, ..weightless() };
-    let mut world = world(&[Joint::wheel("j", M)], with(DcMotor { saturation_effort: 6.0 }, 0.0, 0.0), cfg);
+    let wheel = Joint::wheel("j", M).effort(100.0);
+    let mut world = world(&[wheel], with(DcMotor { saturation_effort: 6.0 }, 0.0, 0.0), cfg);
     let mut robot = world.sim.robot_mut(world.robot);
     robot.set_qvel_limits(&array![[3.0]], None, Some(&[EnvId(1)])).unwrap();
     robot.write_qvel(&array![[1.5]], None, None).unwrap();
@@ -127,6 +125,47 @@ fn speeds_without_load_differ_between_environments() {
         assert!(matches!(error, Error::OutOfRange { argument: "set_qvel_limits", .. }), "{error}");
         assert!(error.to_string().contains("dc_motor"), "{error}");
         assert_eq!(world.view().qvel_limits(), before);
+    }
+    // A motor without a continuous limit would brake without end.
+    let before = world.view().qf_limits();
+    let error = world.sim.robot_mut(world.robot).set_qf_limits(&array![[f64::INFINITY]], None, None).unwrap_err();
+    assert!(matches!(error, Error::OutOfRange { argument: "set_qf_limits", row: 0, column: 0, .. }), "{error}");
+    assert!(error.to_string().contains("dc_motor") && error.to_string().contains("joint \"j\""), "{error}");
+    assert_eq!(world.view().qf_limits(), before);
+    world.sim.robot_mut(world.robot).set_qf_limits(&array![[2.0]], None, None).unwrap();
+    world.sim.robot_mut(world.robot).write_qvel(&array![[1.5]], None, None).unwrap();
+    world.step(1);
+    assert_eq!(world.view().get_qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
+}
+
+/// With full throttle from rest tau = s (1 - v / v_max) in every step: with r = 1 - h s / (M v_max),
+/// v_n = v_max (1 - r^n) and q_n = h (v_1 + ... + v_n) = h v_max (n - r (1 - r^n) / (1 - r)). That settles while |r| < 1;
+/// beyond, the motor overshoots until its limit holds it, and `add_robot` has warned.
+#[test]
+fn a_dc_motor_runs_up_its_line_and_warns_where_that_is_not_stable() {
+    let stall = 6.0;
+    for (slope, stable) in [(0.8, true), (10.0, true), (39.0, true), (41.0, false)] {
+        let top = stall / slope;
+        let drive = with(DcMotor { saturation_effort: stall }, 0.0, 0.0);
+        let drive = DriveCfg { max_velocity: Some(top.into()), ..drive };
+        let mut world = world(&[Joint::wheel("j", M).effort(1.5 * stall)], drive, weightless());
+        let warned = world.sim.warning_counts().keys().any(|name| name.contains("unstable"));
+        assert_eq!(warned, !stable, "slope {slope}");
+        world.sim.robot_mut(world.robot).set_qf(&array![[1e4]], None, None).unwrap();
+        let r = 1.0 - H * slope / M;
+        for n in 1..=200 {
+            world.step(1);
+            let power = r.powi(n);
+            if stable {
+                let q = H * top * (f64::from(n) - r * (1.0 - power) / (1.0 - r));
+                assert_close(world.v()[0], top * (1.0 - power), EXACT, &format!("velocity, slope {slope}, step {n}"));
+                assert_close(world.q()[0], q, EXACT, &format!("position, slope {slope}, step {n}"));
+            }
+        }
+        let off = (world.v()[0] / top - 1.0).abs();
+        // 0.96^200 is 3e-4, 0.95^200 3e-5; the oscillation ends at the limit, 1.5 of v_max away.
+        assert_eq!(off < 1e-3, stable, "slope {slope}: {off}");
+        assert!(stable || off > 1.0, "slope {slope}: {off}");
     }
 }
 
@@ -183,6 +222,66 @@ fn delayed_targets_arrive_in_their_order_in_each_environment() {
     }
 }
 
+/// Step n hears the targets of step n - d(n): the last ones again where the delay grows, some never where it falls.
+#[test]
+fn delays_that_change_in_motion_repeat_or_skip_targets() {
+    let (kp, kd) = (25.0, 1.0);
+    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay: 2, max_delay: 7 }, kp, kd), weightless());
+    // First step and delay from there on; the first one is longer than anything has been set for.
+    let changes = [(1, 7), (20, 2), (50, 5), (100, 1), (110, 0), (120, 7), (150, 0)];
+    let (mut delay, mut x, mut u) = (2, 0.0_f64, 0.0_f64);
+    let mut heard = Vec::new();
+    for n in 0..180 {
+        if let Some((_, changed)) = changes.iter().find(|(at, _)| *at == n) {
+            delay = *changed;
+            world.sim.robot_mut(world.robot).set_delay(&array![[delay as u32]], None, None).unwrap();
+        }
+        set_targets(&mut world, wobble(n));
+        world.step(1);
+        heard.push(n - delay);
+        let [aim, v_aim, ff] = if n < delay { [0.0; 3] } else { wobble(n - delay) };
+        u += H / M * (kp * (aim - x) + kd * (v_aim - u) + ff);
+        x += H * u;
+        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
+        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+    }
+    // What the documents say of it: from 2 to 5 steps three targets act again, from 5 to 1 four never do.
+    assert_eq!(heard[48..55], [46, 47, 45, 46, 47, 48, 49]);
+    assert_eq!(heard[98..102], [93, 94, 99, 100]);
+}
+
+/// A target that was set in a wide range and acts in a tight one acts at the end of the tight one, and one that waits until
+/// the range is wide again as it was set.
+#[test]
+fn targets_that_are_under_way_stay_inside_of_limits_that_are_set_later() {
+    let (kp, kd, delay) = (25.0, 1.0, 5);
+    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay, max_delay: 0 }, kp, kd), weightless());
+    let (wide, tight) = ([f64::NEG_INFINITY, f64::INFINITY], [-0.1, 0.15]);
+    let clamp = |[low, high]: [f64; 2], x: f64| x.max(low).min(high);
+    let (mut set, mut x, mut u) = (Vec::new(), 0.0_f64, 0.0_f64);
+    let (mut cut, mut spared) = (0, 0);
+    for n in 0..200 {
+        let range = if n % 40 >= 20 && n % 40 < 23 { tight } else { wide };
+        if [0, 20, 23].contains(&(n % 40)) {
+            world.sim.robot_mut(world.robot).set_qpos_limits(&array![[[range[0], range[1]]]], None, None).unwrap();
+        }
+        set_targets(&mut world, wobble(n));
+        world.step(1);
+        let [q, v, tau] = wobble(n);
+        set.push([clamp(range, q), v, tau]);
+        let heard = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
+        let aim = clamp(range, heard[0]);
+        cut += u32::from(aim != heard[0]);
+        // Set before the range was tight, it acts after.
+        spared += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
+        u += H / M * (kp * (aim - x) + kd * (heard[1] - u) + heard[2]);
+        x += H * u;
+        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
+        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+    }
+    assert!(cut > 3 && spared > 3, "the control: {cut} were clamped when they acted, {spared} were not");
+}
+
 /// A step that is done again, because its buffers were too small, is one step of the delay line.
 #[test]
 fn a_step_that_is_done_again_delays_nothing_twice() {
@@ -226,13 +325,13 @@ fn a_step_that_is_done_again_delays_nothing_twice() {
 fn every_model_answers_a_step_with_the_solution_of_second_order() {
     let (m, w, z, aim) = (0.1_f64, 10.0_f64, 0.5_f64, 0.05);
     let (kp, kd, d) = (m * w * w, 2.0 * m * z * w, w * (1.0 - z * z).sqrt());
-    let mut models = ActuatorModel::all();
+    let mut models = ActuatorModel::examples();
     models.push(DelayedPd { delay: 7, max_delay: 0 }.into());
     for model in models {
         let delay = if let ActuatorModel::DelayedPd(model) = model { model.delay } else { 0 };
         let error = |h: f64| {
             let drive = DriveCfg { max_velocity: Some(1e6.into()), ..with(model, kp, kd) };
-            let mut world = world(&[Joint::wheel("j", m)], drive, at_dt(h, weightless()));
+            let mut world = world(&[Joint::wheel("j", m).effort(100.0)], drive, at_dt(h, weightless()));
             world.aim(&[aim]);
             let mut worst = 0.0_f64;
             for n in 1..=(1.0 / h).round() as u32 {
@@ -301,6 +400,10 @@ fn models_that_do_not_go_with_their_joints_are_refused() {
     };
     let cases: Vec<(DriveCfg, &[&str])> = vec![
         (plain(), &["dc_motor of joint \"j\"", "max_velocity is inf", "velocity limit"]),
+        (
+            with(DcMotor { saturation_effort: 5.0 }, 1.0, 0.1),
+            &["dc_motor of joint \"j\"", "max_effort is inf", "effort limit"],
+        ),
         (with(DcMotor { saturation_effort: 0.0 }, 1.0, 0.1), &["saturation_effort is 0", "above 0"]),
         (with(DcMotor { saturation_effort: f64::NAN }, 1.0, 0.1), &["saturation_effort is NaN"]),
         (with(DelayedPd { delay: 10_001, max_delay: 0 }, 1.0, 0.1), &["delayed_pd", "10001", "10000"]),
@@ -343,5 +446,7 @@ fn delays_that_cannot_be_are_refused_and_nothing_is_set() {
     refused(array![[1, 1]], None, None, "joint \"b\"");
     refused(array![[1]], None, None, "[1, 1]");
     refused(array![[1]], Some(&[JointIndex(7)]), None, "joint 7");
+    refused(array![[1, 3]], Some(&[JointIndex(0); 2]), None, "set_delay names joint \"a\" twice");
+    refused(array![[1], [3]], Some(&first), Some(&[EnvId(1); 2]), "set_delay names environment 1 twice");
     refused(array![[1]], Some(&first), Some(&[EnvId(2)]), "environment 2");
 }

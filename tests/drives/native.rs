@@ -137,6 +137,16 @@ fn row_drives_refuse_integrators_that_change_the_solution() {
         with(integrator, native(10.0, 1.0)).unwrap();
         with(integrator, DriveCfg { drive_type: DriveType::None, ..Default::default() }).unwrap();
     }
+    // A robot has rows only for joints without a model of their own (`actuators.rs` has the laws).
+    for integrator in [Integrator::Rk4, Integrator::Implicit] {
+        let of = |pattern: &str| {
+            let drive = DriveCfg { actuators: vec![(pattern.into(), IdealPd {}.into())], ..gains(10.0, 1.0) };
+            let joints = [Joint::wheel("a", 0.1), Joint::wheel("b", 0.1)];
+            try_world(&joints, drive, SimulationManagerCfg { integrator, ..weightless() })
+        };
+        of("[ab]").unwrap();
+        assert!(matches!(*of("a").unwrap_err(), Error::Integrator { .. }), "joint b is a row");
+    }
     let fast = with(Integrator::ImplicitFast, gains(10.0, 1.0));
     match mj::TARGET {
         mj::Target::V2 => assert!(matches!(*fast.unwrap_err(), Error::IntegratorUnknown { .. })),
@@ -148,6 +158,29 @@ fn row_drives_refuse_integrators_that_change_the_solution() {
             assert_close(world.v()[0], H * 10.0 * 0.5 / (0.1 + H * 1.0 + H * H * 10.0), EXACT, "velocity");
         }
     }
+}
+
+/// The solver's acceleration, which `get_qacc` tells, is that of the force, a = -B v / M. MuJoCo's Euler takes the damping at
+/// the end of the step, v' = v + h M a / (M + h B). Row drives do that inside the solver: there they are the same.
+#[test]
+fn accelerations_are_the_solvers() {
+    let (m, b, speed) = (0.2, 0.5, 2.0);
+    let after_a_step = |drive, integrator| {
+        let joint = Joint { damping: b, ..Joint::wheel("j", m) };
+        let mut world = world(&[joint], drive, SimulationManagerCfg { integrator, ..weightless() });
+        world.sim.robot_mut(world.robot).write_qvel(&row(&[speed]), None, None).unwrap();
+        world.step(1);
+        (world.view().get_qacc()[(0, 0)], (world.v()[0] - speed) / H)
+    };
+    let felt = -b * speed / (m + H * b);
+    let (a, change) = after_a_step(native(0.0, 0.0), Integrator::Euler);
+    assert_close(a, -b * speed / m, EXACT, "the solver's");
+    assert_close(change, felt, EXACT, "the change of the velocity");
+    let (a, change) = after_a_step(gains(0.0, 0.0), Integrator::Euler);
+    assert_close(a, felt, EXACT, "of a row drive");
+    assert_close(change, felt, EXACT, "of a row drive");
+    let (a, change) = after_a_step(native(0.0, 0.0), Integrator::Rk4);
+    assert!((a - change).abs() > 0.01, "RK4: {a} {change}");
 }
 
 /// Energy of a pendulum after 2 s at dt 0.01, free and with a spring drive; decay of a damped wheel.

@@ -274,6 +274,60 @@ fn mistakes_are_errors_and_nothing_is_set() {
     }
 }
 
+/// Twice the same joint or environment: which value should hold?
+#[test]
+fn what_is_named_twice_is_an_error_and_nothing_is_set() {
+    const JOINTS: Option<&[JointIndex]> = Some(&[JointIndex(1), JointIndex(0), JointIndex(1)]);
+    const ENV_IDS: Option<&[EnvId]> = Some(&[EnvId(2), EnvId(2)]);
+    let calls: [(&str, Call, Call); 6] = [
+        (
+            "set_stiffness",
+            |r| r.set_stiffness(&array![[1.0, 2.0, 3.0]], JOINTS, None),
+            |r| r.set_stiffness(&array![[1.0, 2.0]], None, ENV_IDS),
+        ),
+        (
+            "set_damping",
+            |r| r.set_damping(&array![[1.0, 2.0, 3.0]], JOINTS, None),
+            |r| r.set_damping(&array![[1.0, 2.0], [3.0, 4.0]], None, ENV_IDS),
+        ),
+        (
+            "set_drive_type",
+            |r| r.set_drive_type(DriveType::None, JOINTS, None),
+            |r| r.set_drive_type(DriveType::None, None, ENV_IDS),
+        ),
+        (
+            "set_qf_limits",
+            |r| r.set_qf_limits(&array![[1.0, 2.0, 3.0]], JOINTS, None),
+            |r| r.set_qf_limits(&array![[1.0, 2.0]], None, ENV_IDS),
+        ),
+        (
+            "set_qvel_limits",
+            |r| r.set_qvel_limits(&array![[1.0, 2.0, 3.0]], JOINTS, None),
+            |r| r.set_qvel_limits(&array![[1.0, 2.0]], None, ENV_IDS),
+        ),
+        (
+            "set_qpos_limits",
+            |r| r.set_qpos_limits(&Array3::zeros((1, 3, 2)), JOINTS, None),
+            |r| r.set_qpos_limits(&Array3::zeros((1, 2, 2)), None, ENV_IDS),
+        ),
+    ];
+    let mut world = wheels(gains(100.0, 10.0));
+    let before = told(&world);
+    for (name, joints, envs) in calls {
+        let error = joints(&mut world.sim.robot_mut(world.robot)).unwrap_err();
+        assert!(matches!(error, Error::Repeated { first: 0, second: 2, .. }), "{error}");
+        assert!(error.to_string().contains(&format!("{name} names joint \"b\" twice")), "{error}");
+        let error = envs(&mut world.sim.robot_mut(world.robot)).unwrap_err();
+        assert!(matches!(error, Error::Repeated { first: 0, second: 1, .. }), "{error}");
+        assert!(error.to_string().contains(&format!("{name} names environment 2 twice")), "{error}");
+        assert_eq!(told(&world), before, "{error}");
+    }
+    // Each once is right, in any order.
+    let (joints, envs) = ([JointIndex(1), JointIndex(0)], [EnvId(2), EnvId(0)]);
+    world.sim.robot_mut(world.robot).set_stiffness(&array![[1.0, 2.0]], Some(&joints), Some(&envs)).unwrap();
+    assert_eq!(world.view().get_stiffness(), array![[2.0, 1.0], [100.0, 100.0], [2.0, 1.0]]);
+}
+
 /// Joints without a drive cannot be given one, and MuJoCo's own actuators keep their gains: both say what to do.
 #[test]
 fn drives_that_cannot_change_say_why() {

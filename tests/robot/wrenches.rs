@@ -227,6 +227,7 @@ fn mistakes_are_errors_and_nothing_is_set() {
     let three = |envs, links| Array3::<f64>::zeros((envs, links, 3));
     let nan = |k: usize| Array3::from_shape_fn((1, 3, 3), |(_, l, x)| if 3 * l + x == k { f64::NAN } else { 1.0 });
     let (outer, unknown, nowhere) = ([LinkId(0)], [LinkId(3)], [EnvId(ENVS)]);
+    let (twice, again) = ([LinkId(2), LinkId(1), LinkId(2)], [EnvId(1), EnvId(1)]);
     type Case<'a> = (Array3<f64>, Array3<f64>, Option<&'a [LinkId]>, Option<&'a [EnvId]>, &'a [&'a str]);
     let cases: Vec<Case<'_>> = vec![
         (three(1, 2), three(1, 3), None, None, &["(forces)", "[1, 2, 3]", "[3, 3, 3]", "x y z"]),
@@ -237,6 +238,8 @@ fn mistakes_are_errors_and_nothing_is_set() {
         (three(1, 3), nan(8), None, None, &["(torques)[0, 8]", "z of link \"grip\""]),
         (three(1, 1), three(1, 1), Some(&unknown), None, &["link 3 does not exist", "there are 3"]),
         (three(1, 1), three(1, 1), Some(&outer), Some(&nowhere), &["environment 3 does not exist"]),
+        (three(1, 3), three(1, 3), Some(&twice), None, &["set_external_wrench names link \"grip\" twice", "0 and 2"]),
+        (three(2, 3), three(1, 3), None, Some(&again), &["set_external_wrench names environment 1 twice"]),
     ];
     for (forces, torques, links, envs, expected) in cases {
         let mut robot = sim.robot_mut(id);
@@ -247,7 +250,12 @@ fn mistakes_are_errors_and_nothing_is_set() {
         }
         assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
     }
-    for (links, envs, part) in [(Some(&unknown[..]), None, "link 3"), (None, Some(&nowhere[..]), "environment 3")] {
+    for (links, envs, part) in [
+        (Some(&unknown[..]), None, "link 3"),
+        (None, Some(&nowhere[..]), "environment 3"),
+        (Some(&twice[..]), None, "set_gravity_compensation names link \"grip\" twice"),
+        (None, Some(&again[..]), "set_gravity_compensation names environment 1 twice"),
+    ] {
         let message = sim.robot_mut(id).set_gravity_compensation(true, links, envs).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
         assert_eq!(sim.robot(id).get_gravity_compensation(), Array2::from_elem((ENVS, 3), false));

@@ -40,6 +40,12 @@ fn a_mistake_is_named_with_its_line() {
         ("entities = []", 1, &["`entities`", "array", "table"]),
         ("[entities]\ncube = 1", 2, &["`cube`", "integer", "table"]),
         ("[entities.r]\ntype = \"robot\"\ndrive.stiffness = \"high\"", 3, &["high", "a number for all joints"]),
+        // A motor has no number that would do for others.
+        (
+            "[entities.r]\ntype = \"robot\"\nurdf = \"a.urdf\"\ndrive.actuators.\".*\".dc_motor = {}",
+            4,
+            &["missing field `saturation_effort`"],
+        ),
         ("[entities.r]\ntype = \"robot\"\nurdf = 3", 3, &["3", "URDF"]),
         ("[entities.r]\ntype = \"robot\"\nurdf.components = [{ name = \"arm\" }]", 3, &["urdf"]),
         ("[entities.o]\ntype = \"rigid_object\"\ninit_pose = [0, 0, 0, 0, 0, 0, 0]", 3, &["no rotation"]),

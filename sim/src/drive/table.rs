@@ -378,7 +378,8 @@ impl DriveState {
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
                 Realization::Explicit { model } => {
                     let DriveActuator { model, memory, .. } = &table.models[model];
-                    let now = JointMotion { position: data.qpos()[drive.qpos], velocity: data.qvel()[drive.dof] };
+                    let (position, velocity) = (data.qpos()[drive.qpos], data.qvel()[drive.dof]);
+                    let now = JointMotion { position, velocity, range: self.ranges[i] };
                     let effort = model.law().effort(&now, &target, &self.gains[i], &self.memory[memory.clone()]);
                     data.ctrl_mut()[drive.ctrl] = effort;
                 }

@@ -151,11 +151,14 @@ impl Robot<'_> {
     /// qz]` \[m\], one for each of `env_ids` (all environments where `None`), or one for all of them. Quaternions are
     /// normalised.
     ///
-    /// The joints of the control part that `tip` names, or all of the robot, are found within their limits
-    /// ([`qpos_limits`](Self::qpos_limits)); others stay where they are in the environment. The search starts from
-    /// `initial` \[rad or m\], with rows and columns as in [`compute_fk`](Self::compute_fk), or from where the joints
-    /// are. How: [`IkSolver`], on the calling thread. Contacts are not considered, and the state does not change: give
-    /// what comes out to [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success)
+    /// The joints of the control part that `tip` names, or all of the robot, are found within the limits that the robot was
+    /// added with (joints' own, narrowed by their followers'). Tighter ones of
+    /// [`set_qpos_limits`](crate::objects::robot::RobotMut::set_qpos_limits) are not looked at: a success may be outside of
+    /// [`qpos_limits`](Self::qpos_limits), and `set_qpos` would clamp it. Other joints stay where they are in the
+    /// environment. The search starts from `initial` \[rad or m\], with rows and columns as in
+    /// [`compute_fk`](Self::compute_fk), or from where the joints are. How: [`IkSolver`], on the calling thread. Contacts
+    /// are not considered, and the state does not change: give what comes out to
+    /// [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success)
     /// says that it is right.
     ///
     /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the

@@ -4,14 +4,15 @@ use crate::compile::{JointIndexing, RobotIndex, Simulation};
 use crate::description::{Inertial, JointKind, LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
-use crate::drive::{DriveCfg, DriveModel};
+use crate::drive::table::Gains;
+use crate::drive::{ActuatorSpec, DriveCfg, DriveModel};
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManagerCfg};
 use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
-use crate::objects::rows::{Numbers, Rows, Table};
+use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::urdf::{UrdfCfg, assemble};
@@ -101,7 +102,6 @@ impl RobotData {
         first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
-        check_integrator(&cfg, manager.integrator)?;
         check_pose("init_pose", &cfg.init_pose)?;
         if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
             let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
@@ -129,6 +129,7 @@ impl RobotData {
         let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
+        check_integrator(&cfg, &plans, manager.integrator)?;
         found.append(&mut planned);
         let explicit = explicitly_driven(&plans, cfg.drive.model);
         if explicit.iter().any(|plan| plan.actuator.is_some()) {
@@ -175,10 +176,21 @@ impl RobotData {
     }
 }
 
-/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others.
+/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others; the damping is the
+/// largest that the model of the joint can show.
 fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
-    let explicit = |plan: &JointPlan| model == DriveModel::Actuator || plan.model.is_some();
-    plans.iter().map(|plan| JointPlan { actuator: plan.actuator.filter(|_| explicit(plan)), ..plan.clone() }).collect()
+    let explicit = |plan: &JointPlan| {
+        let spec = plan.actuator?;
+        match plan.model {
+            Some(law) => {
+                let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+                let kd = law.law().damping(&Gains { kp: spec.kp, kd: spec.kd, max_effort, max_velocity });
+                Some(ActuatorSpec { kd, ..spec })
+            }
+            None => Some(spec).filter(|_| model == DriveModel::Actuator),
+        }
+    };
+    plans.iter().map(|plan| JointPlan { actuator: explicit(plan), ..plan.clone() }).collect()
 }
 
 /// Adds what links carry.
@@ -225,14 +237,15 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
 }
 
 /// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
-fn check_integrator(cfg: &RobotCfg, integrator: Integrator) -> Result<()> {
+fn check_integrator(cfg: &RobotCfg, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
         Integrator::Rk4 | Integrator::Implicit => false,
     };
-    let driven = cfg.drive.drive_type != crate::drive::DriveType::None;
-    if cfg.drive.model == DriveModel::Implicit && driven && !allowed {
+    // Joints that are passive, follow others or have an explicit model have no row.
+    let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
+    if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
         let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
         return Err(Error::Integrator { robot: cfg.uid.clone(), integrator: integrator.name(), also });
     }
@@ -668,21 +681,27 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<JointRows<'v>> {
-        let joints = self.joint_columns(joint_ids)?;
+        let joints = self.joint_columns(argument, joint_ids)?;
         let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
         let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
-        let rows = Rows::check_numbers(table, numbers, values, env_ids, self.simulation.batch.num_envs())?;
+        let num_envs = self.simulation.batch.num_envs();
+        distinct_envs(argument, env_ids, num_envs)?;
+        let rows = Rows::check_numbers(table, numbers, values, env_ids, num_envs)?;
         Ok(JointRows { joints, rows })
     }
 
-    /// The joints that are meant, in the order given; all of them where `None`.
-    pub(super) fn joint_columns(&self, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
+    /// The joints that are meant, each once, in the order given; all of them where `None`.
+    pub(super) fn joint_columns(&self, argument: &'static str, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
         let count = self.data.plans.len();
         let exists =
             |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "joint", index, count }) };
         match joint_ids {
             None => Ok((0..count).collect()),
-            Some(ids) => ids.iter().map(|&JointIndex(index)| exists(index)).collect(),
+            Some(ids) => {
+                let joints = ids.iter().map(|&JointIndex(index)| exists(index)).collect::<Result<Vec<_>>>()?;
+                check_named_once(argument, &joints, &|joint| format!("joint {:?}", self.data.joint_names[joint]))?;
+                Ok(joints)
+            }
         }
     }
 }

@@ -10,9 +10,9 @@ use crate::drive::table::{DriveActuator, DriveState, Realization, Setting};
 use crate::drive::{ActuatorModel, DelayedPd, DriveType};
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
+use crate::manager::EnvId;
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
-use crate::objects::rows::Numbers;
+use crate::objects::rows::{Numbers, distinct_envs};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
@@ -55,9 +55,13 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; everything else about them stays, and so does
-    /// this through a reset. Rows are for `env_ids` (all where `None`; a single row is for all of them), columns for
+    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; everything else about them stays, and so
+    /// does this through a reset. Rows are for `env_ids` (all where `None`; a single row is for all of them), columns for
     /// `joint_ids` (all where `None`); columns of mimic joints are accepted and ignored.
+    ///
+    /// Rows of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator models
+    /// are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns of it: what is set here is not checked
+    /// against the time step. [`stable_timestep`](crate::drive::actuator::stable_timestep) computes the limit.
     ///
     /// ```
     /// use ndarray::array;
@@ -78,8 +82,9 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is negative or not finite; a joint that was added without a
-    /// drive, or is driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite; a
+    /// joint that was added without a drive, or is driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then
+    /// nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_stiffness<'t>(
         &mut self,
@@ -93,7 +98,8 @@ impl RobotMut<'_> {
     }
 
     /// Sets the damping of drives \[N m s/rad or N s/m for drive type `force`\]; otherwise as
-    /// [`set_stiffness`](Self::set_stiffness). The viscous friction of the joint itself stays.
+    /// [`set_stiffness`](Self::set_stiffness), also in that nothing warns where an explicit model becomes unstable. The
+    /// viscous friction of the joint itself stays.
     ///
     /// # Errors
     /// As [`set_stiffness`](Self::set_stiffness).
@@ -111,11 +117,12 @@ impl RobotMut<'_> {
 
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
     /// `env_ids` (all where `None`). Their numbers stay, and so does everything else. With `None` a drive gives nothing but
-    /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the inertia
-    /// that the joint feels at the robot's initial positions.
+    /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the
+    /// inertia that the joint feels at the robot's initial positions. Nothing warns where that makes an explicit model
+    /// unstable: see [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
-    /// Unknown joint or environment; a joint that was added without a drive, or is driven by
+    /// Unknown joint or environment, or one that is named twice; a joint that was added without a drive, or is driven by
     /// [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     pub fn set_drive_type(
         &mut self,
@@ -123,8 +130,9 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let drives = self.drives_of("set_drive_type", &self.joint_columns(joint_ids)?)?;
-        let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
+        let argument = "set_drive_type";
+        let drives = self.drives_of(argument, &self.joint_columns(argument, joint_ids)?)?;
+        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let inertias = if drive_type == DriveType::Acceleration { Some(self.inertias_at_start()?) } else { None };
         for env in envs {
             self.simulation.batch.write(env, |env| {
@@ -139,12 +147,14 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset, and what is under way
-    /// stays in its order. Rows and columns as in [`set_stiffness`](Self::set_stiffness).
+    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset. Step n hears the
+    /// targets of step n - delay, whatever the delay was before: where it grows by k, the last k targets that have acted
+    /// act once more, in their order; where it falls by k, the next k never act. Rows and columns as in
+    /// [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment; a joint of another model, or a delay above the model's `max_delay`. Then
-    /// nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a joint of another model, or a delay above
+    /// the model's `max_delay`. Then nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_delay<'t>(
         &mut self,
@@ -212,7 +222,7 @@ impl RobotMut<'_> {
     }
 
     /// `(column, joint, drive)` of the `joints` but the mimic ones, each with gains that may change.
-    fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+    pub(super) fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
         let native = |drive: usize| {
             self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
         };

@@ -2,9 +2,9 @@
 
 use crate::drive::table::Gains;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
-use crate::objects::rows::{Numbers, Rows, Table};
+use crate::manager::EnvId;
+use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
+use crate::objects::rows::{Numbers, Rows, Table, distinct_envs};
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ impl Robot<'_> {
         })
     }
 
-    /// Speed limits \[rad/s or m/s\], infinite where there are none, shape (N, dof): the files', unless the configuration or
-    /// [`set_qvel_limits`](RobotMut::set_qvel_limits) says otherwise. Reported; see there.
+    /// Speed limits \[rad/s or m/s\], infinite where there are none, shape (N, dof): the files', unless the configuration
+    /// or [`set_qvel_limits`](RobotMut::set_qvel_limits) says otherwise. Reported; see there.
     pub fn qvel_limits(&self) -> Array2<f64> {
         let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
@@ -65,18 +65,18 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the positions that targets may have \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (all where
-    /// `None`; a single row is for all of them), joints as `joint_ids` (all where `None`). Present targets are clamped to
-    /// them at once. They may be tighter than the robot's own and be widened again, up to those. Mimic joints are accepted
-    /// and ignored.
+    /// Sets the positions that targets may have \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (all
+    /// where `None`; a single row is for all of them), joints as `joint_ids` (all where `None`). Present targets are
+    /// clamped to them at once, and so is what [`DelayedPd`](crate::DelayedPd) has under way, when it acts. They may be
+    /// tighter than the robot's own and be widened again, up to those. Mimic joints are accepted and ignored.
     ///
     /// These are limits of what is asked for. The stops that a joint hits are in MuJoCo's model and stay where they are: a
     /// load may push a joint beyond a tighter limit. [`compute_ik`](Robot::compute_ik) searches within the limits that the
     /// robot was added with.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, NaN, a lower end above the upper one, an end beyond the robot's own
-    /// limits; a joint without a drive. Then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, NaN, a lower end above the upper one, an end
+    /// beyond the robot's own limits; a joint without a drive. Then nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qpos_limits<'t>(
         &mut self,
@@ -86,9 +86,9 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let argument = "set_qpos_limits";
         let limits: ArrayView3<'_, f64> = limits.into();
-        let joints = self.joint_columns(joint_ids)?;
+        let joints = self.joint_columns(argument, joint_ids)?;
         let num_envs = self.simulation.batch.num_envs();
-        let envs = env_list(env_ids, num_envs)?.len();
+        let envs = distinct_envs(argument, env_ids, num_envs)?.len();
         let (rows, columns, ends) = limits.dim();
         let fits = [1, envs].contains(&rows) && columns == joints.len() && ends == 2;
         let Some(flat) = limits.to_shape((rows, columns * ends)).ok().filter(|_| fits) else {
@@ -141,11 +141,12 @@ impl RobotMut<'_> {
     /// [`set_stiffness`](Self::set_stiffness), which also names the errors.
     ///
     /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive law
-    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load.
+    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load;
+    /// nothing warns where that makes its torque-speed line too steep for the time step.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is negative or NaN, or that its actuator model cannot take; a
-    /// joint without a drive. Then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is negative or NaN, or that its
+    /// actuator model cannot take; a joint without a drive. Then nothing is set.
     #[doc(alias = "max_velocity")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qvel_limits<'t>(
@@ -156,26 +157,8 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let write = self.checked_numbers("set_qvel_limits", Numbers::Limit, limits.into(), joint_ids, env_ids)?;
         let drives = self.driven("set_qvel_limits", &write.joints)?;
-        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
-        for (row, (_, values)) in write.rows.iter().enumerate() {
-            for &(column, joint, drive) in &drives {
-                let (value, gains) = (values[column], table.drives[drive].initial);
-                let checked = table
-                    .model_of(drive)
-                    .map_or(Ok(()), |explicit| explicit.model.law().check(&Gains { max_velocity: value, ..gains }));
-                checked.map_err(|expected| {
-                    let (argument, of) = ("set_qvel_limits", format!("joint {:?}", self.data.joint_names()[joint]));
-                    Error::OutOfRange {
-                        argument,
-                        row,
-                        column,
-                        of,
-                        value,
-                        expected: format!("right for its model: {expected}"),
-                    }
-                })?;
-            }
-        }
+        let change = |gains: Gains, max_velocity| Gains { max_velocity, ..gains };
+        self.check_models("set_qvel_limits", &write, &drives, change)?;
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 for &(column, _, drive) in &drives {
@@ -192,7 +175,8 @@ impl RobotMut<'_> {
     /// clamped to them.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is negative or NaN; a joint without a drive, or one that is
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is negative or NaN, or that its
+    /// actuator model cannot take ([`DcMotor`](crate::DcMotor) needs a finite one); a joint without a drive, or one that is
     /// driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     #[doc(alias = "max_effort")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
@@ -203,8 +187,40 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let argument = "set_qf_limits";
-        self.set_drives(argument, Numbers::Limit, limits.into(), joint_ids, env_ids, |drives, drive, max_effort| {
-            drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
-        })
+        let write = self.checked_numbers(argument, Numbers::Limit, limits.into(), joint_ids, env_ids)?;
+        let drives = self.drives_of(argument, &write.joints)?;
+        self.check_models(argument, &write, &drives, |gains, max_effort| Gains { max_effort, ..gains })?;
+        for (env, row) in write.rows.iter() {
+            self.simulation.batch.write(env, |env| {
+                for &(column, _, drive) in &drives {
+                    let max_effort = row[column];
+                    env.drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the explicit models of `drives` can take what `change` makes of their limits.
+    fn check_models(
+        &self,
+        argument: &'static str,
+        write: &JointRows<'_>,
+        drives: &[(usize, usize, usize)],
+        change: impl Fn(Gains, f64) -> Gains,
+    ) -> Result<()> {
+        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        for (row, (_, values)) in write.rows.iter().enumerate() {
+            for &(column, joint, drive) in drives {
+                let Some(explicit) = table.model_of(drive) else { continue };
+                let value = values[column];
+                explicit.model.law().check(&change(table.drives[drive].initial, value)).map_err(|expected| {
+                    let of = format!("joint {:?}", self.data.joint_names()[joint]);
+                    let expected = format!("right for its model: {expected}");
+                    Error::OutOfRange { argument, row, column, of, value, expected }
+                })?;
+            }
+        }
+        Ok(())
     }
 }

@@ -64,8 +64,14 @@ impl Robot<'_> {
 
 /// Joints.
 impl Robot<'_> {
-    /// Accelerations of the joints in the last step \[rad/s² or m/s²\], shape (N, dof); 0 before the first one. A write to
-    /// the state leaves them as they are until the next step.
+    /// Accelerations of the joints that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
+    /// before the first one. A write to the state leaves them as they are until the next step.
+    ///
+    /// With integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the velocity in
+    /// the step, (v' - v) / h. They are not where something acts on the velocity after the solver: the viscous damping of
+    /// joints of a robot of [`DriveModel::Actuator`](crate::DriveModel::Actuator) (v' - v is h M a / (M + h B) for a single
+    /// joint), velocity terms of the integrators implicit and implicitfast; nor with RK4, where they are those of a stage
+    /// inside of the step. Take the difference of [`get_qvel`](Robot::get_qvel) there.
     pub fn get_qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and what an environment keeps when it is done again.
         self.gather(|env, joint| env.data().qacc_warmstart()[joint.dof])

@@ -2,16 +2,16 @@
 
 use crate::description::LinkId;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
+use crate::manager::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
-use crate::objects::rows::{Rows, Table};
+use crate::objects::rows::{Rows, Table, check_named_once, distinct_envs};
 use crate::wrenches::{Wrench, WrenchFrame};
 use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix3};
 
 impl Robot<'_> {
-    /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes with the links where they
-    /// are \[N, N m\], shape (N, links, 6). Gravity compensation is not among them.
+    /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes with the links where
+    /// they are \[N, N m\], shape (N, links, 6). Gravity compensation is not among them.
     pub fn get_external_wrenches(&self) -> Array3<f64> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
@@ -40,9 +40,9 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the environment is
-    /// reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (all where `None`; a single
-    /// row is for all of them), links as `link_ids` (all where `None`). Other links keep what they have.
+    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the environment
+    /// is reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (all where `None`; a
+    /// single row is for all of them), links as `link_ids` (all where `None`). Other links keep what they have.
     ///
     /// A force acts in the centre of mass of the link's body: of the link and of all that is fixed to it. Links that are
     /// fused to one body add up. To push at a point that is `r` away from there, add `r x F` to the torque. With
@@ -68,7 +68,8 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown link or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown link or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_external_wrench<'f, 't>(
         &mut self,
@@ -78,13 +79,15 @@ impl RobotMut<'_> {
         link_ids: Option<&[LinkId]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let links = self.links(link_ids)?;
+        let argument = "set_external_wrench";
+        let links = self.links(argument, link_ids)?;
+        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let forces = self.vectors("set_external_wrench (forces)", forces.into(), &links, env_ids)?;
         let torques = self.vectors("set_external_wrench (torques)", torques.into(), &links, env_ids)?;
         let robot = self.index;
         let bodies = &self.simulation.robots[robot].links;
         let vector = |row: &[f64], k: usize| Vector3::new(row[3 * k], row[3 * k + 1], row[3 * k + 2]);
-        for (i, env) in env_list(env_ids, self.simulation.batch.num_envs())?.into_iter().enumerate() {
+        for (i, env) in envs.into_iter().enumerate() {
             // A single row is for all environments.
             let [force_row, torque_row] = [&forces, &torques].map(|rows| &rows[i.min(rows.len() - 1)]);
             self.simulation.batch.write(env, |env| {
@@ -111,19 +114,20 @@ impl RobotMut<'_> {
     /// objects and for what the robot holds.
     ///
     /// # Errors
-    /// Unknown link or environment; then nothing is changed.
+    /// Unknown link or environment, or one that is named twice; then nothing is changed.
     pub fn set_gravity_compensation(
         &mut self,
         on: bool,
         link_ids: Option<&[LinkId]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let links = self.links(link_ids)?;
+        let argument = "set_gravity_compensation";
+        let links = self.links(argument, link_ids)?;
         let mut bodies: Vec<usize> =
             links.iter().map(|&link| self.simulation.robots[self.index].links[link].0).collect();
         bodies.sort_unstable();
         bodies.dedup();
-        for env in env_list(env_ids, self.simulation.batch.num_envs())? {
+        for env in distinct_envs(argument, env_ids, self.simulation.batch.num_envs())? {
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| wrenches.set_weightless(&bodies, on));
             });
@@ -131,14 +135,19 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// The links that are meant, in the order given; all of them where `None`.
-    fn links(&self, link_ids: Option<&[LinkId]>) -> Result<Vec<usize>> {
-        let count = self.data.description().links.len();
+    /// The links that are meant, each once, in the order given; all of them where `None`.
+    fn links(&self, argument: &'static str, link_ids: Option<&[LinkId]>) -> Result<Vec<usize>> {
+        let known = &self.data.description().links;
+        let count = known.len();
         let exists =
             |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "link", index, count }) };
         match link_ids {
             None => Ok((0..count).collect()),
-            Some(ids) => ids.iter().map(|&LinkId(index)| exists(index)).collect(),
+            Some(ids) => {
+                let links = ids.iter().map(|&LinkId(index)| exists(index)).collect::<Result<Vec<_>>>()?;
+                check_named_once(argument, &links, &|link| format!("link {:?}", known[link].name))?;
+                Ok(links)
+            }
         }
     }
 
@@ -152,7 +161,7 @@ impl RobotMut<'_> {
     ) -> Result<Vec<Vec<f64>>> {
         let meaning = "environments, links, x y z";
         let num_envs = self.simulation.batch.num_envs();
-        let envs = env_list(env_ids, num_envs)?.len();
+        let envs = env_ids.map_or(num_envs, <[EnvId]>::len);
         let (rows, columns, axes) = vectors.dim();
         let fits = [1, envs].contains(&rows) && columns == links.len() && axes == 3;
         let Some(flat) = vectors.to_shape((rows, columns * axes)).ok().filter(|_| fits) else {

@@ -50,15 +50,35 @@ impl Numbers {
     }
 }
 
+/// The two places of the first thing that a list of indices has twice.
+fn first_repeat(chosen: &[usize]) -> Option<(usize, usize)> {
+    let mut places = vec![None; chosen.iter().max().map_or(0, |most| most + 1)];
+    chosen.iter().enumerate().find_map(|(second, &index)| places[index].replace(second).map(|first| (first, second)))
+}
+
 /// Refuses lists that choose something twice: which of its columns would hold is nobody's to guess.
 pub(super) fn check_distinct(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
-    let mut columns = vec![None; chosen.iter().max().map_or(0, |most| most + 1)];
-    for (second, &index) in chosen.iter().enumerate() {
-        if let Some(first) = columns[index].replace(second) {
-            return Err(Error::RepeatedColumn { argument, of: of(second), first, second });
-        }
+    match first_repeat(chosen) {
+        Some((first, second)) => Err(Error::RepeatedColumn { argument, of: of(second), first, second }),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+/// Refuses lists of indices, known to exist, that name something twice; `of` says what an index is of.
+pub(super) fn check_named_once(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
+    match first_repeat(chosen) {
+        Some((first, second)) => Err(Error::Repeated { argument, of: of(chosen[second]), first, second }),
+        None => Ok(()),
+    }
+}
+
+/// The environments that are meant, each once.
+pub(super) fn distinct_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
+    let envs = env_list(env_ids, num_envs)?;
+    if env_ids.is_some() {
+        check_named_once(argument, &envs, &|env| format!("environment {env}"))?;
+    }
+    Ok(envs)
 }
 
 /// A checked table: every number is finite, every environment exists.

@@ -14,18 +14,14 @@ use serde::{Deserialize, Serialize};
 /// with the stall effort s ([`saturation_effort`](Self::saturation_effort)), the continuous limit `max_effort` and the speed
 /// without load `v_max`, which is the drive's `max_velocity` (`DriveCfg::max_velocity`, or the URDF's velocity limit). The
 /// speed in this formula is held within ±`v_max` (1 + `max_effort` / s), where the motor brakes with all of `max_effort`.
+///
+/// On its line the motor is a damper of s / `v_max`, as explicit as the gains are: a joint of inertia M at the speed without
+/// load is stable while h s / `v_max` < 2 M. `add_robot` warns where s / `v_max` or the gains are too large for the time step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct DcMotor {
-    /// Effort at standstill \[N m or N\].
+    /// Effort at standstill \[N m or N\]. There is no motor whose number would do for others: it must be given.
     pub saturation_effort: f64,
-}
-
-impl Default for DcMotor {
-    /// 1 N m, or 1 N.
-    fn default() -> Self {
-        Self { saturation_effort: 1.0 }
-    }
 }
 
 impl DcMotor {
@@ -55,7 +51,18 @@ impl ActuatorLaw for DcMotor {
                 gains.max_velocity
             ));
         }
+        if !gains.max_effort.is_finite() {
+            return Err(format!(
+                "max_effort is {}; a dc_motor needs the effort that it can hold, finite: set drive.max_effort, or the effort \
+                 limit of the joint in the URDF",
+                gains.max_effort
+            ));
+        }
         Ok(())
+    }
+
+    fn damping(&self, gains: &Gains) -> f64 {
+        gains.kd.max(self.saturation_effort / gains.max_velocity)
     }
 
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, _memory: &[f64]) -> f64 {

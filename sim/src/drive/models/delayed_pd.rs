@@ -10,6 +10,13 @@ use serde::{Deserialize, Serialize};
 /// A target that is set before step n acts from step n + `delay` on. Until then, and after a reset, the targets are those at
 /// the start: the initial positions. Steps are MuJoCo's, `physics_dt / substeps` long. The delay may differ between
 /// environments and change while the simulation runs: [`RobotMut::set_delay`](crate::RobotMut::set_delay).
+///
+/// Step n hears the targets of step n - delay, with the delay as it is in step n. Where the delay grows by k
+/// the last k targets that have acted act once more, in their order, and the line goes on from there; where it falls by k the
+/// next k targets never act.
+///
+/// A position target is clamped to the range of targets twice: when it is set, and when it acts, as the range is then
+/// ([`RobotMut::set_qpos_limits`](crate::RobotMut::set_qpos_limits)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DelayedPd {
@@ -38,7 +45,7 @@ impl DelayedPd {
         memory[DELAY] as u32
     }
 
-    /// Changes the delay of a drive with this memory; what is under way stays in its order.
+    /// Changes the delay of a drive with this memory; the targets in it stay as they are.
     pub fn set_delay(memory: &mut [f64], steps: u32) {
         memory[DELAY] = f64::from(steps);
     }
@@ -74,7 +81,9 @@ impl ActuatorLaw for DelayedPd {
             0 => *target,
             delay => {
                 let [position, velocity, feedforward] = ring[(memory[NEXT] as usize + ring.len() - delay) % ring.len()];
-                Target { position, velocity, feedforward }
+                // It was inside of the range when it was set; the range may be tighter by now.
+                let [low, high] = now.range;
+                Target { position: position.max(low).min(high), velocity, feedforward }
             }
         };
         proportional_derivative(now, &heard, gains).clamp(-gains.max_effort, gains.max_effort)

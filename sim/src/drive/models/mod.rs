@@ -2,7 +2,10 @@
 //!
 //! A model sees position, velocity and targets of its joint as they are when the step begins, and its effort acts during the
 //! whole step (with RK4, too). It is therefore what a real controller at the rate of the simulation would do, with the same
-//! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with.
+//! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with. It takes the
+//! law's stiffness together with its steepest [damping](ActuatorLaw::damping), that of a motor's torque-speed line, too.
+//! Only `add_robot` looks: gains, drive types and speed limits that are set while the simulation runs are taken without a
+//! warning, stable or not.
 //!
 //! A model is one file with an [`ActuatorLaw`], and one line in the list below.
 
@@ -24,6 +27,9 @@ pub struct JointMotion {
     pub position: f64,
     /// Velocity \[rad/s or m/s\].
     pub velocity: f64,
+    /// Positions that a target may have now \[rad or m\], lower and upper end. The present target is among them; one that a
+    /// model remembers need not be.
+    pub range: [f64; 2],
 }
 
 /// The law of an actuator model.
@@ -45,6 +51,12 @@ pub trait ActuatorLaw: std::fmt::Debug {
     /// Forgets what was before: `target` is what the drive is asked for at the start.
     fn start(&self, _target: &Target, _memory: &mut [f64]) {}
 
+    /// How steeply the effort falls with the speed where that is steepest \[N m s/rad or N s/m\]: the damping that decides
+    /// whether the law is stable.
+    fn damping(&self, gains: &Gains) -> f64 {
+        gains.kd
+    }
+
     /// The effort in a step \[N m or N\].
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64;
 
@@ -52,9 +64,9 @@ pub trait ActuatorLaw: std::fmt::Debug {
     fn remember(&self, _target: &Target, _memory: &mut [f64]) {}
 }
 
-/// The list of actuator models: `Variant(its configuration and law)`.
+/// The list of actuator models: `Variant(its configuration and law) = one to try`.
 macro_rules! actuator_models {
-    ($($(#[$doc:meta])* $variant:ident($model:ty),)*) => {
+    ($($(#[$doc:meta])* $variant:ident($model:ty) = $example:expr,)*) => {
         /// An explicit actuator model and its numbers.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -63,9 +75,9 @@ macro_rules! actuator_models {
         }
 
         impl ActuatorModel {
-            /// One of each kind, with its default numbers.
-            pub fn all() -> Vec<Self> {
-                vec![$(Self::$variant(<$model>::default()),)*]
+            /// One of each kind, to try what holds for all of them; a motor of 1 N m, or 1 N.
+            pub fn examples() -> Vec<Self> {
+                vec![$(Self::$variant($example),)*]
             }
 
             /// The model's law.
@@ -88,11 +100,11 @@ macro_rules! actuator_models {
 
 actuator_models! {
     /// A controller that gives what its law asks for, up to the effort limit.
-    IdealPd(IdealPd),
+    IdealPd(IdealPd) = IdealPd {},
     /// A motor that gives less the faster it turns.
-    DcMotor(DcMotor),
+    DcMotor(DcMotor) = DcMotor { saturation_effort: 1.0 },
     /// A controller that hears of its targets some steps later.
-    DelayedPd(DelayedPd),
+    DelayedPd(DelayedPd) = DelayedPd::default(),
 }
 
 /// `kp (q* - q) + kd (v* - v) + tau_ff`, not clamped.
@@ -106,19 +118,25 @@ mod tests {
 
     #[test]
     fn every_model_has_a_name_of_its_own_that_files_know_it_by() {
-        let mut names: Vec<&str> = ActuatorModel::all().iter().map(|model| model.law().name()).collect();
-        for (model, name) in ActuatorModel::all().iter().zip(&names) {
+        let mut names: Vec<&str> = ActuatorModel::examples().iter().map(|model| model.law().name()).collect();
+        for (model, name) in ActuatorModel::examples().iter().zip(&names) {
             let text = serde_json::to_string(model).expect("numbers");
             assert!(text.starts_with(&format!("{{\"{name}\":{{")), "{text}");
             let again: ActuatorModel = serde_json::from_str(&text).expect("as written");
             assert_eq!(again, *model);
-            // Every number has a default.
-            let plain: ActuatorModel = serde_json::from_str(&format!("{{\"{name}\":{{}}}}")).expect("defaults");
-            assert_eq!(plain, *model);
+            // What has a default may be left out; the effort of a motor has none.
+            let plain = serde_json::from_str::<ActuatorModel>(&format!("{{\"{name}\":{{}}}}"));
+            match model {
+                ActuatorModel::IdealPd(_) | ActuatorModel::DelayedPd(_) => assert_eq!(plain.expect("defaults"), *model),
+                ActuatorModel::DcMotor(_) => {
+                    let message = plain.expect_err("no default").to_string();
+                    assert!(message.contains("missing field `saturation_effort`"), "{message}");
+                }
+            }
             assert!(serde_json::from_str::<ActuatorModel>(&format!("{{\"{name}\":{{\"x\":1}}}}")).is_err());
         }
         names.sort_unstable();
         names.dedup();
-        assert_eq!(names.len(), ActuatorModel::all().len());
+        assert_eq!(names.len(), ActuatorModel::examples().len());
     }
 }
