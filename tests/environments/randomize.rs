@@ -142,21 +142,25 @@ fn wheels_slow_down_as_their_own_damping_friction_and_armature_say() {
     }
 }
 
-/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
-#[test]
-fn drives_have_gains_of_their_own() {
-    let dir = tempfile::tempdir().unwrap();
+/// A bar that a drive holds out.
+fn lever(dir: &Path) -> RobotCfg {
     let urdf = r#"<robot name="lever"><link name="post"/>
       <joint name="hinge" type="revolute"><parent link="post"/><child link="bar"/><axis xyz="0 1 0"/>
         <limit lower="-3" upper="3" effort="100" velocity="10"/></joint>
       <link name="bar"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>
         <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link></robot>"#;
-    let path = dir.path().join("lever.urdf");
+    let path = dir.join("lever.urdf");
     std::fs::write(&path, urdf).unwrap();
     let drive = DriveCfg { stiffness: 500.0.into(), damping: 100.0.into(), ..Default::default() };
-    let robot = RobotCfg { uid: "lever".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() };
+    RobotCfg { uid: "lever".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() }
+}
+
+/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
+#[test]
+fn drives_have_gains_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(3, 1) }).unwrap();
-    let id = sim.add_robot(robot).unwrap();
+    let id = sim.add_robot(lever(dir.path())).unwrap();
     set(
         &mut sim,
         &[
@@ -174,10 +178,62 @@ fn drives_have_gains_of_their_own() {
         assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
     }
     assert!((effort[(2, 0)].abs() - 4.0).abs() < 1e-9, "{effort}");
-    // Gains are of the state as well as of the properties.
+    // Gains are of the environment: they stay where they are, and a snapshot takes them nowhere else.
     let snapshot = sim.snapshot(Some(&[EnvId(2)])).unwrap();
-    sim.restore(&snapshot, Some(&[EnvId(0)])).unwrap();
-    assert_eq!(get(&sim, 0, Property::MaxEffort, "lever/hinge"), [4.0]);
+    sim.restore(&snapshot, Some(&[EnvId(0), EnvId(1), EnvId(2)])).unwrap();
+    assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
+    assert_eq!(sim.robot(id).get_stiffness(), array![[500.0], [200.0], [500.0]]);
+}
+
+/// The usual reset of learning goes back to a snapshot from before the draw. What was drawn stays and acts, and what was
+/// set at run time comes from the snapshot. Held out, the drive gives kp q, which is the weight's torque.
+#[test]
+fn drawn_gains_outlive_what_is_restored() {
+    let dir = tempfile::tempdir().unwrap();
+    for drive_type in [DriveType::Force, DriveType::Acceleration] {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(3, 1) }).unwrap();
+        let mut robot = lever(dir.path());
+        robot.drive.drive_type = drive_type;
+        let id = sim.add_robot(robot).unwrap();
+        sim.robot_mut(id).set_damping(&array![[90.0]], None, ALL).unwrap();
+        let start = sim.snapshot(ALL).unwrap();
+        let drawn = Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Scale([0.3, 0.6]));
+        sim.randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
+        let kp: Vec<f64> = (0..3).map(|env| get(&sim, env, Property::Stiffness, "lever/hinge")[0]).collect();
+        assert!(kp[1] < 0.7 * kp[0] && kp[2] < 0.7 * kp[0] && kp[1] != kp[2], "{kp:?}");
+        let asked = sim.robot(id).get_stiffness();
+        sim.robot_mut(id).set_damping(&array![[70.0]], None, ALL).unwrap();
+        let later = sim.snapshot(ALL).unwrap();
+        sim.update(10);
+        for (snapshot, damping) in [(&start, 90.0), (&later, 70.0)] {
+            sim.restore(snapshot, ALL).unwrap();
+            for (env, kp) in kp.iter().enumerate() {
+                assert_eq!(get(&sim, env, Property::Stiffness, "lever/hinge"), [*kp], "environment {env}");
+            }
+            assert_eq!(sim.robot(id).get_stiffness(), asked);
+            assert_eq!(sim.robot(id).get_damping(), Array2::from_elem((3, 1), damping));
+        }
+        // A rollout from the snapshot goes where stepping goes.
+        let rollout = sim.rollout(&Array3::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
+        sim.restore(&start, ALL).unwrap();
+        sim.update(1500);
+        let q = sim.robot(id).get_qpos();
+        for (env, kp) in kp.iter().enumerate() {
+            let q = q[(env, 0)];
+            assert_eq!(rollout.states[(env, 1499, 0)], q, "environment {env}");
+            let weight = 2.0 * G * 0.5 * q.cos();
+            // As in the test above: what is left of the motion.
+            assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
+        }
+        // What was drawn in one environment is not what another goes on with.
+        sim.restore(&later, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
+        assert_eq!(sim.robot(id).get_stiffness(), asked);
+        // A gain that is set is drawn no longer, and a nominal one neither.
+        sim.robot_mut(id).set_stiffness(&array![[333.0]], None, Some(&[EnvId(1)])).unwrap();
+        sim.reset_properties(Some(&[EnvId(2)])).unwrap();
+        sim.restore(&start, ALL).unwrap();
+        assert_eq!(sim.robot(id).get_stiffness(), Array2::from_elem((3, 1), 500.0));
+    }
 }
 
 /// Everything at once.
