@@ -400,6 +400,30 @@ impl DriveState {
     }
 }
 
+/// What [`DriveState::numbers`] cannot have given of so many drives.
+pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static str> {
+    let Some((settings, rest)) = numbers.split_at_checked(10 * drives) else {
+        return Some("drives have fewer numbers than they need");
+    };
+    for &[kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] in
+        settings.as_chunks::<10>().0
+    {
+        if [kp, kd, stiffness, damping, inertia].iter().any(|x| !x.is_finite() || *x < 0.0) {
+            return Some("a gain is negative or not finite");
+        }
+        if !(max_effort >= 0.0 && max_velocity >= 0.0) {
+            return Some("a limit of a drive is negative or not a number");
+        }
+        if !(0..DriveType::ALL.len()).any(|known| known as f64 == drive_type) {
+            return Some("a drive type is unknown");
+        }
+        if low.is_nan() || high.is_nan() || low > high {
+            return Some("a range of targets is none");
+        }
+    }
+    rest.iter().any(|x| !x.is_finite()).then_some("a target, an effort or an applied force is not finite")
+}
+
 /// What one drive is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {

@@ -38,6 +38,11 @@ impl Layout {
         Self(lines)
     }
 
+    /// How many drives there are.
+    pub(super) fn drives(&self) -> usize {
+        self.0.iter().filter(|line| line.starts_with("drive of ")).count()
+    }
+
     /// The lines, as they stand in a file.
     pub(super) fn lines(&self) -> &[String] {
         &self.0
