@@ -230,7 +230,7 @@ mod tests {
         let drive = Drive { qpos: 4, dof: 3, ctrl: 0, realization, initial, setting, range };
         let mut table = DriveTable { drives: vec![drive], ..DriveTable::default() };
         table.push_model(0, DelayedPd { delay: 2, max_delay: 3 }.into());
-        let layout = Layout::of(&model, &table);
+        let layout = Layout::of(&model, &table, 1);
         (Env::new(&model, &Arc::new(table)).expect("small"), layout)
     }
 
