@@ -26,7 +26,7 @@ fn get(sim: &SimulationManager, env: usize, property: Property, name: &str) -> V
 /// a² / 16 = 2.5e-5, the step of 1 ms by (omega h)² / 24 < 2e-6.
 #[test]
 fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
-    let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0"/>
+    let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0" armature="0.1"/>
         <inertial pos="0 0 -0.5" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody></mujoco>"#;
     let settings = SimulationManagerCfg { physics_dt: 0.001, ground: None, ..cfg(6, 2) };
     let mut sim = SimulationManager::new(settings).unwrap();
@@ -39,13 +39,13 @@ fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
         (5, Property::Armature, "p/hinge", &[0.3]),
     ];
     set(&mut sim, &envs);
-    // Mass, moment, distance, gravity, armature. Moments go with the mass: the period stays.
+    // Mass, moment, distance, gravity, armature. Moments go with the mass; the armature does not, so that the mass matters.
     let laws = [
-        (1.0, 0.02, 0.5, G, 0.0),
-        (1.0, 0.02, 0.5, 3.7, 0.0),
-        (1.0, 0.02, 0.7, G, 0.0),
-        (3.0, 0.06, 0.5, G, 0.0),
-        (1.0, 0.1, 0.5, G, 0.0),
+        (1.0, 0.02, 0.5, G, 0.1),
+        (1.0, 0.02, 0.5, 3.7, 0.1),
+        (1.0, 0.02, 0.7, G, 0.1),
+        (3.0, 0.06, 0.5, G, 0.1),
+        (1.0, 0.1, 0.5, G, 0.1),
         (1.0, 0.02, 0.5, G, 0.3),
     ];
     assert_eq!(get(&sim, 3, Property::Inertia, "p/rod"), [0.06; 3]);
@@ -63,10 +63,13 @@ fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
         before = now;
     }
     let periods = crossings.iter().map(|times| (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64);
-    for (env, (period, (m, moment, d, g, armature))) in periods.zip(laws).enumerate() {
-        let expected = TAU * ((moment + m * d * d + armature) / (m * g * d)).sqrt();
+    let expected =
+        laws.map(|(m, moment, d, g, a): (f64, _, _, _, _)| TAU * ((moment + m * d * d + a) / (m * g * d)).sqrt());
+    for (env, (period, expected)) in periods.zip(expected).enumerate() {
         assert!((period / expected - 1.0).abs() < 4e-5, "environment {env}: {period} instead of {expected}");
     }
+    // Control: each property changes the period by far more than that.
+    assert!(expected[1..].iter().all(|period| (period / expected[0] - 1.0).abs() > 0.01), "{expected:?}");
 }
 
 /// Sliding on the ground, the momentum that is lost is mu times that of the normal force, m (g t + dv_z), whatever bounces
@@ -376,8 +379,13 @@ fn what_is_not_changed_is_shared_and_what_is_changed_is_small() {
     let arrays: usize = own.own_arrays().map(|(_, bytes)| bytes).sum();
     let small = 8 * (base.ntendon() + base.nactuator() + 3 * base.nlight());
     assert!(arrays >= at_least && arrays <= at_least + small, "{arrays} {at_least}");
-    // Beside the arrays: the struct, and the values as they were set.
-    assert!(bytes > arrays && bytes < 3 * arrays + (16 << 10), "{bytes} for {arrays}");
+    // Beside the model: the lists of masses, of the moments that go with them and of friction, whole ones, 8 bytes a number.
+    let masses = sim.properties(EnvId(1)).unwrap().names(Property::Mass).len();
+    let collides = |geom: &usize| base.geom_contype()[*geom] != 0 || base.geom_conaffinity()[*geom] != 0;
+    let shapes = (0..geoms).filter(collides).count();
+    let lists = Property::ALL.len() * size_of::<Option<Box<[f64]>>>();
+    assert_eq!(bytes, own.own_bytes() + lists + 8 * (masses * (1 + 3) + shapes));
+    assert!(own.own_bytes() > arrays && own.own_bytes() < arrays + (16 << 10), "{} for {arrays}", own.own_bytes());
     assert!(bytes < base.shared_bytes(), "{bytes} of {}", base.shared_bytes());
 
     // Nominal again: all is shared, and goes on as if nothing had been.

@@ -349,11 +349,17 @@ mod tests {
     fn what_follows_from_masses_is_what_compiling_gives() {
         let model = base();
         let (com, moments) = ([0.13, -0.02, 0.05], [0.03, 0.035, 0.04]);
-        let fresh = compile(&text([1.7, 0.9, 3.1], com, moments, 0.07));
+        // The ball, whose rows MuJoCo takes a short cut through: 2.5 kg, and 2/5 m r² about any axis.
+        let heavy = r#"<freejoint/><geom size="0.1" mass="2.5"/>"#;
+        let fresh = text([1.7, 0.9, 3.1], com, moments, 0.07).replace(r#"<freejoint/><geom size="0.1"/>"#, heavy);
+        let fresh = compile(&fresh);
         assert!(differences(&model, &fresh).len() > 6, "{:?}", differences(&model, &fresh));
         let mut editor = Editor::new(&model).expect("small");
         editor.body_mass_mut()[1..4].copy_from_slice(&[1.7, 0.9, 3.1]);
         editor.body_inertia_mut()[6..9].copy_from_slice(&moments);
+        assert!(editor.body_simple_mut()[4] != 0 && editor.body_mass_mut()[4] != 2.5);
+        editor.body_mass_mut()[4] = 2.5;
+        editor.body_inertia_mut()[12..15].fill(0.01);
         editor.dof_armature_mut()[1] = 0.07;
         editor.set_center_of_mass(2, com).expect("not diagonal");
         // Control: without the constants the model is another one.
