@@ -492,6 +492,9 @@ fn values_that_cannot_be_are_named() {
     let (mut sim, _) = world(cfg(2, 1));
     let cases = [
         (Property::Mass, "cube", Draw::Add([-2.0, -1.0]), "kg"),
+        (Property::Mass, "cube", Draw::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
+        // Such a mass may be, but not the moments that go with it here.
+        (Property::Mass, "cube", Draw::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
         (Property::Inertia, "cube", Draw::Add([-1.0, -1.0]), "positive"),
         (Property::Friction, "ground", Draw::Set([-0.1, -0.1]), ">= 0"),
         (Property::JointDamping, "machine/hinge", Draw::Set([-1.0, -1.0]), ">= 0"),
