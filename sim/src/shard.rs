@@ -121,8 +121,8 @@ mod tests {
 
     #[test]
     fn every_launcher_is_understood() {
-        let (mpi_rank, mpi_world) = VARIABLES[1];
         type Case<'c> = (&'c str, &'c [(&'c str, &'c str)], [usize; 2]);
+        let (mpi_rank, mpi_world) = VARIABLES[1];
         let cases: [Case<'_>; 11] = [
             ("no launcher", &[], [0, 1]),
             ("torchrun", &[("RANK", "3"), ("WORLD_SIZE", "8")], [3, 8]),

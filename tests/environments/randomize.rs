@@ -63,8 +63,8 @@ fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
         before = now;
     }
     let periods = crossings.iter().map(|times| (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64);
-    let expected =
-        laws.map(|(m, moment, d, g, a): (f64, _, _, _, _)| TAU * ((moment + m * d * d + a) / (m * g * d)).sqrt());
+    let expected = laws
+        .map(|(m, moment, d, g, a): (f64, f64, f64, f64, f64)| TAU * ((moment + m * d * d + a) / (m * g * d)).sqrt());
     for (env, (period, expected)) in periods.zip(expected).enumerate() {
         assert!((period / expected - 1.0).abs() < 4e-5, "environment {env}: {period} instead of {expected}");
     }
@@ -217,7 +217,7 @@ fn drawn_gains_outlive_what_is_restored() {
             assert_eq!(sim.robot(id).get_damping(), Array2::from_elem((3, 1), damping));
         }
         // A rollout from the snapshot goes where stepping goes.
-        let rollout = sim.rollout(&Array3::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
+        let rollout = sim.rollout(&Array3::<f64>::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
         sim.restore(&start, ALL).unwrap();
         sim.update(1500);
         let q = sim.robot(id).get_qpos();

@@ -411,7 +411,7 @@ pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static s
         if [kp, kd, stiffness, damping, inertia].iter().any(|x| !x.is_finite() || *x < 0.0) {
             return Some("a gain is negative or not finite");
         }
-        if !(max_effort >= 0.0 && max_velocity >= 0.0) {
+        if ![max_effort, max_velocity].iter().all(|limit| *limit >= 0.0) {
             return Some("a limit of a drive is negative or not a number");
         }
         if !(0..DriveType::ALL.len()).any(|known| known as f64 == drive_type) {
