@@ -449,7 +449,7 @@ impl Built {
             xml: self.xml,
             diagnostics,
             start: self.start,
-            layout: Arc::new(Layout::of(&self.model, &self.table)),
+            layout: Arc::new(Layout::of(&self.model, &self.table, cfg.substeps)),
             tables: OnceLock::new(),
             maker: None,
             own_values: vec![None; cfg.num_envs],

@@ -329,7 +329,7 @@ impl Env {
                         self.seldom.warnings.add(&raised);
                     }
                     self.drives.finish_step(efforts);
-                    self.steps += 1;
+                    self.steps = self.steps.saturating_add(1);
                     self.solved_now = false;
                     return;
                 }

@@ -30,6 +30,10 @@ impl Default for Shard {
 const VARIABLES: [(&str, &str); 3] =
     [("RANK", "WORLD_SIZE"), ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("SLURM_PROCID", "SLURM_NTASKS")];
 
+/// What `srun` sets for what it starts. A shell of `salloc` has the number of processes of its job without being one of
+/// them, and the script of `sbatch` runs once, with number 0.
+const STARTED_BY_SRUN: [&str; 2] = ["SLURM_STEP_ID", "SLURM_PROCID"];
+
 /// The variables of a launcher say nothing sensible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -68,36 +72,42 @@ pub enum ShardError {
 
 impl Shard {
     /// What the launcher of this process says: `RANK` and `WORLD_SIZE` (torchrun), else `OMPI_COMM_WORLD_RANK` and
-    /// `OMPI_COMM_WORLD_SIZE` (mpirun), else `SLURM_PROCID` and `SLURM_NTASKS` (srun); the only process where none is set.
+    /// `OMPI_COMM_WORLD_SIZE` (mpirun), else `SLURM_PROCID` and `SLURM_NTASKS` (srun: in a job step, which has
+    /// `SLURM_STEP_ID`); the only process where none is set. The first pair that is whole counts.
     ///
     /// # Errors
-    /// Of the first pair of which one is set: the other is missing, one is not a number, or the rank is too large.
+    /// Of the first pair that is whole: one is not a number, or the rank is too large. Where none is whole: of the first of
+    /// which one is set, the other is missing.
     pub fn from_env() -> Result<Self, ShardError> {
         Self::from_variables(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()))
     }
 
     fn from_variables(value: impl Fn(&str) -> Option<String>) -> Result<Self, ShardError> {
+        let by_srun = STARTED_BY_SRUN.iter().all(|name| value(name).is_some());
+        let mut incomplete = None;
         for (rank_variable, world_variable) in VARIABLES {
+            if rank_variable == "SLURM_PROCID" && !by_srun {
+                continue;
+            }
             let number = |variable, value: String| match value.trim().parse::<usize>() {
                 Ok(number) => Ok(number),
                 Err(_) => Err(ShardError::NotANumber { variable, value }),
             };
-            let (rank, world) = match (value(rank_variable), value(world_variable)) {
+            let (present, missing) = match (value(rank_variable), value(world_variable)) {
                 (None, None) => continue,
-                (Some(rank), Some(world)) => (number(rank_variable, rank)?, number(world_variable, world)?),
-                (Some(_), None) => {
-                    return Err(ShardError::Incomplete { present: rank_variable, missing: world_variable });
+                (Some(rank), Some(world)) => {
+                    let (rank, world) = (number(rank_variable, rank)?, number(world_variable, world)?);
+                    if rank >= world {
+                        return Err(ShardError::OutOfRange { rank_variable, rank, world_variable, world });
+                    }
+                    return Ok(Self { rank, world });
                 }
-                (None, Some(_)) => {
-                    return Err(ShardError::Incomplete { present: world_variable, missing: rank_variable });
-                }
+                (Some(_), None) => (rank_variable, world_variable),
+                (None, Some(_)) => (world_variable, rank_variable),
             };
-            if rank >= world {
-                return Err(ShardError::OutOfRange { rank_variable, rank, world_variable, world });
-            }
-            return Ok(Self { rank, world });
+            incomplete = incomplete.or(Some(ShardError::Incomplete { present, missing }));
         }
-        Ok(Self::default())
+        incomplete.map_or(Ok(Self::default()), Err)
     }
 }
 
@@ -111,27 +121,64 @@ mod tests {
 
     #[test]
     fn every_launcher_is_understood() {
-        assert_eq!(of(&[]), Ok(Shard { rank: 0, world: 1 }));
-        for (rank, world) in VARIABLES {
-            assert_eq!(of(&[(rank, "3"), (world, "8")]), Ok(Shard { rank: 3, world: 8 }));
+        type Case<'c> = (&'c str, &'c [(&'c str, &'c str)], [usize; 2]);
+        let (mpi_rank, mpi_world) = VARIABLES[1];
+        let cases: [Case<'_>; 11] = [
+            ("no launcher", &[], [0, 1]),
+            ("torchrun", &[("RANK", "3"), ("WORLD_SIZE", "8")], [3, 8]),
+            ("mpirun", &[(mpi_rank, "3"), (mpi_world, "8")], [3, 8]),
+            ("srun", &[("SLURM_STEP_ID", "0"), ("SLURM_PROCID", "3"), ("SLURM_NTASKS", "8")], [3, 8]),
+            ("a shell of salloc", &[("SLURM_JOB_ID", "17"), ("SLURM_NTASKS", "8")], [0, 1]),
+            ("the script of sbatch", &[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "8")], [0, 1]),
+            ("a step without a process", &[("SLURM_STEP_ID", "0"), ("SLURM_NTASKS", "8")], [0, 1]),
+            (
+                "torchrun in a job of two nodes",
+                &[
+                    ("SLURM_STEP_ID", "0"),
+                    ("SLURM_PROCID", "1"),
+                    ("SLURM_NTASKS", "2"),
+                    ("RANK", "5"),
+                    ("WORLD_SIZE", "16"),
+                ],
+                [5, 16],
+            ),
+            ("mpirun in the script of sbatch", &[("SLURM_NTASKS", "8"), (mpi_rank, "1"), (mpi_world, "4")], [1, 4]),
+            ("mpirun, and half of another", &[("RANK", "5"), (mpi_rank, "1"), (mpi_world, "4")], [1, 4]),
+            (
+                "srun, and halves of two others",
+                &[
+                    ("WORLD_SIZE", "9"),
+                    (mpi_rank, "7"),
+                    ("SLURM_STEP_ID", "0"),
+                    ("SLURM_PROCID", "1"),
+                    ("SLURM_NTASKS", "2"),
+                ],
+                [1, 2],
+            ),
+        ];
+        for (who, variables, [rank, world]) in cases {
+            assert_eq!(of(variables), Ok(Shard { rank, world }), "{who}");
         }
-        // torchrun in a job of two nodes.
-        let nested = [("SLURM_PROCID", "1"), ("SLURM_NTASKS", "2"), ("RANK", "5"), ("WORLD_SIZE", "16")];
-        assert_eq!(of(&nested), Ok(Shard { rank: 5, world: 16 }));
     }
 
     #[test]
     fn what_does_not_fit_together_is_named() {
+        let step = ("SLURM_STEP_ID", "0");
         for (rank, world) in VARIABLES {
-            assert_eq!(of(&[(rank, "3")]), Err(ShardError::Incomplete { present: rank, missing: world }));
-            assert_eq!(of(&[(world, "3")]), Err(ShardError::Incomplete { present: world, missing: rank }));
+            assert_eq!(of(&[step, (rank, "3")]), Err(ShardError::Incomplete { present: rank, missing: world }));
+            if rank != "SLURM_PROCID" {
+                assert_eq!(of(&[(world, "3")]), Err(ShardError::Incomplete { present: world, missing: rank }));
+            }
             let none = ShardError::NotANumber { variable: rank, value: "-1".into() };
-            assert_eq!(of(&[(rank, "-1"), (world, "2")]), Err(none));
+            assert_eq!(of(&[step, (rank, "-1"), (world, "2")]), Err(none));
             for (r, w) in [("2", "2"), ("0", "0")] {
-                let error = of(&[(rank, r), (world, w)]).expect_err("out of range");
+                let error = of(&[step, (rank, r), (world, w)]).expect_err("out of range");
                 assert!(matches!(error, ShardError::OutOfRange { .. }), "{error}");
                 assert!(error.to_string().contains(rank) && error.to_string().contains(world), "{error}");
             }
         }
+        // Of two halves the first one is named.
+        let first = ShardError::Incomplete { present: "RANK", missing: "WORLD_SIZE" };
+        assert_eq!(of(&[("OMPI_COMM_WORLD_SIZE", "4"), ("RANK", "3")]), Err(first));
     }
 }

@@ -26,7 +26,7 @@ fn get(sim: &SimulationManager, env: usize, property: Property, name: &str) -> V
 /// a² / 16 = 2.5e-5, the step of 1 ms by (omega h)² / 24 < 2e-6.
 #[test]
 fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
-    let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0"/>
+    let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0" armature="0.1"/>
         <inertial pos="0 0 -0.5" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody></mujoco>"#;
     let settings = SimulationManagerCfg { physics_dt: 0.001, ground: None, ..cfg(6, 2) };
     let mut sim = SimulationManager::new(settings).unwrap();
@@ -39,13 +39,13 @@ fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
         (5, Property::Armature, "p/hinge", &[0.3]),
     ];
     set(&mut sim, &envs);
-    // Mass, moment, distance, gravity, armature. Moments go with the mass: the period stays.
+    // Mass, moment, distance, gravity, armature. Moments go with the mass; the armature does not, so that the mass matters.
     let laws = [
-        (1.0, 0.02, 0.5, G, 0.0),
-        (1.0, 0.02, 0.5, 3.7, 0.0),
-        (1.0, 0.02, 0.7, G, 0.0),
-        (3.0, 0.06, 0.5, G, 0.0),
-        (1.0, 0.1, 0.5, G, 0.0),
+        (1.0, 0.02, 0.5, G, 0.1),
+        (1.0, 0.02, 0.5, 3.7, 0.1),
+        (1.0, 0.02, 0.7, G, 0.1),
+        (3.0, 0.06, 0.5, G, 0.1),
+        (1.0, 0.1, 0.5, G, 0.1),
         (1.0, 0.02, 0.5, G, 0.3),
     ];
     assert_eq!(get(&sim, 3, Property::Inertia, "p/rod"), [0.06; 3]);
@@ -63,10 +63,13 @@ fn pendulums_swing_as_their_own_mass_gravity_and_inertia_say() {
         before = now;
     }
     let periods = crossings.iter().map(|times| (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64);
-    for (env, (period, (m, moment, d, g, armature))) in periods.zip(laws).enumerate() {
-        let expected = TAU * ((moment + m * d * d + armature) / (m * g * d)).sqrt();
+    let expected = laws
+        .map(|(m, moment, d, g, a): (f64, f64, f64, f64, f64)| TAU * ((moment + m * d * d + a) / (m * g * d)).sqrt());
+    for (env, (period, expected)) in periods.zip(expected).enumerate() {
         assert!((period / expected - 1.0).abs() < 4e-5, "environment {env}: {period} instead of {expected}");
     }
+    // Control: each property changes the period by far more than that.
+    assert!(expected[1..].iter().all(|period| (period / expected[0] - 1.0).abs() > 0.01), "{expected:?}");
 }
 
 /// Sliding on the ground, the momentum that is lost is mu times that of the normal force, m (g t + dv_z), whatever bounces
@@ -142,21 +145,25 @@ fn wheels_slow_down_as_their_own_damping_friction_and_armature_say() {
     }
 }
 
-/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
-#[test]
-fn drives_have_gains_of_their_own() {
-    let dir = tempfile::tempdir().unwrap();
+/// A bar that a drive holds out.
+fn lever(dir: &Path) -> RobotCfg {
     let urdf = r#"<robot name="lever"><link name="post"/>
       <joint name="hinge" type="revolute"><parent link="post"/><child link="bar"/><axis xyz="0 1 0"/>
         <limit lower="-3" upper="3" effort="100" velocity="10"/></joint>
       <link name="bar"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>
         <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link></robot>"#;
-    let path = dir.path().join("lever.urdf");
+    let path = dir.join("lever.urdf");
     std::fs::write(&path, urdf).unwrap();
     let drive = DriveCfg { stiffness: 500.0.into(), damping: 100.0.into(), ..Default::default() };
-    let robot = RobotCfg { uid: "lever".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() };
+    RobotCfg { uid: "lever".into(), urdf: UrdfCfg::single(path), drive, ..Default::default() }
+}
+
+/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
+#[test]
+fn drives_have_gains_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(3, 1) }).unwrap();
-    let id = sim.add_robot(robot).unwrap();
+    let id = sim.add_robot(lever(dir.path())).unwrap();
     set(
         &mut sim,
         &[
@@ -174,10 +181,62 @@ fn drives_have_gains_of_their_own() {
         assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
     }
     assert!((effort[(2, 0)].abs() - 4.0).abs() < 1e-9, "{effort}");
-    // Gains are of the state as well as of the properties.
+    // Gains are of the environment: they stay where they are, and a snapshot takes them nowhere else.
     let snapshot = sim.snapshot(Some(&[EnvId(2)])).unwrap();
-    sim.restore(&snapshot, Some(&[EnvId(0)])).unwrap();
-    assert_eq!(get(&sim, 0, Property::MaxEffort, "lever/hinge"), [4.0]);
+    sim.restore(&snapshot, Some(&[EnvId(0), EnvId(1), EnvId(2)])).unwrap();
+    assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
+    assert_eq!(sim.robot(id).get_stiffness(), array![[500.0], [200.0], [500.0]]);
+}
+
+/// The usual reset of learning goes back to a snapshot from before the draw. What was drawn stays and acts, and what was
+/// set at run time comes from the snapshot. Held out, the drive gives kp q, which is the weight's torque.
+#[test]
+fn drawn_gains_outlive_what_is_restored() {
+    let dir = tempfile::tempdir().unwrap();
+    for drive_type in [DriveType::Force, DriveType::Acceleration] {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(3, 1) }).unwrap();
+        let mut robot = lever(dir.path());
+        robot.drive.drive_type = drive_type;
+        let id = sim.add_robot(robot).unwrap();
+        sim.robot_mut(id).set_damping(&array![[90.0]], None, ALL).unwrap();
+        let start = sim.snapshot(ALL).unwrap();
+        let drawn = Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Scale([0.3, 0.6]));
+        sim.randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
+        let kp: Vec<f64> = (0..3).map(|env| get(&sim, env, Property::Stiffness, "lever/hinge")[0]).collect();
+        assert!(kp[1] < 0.7 * kp[0] && kp[2] < 0.7 * kp[0] && kp[1] != kp[2], "{kp:?}");
+        let asked = sim.robot(id).get_stiffness();
+        sim.robot_mut(id).set_damping(&array![[70.0]], None, ALL).unwrap();
+        let later = sim.snapshot(ALL).unwrap();
+        sim.update(10);
+        for (snapshot, damping) in [(&start, 90.0), (&later, 70.0)] {
+            sim.restore(snapshot, ALL).unwrap();
+            for (env, kp) in kp.iter().enumerate() {
+                assert_eq!(get(&sim, env, Property::Stiffness, "lever/hinge"), [*kp], "environment {env}");
+            }
+            assert_eq!(sim.robot(id).get_stiffness(), asked);
+            assert_eq!(sim.robot(id).get_damping(), Array2::from_elem((3, 1), damping));
+        }
+        // A rollout from the snapshot goes where stepping goes.
+        let rollout = sim.rollout(&Array3::<f64>::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
+        sim.restore(&start, ALL).unwrap();
+        sim.update(1500);
+        let q = sim.robot(id).get_qpos();
+        for (env, kp) in kp.iter().enumerate() {
+            let q = q[(env, 0)];
+            assert_eq!(rollout.states[(env, 1499, 0)], q, "environment {env}");
+            let weight = 2.0 * G * 0.5 * q.cos();
+            // As in the test above: what is left of the motion.
+            assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
+        }
+        // What was drawn in one environment is not what another goes on with.
+        sim.restore(&later, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
+        assert_eq!(sim.robot(id).get_stiffness(), asked);
+        // A gain that is set is drawn no longer, and a nominal one neither.
+        sim.robot_mut(id).set_stiffness(&array![[333.0]], None, Some(&[EnvId(1)])).unwrap();
+        sim.reset_properties(Some(&[EnvId(2)])).unwrap();
+        sim.restore(&start, ALL).unwrap();
+        assert_eq!(sim.robot(id).get_stiffness(), Array2::from_elem((3, 1), 500.0));
+    }
 }
 
 /// Everything at once.
@@ -320,8 +379,13 @@ fn what_is_not_changed_is_shared_and_what_is_changed_is_small() {
     let arrays: usize = own.own_arrays().map(|(_, bytes)| bytes).sum();
     let small = 8 * (base.ntendon() + base.nactuator() + 3 * base.nlight());
     assert!(arrays >= at_least && arrays <= at_least + small, "{arrays} {at_least}");
-    // Beside the arrays: the struct, and the values as they were set.
-    assert!(bytes > arrays && bytes < 3 * arrays + (16 << 10), "{bytes} for {arrays}");
+    // Beside the model: the lists of masses, of the moments that go with them and of friction, whole ones, 8 bytes a number.
+    let masses = sim.properties(EnvId(1)).unwrap().names(Property::Mass).len();
+    let collides = |geom: &usize| base.geom_contype()[*geom] != 0 || base.geom_conaffinity()[*geom] != 0;
+    let shapes = (0..geoms).filter(collides).count();
+    let lists = Property::ALL.len() * size_of::<Option<Box<[f64]>>>();
+    assert_eq!(bytes, own.own_bytes() + lists + 8 * (masses * (1 + 3) + shapes));
+    assert!(own.own_bytes() > arrays && own.own_bytes() < arrays + (16 << 10), "{} for {arrays}", own.own_bytes());
     assert!(bytes < base.shared_bytes(), "{bytes} of {}", base.shared_bytes());
 
     // Nominal again: all is shared, and goes on as if nothing had been.
@@ -428,6 +492,9 @@ fn values_that_cannot_be_are_named() {
     let (mut sim, _) = world(cfg(2, 1));
     let cases = [
         (Property::Mass, "cube", Draw::Add([-2.0, -1.0]), "kg"),
+        (Property::Mass, "cube", Draw::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
+        // Such a mass may be, but not the moments that go with it here.
+        (Property::Mass, "cube", Draw::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
         (Property::Inertia, "cube", Draw::Add([-1.0, -1.0]), "positive"),
         (Property::Friction, "ground", Draw::Set([-0.1, -0.1]), ">= 0"),
         (Property::JointDamping, "machine/hinge", Draw::Set([-1.0, -1.0]), ">= 0"),

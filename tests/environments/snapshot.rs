@@ -138,6 +138,34 @@ fn another_scene_or_number_is_refused_and_nothing_changes() {
 }
 
 #[test]
+fn a_scene_that_is_stepped_otherwise_is_another_one() {
+    use kinetoscope::sim::{Cone, Integrator};
+    let build = |settings| {
+        let mut sim = SimulationManager::new(settings).unwrap();
+        sim.add_robot(arm()).unwrap();
+        sim
+    };
+    let mut sim = build(cfg(1, 1));
+    let file = tempfile::NamedTempFile::new().unwrap();
+    sim.snapshot(ALL).unwrap().save(file.path()).unwrap();
+    let snapshot = Snapshot::load(file.path()).unwrap();
+    let others = [
+        (SimulationManagerCfg { physics_dt: 0.005, ..cfg(1, 1) }, "timestep 0.005"),
+        // The same steps of MuJoCo, of which two are one.
+        (SimulationManagerCfg { physics_dt: 0.02, substeps: 2, ..cfg(1, 1) }, "2 substeps"),
+        (SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg(1, 1) }, "RK4"),
+        (SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(1, 1) }, "elliptic"),
+    ];
+    for (settings, what) in others {
+        let Err(Error::Snapshot(fault)) = build(settings).restore(&snapshot, ALL) else { panic!("accepted: {what}") };
+        assert!(matches!(fault, SnapshotError::OtherScene { .. }) && fault.to_string().contains(what), "{fault}");
+    }
+    // Control.
+    build(cfg(1, 1)).restore(&snapshot, ALL).unwrap();
+    sim.restore(&snapshot, ALL).unwrap();
+}
+
+#[test]
 fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
     let dir = tempfile::tempdir().unwrap();
     let urdf = r#"<robot name="wheel"><link name="post"/>

@@ -13,6 +13,7 @@
 
 mod acceleration;
 mod cfg;
+mod drawn;
 mod force;
 mod none;
 

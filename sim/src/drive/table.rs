@@ -1,5 +1,6 @@
 //! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
 
+use super::drawn::DrawnGains;
 use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
 use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
 use crate::mj;
@@ -137,7 +138,7 @@ impl<T: Clone> DerefMut for Shared<T> {
 
 impl<T: Copy + PartialEq> Shared<T> {
     /// Writes where that changes something.
-    fn put(&mut self, index: usize, value: T) {
+    pub(super) fn put(&mut self, index: usize, value: T) {
         if self[index] != value {
             self[index] = value;
         }
@@ -175,6 +176,8 @@ pub struct DriveState {
     pub gains: Shared<Gains>,
     /// What the gains were made of, one per drive.
     pub settings: Shared<Setting>,
+    /// Which of the gains are properties of the environment, not of its state.
+    pub(super) drawn: Shared<DrawnGains>,
     /// Positions a target may have \[rad or m\], one range per drive.
     pub ranges: Shared<[f64; 2]>,
     /// Position targets \[rad or m\].
@@ -204,6 +207,7 @@ impl DriveState {
         let mut state = Self {
             gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
             settings: Shared(table.drives.iter().map(|d| d.setting).collect()),
+            drawn: Shared(vec![DrawnGains::default(); n].into()),
             ranges: Shared(table.drives.iter().map(|d| d.range).collect()),
             position: position.clone(),
             velocity: no_targets.clone(),
@@ -257,11 +261,20 @@ impl DriveState {
 
     /// Changes what is asked of a drive, and with it its gains; limits stay.
     pub fn set(&mut self, drive: usize, change: impl FnOnce(&mut Setting)) {
-        let mut setting = self.settings[drive];
+        let (old, mut setting) = (self.settings[drive], self.settings[drive]);
         change(&mut setting);
+        let mut gains = self.gains[drive];
         let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
+        // A gain that was drawn is not the product of its setting to the last bit: what was not changed stays.
+        let same_type = (setting.drive_type, setting.inertia) == (old.drive_type, old.inertia);
+        if !same_type || setting.stiffness.to_bits() != old.stiffness.to_bits() {
+            gains.kp = kp;
+        }
+        if !same_type || setting.damping.to_bits() != old.damping.to_bits() {
+            gains.kd = kd;
+        }
         self.settings.put(drive, setting);
-        self.gains.put(drive, Gains { kp, kd, ..self.gains[drive] });
+        self.gains.put(drive, gains);
     }
 
     /// Changes the limits of a drive.
@@ -279,6 +292,7 @@ impl DriveState {
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.put(to, other.gains[from]);
         self.settings.put(to, other.settings[from]);
+        self.drawn.put(to, other.drawn[from]);
         self.ranges.put(to, other.ranges[from]);
         self.position[to] = other.position[from];
         self.velocity.put(to, other.velocity[from]);
@@ -294,48 +308,30 @@ impl DriveState {
         self.applied.put(to, other.applied[from]);
     }
 
-    /// Sets gains in torque units and the effort limit of a drive; its drive type stays, and gives them back in its unit.
-    pub(crate) fn set_gains(&mut self, drive: usize, [kp, kd, max_effort]: [f64; 3]) {
-        let old = self.gains[drive];
-        if [old.kp, old.kd, old.max_effort] == [kp, kd, max_effort] {
-            return;
-        }
-        let unit = match self.settings[drive] {
-            Setting { drive_type: DriveType::Acceleration, inertia: Some(inertia), .. } => inertia,
-            _ => 1.0,
-        };
-        self.set(drive, |setting| (setting.stiffness, setting.damping) = (kp / unit, kd / unit));
-        let passive = self.settings[drive].drive_type == DriveType::None;
-        self.set_limits(drive, |gains| {
-            if passive { Gains { max_effort, ..gains } } else { Gains { kp, kd, max_effort, ..gains } }
-        });
-    }
-
     /// Sets coefficients of the damping that is integrated with the drives.
     pub(crate) fn set_damping(&mut self, damping: &[f64]) {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
     }
 
     /// What [`restoring`](Self::set_numbers) a state brings back: ten numbers of each drive (gains and limits, what they
-    /// were made of, range), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
+    /// were made of, range; without what is drawn), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
     /// explicit models keep.
     pub(crate) fn numbers(&self) -> Vec<f64> {
-        let settings =
-            self.gains.iter().zip(&*self.settings).zip(&*self.ranges).flat_map(|((gains, setting), range)| {
-                let drive_type =
-                    DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
-                let Setting { stiffness, damping, inertia, .. } = *setting;
-                let Gains { kp, kd, max_effort, max_velocity } = *gains;
-                // No inertia is 0.
-                let inertia = inertia.unwrap_or(0.0);
-                [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, range[0], range[1]]
-            });
+        let settings = self.ranges.iter().enumerate().flat_map(|(drive, range)| {
+            let (gains, setting) = self.without_drawn(drive);
+            let drive_type = DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
+            let Setting { stiffness, damping, inertia, .. } = setting;
+            let Gains { kp, kd, max_effort, max_velocity } = gains;
+            // No inertia is 0.
+            let inertia = inertia.unwrap_or(0.0);
+            [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, range[0], range[1]]
+        });
         let targets =
             [&self.position[..], &self.velocity, &self.feedforward, &self.effort, &self.applied, &self.memory];
         settings.chain(targets.into_iter().flatten().copied()).collect()
     }
 
-    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number.
+    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number. Gains that are drawn here stay.
     pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
         let n = self.position.len();
         let (settings, rest) = numbers.split_at(10 * n);
@@ -343,8 +339,8 @@ impl DriveState {
             let [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] = numbers;
             let drive_type = DriveType::ALL.get(drive_type as usize).copied().unwrap_or_default();
             let inertia = Some(inertia).filter(|inertia| *inertia > 0.0);
-            self.gains.put(i, Gains { kp, kd, max_effort, max_velocity });
-            self.settings.put(i, Setting { drive_type, stiffness, damping, inertia });
+            let setting = Setting { drive_type, stiffness, damping, inertia };
+            self.set_below_drawn(i, Gains { kp, kd, max_effort, max_velocity }, setting);
             self.ranges.put(i, [low, high]);
         }
         let (position, rest) = rest.split_at(n);
@@ -403,6 +399,30 @@ impl DriveState {
             Realization::Actuator | Realization::Explicit { .. } => data.actuator_force()[drive.ctrl],
         }));
     }
+}
+
+/// What [`DriveState::numbers`] cannot have given of so many drives.
+pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static str> {
+    let Some((settings, rest)) = numbers.split_at_checked(10 * drives) else {
+        return Some("drives have fewer numbers than they need");
+    };
+    for &[kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] in
+        settings.as_chunks::<10>().0
+    {
+        if [kp, kd, stiffness, damping, inertia].iter().any(|x| !x.is_finite() || *x < 0.0) {
+            return Some("a gain is negative or not finite");
+        }
+        if ![max_effort, max_velocity].iter().all(|limit| *limit >= 0.0) {
+            return Some("a limit of a drive is negative or not a number");
+        }
+        if !(0..DriveType::ALL.len()).any(|known| known as f64 == drive_type) {
+            return Some("a drive type is unknown");
+        }
+        if low.is_nan() || high.is_nan() || low > high {
+            return Some("a range of targets is none");
+        }
+    }
+    rest.iter().any(|x| !x.is_finite()).then_some("a target, an effort or an applied force is not finite")
 }
 
 /// What one drive is asked for.

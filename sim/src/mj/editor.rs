@@ -18,6 +18,19 @@ const NOT_LOOKED_AT: [&str; 12] =
     ["mesh_", "skin_", "hfield_", "tex_", "mat_", "flex", "name", "text_", "numeric_", "tuple_", "key_", "oct_"];
 
 /// A whole copy of a model, to make models from that differ from it.
+///
+/// Nobody outside can write what says where things are in the other arrays:
+///
+/// ```
+/// # use sim::mj::{self, Editor};
+/// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
+/// Editor::new(&model).unwrap().body_mass_mut();
+/// ```
+/// ```compile_fail,E0624
+/// # use sim::mj::{self, Editor};
+/// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
+/// Editor::new(&model).unwrap().body_simple_mut();
+/// ```
 #[derive(Debug)]
 pub struct Editor {
     base: Model,
@@ -41,11 +54,11 @@ impl Drop for Scratch {
 }
 
 macro_rules! edited_arrays {
-    ($($name:ident: $element:ty;)*) => {
+    ($($visibility:vis $name:ident: $element:ty;)*) => {
         impl Editor {
             $(
                 #[doc = concat!("MuJoCo's array of the model that is being made, for writing: `", stringify!($name), "`.")]
-                pub fn $name(&mut self) -> &mut [$element] {
+                $visibility fn $name(&mut self) -> &mut [$element] {
                     // SAFETY: the copy is alive, and `Editor`, its only owner, is borrowed mutably.
                     unsafe { fields::$name(self.copy.0.as_ptr()) }
                 }
@@ -55,19 +68,20 @@ macro_rules! edited_arrays {
 }
 
 edited_arrays! {
-    body_mass_mut: f64;
-    body_inertia_mut: f64;
+    pub body_mass_mut: f64;
+    pub body_inertia_mut: f64;
+    pub geom_friction_mut: f64;
+    pub dof_damping_mut: f64;
+    pub dof_armature_mut: f64;
+    pub dof_frictionloss_mut: f64;
+    pub tendon_frictionloss_mut: f64;
+    // MuJoCo takes short cuts by these, to rows that then must be there: only what is right as a whole is written.
     body_ipos_mut: f64;
     body_sameframe_mut: u8;
     body_simple_mut: u8;
-    geom_friction_mut: f64;
     geom_sameframe_mut: u8;
     site_sameframe_mut: u8;
-    dof_damping_mut: f64;
-    dof_armature_mut: f64;
-    dof_frictionloss_mut: f64;
     dof_simplenum_mut: i32;
-    tendon_frictionloss_mut: f64;
 }
 
 impl Editor {
@@ -335,11 +349,17 @@ mod tests {
     fn what_follows_from_masses_is_what_compiling_gives() {
         let model = base();
         let (com, moments) = ([0.13, -0.02, 0.05], [0.03, 0.035, 0.04]);
-        let fresh = compile(&text([1.7, 0.9, 3.1], com, moments, 0.07));
+        // The ball, whose rows MuJoCo takes a short cut through: 2.5 kg, and 2/5 m r² about any axis.
+        let heavy = r#"<freejoint/><geom size="0.1" mass="2.5"/>"#;
+        let fresh = text([1.7, 0.9, 3.1], com, moments, 0.07).replace(r#"<freejoint/><geom size="0.1"/>"#, heavy);
+        let fresh = compile(&fresh);
         assert!(differences(&model, &fresh).len() > 6, "{:?}", differences(&model, &fresh));
         let mut editor = Editor::new(&model).expect("small");
         editor.body_mass_mut()[1..4].copy_from_slice(&[1.7, 0.9, 3.1]);
         editor.body_inertia_mut()[6..9].copy_from_slice(&moments);
+        assert!(editor.body_simple_mut()[4] != 0 && editor.body_mass_mut()[4] != 2.5);
+        editor.body_mass_mut()[4] = 2.5;
+        editor.body_inertia_mut()[12..15].fill(0.01);
         editor.dof_armature_mut()[1] = 0.07;
         editor.set_center_of_mass(2, com).expect("not diagonal");
         // Control: without the constants the model is another one.

@@ -73,7 +73,7 @@ const ENABLED: &[(u32, &str)] = &[
 
 impl Model {
     /// Every setting of `<option>` and its name, as text.
-    fn options(&self) -> Vec<(&'static str, String)> {
+    pub(crate) fn options(&self) -> Vec<(&'static str, String)> {
         let opt = &self.header().opt;
         let integrators = [
             (mj::mjINT_EULER, "Euler"),

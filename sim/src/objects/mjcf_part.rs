@@ -378,7 +378,8 @@ impl<'a> MjcfPart<'a> {
             .map_err(|error| Error::MjcfNames { part: self.uid().into(), error: Box::new(error) })
     }
 
-    /// Sum of the masses of its bodies \[kg\].
+    /// Sum of the masses of its bodies \[kg\], as the file has them. Masses that were drawn for an environment are not in it:
+    /// see [`properties`](crate::SimulationManager::properties).
     pub fn total_mass(&self) -> f64 {
         self.model().body_mass().iter().sum()
     }

@@ -165,7 +165,8 @@ impl<'a> RigidObject<'a> {
         self.data.mask_id
     }
 
-    /// Mass \[kg\].
+    /// Mass \[kg\], as configured. A mass that was drawn for an environment is not here: see
+    /// [`properties`](crate::SimulationManager::properties).
     pub fn mass(&self) -> f64 {
         self.data.inertia().0
     }

@@ -398,7 +398,8 @@ impl<'a> Robot<'a> {
         targets
     }
 
-    /// Sum of the link masses in the files, and of payloads \[kg\].
+    /// Sum of the link masses in the files, and of payloads \[kg\]. Masses that were drawn for an environment are not in it:
+    /// see [`properties`](crate::SimulationManager::properties).
     pub fn total_mass(&self) -> f64 {
         self.data.description.total_mass()
     }

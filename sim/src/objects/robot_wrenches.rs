@@ -16,7 +16,8 @@ impl Robot<'_> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
         self.simulation.batch.for_each(|i, env| {
-            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of.0 == self.index()) {
+            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of.0 == self.index() && wrench.of.1 < links)
+            {
                 let [force, torque] = wrench.in_world(env.data());
                 for (k, value) in force.iter().chain(&torque).enumerate() {
                     wrenches[(i, wrench.of.1, k)] = *value;

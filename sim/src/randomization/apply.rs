@@ -129,7 +129,7 @@ impl Made {
     /// Gives it to the environment.
     pub(crate) fn give(self, env: &mut Env) {
         for (drive, gains) in self.gains {
-            env.drives.set_gains(drive, gains);
+            env.drives.draw_gains(drive, gains);
         }
         env.drives.set_damping(&self.damping);
         if let Some(model) = self.model {

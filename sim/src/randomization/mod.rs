@@ -9,8 +9,9 @@
 //! processes, nor on what other environments do, nor on what else is random.
 //!
 //! Properties stay until they are drawn or set again: [`reset`](SimulationManager::reset) and
-//! [`restore`](SimulationManager::restore) leave them alone, and when more is added to the scene they are carried over by
-//! name. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
+//! [`restore`](SimulationManager::restore) leave them alone, gains of drives included, and when more is added to the scene they are carried over by
+//! name. A gain that was drawn and is then set at run time is that of the drive's setting again; one that is set to its
+//! nominal value, too. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
 //! `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
 
 mod apply;

@@ -108,7 +108,7 @@ impl Property {
         match self {
             Self::Mass => {
                 // MuJoCo's mjMINVAL, below which a body that moves is refused by its compiler.
-                (!all(|m| m.is_finite() && m >= 1e-12)).then_some("a mass must be finite and at least 1e-12 kg")
+                (!all(|m| m.is_finite() && m >= 1e-15)).then_some("a mass must be finite and at least 1e-15 kg")
             }
             Self::Inertia => {
                 let largest = values.iter().copied().fold(0.0, f64::max);

@@ -11,6 +11,7 @@
 use super::bytes::{Malformed, Reader, Writer};
 use super::layout::Layout;
 use super::{Entry, Snapshot, SnapshotError};
+use crate::drive::table::numbers_fault;
 use crate::env::{Divergence, EnvState, EnvStatus};
 use crate::error::{Error, Result};
 use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning};
@@ -118,14 +119,15 @@ impl Snapshot {
 fn read_content(reader: &mut Reader<'_>) -> Result<Snapshot, Malformed> {
     // The length of a text takes 8 bytes.
     let lines = (0..reader.count(8)?).map(|_| reader.text()).collect::<Result<Vec<_>, _>>()?;
-    let entries = (0..reader.count(8)?).map(|_| read_entry(reader)).collect::<Result<Vec<_>, _>>()?;
+    let layout = Layout::from_lines(lines);
+    let entries = (0..reader.count(8)?).map(|_| read_entry(reader, layout.drives())).collect::<Result<Vec<_>, _>>()?;
     if !reader.0.is_empty() {
         return Err(Malformed("something stands after the last environment"));
     }
     if !entries.iter().all(|entry| entry.state.fits(&entries[0].state)) {
         return Err(Malformed("environments have different numbers of numbers"));
     }
-    Ok(Snapshot { layout: Arc::new(Layout::from_lines(lines)), entries: entries.into() })
+    Ok(Snapshot { layout: Arc::new(layout), entries: entries.into() })
 }
 
 fn write_entry(entry: &Entry, out: &mut Writer) {
@@ -156,16 +158,32 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
     out.u64(*step);
 }
 
-fn read_entry(reader: &mut Reader<'_>) -> Result<Entry, Malformed> {
+/// More steps than any run does, and far from where counting them ends: a step of a microsecond for 285 years.
+const MOST_STEPS: u64 = 1 << 53;
+
+/// An environment of a scene with this many drives.
+fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malformed> {
+    let finite = |reader: &mut Reader<'_>, what| {
+        let numbers = reader.numbers()?;
+        if numbers.iter().all(|number| number.is_finite()) { Ok(numbers) } else { Err(Malformed(what)) }
+    };
+    let steps = |reader: &mut Reader<'_>| match reader.u64()? {
+        steps if steps <= MOST_STEPS => Ok(steps),
+        _ => Err(Malformed("a count of steps is larger than any run's")),
+    };
     let size = |reader: &mut Reader<'_>| {
         usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))
     };
     let env = size(reader)?;
-    let steps = reader.u64()?;
-    let motion = Motion::from_values(reader.numbers()?);
-    let (values, active) = (reader.numbers()?, reader.flags()?);
+    let done = steps(reader)?;
+    let motion = Motion::from_values(finite(reader, "a time, position or velocity is not finite")?);
+    let (values, active) = (finite(reader, "a control or an applied force is not finite")?, reader.flags()?);
     let drives = reader.numbers()?;
-    let wrenches = Wrenches::from_numbers(&reader.numbers()?).ok_or(Malformed("a wrench has not all its numbers"))?;
+    if let Some(what) = numbers_fault(&drives, drive_count) {
+        return Err(Malformed(what));
+    }
+    let wrenches = finite(reader, "a wrench is not finite")?;
+    let wrenches = Wrenches::from_numbers(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -182,32 +200,47 @@ fn read_entry(reader: &mut Reader<'_>) -> Result<Entry, Malformed> {
     };
     let diverged = match reason {
         None => None,
-        Some(reason) => Some(Box::new(EnvStatus::Diverged { step: reader.u64()?, reason })),
+        Some(reason) => Some(Box::new(EnvStatus::Diverged { step: steps(reader)?, reason })),
     };
     let inputs = Inputs::from_values(values, active);
-    let state = EnvState { motion, inputs, drives, wrenches, steps, diverged };
+    let state = EnvState { motion, inputs, drives, wrenches, steps: done, diverged };
     Ok(Entry { env, state })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::table::{Drive, DriveTable, Gains, Realization, Setting};
+    use crate::drive::{DelayedPd, DriveType};
     use crate::env::Env;
 
-    /// Two environments of a small model, one of which has diverged for `reason`.
-    fn snapshot(reason: Divergence) -> Snapshot {
+    /// An environment of a small model, with a joint that a drive with a delay moves.
+    fn env() -> (Env, Layout) {
         let model = mj::compile(
-            r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/></body></worldbody></mujoco>"#,
+            r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/>
+            <body name="c"><joint name="k" axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></body></worldbody>
+            <actuator><motor name="m" joint="k"/></actuator></mujoco>"#,
             &[],
         )
         .expect("compiles")
         .into_model();
-        let mut env = Env::new(&model, &Arc::default()).expect("small");
+        let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: 9.0 };
+        let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
+        let (realization, range) = (Realization::Actuator, [f64::NEG_INFINITY, 1.0]);
+        let drive = Drive { qpos: 4, dof: 3, ctrl: 0, realization, initial, setting, range };
+        let mut table = DriveTable { drives: vec![drive], ..DriveTable::default() };
+        table.push_model(0, DelayedPd { delay: 2, max_delay: 3 }.into());
+        let layout = Layout::of(&model, &table, 1);
+        (Env::new(&model, &Arc::new(table)).expect("small"), layout)
+    }
+
+    /// Two such environments, one of which has diverged for `reason`.
+    fn snapshot(reason: Divergence) -> Snapshot {
+        let (mut env, layout) = env();
         env.write(|data| data.qvel_mut()[1] = 0.3);
         env.step(7);
         let mut entries = vec![Entry { env: 3, state: env.remember() }, Entry { env: 0, state: env.remember() }];
         entries[1].state.diverged = Some(Box::new(EnvStatus::Diverged { step: 7, reason }));
-        let layout = Layout::of(&model, &crate::drive::table::DriveTable::default());
         Snapshot { layout: Arc::new(layout), entries: entries.into() }
     }
 
@@ -274,20 +307,117 @@ mod tests {
     }
 
     /// Every byte of the content is changed, and the checksum made right again: an error or another snapshot, never a panic
-    /// or an allocation beyond the file.
+    /// or an allocation beyond the file; and an environment that goes on from what is another snapshot steps, or diverges.
     #[test]
     fn a_right_checksum_over_wrong_content_harms_nobody() {
         let good = bytes();
-        let mut refused = 0;
+        let (mut refused, mut stepped) = (0, 0);
+        let (mut env, _) = env();
+        let like = env.remember();
         for at in HEADER..good.len() - CHECKSUM {
             for value in [0, 1, 0x7f, 0xff] {
                 let mut bytes = good[..good.len() - CHECKSUM].to_vec();
                 bytes[at] = value;
                 let sum = Sha256::digest(&bytes);
                 bytes.extend_from_slice(&sum);
-                refused += usize::from(matches!(decode(&bytes), Err(SnapshotError::Malformed { .. })));
+                match decode(&bytes) {
+                    Ok(snapshot) => {
+                        for entry in snapshot.entries.iter().filter(|entry| entry.state.fits(&like)) {
+                            env.recall(&entry.state);
+                            env.step(3);
+                            assert!(env.data().qpos().iter().all(|q| q.is_finite()), "byte {at}: {value}");
+                            stepped += 1;
+                        }
+                    }
+                    Err(error) => refused += usize::from(matches!(error, SnapshotError::Malformed { .. })),
+                }
             }
         }
-        assert!(refused > 100, "{refused}");
+        assert!(refused > 100 && stepped > 1000, "{refused} {stepped}");
+        env.recall(&like);
+        assert_eq!(env.remember(), like, "what was restored meanwhile left nothing behind");
+    }
+
+    #[test]
+    fn numbers_that_no_run_gives_are_refused() {
+        let fault = |change: &dyn Fn(&mut EnvState)| {
+            let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
+            let mut entries = snapshot.entries.to_vec();
+            change(&mut entries[1].state);
+            snapshot.entries = entries.into();
+            match decode(&snapshot.encode(FORMAT, &mj::version_string())) {
+                Ok(_) => None,
+                Err(SnapshotError::Malformed { what, .. }) => Some(what),
+                Err(other) => panic!("{other}"),
+            }
+        };
+        // Control: what is not changed is read.
+        assert_eq!(fault(&|_| {}), None);
+        let motion = |value| {
+            move |state: &mut EnvState| {
+                let mut values = state.motion.values().to_vec();
+                values[3] = value;
+                state.motion = Motion::from_values(values);
+            }
+        };
+        let input = |value| {
+            move |state: &mut EnvState| {
+                let (values, active) = state.inputs.values();
+                let (mut values, active) = (values.to_vec(), active.to_vec());
+                values[0] = value;
+                state.inputs = Inputs::from_values(values, active);
+            }
+        };
+        let drive = |index: usize, value| move |state: &mut EnvState| state.drives[index] = value;
+        let (nan, infinite) = (f64::NAN, f64::INFINITY);
+        assert!(fault(&motion(nan)).is_some_and(|what| what.contains("position")));
+        assert!(fault(&motion(infinite)).is_some());
+        assert!(fault(&input(nan)).is_some_and(|what| what.contains("control")));
+        // Gains, limits, drive type, stiffness, damping, inertia, range; targets; what the delay keeps.
+        let bad = [
+            (0, nan),
+            (0, -1.0),
+            (0, infinite),
+            (1, -1.0),
+            (2, -1.0),
+            (2, nan),
+            (3, -1.0),
+            (4, 0.5),
+            (4, 9.0),
+            (5, nan),
+            (5, -1.0),
+            (6, -1.0),
+            (7, -1.0),
+            (7, infinite),
+            (8, nan),
+            (8, 2.0),
+            (9, nan),
+            (10, nan),
+            (11, infinite),
+            (12, nan),
+            (16, nan),
+            (20, infinite),
+        ];
+        for (index, value) in bad {
+            assert!(fault(&drive(index, value)).is_some(), "number {index}: {value}");
+        }
+        for (index, value) in [(2, infinite), (3, infinite), (4, 1.0), (8, -2.0), (9, infinite), (10, -3.0)] {
+            assert_eq!(fault(&drive(index, value)), None, "number {index}: {value}");
+        }
+        assert!(fault(&|state| state.drives.truncate(5)).is_some());
+        assert!(fault(&|state| state.steps = MOST_STEPS + 1).is_some_and(|what| what.contains("steps")));
+        assert_eq!(fault(&|state| state.steps = MOST_STEPS), None);
+    }
+
+    #[test]
+    fn counting_goes_on_from_the_most_steps() {
+        let (mut env, _) = env();
+        let mut state = env.remember();
+        for (steps, then) in [(MOST_STEPS, MOST_STEPS + 2), (u64::MAX, u64::MAX)] {
+            state.steps = steps;
+            env.recall(&state);
+            env.step(2);
+            assert_eq!((env.steps(), env.status()), (then, &EnvStatus::Running));
+        }
     }
 }

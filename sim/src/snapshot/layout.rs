@@ -1,15 +1,16 @@
-//! Which numbers a state has: sizes and names of a compiled scene, to tell one scene from another.
+//! Which numbers a state has, and how it is stepped: sizes, names and steps of a compiled scene, to tell one scene from
+//! another.
 
 use crate::drive::table::DriveTable;
 use crate::mj::{Model, ObjectKind, words};
 
-/// Sizes and names of everything that has numbers in a state, one line each.
+/// How a scene is stepped, then sizes and names of everything that has numbers in a state, one line each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Layout(Vec<String>);
 
 impl Layout {
-    /// The layout of a model with its drives.
-    pub(crate) fn of(model: &Model, drives: &DriveTable) -> Self {
+    /// The layout of a model with its drives, `substeps` of whose steps are one of the simulation.
+    pub(crate) fn of(model: &Model, drives: &DriveTable, substeps: u32) -> Self {
         let sizes = [
             ("positions", model.nq()),
             ("degrees of freedom", model.nv()),
@@ -18,7 +19,12 @@ impl Layout {
             ("bodies", model.nbody()),
             ("equalities", model.neq()),
         ];
-        let mut lines: Vec<String> = sizes.map(|(what, count)| format!("{count} {what}")).into();
+        // Every bit of the step: Rust writes the shortest number that is read as the same.
+        let stepped = |(name, _): &(&str, String)| matches!(*name, "timestep" | "integrator" | "cone");
+        let options = model.options().into_iter().filter(stepped);
+        let mut lines: Vec<String> = options.map(|(name, value)| format!("{name} {value}")).collect();
+        lines.push(format!("{substeps} substeps"));
+        lines.extend(sizes.map(|(what, count)| format!("{count} {what}")));
         let name = |kind, index| model.name(kind, index).unwrap_or_default();
         for joint in 0..model.njnt() {
             let word = words::joint(model.jnt_type()[joint]).unwrap_or("joint");
@@ -36,6 +42,11 @@ impl Layout {
             lines.push(format!("drive of {:?}", name(ObjectKind::Joint, joint)));
         }
         Self(lines)
+    }
+
+    /// How many drives there are.
+    pub(super) fn drives(&self) -> usize {
+        self.0.iter().filter(|line| line.starts_with("drive of ")).count()
     }
 
     /// The lines, as they stand in a file.

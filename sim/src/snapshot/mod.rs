@@ -2,16 +2,20 @@
 //!
 //! A snapshot holds everything that decides how an environment goes on: time, positions with quaternions as they were
 //! before they were normalised, velocities, activations, the solver's warm start, what users set (controls, applied forces,
-//! bodies moved by hand, active equalities), targets, gains, limits, efforts and delays of drives, wrenches on links, the count of steps, and whether and why
-//! it has diverged. Going on from it is bit-identical, in any environment of any manager that was built by the same program
-//! with the same MuJoCo, for any number of threads.
+//! bodies moved by hand, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
+//! on links, the count of steps, and whether and why it has diverged. Going on from it is bit-identical in any environment
+//! with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
+//! threads.
 //!
 //! What it does not hold:
 //!
 //! * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
 //!   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory nobody else
 //!   knows; and measurements of one run would not belong to the other.
-//! * The model: masses, friction, gravity and other properties belong to the environment, not to its state.
+//! * The model and the [properties](crate::randomization) of environments: masses, friction, gravity, gains that were drawn.
+//!   They belong to the environment, not to its state, and stay when a snapshot is restored; of a drive whose gain is drawn,
+//!   the snapshot holds the gain that was set before. A snapshot of a scene with other steps, another integrator or other
+//!   friction cones is refused, as that of another scene.
 //! * What happened on the way: counts of warnings and of buffers that grew.
 
 mod bytes;

@@ -80,7 +80,9 @@ impl ActuatorLaw for DelayedPd {
         let heard = match (memory[DELAY] as usize).min(ring.len()) {
             0 => *target,
             delay => {
-                let [position, velocity, feedforward] = ring[(memory[NEXT] as usize + ring.len() - delay) % ring.len()];
+                // A file that was made by hand may hold any number.
+                let next = memory[NEXT] as usize % ring.len();
+                let [position, velocity, feedforward] = ring[(next + ring.len() - delay) % ring.len()];
                 // It was inside of the range when it was set; the range may be tighter by now.
                 let [low, high] = now.range;
                 Target { position: position.max(low).min(high), velocity, feedforward }
@@ -95,7 +97,7 @@ impl ActuatorLaw for DelayedPd {
         let slots = ring.len();
         if slots > 0 {
             ring[next % slots] = [target.position, target.velocity, target.feedforward];
-            memory[NEXT] = ((next + 1) % slots) as f64;
+            memory[NEXT] = ((next % slots + 1) % slots) as f64;
         }
     }
 }

@@ -1,0 +1,133 @@
+//! Gains that an environment has as properties of its own, drawn or set. They are not of its state: a snapshot holds what
+//! they stand in for, and an environment that goes on from a snapshot keeps its own.
+
+use super::DriveType;
+use super::table::{DriveState, Gains, Setting};
+
+/// A gain that was drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Drawn {
+    /// The gain, in torque units.
+    value: f64,
+    /// What it stands in for: stiffness or damping in the unit of the drive type, or an effort limit.
+    instead_of: f64,
+}
+
+/// What is drawn of each drive, in the order of [`Kind::ALL`].
+pub(super) type DrawnGains = [Option<Drawn>; 3];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Stiffness,
+    Damping,
+    MaxEffort,
+}
+
+impl Kind {
+    const ALL: [Self; 3] = [Self::Stiffness, Self::Damping, Self::MaxEffort];
+
+    fn gain(self, gains: &Gains) -> f64 {
+        match self {
+            Self::Stiffness => gains.kp,
+            Self::Damping => gains.kd,
+            Self::MaxEffort => gains.max_effort,
+        }
+    }
+
+    /// What a user sets of it.
+    fn set_to(self, gains: &Gains, setting: &Setting) -> f64 {
+        match self {
+            Self::Stiffness => setting.stiffness,
+            Self::Damping => setting.damping,
+            Self::MaxEffort => gains.max_effort,
+        }
+    }
+
+    /// Sets the gain; the drive type stays, and gives it back in its unit. A passive joint has no gains.
+    fn put(self, value: f64, gains: &mut Gains, setting: &mut Setting) {
+        let unit = match *setting {
+            Setting { drive_type: DriveType::Acceleration, inertia: Some(inertia), .. } => inertia,
+            _ => 1.0,
+        };
+        let passive = setting.drive_type == DriveType::None;
+        match self {
+            Self::Stiffness => {
+                setting.stiffness = value / unit;
+                gains.kp = if passive { gains.kp } else { value };
+            }
+            Self::Damping => {
+                setting.damping = value / unit;
+                gains.kd = if passive { gains.kd } else { value };
+            }
+            Self::MaxEffort => gains.max_effort = value,
+        }
+    }
+
+    /// Sets it as a user would.
+    fn set(self, value: f64, gains: &mut Gains, setting: &mut Setting) {
+        match self {
+            Self::Stiffness => setting.stiffness = value,
+            Self::Damping => setting.damping = value,
+            Self::MaxEffort => gains.max_effort = value,
+        }
+        let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
+        match self {
+            Self::Stiffness => gains.kp = kp,
+            Self::Damping => gains.kd = kd,
+            Self::MaxEffort => {}
+        }
+    }
+}
+
+impl DriveState {
+    /// What is drawn of a gain; nothing where the gain was set to something else since.
+    fn drawn_gain(&self, drive: usize, kind: Kind) -> Option<Drawn> {
+        let now = kind.gain(&self.gains[drive]);
+        self.drawn[drive][kind as usize].filter(|drawn| drawn.value.to_bits() == now.to_bits())
+    }
+
+    /// Draws gains (in torque units) and the effort limit of a drive. What stays as it is is not drawn, and what becomes
+    /// nominal is no longer.
+    pub(crate) fn draw_gains(&mut self, drive: usize, values: [f64; 3]) {
+        let initial = self.table().drives[drive].initial;
+        for (kind, value) in Kind::ALL.into_iter().zip(values) {
+            let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
+            if kind.gain(&gains).to_bits() == value.to_bits() {
+                continue;
+            }
+            let before = self.drawn_gain(drive, kind);
+            let instead_of = before.map_or(kind.set_to(&gains, &setting), |drawn| drawn.instead_of);
+            let is_nominal = value.to_bits() == kind.gain(&initial).to_bits();
+            kind.put(value, &mut gains, &mut setting);
+            self.gains.put(drive, gains);
+            self.settings.put(drive, setting);
+            let mut drawn = self.drawn[drive];
+            drawn[kind as usize] = (!is_nominal).then_some(Drawn { value, instead_of });
+            self.drawn.put(drive, drawn);
+        }
+    }
+
+    /// Gains and setting of a drive as they would be if nothing had been drawn.
+    pub(super) fn without_drawn(&self, drive: usize) -> (Gains, Setting) {
+        let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
+        for kind in Kind::ALL {
+            if let Some(drawn) = self.drawn_gain(drive, kind) {
+                kind.set(drawn.instead_of, &mut gains, &mut setting);
+            }
+        }
+        (gains, setting)
+    }
+
+    /// Sets gains and setting of a drive; those that are drawn stay, and stand in for these.
+    pub(super) fn set_below_drawn(&mut self, drive: usize, mut gains: Gains, mut setting: Setting) {
+        let drawn = Kind::ALL.map(|kind| {
+            let Drawn { value, .. } = self.drawn_gain(drive, kind)?;
+            let instead_of = kind.set_to(&gains, &setting);
+            kind.put(value, &mut gains, &mut setting);
+            Some(Drawn { value, instead_of })
+        });
+        self.gains.put(drive, gains);
+        self.settings.put(drive, setting);
+        self.drawn.put(drive, drawn);
+    }
+}
