@@ -1,23 +1,26 @@
 //! Channels of cameras as files.
 
-use super::Result;
+use super::{Result, npy};
 use image::{Rgb, RgbImage};
 use kinetoscope::ndarray::{ArrayBase, Data, Dimension};
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
-use ndarray_npy::{WritableElement, WriteNpyExt};
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Writes an array for NumPy.
 pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
 where
     S: Data,
-    S::Elem: WritableElement,
+    S::Elem: npy::Element,
     D: Dimension,
 {
-    let file = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    array.write_npy(BufWriter::new(file)).map_err(|e| format!("{}: {e}", path.display()).into())
+    let write = || {
+        let mut file = BufWriter::new(File::create(path)?);
+        npy::write(&mut file, array)?;
+        file.flush()
+    };
+    write().map_err(|e: std::io::Error| format!("{}: {e}", path.display()).into())
 }
 
 /// Writes a picture as PNG.

@@ -3,6 +3,7 @@
 
 mod models;
 mod mujoco_renderer;
+mod npy;
 mod objects;
 mod overview;
 mod placement;
