@@ -89,8 +89,8 @@ fn between_levels<S: Simd>(
     let levels = texture.levels();
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
     let mut out = [zero, zero, zero];
-    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.5 times 2^k it is enough alone: the four texels of a point
-    // cover that; beyond it is blended with the next.
+    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.75 times 2^k it is enough alone: the four texels of a point
+    // nearly cover that; beyond it is blended with the next, which costs a second look.
     let (mut from_last, mut left, mut width) = (zero, lanes, 1.0f32);
     let mut carried = false;
     for (k, level) in levels.iter().enumerate() {
@@ -100,7 +100,7 @@ fn between_levels<S: Simd>(
             continue;
         }
         let here = if last { left } else { left & texels.simd_lt(splat(s, 2.0 * width)) };
-        let to_next = if last { zero } else { min(max(texels * (2.0 / width) - 3.0, zero), one) };
+        let to_next = if last { zero } else { min(max(texels * (4.0 / width) - 7.0, zero), one) };
         let to_next = select(here, to_next, zero);
         let weight = select(here, one - to_next, zero) + from_last;
         let wanted = weight.simd_gt(zero);
