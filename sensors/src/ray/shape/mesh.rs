@@ -29,8 +29,8 @@ pub(crate) struct MeshTree {
     bvh: Bvh,
     triangles: Vec<Triangle>,
     bounds: [V3; 2],
-    /// Made when the first steep rays come; none for some meshes.
-    columns: OnceLock<Option<Columns>>,
+    /// Along each axis, made when the first steep rays come; none for some meshes.
+    columns: [OnceLock<Option<Columns>>; 3],
 }
 
 impl MeshTree {
@@ -54,7 +54,7 @@ impl MeshTree {
             let (lo, hi) = (to_f64(b[0]), to_f64(b[1]));
             [[0, 1, 2].map(|k| all[0][k].min(lo[k])), [0, 1, 2].map(|k| all[1][k].max(hi[k]))]
         });
-        Self { bvh, triangles, bounds, columns: OnceLock::new() }
+        Self { bvh, triangles, bounds, columns: Default::default() }
     }
 }
 
@@ -81,8 +81,8 @@ impl MeshTree {
     }
 
     #[inline(always)]
-    pub(crate) fn columns(&self) -> Option<&Columns> {
-        self.columns.get_or_init(|| Columns::new(&self.triangles, &self.bounds)).as_ref()
+    pub(crate) fn columns(&self, axes: [usize; 3]) -> Option<&Columns> {
+        self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds, axes)).as_ref()
     }
 
     /// The nearest triangle up to `limit`, or one that was found before.
@@ -125,7 +125,7 @@ impl RayShape for Mesh {
         let tree = &*self.tree;
         let Some(shear) = ShearPacket::new(s, packet) else { return touch_each(self, packet, stack, touches) };
         if columns::are_steep(s, &shear)
-            && let Some(columns) = tree.columns()
+            && let Some(columns) = tree.columns(shear.axes())
             && columns.touch_packet(s, tree, packet, &shear, touches)
         {
             return;

@@ -16,6 +16,9 @@ use scene::mesh::TriMesh;
 use scene::{Instance, Material, PoseF64, RenderMesh, RenderScene, pose};
 use std::sync::Arc;
 
+/// The axes of columns along z.
+const ABOVE: [usize; 3] = [0, 1, 2];
+
 /// What was compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Count {
@@ -46,7 +49,7 @@ fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_di
         for (index, level) in levels().into_iter().enumerate() {
             let mut touches: Touches = [None; WIDTH];
             let by_columns = at_level!(level, s => match ShearPacket::new(s, &packet) {
-                Some(shear) if are_steep(s, &shear) => {
+                Some(shear) if are_steep(s, &shear) && columns.is_some_and(|c| c.axes() == shear.axes()) => {
                     columns.is_some_and(|columns| columns.touch_packet(s, tree, &packet, &shear, &mut touches))
                 }
                 _ => false,
@@ -113,6 +116,13 @@ fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
     cells.flat_map(|(i, j)| cell(i, j)).collect()
 }
 
+/// With the coordinates x, y, z along some axes.
+fn turned<T: Copy>(p: [T; 3], axes: [usize; 3]) -> [T; 3] {
+    let mut to = p;
+    axes.into_iter().zip(p).for_each(|(axis, x)| to[axis] = x);
+    to
+}
+
 fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
     triangles.iter().map(|t| t.map(|p| p.map(|x| x + by))).collect()
 }
@@ -124,23 +134,29 @@ fn steep_rays_are_rays_one_by_one() {
     // Twice the same triangles: of all ties the first one counts.
     let twice: Vec<Triangle> = ground.iter().chain(&ground).copied().collect();
     let layers: Vec<Triangle> = (0..4).flat_map(|k| sheet(&mut dice, 25, 0.3 * f64::from(k) - 0.9)).collect();
-    let turned = ground.iter().map(|t| t.map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]]));
+    let rotated = ground.iter().map(|t| t.map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]]));
     let flat = ground.iter().map(|t| t.map(|p| [p[0], p[1], 0.25]));
     for (what, triangles, at) in [
         ("a sheet", ground.clone(), 0.0),
         ("two sheets", twice, 0.0),
         ("four layers", layers, 0.0),
-        ("a turned sheet", turned.collect(), 0.0),
+        ("a turned sheet", rotated.collect(), 0.0),
         ("a flat sheet", flat.collect(), 0.0),
         ("a sheet far away", moved(&ground, 4096.0), 4096.0),
         ("soup", soup(&mut dice, 1500, [0.0; 3]), 0.0),
         ("soup far away", soup(&mut dice, 1500, [3000.0; 3]), 3000.0),
     ] {
-        let tree = Arc::new(MeshTree::of_triangles(triangles));
-        let columns = tree.columns();
         let mut all = Count::default();
-        for max_distance in [f64::INFINITY, 3.0, 0.5] {
-            let count = compare(&tree, columns, &steep(&mut dice, [at; 3]), max_distance);
+        for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
+            // The same with other axes above.
+            let axes = [(last + 1) % 3, (last + 2) % 3, last];
+            let tree = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
+            let tree = Arc::new(MeshTree::of_triangles(tree));
+            let rays: Vec<Ray> = steep(&mut dice, [at; 3])
+                .iter()
+                .map(|ray| Ray { origin: turned(ray.origin, axes), direction: turned(ray.direction, axes) })
+                .collect();
+            let count = compare(&tree, tree.columns(axes), &rays, max_distance);
             assert_eq!(count.wrong, 0, "{what}: {count:?}");
             (all.hits, all.packets, all.columns) =
                 (all.hits + count.hits, all.packets + count.packets, all.columns + count.columns);
@@ -161,7 +177,7 @@ fn rays_between_columns_are_not_lost() {
     let flat = sheet(&mut dice, 33, 0.0);
     let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
     let tree = Arc::new(MeshTree::of_triangles(flat));
-    let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], [32, 32]).unwrap();
+    let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], ABOVE, [32, 32]).unwrap();
     let rays: Vec<Ray> = (0..12_000)
         .map(|k| {
             let corner = to_f64(tree.triangles()[k % 2048][k % 3]);
@@ -186,7 +202,7 @@ fn rays_between_columns_are_not_lost() {
 fn some_meshes_have_no_columns() {
     let mut dice = Dice(53);
     let ground = sheet(&mut dice, 25, 0.0);
-    let columns = |triangles: &[Triangle]| MeshTree::of_triangles(triangles.to_vec()).columns().is_some();
+    let columns = |triangles: &[Triangle]| MeshTree::of_triangles(triangles.to_vec()).columns(ABOVE).is_some();
     assert!(columns(&ground));
     assert!(!columns(&ground[..100]), "few");
     assert!(!columns(&[]), "none");
@@ -209,9 +225,9 @@ fn crowds_are_left_to_the_tree() {
         let ray = |k: usize| [x + 0.01 * (k % 4) as f64, 0.01 * (k / 4) as f64, 2.0];
         (0..WIDTH).map(|k| Ray { origin: ray(k), direction: [0.0, 0.0, -1.0] }).collect()
     };
-    let count = compare(&tree, tree.columns(), &rays(0.0), f64::INFINITY);
+    let count = compare(&tree, tree.columns(ABOVE), &rays(0.0), f64::INFINITY);
     assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 0, wrong: 0 });
-    let count = compare(&tree, tree.columns(), &rays(1.0), f64::INFINITY);
+    let count = compare(&tree, tree.columns(ABOVE), &rays(1.0), f64::INFINITY);
     assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 1, wrong: 0 }, "the control: beside it");
 }
 

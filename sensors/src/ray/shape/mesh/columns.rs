@@ -1,8 +1,10 @@
-//! Triangles by where they are seen from above: a list for each of many columns along z.
+//! Triangles by where they are seen from above: a list for each of many columns.
 //!
 //! What height scanners look at is terrain, from above. There a steep ray has few triangles near it, and which ones is known
 //! without a walk: those of the columns that it passes between the lowest and the highest corner. It is tested against each of
 //! them, eight pairs of a ray and a triangle at a time, by the arithmetic of a single ray: the same bits.
+//!
+//! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes); below, that is called z.
 //!
 //! No triangle is missed that [`Shear`](crate::ray::triangle::Shear) finds a ray inside of. Of that triangle, a point at a
 //! height z between those of its corners is, along x, where the ray is at that height, up to rounding: its corners as seen from
@@ -39,6 +41,8 @@ const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Columns {
+    /// The axis of the columns comes last; all other numbers are in this order.
+    axes: [usize; 3],
     /// Smallest coordinates of all triangles.
     low: [f64; 2],
     per_metre: [f64; 2],
@@ -57,37 +61,45 @@ pub(crate) struct Columns {
 
 impl Columns {
     /// Columns a bit narrower than the mean triangle; `None` where triangles are in too many.
-    pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2]) -> Option<Self> {
+    pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2], axes: [usize; 3]) -> Option<Self> {
         if triangles.len() < FEWEST {
             return None;
         }
         let count = triangles.len() as f64;
         let size = [0, 1].map(|axis| {
-            let mean = triangles.iter().map(|t| extent(t, axis)).map(|[low, high]| high - low).sum::<f64>() / count;
-            (bounds[1][axis] - bounds[0][axis]) / (NARROW * mean)
+            let mean = triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
+            (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (NARROW * mean)
         });
         // No more than are worth the memory.
         let fewer = (MOST * count / (size[0] * size[1])).sqrt().min(1.0);
         let size = size.map(|n| (n * fewer).ceil());
         let known = size.iter().all(|n| (1.0..=MOST * count).contains(n));
-        if known { Self::with_size(triangles, bounds, size.map(|n| n as usize)) } else { None }
+        if known { Self::with_size(triangles, bounds, axes, size.map(|n| n as usize)) } else { None }
     }
 
-    pub(crate) fn with_size(triangles: &[Triangle], bounds: &[V3; 2], size: [usize; 2]) -> Option<Self> {
-        let per_metre = [0, 1].map(|axis| size[axis] as f64 / (bounds[1][axis] - bounds[0][axis]));
+    pub(crate) fn with_size(
+        triangles: &[Triangle],
+        bounds: &[V3; 2],
+        axes: [usize; 3],
+        size: [usize; 2],
+    ) -> Option<Self> {
+        let [low, high] = bounds.map(|p| axes.map(|axis| p[axis]));
+        let per_metre = [0, 1].map(|axis| size[axis] as f64 / (high[axis] - low[axis]));
         let mut columns = Self {
-            low: [bounds[0][0], bounds[0][1]],
+            axes,
+            low: [low[0], low[1]],
             per_metre,
             size,
             starts: vec![0; size[0] * size[1] + 2],
             lists: Vec::new(),
-            heights: [bounds[0][2], bounds[1][2]],
+            heights: [low[2], high[2]],
             reach: bounds.iter().flatten().fold(0.0, |m, x| x.abs().max(m)),
             // 32 e.
             slack: 16.0 * f64::EPSILON,
         };
         let most = SPREAD * triangles.len();
-        let in_all: usize = triangles.iter().map(|t| columns.rectangle(t)).map(|[[a, b], [c, d]]| (c - a + 1) * (d - b + 1)).sum();
+        let rectangles = triangles.iter().map(|t| columns.rectangle(t));
+        let in_all: usize = rectangles.map(|[from, to]| (to[0] - from[0] + 1) * (to[1] - from[1] + 1)).sum();
         if in_all > most || !per_metre.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -114,6 +126,11 @@ impl Columns {
         Some(columns)
     }
 
+    #[cfg(test)]
+    pub(crate) fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
     /// The same, with rays as wide as they are.
     #[cfg(test)]
     pub(crate) fn without_slack(&self) -> Self {
@@ -122,7 +139,8 @@ impl Columns {
 
     /// The first and the last column of a triangle along both axes.
     fn rectangle(&self, triangle: &Triangle) -> [[usize; 2]; 2] {
-        let [[left, right], [bottom, top]] = [0, 1].map(|axis| extent(triangle, axis).map(|x| self.column(axis, x)));
+        let ends = |axis: usize| extent(triangle, self.axes[axis]).map(|x| self.column(axis, x));
+        let ([left, right], [bottom, top]) = (ends(0), ends(1));
         [[left, bottom], [right, top]]
     }
 
@@ -152,7 +170,7 @@ fn extent(triangle: &Triangle, axis: usize) -> [f64; 2] {
 #[inline(always)]
 pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearPacket<S>) -> bool {
     let [x, y] = shear.slopes();
-    shear.axes()[2] == 2 && x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::ray::packet::ALL
+    x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::ray::packet::ALL
 }
 
 /// The nearest triangle of each ray that was found.
@@ -210,14 +228,14 @@ impl Columns {
                     (pairs.triangles[at], pairs.rays[at]) = (triangle, k);
                     pairs.count += 1;
                     if at == WIDTH - 1 {
-                        pairs.test(s, &tree.triangles, &rays, &mut nearest);
+                        pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
                     }
                 }
             }
         }
         if !pairs.count.is_multiple_of(WIDTH) {
             // The others are of before, or none at first: they change nothing.
-            pairs.test(s, &tree.triangles, &rays, &mut nearest);
+            pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
         }
         tree.show(s, &nearest.limit, &nearest.best, touches);
         true
@@ -256,7 +274,14 @@ impl Columns {
 impl Pairs {
     /// Tests all lanes.
     #[inline(always)]
-    fn test<S: Simd>(&self, s: S, triangles: &[Triangle], rays: &[[[f64; WIDTH]; 3]; 2], nearest: &mut Nearest) {
+    fn test<S: Simd>(
+        &self,
+        s: S,
+        triangles: &[Triangle],
+        axes: [usize; 3],
+        rays: &[[[f64; WIDTH]; 3]; 2],
+        nearest: &mut Nearest,
+    ) {
         let mut corners = [[[0.0; WIDTH]; 3]; 3];
         let mut lines = [[[0.0; WIDTH]; 3]; 2];
         for lane in 0..WIDTH {
@@ -277,7 +302,7 @@ impl Pairs {
             &origin,
             &by,
             #[inline(always)]
-            |corner, axis| D::load(s, &corners[corner][axis]),
+            |corner, axis| D::load(s, &corners[corner][axes[axis]]),
         );
         let Some((t, inside)) = met else { return };
         let mut met = (inside & D::splat(s, 0.0).le(t)).to_bitmask();
