@@ -51,6 +51,8 @@ pub(crate) struct Columns {
     /// Where the list of each column begins, row by row along x, and after the last one where it ends.
     starts: Vec<u32>,
     lists: Vec<u32>,
+    /// Smallest and largest coordinates of each triangle across the columns.
+    sides: Vec<[[f32; 2]; 2]>,
     /// Lowest and highest corner.
     heights: [f64; 2],
     /// The largest coordinate.
@@ -92,6 +94,7 @@ impl Columns {
             size,
             starts: vec![0; size[0] * size[1] + 2],
             lists: Vec::new(),
+            sides: Vec::new(),
             heights: [low[2], high[2]],
             reach: bounds.iter().flatten().fold(0.0, |m, x| x.abs().max(m)),
             // 32 e.
@@ -103,6 +106,8 @@ impl Columns {
         if in_all > most || !per_metre.iter().all(|x| x.is_finite()) {
             return None;
         }
+        let side = |t: &Triangle, axis: usize| extent(t, axes[axis]).map(|x| x as f32);
+        columns.sides = triangles.iter().map(|t| [side(t, 0), side(t, 1)]).collect();
         // Counted two columns ahead, a running sum says one ahead where each list begins; when a list is written, that is where
         // the next one begins.
         for t in triangles {
@@ -173,6 +178,15 @@ pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearPacket<S>) -> bool {
     x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::ray::packet::ALL
 }
 
+/// For both ends, along both axes, what is so of each ray.
+type Ends<T> = [[[T; WIDTH]; 2]; 2];
+
+/// Whether two intervals have something in common.
+#[inline(always)]
+fn meet([a, b]: &[f32; 2], [c, d]: [f64; 2]) -> bool {
+    (f64::from(*a) <= d) & (c <= f64::from(*b))
+}
+
 /// The nearest triangle of each ray that was found.
 struct Nearest {
     limit: [f64; WIDTH],
@@ -199,7 +213,7 @@ impl Columns {
         touches: &mut Touches,
     ) -> bool {
         let (origin, by) = (shear.origin(), shear.by());
-        let [[left, bottom], [right, top]] = self.passed(s, &origin, &by);
+        let (ends, [[left, bottom], [right, top]]) = self.passed(s, &origin, &by);
         let mut crowd = 0;
         for k in 0..WIDTH {
             if !packet.has(k) {
@@ -222,18 +236,22 @@ impl Columns {
             if !packet.has(k) {
                 continue;
             }
+            let [x, y] = [[ends[0][0][k], ends[1][0][k]], [ends[0][1][k], ends[1][1][k]]];
             for row in bottom[k]..=top[k] {
                 for &triangle in self.list(row, left[k], right[k]) {
                     let at = pairs.count % WIDTH;
                     (pairs.triangles[at], pairs.rays[at]) = (triangle, k);
-                    pairs.count += 1;
-                    if at == WIDTH - 1 {
+                    // No jump that could not be foretold: about half of them are near the ray.
+                    let sides = &self.sides[triangle as usize];
+                    pairs.count += usize::from(meet(&sides[0], x) & meet(&sides[1], y));
+                    if pairs.count == WIDTH {
                         pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
+                        pairs.count = 0;
                     }
                 }
             }
         }
-        if !pairs.count.is_multiple_of(WIDTH) {
+        if pairs.count > 0 {
             // The others are of before, or none at first: they change nothing.
             pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
         }
@@ -241,26 +259,27 @@ impl Columns {
         true
     }
 
-    /// The first and the last columns that rays pass, along both axes.
+    /// Between which coordinates rays are, along both axes, and the first and the last columns there.
     #[inline(always)]
-    fn passed<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> [[[usize; WIDTH]; 2]; 2] {
+    fn passed<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> (Ends<f64>, Ends<usize>) {
         let reach = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).max(D::splat(s, self.reach));
         let slack = reach * self.slack;
         let [below, above] = self.heights.map(|z| D::splat(s, z) - origin[2]);
         let zero = D::splat(s, 0.0);
-        let mut ends = [[[0; WIDTH]; 2]; 2];
+        let (mut ends, mut columns) = ([[[0.0; WIDTH]; 2]; 2], [[[0; WIDTH]; 2]; 2]);
         for axis in 0..2 {
             let (a, b) = (origin[axis] + by[axis] * below, origin[axis] + by[axis] * above);
             let last = D::splat(s, (self.size[axis] - 1) as f64);
             for (end, x) in [a.min(b) - slack, a.max(b) + slack].into_iter().enumerate() {
+                ends[end][axis] = x.array();
                 let at = (x - D::splat(s, self.low[axis])) * self.per_metre[axis];
                 let at = at.max(zero).min(last).array();
                 for k in 0..WIDTH {
-                    ends[end][axis][k] = at[k] as u32 as usize;
+                    columns[end][axis][k] = at[k] as u32 as usize;
                 }
             }
         }
-        ends
+        (ends, columns)
     }
 
     /// What is in some columns of a row.
