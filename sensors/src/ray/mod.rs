@@ -5,9 +5,9 @@
 //!
 //! Rays are cast in packets of eight, a lane for each. A shape says what one ray touches; a shape that can do better for rays
 //! that run side by side does so by the same operations in the same order, so that a hit never depends on which other rays
-//! are cast with it, on the order of the rays or on the instruction set. Meshes walk their tree once for a packet (`bvh/beam`)
-//! and test triangles in all lanes; height fields look at the first cells in all lanes. Rays that run apart are cast one by
-//! one.
+//! are cast with it, on the order of the rays or on the instruction set. Meshes have lists of what steep rays may meet
+//! (`shape/mesh/columns`); for others they walk their tree once for a packet (`bvh/beam`) and test triangles in all lanes;
+//! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
 
 mod assets;
 mod bvh;

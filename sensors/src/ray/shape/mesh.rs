@@ -1,5 +1,7 @@
 //! Triangles.
 
+pub(crate) mod columns;
+
 use super::{RayShape, Touch, Touches, touch_each};
 use crate::lanes::{D, Simd};
 use crate::ray::bvh::{Beam, Bvh, Stack, Walked};
@@ -8,7 +10,8 @@ use crate::ray::triangle::{Shear, ShearPacket, Triangle, normal};
 use crate::ray::vector::{V3, to_f64};
 use crate::ray::{Assets, Ray};
 use scene::RenderMesh;
-use std::sync::Arc;
+use columns::Columns;
+use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
 /// about as much as these.
@@ -26,6 +29,8 @@ pub(crate) struct MeshTree {
     bvh: Bvh,
     triangles: Vec<Triangle>,
     bounds: [V3; 2],
+    /// Along each axis, made when the first steep rays come; none for some meshes.
+    columns: [OnceLock<Option<Columns>>; 3],
 }
 
 impl MeshTree {
@@ -49,7 +54,7 @@ impl MeshTree {
             let (lo, hi) = (to_f64(b[0]), to_f64(b[1]));
             [[0, 1, 2].map(|k| all[0][k].min(lo[k])), [0, 1, 2].map(|k| all[1][k].max(hi[k]))]
         });
-        Self { bvh, triangles, bounds }
+        Self { bvh, triangles, bounds, columns: Default::default() }
     }
 }
 
@@ -68,6 +73,16 @@ impl MeshTree {
     #[cfg(test)]
     pub(crate) fn bvh(&self) -> &Bvh {
         &self.bvh
+    }
+
+    #[cfg(test)]
+    pub(crate) fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    #[inline(always)]
+    pub(crate) fn columns(&self, axes: [usize; 3]) -> Option<&Columns> {
+        self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds, axes)).as_ref()
     }
 
     /// The nearest triangle up to `limit`, or one that was found before.
@@ -102,12 +117,19 @@ impl RayShape for Mesh {
         self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
     }
 
-    /// One walk for all rays where they run side by side. Every triangle that a ray may hit is tested by the arithmetic of
-    /// the single ray, and the nearest one counts, the first one of those that are as near: the same bits.
+    /// Steep rays look into columns; others take one walk for all where they run side by side. Every triangle that a ray may
+    /// hit is tested by the arithmetic of the single ray, and the nearest one counts, the first one of those that are as
+    /// near: the same bits.
     #[inline(always)]
     fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
         let tree = &*self.tree;
         let Some(shear) = ShearPacket::new(s, packet) else { return touch_each(self, packet, stack, touches) };
+        if columns::are_steep(s, &shear)
+            && let Some(columns) = tree.columns(shear.axes())
+            && columns.touch_packet(s, tree, packet, &shear, touches)
+        {
+            return;
+        }
         let Some(beam) = Beam::around(s, packet, &shear, &tree.bvh) else {
             return touch_each(self, packet, stack, touches);
         };

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod brute_force;
+mod columns;
 mod packets;
 mod shapes;
 mod terrain;
