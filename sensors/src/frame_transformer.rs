@@ -3,6 +3,7 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::matching;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
@@ -79,6 +80,10 @@ impl SensorCfg for FrameTransformerCfg {
 
     fn debug_vis(&self) -> bool {
         self.debug_vis
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
     }
 
     /// # Errors
@@ -168,7 +173,7 @@ impl Sensor for FrameTransformer {
     }
 
     /// The axes of all frames.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let axes = |p: [f64; 3], q: [f64; 4]| Marker::axes(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0.2);
         let (p, q) = (self.source_pos_w(), self.source_quat_w());
         let mut markers = vec![axes([0, 1, 2].map(|k| p[(env, k)]), [0, 1, 2, 3].map(|k| q[(env, k)]))];

@@ -5,6 +5,7 @@
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
@@ -37,6 +38,10 @@ impl SensorCfg for JointStateCfg {
 
     fn requires(&self) -> Requires {
         Requires::JOINT_STATE | Requires::JOINT_EFFORTS
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
     }
 
     /// # Errors

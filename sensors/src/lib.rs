@@ -32,6 +32,7 @@ pub mod schedule;
 pub mod select;
 pub mod sensor;
 pub(crate) mod share;
+pub mod slot;
 mod summary;
 pub mod visibility;
 
@@ -51,3 +52,4 @@ pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
+pub use slot::SensorSlot;

@@ -452,10 +452,10 @@ impl SimulationManager {
         self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
 
-    /// A sensor, to read.
+    /// A sensor, to read. A [lazy](SensorCfg::lazy) one measures now what was due.
     ///
     /// # Errors
-    /// The sensor failed in an earlier step.
+    /// The sensor failed, in an earlier step or now.
     pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         self.sensors.get(id)
     }
@@ -468,9 +468,27 @@ impl SimulationManager {
         self.sensors.get_mut(id)
     }
 
-    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview).
+    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
+    /// configured to ([`SensorCfg::debug_vis`]), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
-        self.sensors.markers(self.num_envs())
+        self.sensors.markers(&self.simulation)
+    }
+
+    /// Whether the markers of a sensor are among [`markers`](Self::markers).
+    ///
+    /// # Errors
+    /// There is no such sensor.
+    pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
+        self.sensors.debug_vis(id)
+    }
+
+    /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
+    /// changes.
+    ///
+    /// # Errors
+    /// There is no such sensor.
+    pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
+        self.sensors.set_debug_vis(id, shown)
     }
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
