@@ -37,12 +37,21 @@ pub struct SceneState {
     /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
     /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
     pub joint_wrenches: Option<Array3<f64>>,
-    /// Joint positions \[rad or m\], shape \[num_envs, joints\].
+    /// Joint positions \[rad or m\], shape \[num_envs, joints\]: one for each joint with one degree of freedom.
     pub joint_positions: Option<Array2<f64>>,
     /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
     pub joint_velocities: Option<Array2<f64>>,
-    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
+    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
+    /// MJCF files, the sum of what the file's actuators exert on the joint; after a reset, on the state as it is.
     pub joint_efforts: Option<Array2<f64>>,
+    /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
+    /// of an MJCF file is told, in the unit that the file gives it.
+    pub actuator_controls: Option<Array2<f64>>,
+    /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
+    /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
+    pub actuator_forces: Option<Array2<f64>>,
+    /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none.
+    pub actuator_activations: Option<Array2<f64>>,
     /// Contacts with forces.
     pub contacts: Option<Contacts>,
     /// Values of the physics engine's own sensors, shape \[num_envs, values\].
@@ -169,13 +178,33 @@ impl SceneState {
         [body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches]
     }
 
-    fn per_env(&self) -> [&Option<Array2<f64>>; 4] {
-        [&self.joint_positions, &self.joint_velocities, &self.joint_efforts, &self.sensordata]
+    fn per_env(&self) -> [&Option<Array2<f64>>; 7] {
+        let Self { joint_positions, joint_velocities, joint_efforts, sensordata, .. } = self;
+        let Self { actuator_controls, actuator_forces, actuator_activations, .. } = self;
+        let [controls, forces, activations] = [actuator_controls, actuator_forces, actuator_activations];
+        [joint_positions, joint_velocities, joint_efforts, sensordata, controls, forces, activations]
     }
 
-    fn per_env_mut(&mut self) -> [&mut Option<Array2<f64>>; 4] {
-        let Self { joint_positions, joint_velocities, joint_efforts, sensordata, .. } = self;
-        [joint_positions, joint_velocities, joint_efforts, sensordata]
+    fn per_env_mut(&mut self) -> [&mut Option<Array2<f64>>; 7] {
+        let Self {
+            joint_positions,
+            joint_velocities,
+            joint_efforts,
+            sensordata,
+            actuator_controls,
+            actuator_forces,
+            actuator_activations,
+            ..
+        } = self;
+        [
+            joint_positions,
+            joint_velocities,
+            joint_efforts,
+            sensordata,
+            actuator_controls,
+            actuator_forces,
+            actuator_activations,
+        ]
     }
 }
 
@@ -279,6 +308,9 @@ mod tests {
             joint_velocities: numbers(4),
             joint_efforts: numbers(4),
             sensordata: numbers(5),
+            actuator_controls: numbers(2),
+            actuator_forces: numbers(2),
+            actuator_activations: numbers(2),
             contacts: Some(Contacts { first, list }),
             visible: Some(VisibleState {
                 instance_poses: Array2::from_shape_fn((3, 2), |(env, _)| PoseF32::from_translation(at(env))),

@@ -19,7 +19,8 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct JointStateCfg {
     /// The joints to measure, by patterns of their names (`uid/joint`, or `joint` alone), in the order they are reported;
-    /// `None` is all of them.
+    /// `None` is all of them. They are the movable joints of robots, and of MJCF files those that turn about one axis or
+    /// slide along one.
     pub joints: Option<Vec<String>>,
     /// Rate, history, latency and noise; the channels are `positions`, `velocities` and `efforts`.
     pub sampling: SamplingCfg,

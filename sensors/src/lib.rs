@@ -9,6 +9,7 @@
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
+pub mod actuator_state;
 pub mod camera;
 pub mod contact_sensor;
 pub mod crew;
@@ -36,6 +37,7 @@ pub mod slot;
 mod summary;
 pub mod visibility;
 
+pub use actuator_state::{ActuatorState, ActuatorStateCfg};
 pub use camera::{Camera, CameraCfg, CameraError};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use crew::Crew;

@@ -123,6 +123,9 @@ pub struct SensorContext {
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
+    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot's
+    /// joint, `uid/actuator` for those of an MJCF file.
+    pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
     /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
@@ -225,12 +228,14 @@ impl Requires {
     pub const JOINT_WRENCHES: Self = Self(1 << 8);
     /// [`SceneState::instance_poses`], and [`SensorContext::scene`].
     pub const INSTANCES: Self = Self(1 << 9);
+    /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
+    pub const ACTUATORS: Self = Self(1 << 10);
 
     /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
     /// know before the step that somebody wants it.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    const NAMES: [(Self, &str); 10] = [
+    const NAMES: [(Self, &str); 11] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -241,6 +246,7 @@ impl Requires {
         (Self::VISIBLE, "visible"),
         (Self::JOINT_WRENCHES, "joint_wrenches"),
         (Self::INSTANCES, "instances"),
+        (Self::ACTUATORS, "actuators"),
     ];
 
     /// Whether all of `other` is in this set.
@@ -267,6 +273,9 @@ impl Requires {
             joint_positions: part(has(Self::JOINT_STATE), &state.joint_positions),
             joint_velocities: part(has(Self::JOINT_STATE), &state.joint_velocities),
             joint_efforts: part(has(Self::JOINT_EFFORTS), &state.joint_efforts),
+            actuator_controls: part(has(Self::ACTUATORS), &state.actuator_controls),
+            actuator_forces: part(has(Self::ACTUATORS), &state.actuator_forces),
+            actuator_activations: part(has(Self::ACTUATORS), &state.actuator_activations),
             contacts: part(has(Self::CONTACTS), &state.contacts),
             sensordata: part(has(Self::SENSORDATA), &state.sensordata),
             visible: part(has(Self::VISIBLE), &state.visible),
@@ -310,6 +319,12 @@ impl Requires {
             | has(state.visible.is_some(), Self::VISIBLE)
             | has(state.joint_wrenches.is_some(), Self::JOINT_WRENCHES)
             | has(state.instance_poses.is_some(), Self::INSTANCES)
+            | has(
+                state.actuator_controls.is_some()
+                    && state.actuator_forces.is_some()
+                    && state.actuator_activations.is_some(),
+                Self::ACTUATORS,
+            )
     }
 
     /// The names of the fields in the set.

@@ -437,8 +437,8 @@ impl SimulationManager {
     }
 
     /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
-    /// sensor sees links and movable joints of all robots, in the order in which they were added. Adding a robot later
-    /// starts its history again.
+    /// sensor sees links, movable joints and drives of all robots, in the order in which they were added, then what MJCF files
+    /// have of these. Adding a robot later starts its history again.
     ///
     /// # Errors
     /// The configuration is wrong, the name is taken, or the sensor needs a quantity that is not gathered.
@@ -479,7 +479,7 @@ impl SimulationManager {
     /// # Errors
     /// There is no such sensor.
     pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
-        self.sensors.debug_vis(id)
+        self.sensors.debug_vis(id.index())
     }
 
     /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
@@ -488,7 +488,7 @@ impl SimulationManager {
     /// # Errors
     /// There is no such sensor.
     pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
-        self.sensors.set_debug_vis(id, shown)
+        self.sensors.set_debug_vis(id.index(), shown)
     }
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
@@ -505,6 +505,7 @@ impl SimulationManager {
             bodies: self.contents.body_names(),
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),
+            actuators: self.contents.actuator_names(),
             engine_sensors: self.contents.engine_sensors(),
             scene,
             ray_assets: self.ray_assets.clone(),

@@ -18,6 +18,13 @@ pub struct SensorId<S> {
     sensor: PhantomData<fn() -> S>,
 }
 
+impl<S> SensorId<S> {
+    /// Its place in the list.
+    pub(crate) fn index(self) -> usize {
+        self.index
+    }
+}
+
 impl<S> Clone for SensorId<S> {
     fn clone(&self) -> Self {
         *self
@@ -223,26 +230,25 @@ impl SensorList {
     }
 
     /// Whether the markers of a sensor are shown.
-    pub(crate) fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
-        self.entry(id).map(|entry| entry.debug_vis)
+    pub(crate) fn debug_vis(&self, index: usize) -> Result<bool> {
+        self.entry(index).map(|entry| entry.debug_vis)
     }
 
     /// Shows the markers of a sensor, or does not.
-    pub(crate) fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
-        self.entry(id)?;
-        self.entries.get_mut(id.index).into_iter().for_each(|entry| entry.debug_vis = shown);
+    pub(crate) fn set_debug_vis(&mut self, index: usize, shown: bool) -> Result<()> {
+        self.entry(index)?;
+        self.entries.get_mut(index).into_iter().for_each(|entry| entry.debug_vis = shown);
         Ok(())
     }
 
-    /// The entry of a handle.
-    fn entry<S: Sensor>(&self, id: SensorId<S>) -> Result<&Entry> {
+    fn entry(&self, index: usize) -> Result<&Entry> {
         let count = self.entries.len();
-        self.entries.get(id.index).ok_or(Error::UnknownIndex { what: "sensor", index: id.index, count })
+        self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
 
     /// The sensor of a handle.
     pub(crate) fn get<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id.index)?;
         let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))?;
         let any: &dyn Any = sensor;
         any.downcast_ref::<S>().ok_or_else(|| Error::UnknownName {

@@ -151,3 +151,22 @@ fn what_is_shown_can_be_switched_while_it_runs() {
     assert_eq!([off, on].map(|id| sim.debug_vis(id).unwrap()), [false, false]);
     assert!(sim.debug_vis(load).unwrap());
 }
+
+/// In a scene, by the name of the sensor, whatever its kind.
+#[test]
+fn what_is_shown_can_be_switched_by_name() {
+    let mut scene = InteractiveScene::new(
+        SceneCfg::new(cfg(1)).with("box", cube("box", 2.0, 0.2, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box")),
+    )
+    .unwrap();
+    assert_eq!(scene.sim().markers(), []);
+    // It stands: the arrow is there.
+    scene.update(50);
+    scene.set_debug_vis("{ENV}/imu", true).unwrap();
+    assert_eq!(scene.sim().markers().len(), 2);
+    assert!(scene.sim().debug_vis(scene.sensor_id::<Imu>("imu").unwrap()).unwrap());
+    let text = scene.set_debug_vis("imo", true).unwrap_err().to_string();
+    assert!(text.contains("\"imo\"") && text.contains("\"imu\""), "{text}");
+    let text = scene.set_debug_vis("box", true).unwrap_err().to_string();
+    assert_eq!(text, "\"box\" is a rigid object, not a sensor");
+}

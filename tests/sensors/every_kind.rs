@@ -23,6 +23,7 @@ struct Ids {
     imu: SensorId<Imu>,
     frames: SensorId<FrameTransformer>,
     joints: SensorId<JointState>,
+    actuators: SensorId<ActuatorState>,
     wrench: SensorId<JointWrench>,
     own: SensorId<MujocoSensor>,
 }
@@ -112,6 +113,9 @@ fn world(threads: usize, seed: u64, sampling: Sampling) -> (SimulationManager, I
         joints: sim
             .add_sensor("joints", JointStateCfg { joints: None, sampling: sampling("velocities", 0.0) })
             .unwrap(),
+        actuators: sim
+            .add_sensor("actuators", ActuatorStateCfg { actuators: None, sampling: sampling("forces", 0.01) })
+            .unwrap(),
         wrench: sim.add_sensor("wrench", wrench).unwrap(),
         own: sim.add_sensor("own", own).unwrap(),
     };
@@ -178,6 +182,7 @@ fn listen(sim: &SimulationManager, ids: &Ids, said: &mut Said) {
     add("imu", sampled(sim.sensor(ids.imu).unwrap()));
     add("frame_transformer", sampled(sim.sensor(ids.frames).unwrap()));
     add("joint_state", sampled(sim.sensor(ids.joints).unwrap()));
+    add("actuator_state", sampled(sim.sensor(ids.actuators).unwrap()));
     add("joint_wrench", sampled(sim.sensor(ids.wrench).unwrap()));
     add("mujoco_sensor", sampled(sim.sensor(ids.own).unwrap()));
 }
