@@ -4,7 +4,7 @@ use crate::error::SensorError;
 use crate::frames::{pose, put};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::matching;
+use crate::select::{at_least_one, matching};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView2, ArrayView3};
@@ -88,10 +88,11 @@ impl SensorCfg for FrameTransformerCfg {
 
     /// # Errors
     ///
-    /// There is no such body, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
+    /// There is no such body, no target at all, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
     /// is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
+        at_least_one(self.targets.len(), ("frame transformer", "targets", "target"), &context.bodies)?;
         let (mut targets, mut names) = (Vec::new(), Vec::<String>::new());
         for target in &self.targets {
             let bodies = matching(&target.bodies, &context.bodies, "body")?;
