@@ -20,7 +20,7 @@ use std::process::ExitCode;
 
 /// A standing quadruped with sensors.
 #[derive(Debug, Parser)]
-#[command(name = "add_sensors_on_robot")]
+#[command(name = "add_sensors_on_robot", mut_arg("num_envs", |arg| arg.default_value("2")))]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
