@@ -20,7 +20,7 @@ use std::process::ExitCode;
 
 /// A standing quadruped with sensors.
 #[derive(Debug, Parser)]
-#[command(name = "add_sensors_on_robot")]
+#[command(name = "add_sensors_on_robot", mut_arg("num_envs", |arg| arg.default_value("2")))]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
@@ -70,11 +70,7 @@ fn run(args: &Args) -> launcher::Result {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     println!("[INFO]: Setup complete...");
     println!("{}\n{}\n{}", sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
 
@@ -111,7 +107,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", summary(&sim, camera, scanner, contacts)?);
     println!("\n{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
     if let Some(out) = &args.launcher.out {
-        std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+        launcher::make_folder(out)?;
         write_pictures(&mut sim, camera, out)?;
         println!("Pictures written to {}", out.display());
     }

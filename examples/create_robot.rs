@@ -54,12 +54,7 @@ fn run(args: &Args) -> launcher::Result {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-        println!("Pipeline stages written to {}", dir.display());
-    }
+    args.launcher.write_dump(&sim)?;
 
     println!("Starting simulation...");
     let phases = phases(&sim, robot, args.swap_hand)?;

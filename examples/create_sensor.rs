@@ -83,14 +83,8 @@ fn run(args: &Args) -> launcher::Result {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-        println!("Pipeline stages written to {}", dir.display());
-    }
-    let out = args.launcher.out.clone().unwrap_or_else(|| ".".into());
-    std::fs::create_dir_all(&out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+    args.launcher.write_dump(&sim)?;
+    let out = args.launcher.out_folder(true)?;
 
     println!("Starting simulation...");
     let arm = sim.robot(robot).get_joint_ids("arm")?;

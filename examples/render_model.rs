@@ -120,7 +120,7 @@ fn run(args: &Args) -> launcher::Result {
     }
     let rate = f64::from(images) / start.elapsed().as_secs_f64();
 
-    std::fs::create_dir_all(&args.out).map_err(|e| format!("--out {}: {e}", args.out.display()))?;
+    launcher::make_folder(&args.out)?;
     write_pictures(args, &view, &frame)?;
     let meta = json!({
         "width": view.width,

@@ -60,26 +60,15 @@ fn run(args: &Args) -> launcher::Result {
         arena_space: args.launcher.arena_space.unwrap_or(6.0),
         ..args.launcher.simulation()?
     })?;
-    if args.camera_id >= sim.num_envs() {
-        return Err(format!("--camera-id {}: there are {} environments, from 0", args.camera_id, sim.num_envs()).into());
-    }
+    launcher::check_camera_id(args.camera_id, &sim)?;
     let objects = add_objects(&mut sim, args)?;
     let camera = sim.add_sensor("camera", camera_cfg(args))?;
     scatter(&mut sim, &objects, args.launcher.seed)?;
-    // The tutorial's two views, in turns.
-    let eyes: Vec<[f64; 3]> =
-        (0..sim.num_envs()).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect();
+    let eyes = launcher::two_views(sim.num_envs());
     sim.sensor_mut(camera)?.look_at(&eyes, &[[0.0; 3]], &[[0.0, 0.0, 1.0]], None)?;
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(camera)?);
-    let out = args.launcher.out.clone().unwrap_or_else(|| ".".into());
-    if args.save || args.draw {
-        std::fs::create_dir_all(&out).map_err(|e| format!("--out {}: {e}", out.display()))?;
-    }
+    let out = args.launcher.out_folder(args.save || args.draw)?;
 
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut drawing, mut images) = (0, Duration::ZERO, 0);

@@ -56,11 +56,7 @@ fn run(args: &Args) -> launcher::Result {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(frames)?);
     let progress = Progress::new(&args.launcher, 1000);
     let count = sim.sensor(frames)?.target_frame_names().len();
@@ -81,7 +77,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("LF_FOOT_URDF is {own:.1e} m from LF_FOOT, LF_FOOT_USER is {user:.6} m");
     println!("{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
     if let Some(out) = &args.launcher.out {
-        std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+        launcher::make_folder(out)?;
         let (markers, file) = (sim.markers(), out.join("run_frame_transformer.png"));
         let reach = sim.env_origins().iter().fold(0.0, |far: f64, x| far.max(x.abs()));
         let eye = [1.3 + 1.6 * reach, 1.5 + 1.6 * reach, 1.0 + reach];

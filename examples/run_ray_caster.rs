@@ -94,11 +94,7 @@ fn run(args: &Args) -> launcher::Result {
     }
 
     let scanner = sim.add_sensor("scanner", scanner_cfg(args))?;
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(scanner)?);
     let scene = Scene { ball, terrain, scanner };
     let progress = Progress::new(&args.launcher, 1000);
@@ -130,7 +126,7 @@ fn run(args: &Args) -> launcher::Result {
     );
     println!("{} hits, {} misses; hits lie on the terrain to {:.1e} m", totals.hits, totals.misses, totals.worst);
     if let Some(out) = &args.launcher.out {
-        std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+        launcher::make_folder(out)?;
         let origins = sim.env_origins();
         let reach = origins.iter().fold(SIDE / 2.0, |far: f64, x| far.max(x.abs() + 1.5));
         let (markers, file) = (sim.markers(), out.join("run_ray_caster.png"));

@@ -53,26 +53,15 @@ fn run(args: &Args) -> launcher::Result {
         arena_space: args.launcher.arena_space.unwrap_or(SIDE),
         ..args.launcher.simulation()?
     })?;
-    if args.camera_id >= sim.num_envs() {
-        return Err(format!("--camera-id {}: there are {} environments, from 0", args.camera_id, sim.num_envs()).into());
-    }
+    launcher::check_camera_id(args.camera_id, &sim)?;
     let rough = RoughTerrain { size: [SIDE; 2], cell: 0.2, range: [0.0, 0.3], step: 0.02, seed: args.launcher.seed };
     let terrain = sim.add_terrain(TerrainCfg { heights: rough.heights()?, size: rough.size, ..Default::default() })?;
     let camera = sim.add_sensor("camera", camera_cfg(args))?;
-    // The tutorial's two views, in turns.
-    let eyes: Vec<[f64; 3]> =
-        (0..sim.num_envs()).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect();
+    let eyes = launcher::two_views(sim.num_envs());
     sim.sensor_mut(camera)?.look_at(&eyes, &[[0.0; 3]], &[[0.0, 0.0, 1.0]], None)?;
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(camera)?);
-    let out = args.launcher.out.clone().unwrap_or_else(|| ".".into());
-    if args.save {
-        std::fs::create_dir_all(&out).map_err(|e| format!("--out {}: {e}", out.display()))?;
-    }
+    let out = args.launcher.out_folder(args.save)?;
 
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut stepping, mut files) = (0, Duration::ZERO, Vec::new());

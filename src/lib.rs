@@ -19,8 +19,9 @@ pub mod prelude {
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,
     };
     pub use sensors::{
-        ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu, ImuCfg, JointState, JointStateCfg,
-        JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
+        ActuatorState, ActuatorStateCfg, ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu,
+        ImuCfg, JointState, JointStateCfg, JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg,
+        Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
         ActuatorIndex, ActuatorModel, BodyType, ComponentCfg, DcMotor, DelayedPd, Diagnostic, Draw, DriveCfg,

@@ -105,6 +105,31 @@ impl Launcher {
         })
     }
 
+    /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub(crate) fn write_dump(&self, sim: &SimulationManager) -> Result {
+        let Some(dir) = &self.dump else { return Ok(()) };
+        for left_out in sim.dump(dir)? {
+            eprintln!("warning: {left_out}");
+        }
+        println!("Pipeline stages written to {}", dir.display());
+        Ok(())
+    }
+
+    /// The folder of `--out`, else the one that the example runs in; made where it is `wanted`.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub(crate) fn out_folder(&self, wanted: bool) -> Result<PathBuf> {
+        let out = self.out.clone().unwrap_or_else(|| ".".into());
+        if wanted {
+            make_folder(&out)?;
+        }
+        Ok(out)
+    }
+
     /// Writes `report` to the file of `--report`.
     ///
     /// # Errors
@@ -124,6 +149,32 @@ impl Launcher {
 /// It is neither.
 pub(crate) fn user_or_asset(path: &Path) -> Result<PathBuf> {
     if path.exists() { Ok(path.to_path_buf()) } else { Ok(assets::path(path)?) }
+}
+
+/// Makes the folder of `--out`.
+///
+/// # Errors
+/// It cannot be made.
+pub(crate) fn make_folder(out: &Path) -> Result {
+    std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()).into())
+}
+
+/// Checks that there is the environment of `--camera-id`.
+///
+/// # Errors
+/// There is none of that number.
+pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Result {
+    let n = sim.num_envs();
+    if camera_id < n {
+        Ok(())
+    } else {
+        Err(format!("--camera-id {camera_id}: there are {n} environments, from 0").into())
+    }
+}
+
+/// Where the tutorial's cameras stand \[m\]: at two places, in turns.
+pub(crate) fn two_views(num_envs: usize) -> Vec<[f64; 3]> {
+    (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
 
 /// Runs an example: an error is printed and gives exit code 2.

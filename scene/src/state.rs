@@ -7,7 +7,7 @@
 //! and velocities are those of t_(k+1). Both times are given.
 
 use crate::{Light, PoseF32, PoseF64};
-use ndarray::{Array2, Array3};
+use ndarray::{Array, Array2, Array3, Axis, RemoveAxis};
 
 /// State of all environments after a physics step (or after a reset).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,12 +37,21 @@ pub struct SceneState {
     /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
     /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
     pub joint_wrenches: Option<Array3<f64>>,
-    /// Joint positions \[rad or m\], shape \[num_envs, joints\].
+    /// Joint positions \[rad or m\], shape \[num_envs, joints\]: one for each joint with one degree of freedom.
     pub joint_positions: Option<Array2<f64>>,
     /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
     pub joint_velocities: Option<Array2<f64>>,
-    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
+    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
+    /// MJCF files, the sum of what the file's actuators exert on the joint; after a reset, on the state as it is.
     pub joint_efforts: Option<Array2<f64>>,
+    /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
+    /// of an MJCF file is told, in the unit that the file gives it.
+    pub actuator_controls: Option<Array2<f64>>,
+    /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
+    /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
+    pub actuator_forces: Option<Array2<f64>>,
+    /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none.
+    pub actuator_activations: Option<Array2<f64>>,
     /// Contacts with forces.
     pub contacts: Option<Contacts>,
     /// Values of the physics engine's own sensors, shape \[num_envs, values\].
@@ -101,9 +110,142 @@ impl SceneState {
     pub fn num_envs(&self) -> usize {
         self.step.len()
     }
+
+    /// Takes over from `other` the environments where `chosen` is true: steps, times, and the fields that this state has.
+    /// `false`, and nothing is taken over, where `other` is not of the same scene: it lacks a field of this one, or has
+    /// another number of anything. Allocates only for more contacts than there ever were.
+    #[must_use]
+    pub fn take_over(&mut self, other: &Self, chosen: &[bool]) -> bool {
+        if !(chosen.len() == self.num_envs() && self.fits(other)) {
+            return false;
+        }
+        let envs = || (0..).zip(chosen).filter(|(_, chosen)| **chosen).map(|(env, _)| env);
+        for env in envs() {
+            self.step[env] = other.step[env];
+            self.time[env] = other.time[env];
+            self.force_time[env] = other.force_time[env];
+        }
+        for (to, from) in self.per_body_mut().into_iter().zip(other.per_body()) {
+            copy_rows(to, from, envs());
+        }
+        for (to, from) in self.per_env_mut().into_iter().zip(other.per_env()) {
+            copy_rows(to, from, envs());
+        }
+        copy_rows(&mut self.instance_poses, &other.instance_poses, envs());
+        if let (Some(to), Some(from)) = (&mut self.visible, &other.visible) {
+            for env in envs() {
+                to.instance_poses.row_mut(env).assign(&from.instance_poses.row(env));
+                to.lights.row_mut(env).assign(&from.lights.row(env));
+            }
+        }
+        if let (Some(to), Some(from)) = (&mut self.contacts, &other.contacts) {
+            to.take_over(from, chosen);
+        }
+        true
+    }
+
+    /// Whether `other` has every field of this state, with the same numbers of everything.
+    fn fits(&self, other: &Self) -> bool {
+        let n = self.num_envs();
+        let same_envs = [other.step.len(), other.time.len(), other.force_time.len()] == [n; 3];
+        let visible = match (&self.visible, &other.visible) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(a), Some(b)) => a.instance_poses.dim() == b.instance_poses.dim() && a.lights.dim() == b.lights.dim(),
+        };
+        let contacts = match (&self.contacts, &other.contacts) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(a), Some(b)) => a.first.len() == n + 1 && b.first.len() == n + 1,
+        };
+        same_envs
+            && visible
+            && contacts
+            && self.per_body().into_iter().zip(other.per_body()).all(|(a, b)| same_shape(a, b))
+            && self.per_env().into_iter().zip(other.per_env()).all(|(a, b)| same_shape(a, b))
+            && same_shape(&self.instance_poses, &other.instance_poses)
+    }
+
+    fn per_body(&self) -> [&Option<Array3<f64>>; 6] {
+        let Self { body_poses, body_velocities, body_accelerations, force_poses, force_velocities, .. } = self;
+        [body_poses, body_velocities, body_accelerations, force_poses, force_velocities, &self.joint_wrenches]
+    }
+
+    fn per_body_mut(&mut self) -> [&mut Option<Array3<f64>>; 6] {
+        let Self {
+            body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches, ..
+        } = self;
+        [body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches]
+    }
+
+    fn per_env(&self) -> [&Option<Array2<f64>>; 7] {
+        let Self { joint_positions, joint_velocities, joint_efforts, sensordata, .. } = self;
+        let Self { actuator_controls, actuator_forces, actuator_activations, .. } = self;
+        let [controls, forces, activations] = [actuator_controls, actuator_forces, actuator_activations];
+        [joint_positions, joint_velocities, joint_efforts, sensordata, controls, forces, activations]
+    }
+
+    fn per_env_mut(&mut self) -> [&mut Option<Array2<f64>>; 7] {
+        let Self {
+            joint_positions,
+            joint_velocities,
+            joint_efforts,
+            sensordata,
+            actuator_controls,
+            actuator_forces,
+            actuator_activations,
+            ..
+        } = self;
+        [
+            joint_positions,
+            joint_velocities,
+            joint_efforts,
+            sensordata,
+            actuator_controls,
+            actuator_forces,
+            actuator_activations,
+        ]
+    }
+}
+
+/// Whether `b` has the shape of `a`, where there is an `a`.
+fn same_shape<T, D: RemoveAxis>(a: &Option<Array<T, D>>, b: &Option<Array<T, D>>) -> bool {
+    a.as_ref().is_none_or(|a| b.as_ref().is_some_and(|b| a.shape() == b.shape()))
+}
+
+/// Copies the rows of some environments between arrays of the same shape.
+fn copy_rows<T: Clone, D: RemoveAxis>(
+    to: &mut Option<Array<T, D>>,
+    from: &Option<Array<T, D>>,
+    envs: impl Iterator<Item = usize>,
+) {
+    if let (Some(to), Some(from)) = (to, from) {
+        for env in envs {
+            to.index_axis_mut(Axis(0), env).assign(&from.index_axis(Axis(0), env));
+        }
+    }
 }
 
 impl Contacts {
+    /// Takes over the environments where `chosen` is true from contacts of as many environments.
+    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+        // The new list grows behind the old one, which then goes: no memory of its own.
+        let old = self.list.len();
+        for (env, chosen) in chosen.iter().enumerate() {
+            let mine = self.first[env]..self.first[env + 1];
+            self.first[env] = self.list.len() - old;
+            if *chosen {
+                self.list.extend_from_slice(other.of(env));
+            } else {
+                self.list.extend_from_within(mine);
+            }
+        }
+        if let Some(last) = self.first.last_mut() {
+            *last = self.list.len() - old;
+        }
+        self.list.drain(..old);
+    }
+
     /// The contacts of environment `env`.
     ///
     /// # Panics
@@ -134,5 +276,87 @@ mod tests {
         assert_eq!(contacts.of(1), []);
         assert_eq!(contacts.of(2), &contacts.list[2..]);
         assert_eq!(SceneState::new(3).num_envs(), 3);
+    }
+
+    /// A state of 3 environments, every number of which says the environment and whose it is.
+    fn state(who: f64, contacts: [usize; 3]) -> SceneState {
+        let contact = |env: usize| Contact {
+            bodies: [None, Some(0)],
+            point: [who, env as f64, 0.0],
+            normal: [0.0, 0.0, 1.0],
+            distance: 0.0,
+            force: [0.0; 3],
+            normal_force: who,
+        };
+        let first = (0..=3).map(|env| contacts[..env].iter().sum()).collect();
+        let list = (0..3).flat_map(|env| vec![contact(env); contacts[env]]).collect();
+        let rows = |width| Some(Array3::from_shape_fn((3, 2, width), |(env, b, k)| who + (10 * env + b + k) as f64));
+        let numbers = |width| Some(Array2::from_shape_fn((3, width), |(env, k)| who + (10 * env + k) as f64));
+        let lamp = |env: usize| Light { direction: [who as f32, env as f32, 1.0], ..Light::default() };
+        let at = |env: usize| [who as f32, env as f32, 0.0];
+        SceneState {
+            step: (0..3).map(|env| who as u64 + env).collect(),
+            time: (0..3).map(|env| who + f64::from(env)).collect(),
+            force_time: (0..3).map(|env| who - f64::from(env)).collect(),
+            body_poses: rows(7),
+            body_velocities: rows(6),
+            body_accelerations: rows(6),
+            force_poses: rows(7),
+            force_velocities: rows(6),
+            joint_wrenches: rows(6),
+            joint_positions: numbers(4),
+            joint_velocities: numbers(4),
+            joint_efforts: numbers(4),
+            sensordata: numbers(5),
+            actuator_controls: numbers(2),
+            actuator_forces: numbers(2),
+            actuator_activations: numbers(2),
+            contacts: Some(Contacts { first, list }),
+            visible: Some(VisibleState {
+                instance_poses: Array2::from_shape_fn((3, 2), |(env, _)| PoseF32::from_translation(at(env))),
+                lights: Array2::from_shape_fn((3, 1), |(env, _)| lamp(env)),
+            }),
+            instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
+        }
+    }
+
+    /// Every field of an environment is taken over or none is: the judge is a state made of the numbers of both.
+    #[test]
+    fn environments_are_taken_over_whole() {
+        let mut kept = state(100.0, [1, 0, 2]);
+        assert!(kept.take_over(&state(200.0, [0, 3, 5]), &[false, true, false]));
+        let one = |s: &SceneState, env: usize| {
+            let rows: Vec<f64> =
+                s.per_body().into_iter().flatten().flat_map(|a| a.index_axis(Axis(0), env).to_owned()).collect();
+            let numbers: Vec<f64> = s.per_env().into_iter().flatten().flat_map(|a| a.row(env).to_owned()).collect();
+            let seen = s.visible.as_ref().map(|v| (v.instance_poses.row(env).to_owned(), v.lights.row(env).to_owned()));
+            let contacts = s.contacts.as_ref().map(|c| c.of(env).to_vec());
+            (s.step[env], s.time[env], s.force_time[env], rows, numbers, seen, contacts)
+        };
+        for (env, from) in
+            [state(100.0, [1, 0, 2]), state(200.0, [0, 3, 5]), state(100.0, [1, 0, 2])].iter().enumerate()
+        {
+            assert_eq!(one(&kept, env), one(from, env), "environment {env}");
+        }
+        assert!(kept.take_over(&state(300.0, [2, 2, 2]), &[true; 3]));
+        assert_eq!(kept, state(300.0, [2, 2, 2]));
+        // The control: nobody is chosen.
+        assert!(kept.take_over(&state(400.0, [1, 1, 1]), &[false; 3]));
+        assert_eq!(kept, state(300.0, [2, 2, 2]));
+    }
+
+    #[test]
+    fn states_of_another_scene_are_not_taken_over() {
+        let mut kept = state(100.0, [1, 0, 2]);
+        let mut other = state(200.0, [1, 0, 2]);
+        other.joint_efforts = Some(Array2::zeros((3, 5)));
+        assert!(!kept.take_over(&other, &[true; 3]));
+        other.joint_efforts = None;
+        assert!(!kept.take_over(&other, &[true; 3]));
+        assert!(!kept.take_over(&state(200.0, [1, 0, 2]), &[true; 2]));
+        assert!(!kept.take_over(&SceneState::new(2), &[true; 3]));
+        assert_eq!(kept, state(100.0, [1, 0, 2]), "nothing was changed");
+        // More than what is kept may be there.
+        assert!(SceneState::new(3).take_over(&state(200.0, [1, 0, 2]), &[true; 3]));
     }
 }

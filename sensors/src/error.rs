@@ -14,6 +14,9 @@ pub enum SensorError {
         /// The physics step \[s\].
         dt: f64,
     },
+    /// The sensor panicked while it measured.
+    #[error("a panic broke its measurement off")]
+    BrokenOff,
     /// The update period is negative, infinite or not a number.
     #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
     InvalidPeriod {

@@ -13,6 +13,7 @@ pub struct Expected {
     num_envs: usize,
     bodies: usize,
     joints: usize,
+    actuators: usize,
     instances: usize,
     engine_values: usize,
 }
@@ -21,9 +22,10 @@ impl Expected {
     /// States of the scene of `context` that have what the kind of sensor called `sensor` requires.
     pub fn new(sensor: &'static str, requires: Requires, context: &SensorContext) -> Self {
         let (num_envs, bodies, joints) = (context.num_envs, context.bodies.len(), context.joints.len());
+        let actuators = context.actuators.len();
         let instances = context.scene.as_ref().map_or(0, |scene| scene.instances().len());
         let engine_values = context.engine_sensors.iter().map(|s| s.first + s.width).max().unwrap_or(0);
-        Self { sensor, requires, num_envs, bodies, joints, instances, engine_values }
+        Self { sensor, requires, num_envs, bodies, joints, actuators, instances, engine_values }
     }
 
     /// Number of environments.
@@ -63,6 +65,9 @@ impl Expected {
             (Requires::JOINT_EFFORTS, &state.joint_efforts),
         ] {
             self.rows(field, array.as_ref().map(Array2::shape), "joints", self.joints)?;
+        }
+        for array in [&state.actuator_controls, &state.actuator_forces, &state.actuator_activations] {
+            self.rows(Requires::ACTUATORS, array.as_ref().map(Array2::shape), "actuators", self.actuators)?;
         }
         let sensordata = state.sensordata.as_ref().map(Array2::shape);
         self.rows(Requires::SENSORDATA, sensordata, "values of the engine's sensors", self.engine_values)?;

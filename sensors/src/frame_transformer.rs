@@ -3,7 +3,8 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
-use crate::select::matching;
+use crate::schedule::Schedule;
+use crate::select::{at_least_one, matching};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView2, ArrayView3};
@@ -81,12 +82,17 @@ impl SensorCfg for FrameTransformerCfg {
         self.debug_vis
     }
 
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
+    }
+
     /// # Errors
     ///
-    /// There is no such body, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
+    /// There is no such body, no target at all, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
     /// is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
+        at_least_one(self.targets.len(), ("frame transformer", "targets", "target"), &context.bodies)?;
         let (mut targets, mut names) = (Vec::new(), Vec::<String>::new());
         for target in &self.targets {
             let bodies = matching(&target.bodies, &context.bodies, "body")?;
@@ -168,7 +174,7 @@ impl Sensor for FrameTransformer {
     }
 
     /// The axes of all frames.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let axes = |p: [f64; 3], q: [f64; 4]| Marker::axes(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0.2);
         let (p, q) = (self.source_pos_w(), self.source_quat_w());
         let mut markers = vec![axes([0, 1, 2].map(|k| p[(env, k)]), [0, 1, 2, 3].map(|k| q[(env, k)]))];

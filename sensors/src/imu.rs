@@ -3,6 +3,7 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use nalgebra::Vector3;
@@ -77,6 +78,10 @@ impl SensorCfg for ImuCfg {
         self.debug_vis
     }
 
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
+    }
+
     /// # Errors
     ///
     /// There is no such body, an offset or a bias that is not finite, and what is wrong with the sampling.
@@ -148,7 +153,7 @@ impl Sensor for Imu {
     }
 
     /// Its frame, and an arrow of the acceleration that it reads, 1 m for 20 m/s²: at rest upwards.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (p, q, a) = (self.pos_w(), self.quat_w(), self.lin_acc_b());
         let place = from_row(&std::array::from_fn(|k| if k < 3 { p[(env, k)] } else { q[(env, k - 3)] }));
         let acceleration = place.rotation * Vector3::from_fn(|k, _| a[(env, k)]) / 20.0;

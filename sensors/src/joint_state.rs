@@ -5,6 +5,7 @@
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
@@ -18,7 +19,8 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct JointStateCfg {
     /// The joints to measure, by patterns of their names (`uid/joint`, or `joint` alone), in the order they are reported;
-    /// `None` is all of them.
+    /// `None` is all of them. They are the movable joints of robots, and of MJCF files those that turn about one axis or
+    /// slide along one.
     pub joints: Option<Vec<String>>,
     /// Rate, history, latency and noise; the channels are `positions`, `velocities` and `efforts`.
     pub sampling: SamplingCfg,
@@ -37,6 +39,10 @@ impl SensorCfg for JointStateCfg {
 
     fn requires(&self) -> Requires {
         Requires::JOINT_STATE | Requires::JOINT_EFFORTS
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
     }
 
     /// # Errors

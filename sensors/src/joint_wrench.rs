@@ -3,12 +3,12 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use nalgebra::Vector3;
 use ndarray::ArrayView3;
-use scene::pose::{from_row, to_row};
 use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -63,12 +63,15 @@ impl SensorCfg for JointWrenchCfg {
     type Sensor = JointWrench;
 
     fn requires(&self) -> Requires {
-        let poses = self.debug_vis || !self.frames.is_empty();
-        if poses { Requires::JOINT_WRENCHES | Requires::POSES } else { Requires::JOINT_WRENCHES }
+        if !self.frames.is_empty() { Requires::JOINT_WRENCHES | Requires::POSES } else { Requires::JOINT_WRENCHES }
     }
 
     fn debug_vis(&self) -> bool {
         self.debug_vis
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
     }
 
     /// # Errors
@@ -92,10 +95,7 @@ impl SensorCfg for JointWrenchCfg {
         };
         let in_links = links.into_iter().map(|link| Measured { link, frame: None });
         let measured: Vec<Measured> = in_links.chain(frames.into_iter().map(in_frame)).collect();
-        let mut channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len())).to_vec();
-        if self.debug_vis {
-            channels.push(Channel::exact(PLACES, 7 * measured.len()));
-        }
+        let channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len()));
         Ok(JointWrench {
             names,
             measured,
@@ -104,14 +104,10 @@ impl SensorCfg for JointWrenchCfg {
     }
 }
 
-/// Where the wrenches are measured: poses, only there to be shown.
-const PLACES: &str = "places_w";
-
 /// Writes what the sensor measures in environment `env` to `row`.
 fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(wrenches) = &state.joint_wrenches else { return };
-    let (mut forces, row) = row.split_at_mut(3 * measured.len());
-    let (mut torques, mut places) = row.split_at_mut(3 * measured.len());
+    let (mut forces, mut torques) = row.split_at_mut(3 * measured.len());
     for Measured { link, frame } in measured {
         let (mut force, mut torque) = (vector(wrenches, env, *link, 0), vector(wrenches, env, *link, 3));
         if let (Some(frame), Some(poses)) = (frame, &state.body_poses) {
@@ -120,9 +116,6 @@ fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) 
         }
         forces = put(forces, force.as_slice());
         torques = put(torques, torque.as_slice());
-        if let Some(poses) = state.body_poses.as_ref().filter(|_| !places.is_empty()) {
-            places = put(places, &to_row(&pose(poses, env, frame.unwrap_or(*link))));
-        }
     }
 }
 
@@ -150,23 +143,19 @@ impl Sensor for JointWrench {
         self.sampler.due_in(step)
     }
 
-    /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) where they are measured; none without
-    /// [`JointWrenchCfg::debug_vis`].
-    fn markers(&self, env: usize) -> Vec<Marker> {
-        if !self.sampler.has(PLACES) {
-            return Vec::new();
-        }
-        let (places, forces, torques) = (self.sampler.values(PLACES), self.forces(), self.torques());
-        let arrows = |b: usize| {
-            let place = from_row(&std::array::from_fn(|k| places[(env, 7 * b + k)]));
+    /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) where they are measured.
+    fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
+        let (forces, torques) = (self.forces(), self.torques());
+        let arrows = |(k, measured): (usize, &Measured)| {
+            let place = pose(measured.frame.unwrap_or(measured.link));
             let arrow = |values: &ArrayView3<'_, f64>, per_metre: f64, rgba| {
-                let vector = place.rotation * Vector3::from_fn(|k, _| values[(env, b, k)]) / per_metre;
+                let vector = place.rotation * Vector3::from_fn(|axis, _| values[(env, k, axis)]) / per_metre;
                 Marker::arrow(place.translation.vector.into(), vector.into(), rgba)
             };
             let force = arrow(&forces, 500.0, [0.95, 0.6, 0.1, 1.0]);
             force.into_iter().chain(arrow(&torques, 50.0, [0.6, 0.2, 0.9, 1.0]))
         };
-        (0..self.measured.len()).flat_map(arrows).collect()
+        self.measured.iter().enumerate().flat_map(arrows).collect()
     }
 }
 

@@ -9,6 +9,7 @@
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
+pub mod actuator_state;
 pub mod camera;
 pub mod contact_sensor;
 pub mod crew;
@@ -32,9 +33,11 @@ pub mod schedule;
 pub mod select;
 pub mod sensor;
 pub(crate) mod share;
+pub mod slot;
 mod summary;
 pub mod visibility;
 
+pub use actuator_state::{ActuatorState, ActuatorStateCfg};
 pub use camera::{Camera, CameraCfg, CameraError};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use crew::Crew;
@@ -51,3 +54,4 @@ pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
+pub use slot::SensorSlot;

@@ -2,6 +2,7 @@
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
 use crate::sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
@@ -42,6 +43,10 @@ impl SensorCfg for MujocoSensorCfg {
 
     fn requires(&self) -> Requires {
         Requires::SENSORDATA
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
     }
 
     /// # Errors

@@ -24,6 +24,10 @@ pub struct SamplingCfg {
     pub update_period: f64,
     /// Take the nearest whole number of physics steps where the period is none, instead of an error.
     pub round_period: bool,
+    /// Measure when somebody reads, not when it is due: [`SensorCfg::lazy`](crate::SensorCfg::lazy). What is read is the same,
+    /// bit for bit. A sensor with a history, a latency, dropout or noise measures when it is due nevertheless: there, what
+    /// is read follows from all measurements before.
+    pub lazy: bool,
     /// Measurements to remember, the newest included.
     pub history_length: usize,
     /// Physics steps from the capture of a measurement until it can be read. It keeps the stamp of its capture. What somebody
@@ -40,6 +44,15 @@ impl SamplingCfg {
     /// A perfect sensor that measures every `period` \[s\].
     pub fn every(period: f64) -> Self {
         Self { update_period: period, ..Self::default() }
+    }
+
+    /// By which schedule a sensor with this sampling is lazy, with physics steps of `dt` \[s\]: for
+    /// [`SensorCfg::lazy`](crate::SensorCfg::lazy). `None` where it is eager: it is not told to be [`lazy`](Self::lazy), or
+    /// what it measures is not of one instant alone.
+    pub fn lazy_schedule(&self, dt: f64) -> Option<Schedule> {
+        let alone = self.history_length == 0 && self.latency_steps == 0 && self.dropout == 0.0 && self.noise.is_empty();
+        // A period that is no good is an error of building the sensor.
+        (self.lazy && alone).then(|| Schedule::new(self.update_period, dt, self.round_period).ok()).flatten()
     }
 }
 
@@ -182,7 +195,8 @@ impl Sampler {
         self.check(state)?;
         for env in 0..self.expected.num_envs() {
             let step = state.step[env];
-            if self.phases.is_due(env, step) {
+            let fallen_due = self.phases.fallen_due(env, step);
+            if fallen_due > 0 {
                 self.read(env, state, &mut read);
                 let arrives = self.noise.as_mut().is_none_or(|noise| noise.measure(env, &mut self.row[STAMPS..]));
                 match &mut self.delay {
@@ -190,6 +204,8 @@ impl Sampler {
                     Some(delay) => delay.push(env, step, &self.row),
                     None => {
                         self.remember(env);
+                        // Those before that nobody read, where the sensor is lazy.
+                        self.counts[env] += fallen_due - 1;
                         self.show(env);
                     }
                 }
@@ -431,7 +447,8 @@ pub trait Sampled {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
     }
 
-    /// Measurements that arrived since the last reset, shape \[num_envs\]; the refresh of a reset is none.
+    /// Measurements that arrived since the last reset, shape \[num_envs\], those of a lazy sensor that nobody read among
+    /// them; the refresh of a reset is none.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
         self.sampler().counts.view()
     }

@@ -89,11 +89,24 @@ impl Phases {
     /// If there is no such environment, or if steps went backwards without [`reset`](Self::reset).
     #[track_caller]
     pub fn is_due(&mut self, env: usize, step: u64) -> bool {
-        let phase = &mut self.envs[env];
+        self.fallen_due(env, step) > 0
+    }
+
+    /// How many measurements environment `env`, which is at physics step `step`, has come to since it was last asked: 0
+    /// where [`is_due`](Self::is_due) says no, else 1, or more where it was not asked when the ones before were due (a lazy
+    /// sensor that nobody read).
+    ///
+    /// # Panics
+    ///
+    /// As [`is_due`](Self::is_due).
+    #[track_caller]
+    pub fn fallen_due(&mut self, env: usize, step: u64) -> u64 {
+        let (phase, period) = (&mut self.envs[env], self.schedule.period_steps);
         assert!(step >= phase.seen, "environment {env} went from step {} to {step} without a reset", phase.seen);
-        let is_new = step > phase.seen;
+        let before = (phase.seen - phase.start) / period;
         phase.seen = step;
-        is_new && (step - phase.start).is_multiple_of(self.schedule.period_steps)
+        let run = step - phase.start;
+        if run.is_multiple_of(period) { run / period - before } else { 0 }
     }
 
     /// Steps until the next environment is due, at least 1, when they are at `steps`.
@@ -163,6 +176,13 @@ mod tests {
         let mut phases = Schedule::new(0.1, 0.005, false).unwrap().phases(1);
         let due: Vec<u64> = (1..=1_000_000).filter(|&step| phases.is_due(0, step)).collect();
         assert!(due.iter().copied().eq((1..=50_000).map(|k| 20 * k)));
+    }
+
+    #[test]
+    fn measurements_that_nobody_asked_for_are_counted() {
+        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(1);
+        phases.reset(0, 3);
+        assert_eq!([3, 7, 7, 19, 20, 23].map(|step| phases.fallen_due(0, step)), [0, 1, 0, 3, 0, 1]);
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use crate::crew::Crew;
 use crate::error::SensorError;
 use crate::ray::RayAssets;
+use crate::schedule::Schedule;
 use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
-use scene::{Marker, RenderScene, SceneState};
+use scene::{Marker, Pose, RenderScene, SceneState};
 use std::any::Any;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -19,10 +20,27 @@ pub trait SensorCfg {
     /// What the sensor needs to see. The simulation gathers the union over all sensors, and nothing else.
     fn requires(&self) -> Requires;
 
-    /// Whether the simulation shows the sensor's [`markers`](Sensor::markers) among its own. Built-in sensors have a field
-    /// `debug_vis` for it, off by default as in Isaac Lab; a sensor that has no such switch shows what it has.
+    /// Whether the simulation shows the sensor's [`markers`](Sensor::markers) among its own, until somebody switches that.
+    /// Built-in sensors have a field `debug_vis` for it, off by default as in Isaac Lab; a sensor that has no such field shows
+    /// what it has.
     fn debug_vis(&self) -> bool {
         true
+    }
+
+    /// When a lazy sensor is due, with physics steps of `dt` \[s\]; `None` for an eager one, as by default.
+    ///
+    /// An eager sensor measures when it is due. Of a lazy one, the owner keeps what the sensor [requires](Self::requires) of
+    /// the state then (the last time it was due, for each environment), and the sensor measures that when somebody first reads
+    /// it: what is read is the same, and what nobody reads costs no more than the copy. Isaac Lab's lazy sensors measure the
+    /// instant at which they are read; here that changes nothing either. Resets, and writes to the state, are seen at once.
+    ///
+    /// Give a schedule only where a measurement depends on the state at its instant and on nothing before, and where
+    /// [`Sensor::update`] counts right with [`Phases::fallen_due`](crate::Phases::fallen_due), as a
+    /// [`Sampler`](crate::Sampler) does: [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides that for
+    /// sensors with one. The [`Camera`](crate::Camera) keeps and draws by itself.
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        let _ = dt;
+        None
     }
 
     /// The sensor, with all its buffers allocated.
@@ -35,12 +53,13 @@ pub trait SensorCfg {
 
 /// A sensor of all environments.
 ///
-/// The owner calls [`update`](Self::update) after a physics step at the latest when [`due_in`](Self::due_in) says so; the
-/// sensor knows which environments are due. Measurements are read through views borrowed from the sensor, so they cannot
+/// The owner calls [`update`](Self::update) after a physics step at the latest when [`due_in`](Self::due_in) says so (later
+/// for a [lazy](SensorCfg::lazy) sensor); the sensor knows which environments are due. Measurements are read through views borrowed from the sensor, so they cannot
 /// change while somebody reads. The trait is object safe, and `&dyn Sensor` converts to `&dyn Any`, from which the owner
 /// finds the type back.
 pub trait Sensor: Any + fmt::Debug + Send + Sync {
-    /// Measures in the environments that are due at `state`, which holds at least what the configuration requires.
+    /// Measures in the environments that are due at `state`, which holds at least what the configuration requires. Each
+    /// environment is at an instant of its own ([`SceneState::step`]).
     ///
     /// # Errors
     ///
@@ -65,9 +84,10 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// What it shows people of its last measurement in environment `env`: drawn in overviews, never measured. Whether they
-    /// are drawn is [`SensorCfg::debug_vis`].
-    fn markers(&self, env: usize) -> Vec<Marker> {
-        let _ = env;
+    /// are drawn is [`SensorCfg::debug_vis`]. `pose` tells where a body of the body axis is now, which is where an overview
+    /// draws it.
+    fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
+        let _ = (env, pose);
         Vec::new()
     }
 
@@ -103,6 +123,9 @@ pub struct SensorContext {
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
+    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot's
+    /// joint, `uid/actuator` for those of an MJCF file.
+    pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
     /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
@@ -205,12 +228,14 @@ impl Requires {
     pub const JOINT_WRENCHES: Self = Self(1 << 8);
     /// [`SceneState::instance_poses`], and [`SensorContext::scene`].
     pub const INSTANCES: Self = Self(1 << 9);
+    /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
+    pub const ACTUATORS: Self = Self(1 << 10);
 
     /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
     /// know before the step that somebody wants it.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    const NAMES: [(Self, &str); 10] = [
+    const NAMES: [(Self, &str); 11] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -221,11 +246,41 @@ impl Requires {
         (Self::VISIBLE, "visible"),
         (Self::JOINT_WRENCHES, "joint_wrenches"),
         (Self::INSTANCES, "instances"),
+        (Self::ACTUATORS, "actuators"),
     ];
 
     /// Whether all of `other` is in this set.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
+    }
+
+    /// The part of `state` that is in the set, with its steps and times.
+    pub fn part_of(self, state: &SceneState) -> SceneState {
+        fn part<T: Clone>(wanted: bool, field: &Option<T>) -> Option<T> {
+            field.as_ref().filter(|_| wanted).cloned()
+        }
+        let has = |field| self.contains(field);
+        SceneState {
+            step: state.step.clone(),
+            time: state.time.clone(),
+            force_time: state.force_time.clone(),
+            body_poses: part(has(Self::POSES), &state.body_poses),
+            body_velocities: part(has(Self::VELOCITIES), &state.body_velocities),
+            body_accelerations: part(has(Self::ACCELERATIONS), &state.body_accelerations),
+            force_poses: part(has(Self::ACCELERATIONS), &state.force_poses),
+            force_velocities: part(has(Self::ACCELERATIONS), &state.force_velocities),
+            joint_wrenches: part(has(Self::JOINT_WRENCHES), &state.joint_wrenches),
+            joint_positions: part(has(Self::JOINT_STATE), &state.joint_positions),
+            joint_velocities: part(has(Self::JOINT_STATE), &state.joint_velocities),
+            joint_efforts: part(has(Self::JOINT_EFFORTS), &state.joint_efforts),
+            actuator_controls: part(has(Self::ACTUATORS), &state.actuator_controls),
+            actuator_forces: part(has(Self::ACTUATORS), &state.actuator_forces),
+            actuator_activations: part(has(Self::ACTUATORS), &state.actuator_activations),
+            contacts: part(has(Self::CONTACTS), &state.contacts),
+            sensordata: part(has(Self::SENSORDATA), &state.sensordata),
+            visible: part(has(Self::VISIBLE), &state.visible),
+            instance_poses: part(has(Self::INSTANCES), &state.instance_poses),
+        }
     }
 
     /// What is in both sets.
@@ -264,6 +319,12 @@ impl Requires {
             | has(state.visible.is_some(), Self::VISIBLE)
             | has(state.joint_wrenches.is_some(), Self::JOINT_WRENCHES)
             | has(state.instance_poses.is_some(), Self::INSTANCES)
+            | has(
+                state.actuator_controls.is_some()
+                    && state.actuator_forces.is_some()
+                    && state.actuator_activations.is_some(),
+                Self::ACTUATORS,
+            )
     }
 
     /// The names of the fields in the set.

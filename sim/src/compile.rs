@@ -104,6 +104,8 @@ pub(crate) struct PartIndex {
     pub dofs: Vec<usize>,
     /// Each actuator of the file.
     pub actuators: Vec<usize>,
+    /// Each joint of the file with one degree of freedom.
+    pub joints: Vec<JointIndexing>,
     /// The control of each actuator of the file.
     pub controls: Vec<usize>,
     /// Each activation of the file's actuators.
@@ -257,10 +259,14 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
     let mut bodies = vec![find(ObjectKind::Body, "body", part.uid())?];
     bodies.extend(all(ObjectKind::Body, "body", &names.bodies[1..])?);
     let actuators = all(ObjectKind::Actuator, "actuator", &names.actuators)?;
-    let (mut qpos, mut dofs) = (Vec::new(), Vec::new());
+    let (mut qpos, mut dofs, mut joints) = (Vec::new(), Vec::new(), Vec::new());
     // In the file's own order: joint by joint, as their numbers stand there.
     for (joint, here) in all(ObjectKind::Joint, "joint", &names.joints)?.into_iter().enumerate() {
         let (nq, nv) = joint_widths(file.jnt_type()[joint]);
+        if nq == 1 {
+            let (qpos, dof) = (model.jnt_qposadr()[here] as usize, model.jnt_dofadr()[here] as usize);
+            joints.push(JointIndexing { qpos, dof, drive: None });
+        }
         qpos.extend((0..nq).map(|k| model.jnt_qposadr()[here] as usize + k));
         dofs.extend((0..nv).map(|k| model.jnt_dofadr()[here] as usize + k));
     }
@@ -270,6 +276,7 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
         geoms: all(ObjectKind::Geom, "geom", &names.geoms)?,
         qpos,
         dofs,
+        joints,
         controls: actuators.iter().map(|&actuator| model.actuator_control(actuator)).collect(),
         activations: actuators.iter().flat_map(|&actuator| model.actuator_activation(actuator)).collect(),
         actuators,

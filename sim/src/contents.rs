@@ -87,8 +87,18 @@ impl Contents {
         sensors.into()
     }
 
-    /// Names of the movable joints of all robots, `uid/joint`.
+    /// Names of the movable joints of all robots, then of the joints of parts that have one degree of freedom, `uid/joint`.
     pub(crate) fn joint_names(&self) -> Arc<[String]> {
-        self.robots.iter().flat_map(|r| r.joint_names().iter().map(|j| format!("{}/{j}", r.uid()))).collect()
+        let of_robots = self.robots.iter().flat_map(|r| r.joint_names().iter().map(|j| format!("{}/{j}", r.uid())));
+        of_robots.chain(self.parts.iter().flat_map(|p| p.single_joints().map(|j| p.full(j)))).collect()
+    }
+
+    /// Names of the drives of all robots, `uid/joint`, then of the actuators of parts, `uid/actuator`.
+    pub(crate) fn actuator_names(&self) -> Arc<[String]> {
+        let of_robots = self.robots.iter().flat_map(|r| {
+            let driven = r.joint_names().iter().zip(r.plans()).filter(|(_, plan)| plan.actuator.is_some());
+            driven.map(|(joint, _)| format!("{}/{joint}", r.uid()))
+        });
+        of_robots.chain(self.parts.iter().flat_map(|p| p.names().actuators.iter().map(|a| p.full(a)))).collect()
     }
 }

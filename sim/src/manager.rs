@@ -437,8 +437,8 @@ impl SimulationManager {
     }
 
     /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
-    /// sensor sees links and movable joints of all robots, in the order in which they were added. Adding a robot later
-    /// starts its history again.
+    /// sensor sees links, movable joints and drives of all robots, in the order in which they were added, then what MJCF files
+    /// have of these. Adding a robot later starts its history again.
     ///
     /// # Errors
     /// The configuration is wrong, the name is taken, or the sensor needs a quantity that is not gathered.
@@ -452,10 +452,10 @@ impl SimulationManager {
         self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
 
-    /// A sensor, to read.
+    /// A sensor, to read. A [lazy](SensorCfg::lazy) one measures now what was due.
     ///
     /// # Errors
-    /// The sensor failed in an earlier step.
+    /// The sensor failed, in an earlier step or now.
     pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         self.sensors.get(id)
     }
@@ -468,9 +468,27 @@ impl SimulationManager {
         self.sensors.get_mut(id)
     }
 
-    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview).
+    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
+    /// configured to ([`SensorCfg::debug_vis`]), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
-        self.sensors.markers(self.num_envs())
+        self.sensors.markers(&self.simulation)
+    }
+
+    /// Whether the markers of a sensor are among [`markers`](Self::markers).
+    ///
+    /// # Errors
+    /// There is no such sensor.
+    pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
+        self.sensors.debug_vis(id.index())
+    }
+
+    /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
+    /// changes.
+    ///
+    /// # Errors
+    /// There is no such sensor.
+    pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
+        self.sensors.set_debug_vis(id.index(), shown)
     }
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
@@ -487,6 +505,7 @@ impl SimulationManager {
             bodies: self.contents.body_names(),
             carriers: self.contents.carriers(),
             joints: self.contents.joint_names(),
+            actuators: self.contents.actuator_names(),
             engine_sensors: self.contents.engine_sensors(),
             scene,
             ray_assets: self.ray_assets.clone(),

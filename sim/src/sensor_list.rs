@@ -1,13 +1,13 @@
 //! The sensors of a simulation: built from their configurations, ticked after every step, read by typed handles.
 
-use crate::capture::Capture;
+use crate::capture::{Capture, link_pose};
 use crate::compile::Simulation;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::manager::EnvId;
-use scene::{Marker, SceneState};
-use sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
+use scene::{Marker, Pose, SceneState};
+use sensors::{Requires, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
 use std::any::Any;
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -16,6 +16,13 @@ use std::sync::Arc;
 pub struct SensorId<S> {
     index: usize,
     sensor: PhantomData<fn() -> S>,
+}
+
+impl<S> SensorId<S> {
+    /// Its place in the list.
+    pub(crate) fn index(self) -> usize {
+        self.index
+    }
 }
 
 impl<S> Clone for SensorId<S> {
@@ -39,10 +46,21 @@ struct Entry {
     requires: Requires,
     /// Whether its markers are shown.
     debug_vis: bool,
+    lazy: Option<Schedule>,
     build: Builder,
-    sensor: Box<dyn Sensor>,
-    /// Why it is not updated any more.
-    fault: Option<SensorError>,
+    /// The sensor; why there is none, where it could not be built again.
+    slot: Result<SensorSlot, SensorError>,
+}
+
+impl Entry {
+    /// The sensor, unless it is known that it is not asked any more.
+    fn running(&self) -> Option<&SensorSlot> {
+        self.slot.as_ref().ok().filter(|slot| !slot.has_failed())
+    }
+
+    fn fault(&self, fault: &SensorError) -> Error {
+        Error::SensorFault { sensor: self.uid.clone(), fault: fault.to_string() }
+    }
 }
 
 /// All sensors and the state they read.
@@ -103,18 +121,20 @@ impl SensorList {
     where
         C: SensorCfg + Send + 'static,
     {
-        let (requires, debug_vis) = (cfg.requires(), cfg.debug_vis());
+        let (requires, debug_vis, lazy) = (cfg.requires(), cfg.debug_vis(), cfg.lazy(context.dt));
         let build: Builder = Box::new(move |context| Ok(Box::new(cfg.build(context)?) as Box<dyn Sensor>));
-        let mut sensor =
-            build(context).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
+        let wrong = |error: SensorError| Error::Sensor { sensor: uid.clone(), error: Box::new(error) };
+        let sensor = build(context).map_err(wrong)?;
         let all = self.requires() | requires;
         let envs: Vec<usize> = (0..context.num_envs).collect();
         let mut state = gather::allocate(simulation, all);
         solve(simulation, all, &envs);
         gather::gather(simulation, self.substeps, all, &mut state);
-        sensor.reset(&envs, &state).map_err(|error| Error::Sensor { sensor: uid.clone(), error: Box::new(error) })?;
+        let mut slot = SensorSlot::new(sensor, requires, lazy, context.num_envs);
+        slot.reset(&envs, &state);
+        slot.sensor().map_err(|error| wrong(error.clone()))?;
         self.state = state;
-        self.entries.push(Entry { uid, requires, debug_vis, build, sensor, fault: None });
+        self.entries.push(Entry { uid, requires, debug_vis, lazy, build, slot: Ok(slot) });
         Ok(SensorId { index: self.entries.len() - 1, sensor: PhantomData })
     }
 
@@ -127,13 +147,11 @@ impl SensorList {
         gather::gather(simulation, self.substeps, all, &mut self.state);
         for entry in &mut self.entries {
             let context = SensorContext { name: entry.uid.as_str().into(), ..context.clone() };
-            entry.fault = match (entry.build)(&context) {
-                Ok(sensor) => {
-                    entry.sensor = sensor;
-                    entry.sensor.reset(&envs, &self.state).err()
-                }
-                Err(error) => Some(error),
-            };
+            entry.slot = (entry.build)(&context).map(|sensor| {
+                let mut slot = SensorSlot::new(sensor, entry.requires, entry.lazy, context.num_envs);
+                slot.reset(&envs, &self.state);
+                slot
+            });
         }
     }
 
@@ -142,11 +160,15 @@ impl SensorList {
     pub(crate) fn advance(&mut self, simulation: &mut Simulation, steps: u32) -> u32 {
         gather::gather_clocks(simulation, self.substeps, &mut self.clocks);
         let now = &self.clocks;
-        let wait = |e: &Entry| e.sensor.due_in(now).max(1);
-        let running = self.entries.iter().filter(|e| e.fault.is_none());
-        let block = running.map(wait).min().map_or(steps, |due| u32::try_from(due).unwrap_or(u32::MAX).min(steps));
+        let wait = |e: &Entry| Some(e.running()?.due_in(now).max(1));
+        let block = self
+            .entries
+            .iter()
+            .filter_map(wait)
+            .min()
+            .map_or(steps, |due| u32::try_from(due).unwrap_or(u32::MAX).min(steps));
         self.due.clear();
-        self.due.extend(self.entries.iter().map(|e| e.fault.is_none() && wait(e) <= u64::from(block)));
+        self.due.extend(self.entries.iter().map(|e| wait(e).is_some_and(|wait| wait <= u64::from(block))));
         let due = self.entries.iter().zip(&self.due).filter(|(_, due)| **due);
         let requires = due.fold(Requires::NONE, |all, (e, _)| all | e.requires);
         match capture(simulation, requires) {
@@ -157,7 +179,7 @@ impl SensorList {
             gather::gather(simulation, self.substeps, requires, &mut self.state);
         }
         for (entry, _) in self.entries.iter_mut().zip(&self.due).filter(|(_, due)| **due) {
-            entry.fault = entry.sensor.update(&self.state).err();
+            entry.slot.iter_mut().for_each(|slot| slot.update(&self.state));
         }
         block
     }
@@ -165,8 +187,8 @@ impl SensorList {
     /// After a reset of `env_ids`.
     pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         self.renew(simulation, env_ids);
-        for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
-            entry.fault = entry.sensor.reset(env_ids, &self.state).err();
+        for slot in self.entries.iter_mut().flat_map(|entry| &mut entry.slot) {
+            slot.reset(env_ids, &self.state);
         }
     }
 
@@ -179,8 +201,8 @@ impl SensorList {
             return;
         }
         self.renew(simulation, &running);
-        for entry in self.entries.iter_mut().filter(|e| e.fault.is_none()) {
-            entry.fault = entry.sensor.refresh(&running, &self.state).err();
+        for slot in self.entries.iter_mut().flat_map(|entry| &mut entry.slot) {
+            slot.refresh(&running, &self.state);
         }
     }
 
@@ -192,20 +214,43 @@ impl SensorList {
     }
 
     /// What they show of their last measurements.
-    pub(crate) fn markers(&self, num_envs: usize) -> Vec<(EnvId, Marker)> {
-        let shown = || self.entries.iter().filter(|e| e.debug_vis && e.fault.is_none());
-        let of = |env| shown().flat_map(move |e| e.sensor.markers(env)).map(move |marker| (EnvId(env), marker));
-        (0..num_envs).flat_map(of).collect()
+    pub(crate) fn markers(&self, simulation: &Simulation) -> Vec<(EnvId, Marker)> {
+        let shown = self.entries.iter().filter(|e| e.debug_vis).filter_map(|e| e.slot.as_ref().ok()?.sensor().ok());
+        let shown: Vec<&dyn Sensor> = shown.collect();
+        let mut markers = Vec::new();
+        simulation.batch.for_each(|i, env| {
+            let pose = |body: usize| {
+                let place = simulation.plan.bodies().get(body);
+                place.map_or_else(Pose::identity, |place| link_pose(env.data(), place))
+            };
+            let of_env = shown.iter().flat_map(|sensor| sensor.markers(i, &pose));
+            markers.extend(of_env.map(|marker| (EnvId(i), marker)));
+        });
+        markers
+    }
+
+    /// Whether the markers of a sensor are shown.
+    pub(crate) fn debug_vis(&self, index: usize) -> Result<bool> {
+        self.entry(index).map(|entry| entry.debug_vis)
+    }
+
+    /// Shows the markers of a sensor, or does not.
+    pub(crate) fn set_debug_vis(&mut self, index: usize, shown: bool) -> Result<()> {
+        self.entry(index)?;
+        self.entries.get_mut(index).into_iter().for_each(|entry| entry.debug_vis = shown);
+        Ok(())
+    }
+
+    fn entry(&self, index: usize) -> Result<&Entry> {
+        let count = self.entries.len();
+        self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
 
     /// The sensor of a handle.
     pub(crate) fn get<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
-        let unknown = Error::UnknownIndex { what: "sensor", index: id.index, count: self.entries.len() };
-        let entry = self.entries.get(id.index).ok_or(unknown)?;
-        if let Some(fault) = &entry.fault {
-            return Err(Error::SensorFault { sensor: entry.uid.clone(), fault: fault.to_string() });
-        }
-        let any: &dyn Any = entry.sensor.as_ref();
+        let entry = self.entry(id.index)?;
+        let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))?;
+        let any: &dyn Any = sensor;
         any.downcast_ref::<S>().ok_or_else(|| Error::UnknownName {
             what: "sensor of this type called",
             name: entry.uid.clone(),
@@ -217,7 +262,8 @@ impl SensorList {
     pub(crate) fn get_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.get(id)?;
         let count = self.entries.len();
-        let any: Option<&mut dyn Any> = self.entries.get_mut(id.index).map(|e| e.sensor.as_mut() as &mut dyn Any);
+        let sensor = self.entries.get_mut(id.index).and_then(|e| e.slot.as_mut().ok()?.sensor_mut().ok());
+        let any: Option<&mut dyn Any> = sensor.map(|sensor| sensor as &mut dyn Any);
         any.and_then(|any| any.downcast_mut::<S>()).ok_or(Error::UnknownIndex {
             what: "sensor",
             index: id.index,

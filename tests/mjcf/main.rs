@@ -9,6 +9,7 @@ mod meshes;
 mod mujoco_sensors;
 mod refused;
 mod samples;
+mod state;
 mod twins;
 mod visible;
 mod wrench;

@@ -8,6 +8,7 @@ fn error(text: &str) -> String {
 
 #[test]
 fn a_mistake_is_named_with_its_line() {
+    let mut wrong = Vec::new();
     for (text, line, parts) in [
         // Keys that nobody knows, at every depth.
         ("[simulation]\nnum_envs = 2\nphysics_td = 0.01\n", 3, &["physics_td", "physics_dt"][..]),
@@ -21,7 +22,7 @@ fn a_mistake_is_named_with_its_line() {
         (
             "[entities.c]\ntype = \"camera\"\nextrinsics.placement.look_at = { eye = [1, 0, 0], tarket = [0, 0, 0] }",
             3,
-            &["tarket", "target,"],
+            &["tarket", "`target`"],
         ),
         ("[entities.i]\ntype = \"imu\"\n[entities.i.sampling.noise.lin_acc_b]\nstdd = 0.1", 4, &["stdd", "`std`"]),
         // Kinds that nobody knows.
@@ -58,6 +59,76 @@ fn a_mistake_is_named_with_its_line() {
         ("[entities.t]\ntype = \"terrain\"\nheights = { rough = {}, slope = {} }", 3, &["one generator", "two"]),
         ("[entities.t]\ntype = \"terrain\"\nheights.hills = {}", 3, &["hills", "`rough`"]),
         ("[entities.t]\ntype = \"terrain\"\nheights = 3", 3, &["rows of heights", "generator"]),
+        // One of several kinds is to be named: by its name alone, or as a table of one.
+        (
+            "[entities.s]\ntype = \"ray_caster\"\npattern = {}",
+            3,
+            &["nothing is named", "`grid`", "`lidar`", "`pinhole`"],
+        ),
+        ("[entities.s]\ntype = \"ray_caster\"\npattern = \"grid\"", 3, &["`grid`", "too little", "{ grid = ... }"]),
+        ("[entities.s]\ntype = \"ray_caster\"\npattern = \"gird\"", 3, &["`gird`", "one of `grid`"]),
+        ("[entities.s]\ntype = \"ray_caster\"\npattern = 3", 3, &["integer `3`", "one of `grid`"]),
+        (
+            "[entities.s]\ntype = \"ray_caster\"\npattern = { grid = {},\n lidar = {} }",
+            3,
+            &["`grid`, `lidar` are 2", "one of"],
+        ),
+        (
+            "[entities.s]\ntype = \"ray_caster\"\npattern.grid = 1",
+            3,
+            &["integer `1`", "a table of `resolution`", "`size`"],
+        ),
+        ("[entities.s]\ntype = \"ray_caster\"\npattern.grid.order = \"zz\"", 3, &["zz", "`xy`", "`yx`"]),
+        (
+            "[entities.s]\ntype = \"ray_caster\"\n\nalignment = {}",
+            4,
+            &["nothing is named", "`base`", "`yaw`", "`world`"],
+        ),
+        ("[entities.s]\ntype = \"ray_caster\"\nalignment = { yaw = 3 }", 3, &["`yaw`", "its name alone"]),
+        ("[entities.s]\ntype = \"ray_caster\"\ntargets = {}", 3, &["`static_only`", "`named`", "`everything`"]),
+        ("[entities.s]\ntype = \"ray_caster\"\n[entities.s.targets]\nnammed = [\"a\"]", 4, &["nammed", "`named`"]),
+        ("[entities.s]\ntype = \"camera\"\nintrinsics = {}", 3, &["`pixels`", "`aperture`", "`fovy`"]),
+        ("[entities.s]\ntype = \"camera\"\nintrinsics.fovi = {}", 3, &["fovi", "`fovy`"]),
+        ("[entities.s]\ntype = \"camera\"\nintrinsics.pixels = { fx = 1.0 }", 3, &["missing field `fy`"]),
+        (
+            "[entities.s]\ntype = \"camera\"\n\nextrinsics.placement = {}",
+            4,
+            &["nothing is named", "`pose`", "`look_at`"],
+        ),
+        ("[entities.s]\ntype = \"camera\"\ndepth_miss = \"infinity\"", 3, &["infinity", "`inf`", "`far`", "`zero`"]),
+        ("[entities.s]\ntype = \"camera\"\nraster = 4", 3, &["integer `4`", "a table of `samples`"]),
+        ("[entities.s]\ntype = \"imu\"\nsampling.noise = { lin_acc_b = 3 }", 3, &["integer `3`", "a table of `std`"]),
+        (
+            "[entities.s]\ntype = \"frame_transformer\"\nsource = \"a\"\ntargets = [\n{},\n]",
+            5,
+            &["missing field `bodies`"],
+        ),
+        (
+            "[entities.s]\ntype = \"frame_transformer\"\nsource = \"a\"\ntargets = [\n\"b\"]",
+            5,
+            &["\"b\"", "a table of `bodies`"],
+        ),
+        (
+            "[entities.s]\ntype = \"rigid_object\"\nshape = {}",
+            3,
+            &["nothing is named", "`box`", "`sphere`", "`capsule`"],
+        ),
+        ("[entities.s]\ntype = \"rigid_object\"\nshape = \"box\"", 3, &["`box`", "too little", "{ box = ... }"]),
+        ("[entities.s]\ntype = \"rigid_object\"\nshape.box = {}", 3, &["missing field `size`"]),
+        ("[entities.s]\ntype = \"rigid_object\"\nshape.box.size = [1, 2]", 3, &["array of length 3"]),
+        ("[entities.r]\ntype = \"robot\"\nurdf = \"a\"\ndrive.model = {}", 4, &["`implicit`", "`actuator`"]),
+        ("[entities.r]\ntype = \"robot\"\nurdf = \"a\"\ndrive.actuators.\".*\" = {}", 4, &["`ideal_pd`", "`dc_motor`"]),
+        (
+            "[entities.r]\ntype = \"robot\"\nurdf = \"a\"\ndrive.actuators.\".*\" = \"dc_motor\"",
+            4,
+            &["{ dc_motor = ... }"],
+        ),
+        ("[simulation]\ncone = {}", 2, &["nothing is named", "`pyramidal`", "`elliptic`"]),
+        ("[simulation]\nlights = [{ direction = 3 }]", 2, &["integer `3`", "array of length 3"]),
+        // Numbers that are none, and dates.
+        ("[simulation]\nphysics_dt = 1e999", 2, &["1e999", "beyond"]),
+        ("[simulation]\nseed = 99999999999999999999", 2, &["99999999999999999999", "beyond"]),
+        ("[simulation]\nphysics_dt = 2026-01-01", 2, &["2026-01-01", "nowhere"]),
         // Names stand in one place only.
         ("[entities.o]\ntype = \"rigid_object\"\nuid = \"o\"", 3, &["\"o\"", "uid"]),
         // What is no TOML.
@@ -66,11 +137,12 @@ fn a_mistake_is_named_with_its_line() {
         ("a b", 1, &[]),
     ] {
         let message = error(text);
-        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
-        for part in parts {
-            assert!(message.contains(part), "{text}\n{message}: no {part}");
+        let said = message.strip_prefix(&format!("dir/scene.toml:{line}: ")).unwrap_or_default();
+        if said.is_empty() || parts.iter().any(|part| !said.contains(part)) {
+            wrong.push(format!("{text}\n  {message}\n  is not at line {line} with {parts:?}"));
         }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
 
 /// Whatever stands in a file, reading it ends with a scene or an error.
@@ -126,4 +198,18 @@ fn what_cannot_be_built_is_named_with_its_line() {
             assert!(message.contains(part), "{text}\n{message}: no {part}");
         }
     }
+}
+
+/// A kind that has nothing to set may be named alone or with an empty table; all that a kind has a default for may be left
+/// out.
+#[test]
+fn kinds_may_be_named_either_way() {
+    let text =
+        "[entities.s]\ntype = \"ray_caster\"\npattern.grid = {}\nalignment = { world = {} }\ntargets = \"static_only\"";
+    let cfg = SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).unwrap();
+    let EntityCfg::Sensor(sensor) = &cfg.entities[0].1 else { panic!("no sensor") };
+    let any: &dyn std::any::Any = sensor.as_ref();
+    let expected =
+        RayCasterCfg { alignment: RayAlignment::World, targets: HitTargets::StaticOnly, ..RayCasterCfg::default() };
+    assert_eq!(any.downcast_ref::<RayCasterCfg>(), Some(&expected));
 }

@@ -96,32 +96,77 @@ fn frames_and_rays_show_where_they_are() {
     assert_eq!(places, [[4.75, 4.75, 0.0], [4.75, 5.25, 0.0], [5.25, 4.75, 0.0], [5.25, 5.25, 0.0]]);
 }
 
-/// From (1, 0, 1) along -x, with a lens whose corners are half as far to the sides and three eighths as far up and down as
-/// they are away: the arrows end 0.3 m before the eye.
+/// A camera that looks at the origin from (1, 0, 1) along -x, drawn or made of rays.
+const EYE: Placement = Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] };
+
+/// A lens whose corners are half as far to the sides and three eighths as far up and down as they are away: the arrows end
+/// 0.3 m before the eye.
 #[test]
 fn cameras_show_what_their_pictures_cover() {
-    let placement = Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] };
-    let extrinsics = || Extrinsics { placement, ..Default::default() };
+    let extrinsics = || Extrinsics { placement: EYE, ..Default::default() };
+    let (width, height) = (40, 30);
     let intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 40.0, cx: 20.0, cy: 15.0 };
-    let raster = shown(|debug_vis| CameraCfg {
-        width: 40,
-        height: 30,
-        intrinsics,
-        extrinsics: extrinsics(),
-        debug_vis,
-        ..Default::default()
+    let raster = shown(|debug_vis| {
+        let (extrinsics, rest) = (extrinsics(), CameraCfg::default());
+        CameraCfg { width, height, intrinsics, extrinsics, debug_vis, ..rest }
     });
-    let rays = shown(|debug_vis| RayCasterCameraCfg {
-        width: 40,
-        height: 30,
-        intrinsics,
-        extrinsics: extrinsics(),
-        debug_vis,
-        ..Default::default()
+    let rays = shown(|debug_vis| {
+        let (extrinsics, rest) = (extrinsics(), RayCasterCameraCfg::default());
+        RayCasterCameraCfg { width, height, intrinsics, extrinsics, debug_vis, ..rest }
     });
     assert_eq!(raster, rays, "placed alike, shown alike");
     assert!(raster.len() == 5 && matches!(raster[0].kind, MarkerKind::Axes { .. }));
     for (marker, (y, z)) in raster[1..].iter().zip([(-0.5, 0.375), (0.5, 0.375), (0.5, -0.375), (-0.5, -0.375)]) {
         near(arrow(marker), [1.0, 0.0, 1.0], [-0.3, 0.3 * y, 0.3 * z], 1e-6);
     }
+}
+
+/// The switch is at hand while the simulation runs: what is shown is what a sensor shows that was configured so, wherever
+/// the bodies have come to meanwhile, and nothing of what is measured changes.
+#[test]
+fn what_is_shown_can_be_switched_while_it_runs() {
+    let mut sim = world();
+    let contact = |debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box") };
+    let wrench = |debug_vis| JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() };
+    let (off, on) = (sim.add_sensor("off", contact(false)).unwrap(), sim.add_sensor("on", contact(true)).unwrap());
+    let load = sim.add_sensor("load", wrench(false)).unwrap();
+    assert_eq!([sim.debug_vis(off).unwrap(), sim.debug_vis(on).unwrap()], [false, true]);
+    sim.update(4);
+    // Two environments with a ball and an arrow each.
+    let of_on = sim.markers();
+    assert_eq!(of_on.len(), 4);
+    sim.set_debug_vis(on, false).unwrap();
+    assert_eq!(sim.markers(), []);
+    sim.set_debug_vis(off, true).unwrap();
+    assert_eq!(sim.markers(), of_on, "the same, of a sensor that was built without");
+    sim.set_debug_vis(off, false).unwrap();
+    sim.set_debug_vis(load, true).unwrap();
+    let (first, marker) = &sim.markers()[0];
+    assert_eq!(*first, EnvId(0));
+    near(arrow(marker), [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
+    assert!(sim.sensor(off).unwrap().pos_w().is_none(), "poses are for show, and not measured");
+    assert_eq!(sim.sensor(off).unwrap().sample_counts().to_vec(), [4, 4], "nothing started anew");
+    // The switch stays where a robot is added later, and all is built anew.
+    sim.add_rigid_object(cube("late", 1.0, 0.2, [3.0, 3.0, 0.1])).unwrap();
+    assert_eq!([off, on].map(|id| sim.debug_vis(id).unwrap()), [false, false]);
+    assert!(sim.debug_vis(load).unwrap());
+}
+
+/// In a scene, by the name of the sensor, whatever its kind.
+#[test]
+fn what_is_shown_can_be_switched_by_name() {
+    let mut scene = InteractiveScene::new(
+        SceneCfg::new(cfg(1)).with("box", cube("box", 2.0, 0.2, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box")),
+    )
+    .unwrap();
+    assert_eq!(scene.sim().markers(), []);
+    // It stands: the arrow is there.
+    scene.update(50);
+    scene.set_debug_vis("{ENV}/imu", true).unwrap();
+    assert_eq!(scene.sim().markers().len(), 2);
+    assert!(scene.sim().debug_vis(scene.sensor_id::<Imu>("imu").unwrap()).unwrap());
+    let text = scene.set_debug_vis("imo", true).unwrap_err().to_string();
+    assert!(text.contains("\"imo\"") && text.contains("\"imu\""), "{text}");
+    let text = scene.set_debug_vis("box", true).unwrap_err().to_string();
+    assert_eq!(text, "\"box\" is a rigid object, not a sensor");
 }

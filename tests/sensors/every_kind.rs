@@ -23,6 +23,7 @@ struct Ids {
     imu: SensorId<Imu>,
     frames: SensorId<FrameTransformer>,
     joints: SensorId<JointState>,
+    actuators: SensorId<ActuatorState>,
     wrench: SensorId<JointWrench>,
     own: SensorId<MujocoSensor>,
 }
@@ -34,9 +35,12 @@ fn sampling(channel: &str, seconds: f64) -> SamplingCfg {
     SamplingCfg { latency_steps: 2, dropout: 0.1, history_length: 3, noise, ..SamplingCfg::every(seconds) }
 }
 
+/// The sampling of one sensor, by its noisy channel and its period.
+type Sampling = fn(&str, f64) -> SamplingCfg;
+
 /// An arm, boxes that tumble and a pendulum, with a sensor of every kind. There is enough to see for three threads: 5 cameras
 /// of 128 by 96 pixels take some 2 ms, rays are 13000 and 15000.
-fn world(threads: usize, seed: u64) -> (SimulationManager, Ids) {
+fn world(threads: usize, seed: u64, sampling: Sampling) -> (SimulationManager, Ids) {
     let settings = SimulationManagerCfg { threads: Some(threads), seed, ..cfg(5) };
     let mut sim = SimulationManager::new(settings).unwrap();
     let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
@@ -78,7 +82,7 @@ fn world(threads: usize, seed: u64) -> (SimulationManager, Ids) {
     let contact = ContactSensorCfg {
         filters: vec!["ground".into(), "box.*".into()],
         track_pose: true,
-        track_air_time: true,
+        track_air_time: sampling("", 0.0).history_length > 0,
         track_contact_points: true,
         track_friction_forces: true,
         sampling: sampling("net_forces_w", 0.01),
@@ -108,6 +112,9 @@ fn world(threads: usize, seed: u64) -> (SimulationManager, Ids) {
         frames: sim.add_sensor("frames", frames).unwrap(),
         joints: sim
             .add_sensor("joints", JointStateCfg { joints: None, sampling: sampling("velocities", 0.0) })
+            .unwrap(),
+        actuators: sim
+            .add_sensor("actuators", ActuatorStateCfg { actuators: None, sampling: sampling("forces", 0.01) })
             .unwrap(),
         wrench: sim.add_sensor("wrench", wrench).unwrap(),
         own: sim.add_sensor("own", own).unwrap(),
@@ -151,27 +158,33 @@ fn seen(eye: &RayCasterCamera) -> impl Iterator<Item = u64> {
 }
 
 fn said(threads: usize, seed: u64) -> Said {
-    let (mut sim, ids) = world(threads, seed);
+    let (mut sim, ids) = world(threads, seed, sampling);
     let mut said = Said::new();
     for k in 0..12 {
         if k == 6 {
             sim.reset(Some(&[EnvId(1)])).unwrap();
         }
         sim.update(5);
-        let mut add = |kind, words: Vec<u64>| said.entry(kind).or_default().extend(words);
-        add("camera", pictures(sim.sensor(ids.camera).unwrap()));
-        let rays = sim.sensor(ids.rays).unwrap();
-        add("ray_caster", sampled(rays).into_iter().chain(bits(&rays.hits())).collect());
-        let eye = sim.sensor(ids.eye).unwrap();
-        add("ray_caster_camera", sampled(eye).into_iter().chain(seen(eye)).collect());
-        add("contact_sensor", sampled(sim.sensor(ids.contact).unwrap()));
-        add("imu", sampled(sim.sensor(ids.imu).unwrap()));
-        add("frame_transformer", sampled(sim.sensor(ids.frames).unwrap()));
-        add("joint_state", sampled(sim.sensor(ids.joints).unwrap()));
-        add("joint_wrench", sampled(sim.sensor(ids.wrench).unwrap()));
-        add("mujoco_sensor", sampled(sim.sensor(ids.own).unwrap()));
+        listen(&sim, &ids, &mut said);
     }
     said
+}
+
+/// Reads every sensor.
+fn listen(sim: &SimulationManager, ids: &Ids, said: &mut Said) {
+    let mut add = |kind, words: Vec<u64>| said.entry(kind).or_default().extend(words);
+    add("camera", pictures(sim.sensor(ids.camera).unwrap()));
+    let rays = sim.sensor(ids.rays).unwrap();
+    add("ray_caster", sampled(rays).into_iter().chain(bits(&rays.hits())).collect());
+    let eye = sim.sensor(ids.eye).unwrap();
+    add("ray_caster_camera", sampled(eye).into_iter().chain(seen(eye)).collect());
+    add("contact_sensor", sampled(sim.sensor(ids.contact).unwrap()));
+    add("imu", sampled(sim.sensor(ids.imu).unwrap()));
+    add("frame_transformer", sampled(sim.sensor(ids.frames).unwrap()));
+    add("joint_state", sampled(sim.sensor(ids.joints).unwrap()));
+    add("actuator_state", sampled(sim.sensor(ids.actuators).unwrap()));
+    add("joint_wrench", sampled(sim.sensor(ids.wrench).unwrap()));
+    add("mujoco_sensor", sampled(sim.sensor(ids.own).unwrap()));
 }
 
 #[test]
@@ -194,10 +207,45 @@ fn threads_change_no_bit_of_any_kind_of_sensor() {
     assert_eq!(one.keys().copied().collect::<Vec<_>>(), kinds);
 }
 
+/// Eager and lazy, reading after more than one measurement, with resets and writes in between: one bit of either is one bit
+/// of the other, for every kind of sensor. What lazy sensors count is what was due.
+#[test]
+fn lazy_sensors_say_what_eager_ones_say() {
+    let exact: [Sampling; 2] = [
+        |_, seconds| SamplingCfg::every(seconds),
+        |_, seconds| SamplingCfg { lazy: true, ..SamplingCfg::every(seconds) },
+    ];
+    let [eager, lazy] = exact.map(|sampling| {
+        let (mut sim, ids) = world(2, 5, sampling);
+        let mut said = Said::new();
+        for k in 0..10_u32 {
+            match k {
+                3 | 6 => sim.reset(Some(&[EnvId(k as usize / 3)])).unwrap(),
+                5 => {
+                    let box_ = sim.rigid_object_id("box1").unwrap();
+                    let speed = Array2::from_elem((1, 6), 0.5);
+                    sim.rigid_object_mut(box_).write_velocity(&speed, Some(&[EnvId(3)])).unwrap();
+                }
+                _ => {}
+            }
+            // One step, or seven, or none: nobody reads before that.
+            sim.update([7, 1, 7, 0][k as usize % 4]);
+            listen(&sim, &ids, &mut said);
+        }
+        let counts = sim.sensor(ids.rays).unwrap().sample_counts().to_vec();
+        assert_eq!(counts, [38, 23, 15, 38, 38], "every step since the last reset");
+        said
+    });
+    assert_eq!(eager.keys().collect::<Vec<_>>(), lazy.keys().collect::<Vec<_>>());
+    for (kind, words) in &eager {
+        assert!(words == &lazy[kind], "{kind}");
+    }
+}
+
 /// What is compared is not nothing: boxes touch, the pendulum swings, rays and pictures show things, environments differ.
 #[test]
 fn there_is_something_to_compare() {
-    let (mut sim, ids) = world(2, 5);
+    let (mut sim, ids) = world(2, 5, sampling);
     sim.update(60);
     let contact = sim.sensor(ids.contact).unwrap();
     assert!(contact.contact_counts().unwrap().iter().any(|n| *n > 0.0));

@@ -55,6 +55,8 @@ fn mistakes_name_what_would_be_right() {
     let mut wrong = |cfg: FrameTransformerCfg| sim.add_sensor("f", cfg).unwrap_err().to_string();
     let text = wrong(FrameTransformerCfg::from("cub", vec![]));
     assert!(text.contains("no body \"cub\"; known are \"cube\""), "{text}");
+    let text = wrong(FrameTransformerCfg::from("cube", vec![]));
+    assert!(text.contains("measure nothing: targets") && text.contains("\"cube\""), "{text}");
     let text = wrong(FrameTransformerCfg::from("cube", vec![TargetFrameCfg::of("ball")]));
     assert!(text.contains("no body \"ball\"; known are \"cube\""), "{text}");
     let twice = vec![TargetFrameCfg::of("cube"), TargetFrameCfg::of("cube")];

@@ -14,7 +14,9 @@ mod wrench;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
     let cfg = SimulationManagerCfg { num_envs, ..Default::default() };
@@ -128,6 +130,66 @@ fn a_sensor_of_another_crate_is_added_like_any_other() {
         let expected = sim.robot(robot).link_pose("ee_link").unwrap();
         assert_eq!(sim.sensor(id).unwrap().0, expected.column(2).to_vec());
     }
+}
+
+/// Height of the last link too, but only when it is asked for: counts how often it measures.
+#[derive(Clone, Default)]
+struct SeldomCfg(Arc<AtomicUsize>);
+
+#[derive(Debug)]
+struct Seldom(Height, Arc<AtomicUsize>);
+
+impl SensorCfg for SeldomCfg {
+    type Sensor = Seldom;
+
+    fn requires(&self) -> Requires {
+        HeightCfg.requires()
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        Schedule::new(0.03, dt, false).ok()
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Seldom, SensorError> {
+        HeightCfg.build(context).map(|height| Seldom(height, Arc::clone(&self.0)))
+    }
+}
+
+impl Sensor for Seldom {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.update(state)
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.0.reset(env_ids, state)
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.0.refresh(env_ids, state)
+    }
+}
+
+/// A sensor of a user's crate is lazy by one method: it then holds what it would have measured when it was due, and measures
+/// once for all readers.
+#[test]
+fn a_sensor_of_another_crate_can_be_lazy() {
+    let (mut sim, robot) = arm(2);
+    let cfg = SeldomCfg::default();
+    let id = sim.add_sensor("height", cfg.clone()).unwrap();
+    let height = |sim: &SimulationManager| sim.robot(robot).link_pose("ee_link").unwrap().column(2).to_vec();
+    let start = height(&sim);
+    sim.update(2);
+    assert_eq!(sim.sensor(id).unwrap().0.0, start, "nothing was due");
+    sim.update(10);
+    let due = height(&sim);
+    assert_ne!(due, start);
+    // The instant of the last measurement, not that of the reading: 12 steps are 4 periods of 3.
+    sim.update(2);
+    for _ in 0..3 {
+        assert_eq!(sim.sensor(id).unwrap().0.0, due);
+    }
+    assert_eq!(cfg.0.load(Ordering::Relaxed), 1, "four measurements were due, one was made");
 }
 
 /// Speed of a body, with all that a sampler gives: rate, latency, noise.

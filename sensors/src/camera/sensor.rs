@@ -153,7 +153,7 @@ impl Sensor for Camera {
 
     /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
     /// environment that it does not look into.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let row = self.row_of_env.get(env).copied().flatten();
         let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.mounts.row(row).pixels)));
         placed.map_or_else(Vec::new, |(pose, lens)| frustum(&pose, &lens, self.image_shape()))

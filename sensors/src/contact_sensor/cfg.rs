@@ -5,6 +5,7 @@ use super::pairs::{Layout, Pairs, count};
 use super::sensor::ContactSensor;
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
 use crate::select::{matching, select};
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use serde::{Deserialize, Serialize};
@@ -21,7 +22,8 @@ pub struct ContactSensorCfg {
     pub filters: Vec<String>,
     /// Report the poses of the bodies.
     pub track_pose: bool,
-    /// Report since when bodies touch or do not. Contact is then looked at in every physics step, whatever the period.
+    /// Report since when bodies touch or do not. Contact is then looked at in every physics step, whatever the period, and
+    /// the sensor is never lazy.
     pub track_air_time: bool,
     /// Report where bodies are touched, and where by the bodies of each filter.
     pub track_contact_points: bool,
@@ -35,7 +37,7 @@ pub struct ContactSensorCfg {
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
     /// Show a red ball at every body that is touched, and an arrow of its net normal force, 1 m for 500 N
-    /// ([`Sensor::markers`](crate::Sensor::markers)). Poses are tracked for that.
+    /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
 }
 
@@ -67,11 +69,15 @@ impl SensorCfg for ContactSensorCfg {
     type Sensor = ContactSensor;
 
     fn requires(&self) -> Requires {
-        if self.track_pose || self.debug_vis { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
+        if self.track_pose { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
     }
 
     fn debug_vis(&self) -> bool {
         self.debug_vis
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt).filter(|_| !self.track_air_time)
     }
 
     /// # Errors
@@ -99,7 +105,7 @@ impl SensorCfg for ContactSensorCfg {
             groups: m,
             friction: self.track_friction_forces,
             points: self.track_contact_points,
-            poses: self.track_pose || self.debug_vis,
+            poses: self.track_pose,
             air: self.track_air_time,
         };
         let mut channels =

@@ -48,6 +48,11 @@ impl Pairs {
         Self { layout, bodies, slots, groups: (0..=axis).map(of).collect() }
     }
 
+    /// Watched bodies as indices of the body axis.
+    pub(super) fn bodies(&self) -> &[usize] {
+        &self.bodies
+    }
+
     /// The watched body and its side of every end of a contact, with the index of the body at the other end.
     fn ends<'c>(&'c self, contact: &'c Contact) -> impl Iterator<Item = (usize, f64, usize)> + 'c {
         let world = self.slots.len() - 1;

@@ -8,7 +8,7 @@ use crate::select::matching;
 use crate::sensor::Sensor;
 use crate::summary;
 use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
-use scene::{Marker, SceneState};
+use scene::{Marker, Pose, SceneState};
 use std::fmt;
 
 /// Contact forces on bodies in all environments, world axes; [`Sampled`] has their stamps and counts.
@@ -65,13 +65,14 @@ impl Sensor for ContactSensor {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
     }
 
-    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N. Only where poses are tracked.
-    fn markers(&self, env: usize) -> Vec<Marker> {
-        let (Some(places), forces) = (self.pos_w(), self.net_forces_w()) else { return Vec::new() };
+    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N.
+    fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
+        let forces = self.net_forces_w();
         let mut markers = Vec::new();
-        for body in 0..self.names.len() {
-            let [place, force] = [&places, &forces].map(|a| [0, 1, 2].map(|k| a[(env, body, k)]));
+        for (k, &body) in self.pairs.bodies().iter().enumerate() {
+            let force = [0, 1, 2].map(|axis| forces[(env, k, axis)]);
             if force.iter().map(|f| f * f).sum::<f64>().sqrt() > self.force_threshold() {
+                let place = pose(body).translation.vector.into();
                 markers.push(Marker::sphere(place, 0.05, [0.9, 0.05, 0.05, 1.0]));
                 markers.extend(Marker::arrow(place, force.map(|f| f / 500.0), [0.95, 0.6, 0.1, 1.0]));
             }

@@ -1,10 +1,11 @@
 //! From a batch of environments to the arrays that sensors read: only what somebody asked for.
 
+mod actuators;
 mod joints;
 mod motion;
 mod solved;
 
-use crate::compile::Simulation;
+use crate::compile::{JointIndexing, Simulation};
 use crate::env::EnvStatus;
 use ndarray::{Array2, Array3};
 use scene::state::Contacts;
@@ -16,20 +17,23 @@ pub(crate) const AVAILABLE: Requires = Requires::POSES
     .union(Requires::VELOCITIES)
     .union(Requires::JOINT_STATE)
     .union(Requires::JOINT_EFFORTS)
+    .union(Requires::ACTUATORS)
     .union(Requires::SENSORDATA)
     .union(Requires::VISIBLE)
     .union(Requires::INSTANCES)
     .union(Requires::SOLVED);
 
 /// A state with room for what `requires` names. The body axis has the links of all robots, then objects, then frames of
-/// parts; the joint axis the
-/// movable joints of all robots.
+/// parts; the joint axis the movable joints of all robots, then those of parts with one degree of freedom; the actuator axis
+/// the drives of all robots, then the actuators of parts.
 pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneState {
     let n = simulation.batch.num_envs();
     let bodies = simulation.plan.bodies().len();
-    let joints = simulation.robots.iter().map(|r| r.joints.len()).sum();
+    let joints = joints::all(simulation).count();
+    let actuators = actuators::count(simulation);
     let per_body = |field, width| requires.contains(field).then(|| Array3::zeros((n, bodies, width)));
     let per_joint = |field| requires.contains(field).then(|| Array2::zeros((n, joints)));
+    let per_actuator = || requires.contains(Requires::ACTUATORS).then(|| Array2::zeros((n, actuators)));
     let visible = simulation.visible.as_ref().filter(|_| requires.contains(Requires::VISIBLE));
     let exact = simulation.visible.as_ref().filter(|_| requires.contains(Requires::INSTANCES));
     SceneState {
@@ -42,6 +46,9 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
         joint_positions: per_joint(Requires::JOINT_STATE),
         joint_velocities: per_joint(Requires::JOINT_STATE),
         joint_efforts: per_joint(Requires::JOINT_EFFORTS),
+        actuator_controls: per_actuator(),
+        actuator_forces: per_actuator(),
+        actuator_activations: per_actuator(),
         sensordata: requires
             .contains(Requires::SENSORDATA)
             .then(|| Array2::zeros((n, simulation.batch.model().nsensordata()))),
@@ -81,7 +88,7 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
         return;
     }
     let wants = |field| requires.contains(field);
-    let (bodies, robots) = (simulation.plan.bodies(), &simulation.robots[..]);
+    let bodies = simulation.plan.bodies();
     if let Some(contacts) = state.contacts.as_mut().filter(|_| wants(Requires::CONTACTS)) {
         contacts.list.clear();
     }
@@ -93,12 +100,19 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
             motion::velocities(bodies, env.data(), i, &mut state.body_velocities);
         }
         if wants(Requires::JOINT_STATE) {
-            joints::fill(&mut state.joint_positions, i, robots, |joint| env.data().qpos()[joint.qpos]);
-            joints::fill(&mut state.joint_velocities, i, robots, |joint| env.data().qvel()[joint.dof]);
+            joints::fill(&mut state.joint_positions, i, simulation, |joint| env.data().qpos()[joint.qpos]);
+            joints::fill(&mut state.joint_velocities, i, simulation, |joint| env.data().qvel()[joint.dof]);
         }
         if wants(Requires::JOINT_EFFORTS) {
-            let effort = |drive| env.drives.effort[drive];
-            joints::fill(&mut state.joint_efforts, i, robots, |joint| joint.drive.map_or(0.0, effort));
+            // A joint without a drive of ours may have actuators of an MJCF file.
+            let effort = |joint: &JointIndexing| match joint.drive {
+                Some(drive) => env.drives.effort[drive],
+                None => env.data().qfrc_actuator()[joint.dof],
+            };
+            joints::fill(&mut state.joint_efforts, i, simulation, effort);
+        }
+        if wants(Requires::ACTUATORS) {
+            actuators::fill(simulation, env, i, state);
         }
         if wants(Requires::SENSORDATA)
             && let Some(mut row) = state.sensordata.as_mut().map(|values| values.row_mut(i))

@@ -93,17 +93,22 @@ impl Clone for Box<dyn SensorEntity> {
 #[derive(Debug)]
 pub struct SensorHandle {
     id: Box<dyn Any + Send + Sync>,
+    index: usize,
     type_name: &'static str,
 }
 
 impl SensorHandle {
     fn new<S: Sensor>(id: SensorId<S>) -> Self {
-        Self { id: Box::new(id), type_name: short_name::<S>() }
+        Self { id: Box::new(id), index: id.index(), type_name: short_name::<S>() }
     }
 
     /// The handle, where the sensor is of this type.
     pub fn get<S: Sensor>(&self) -> Option<SensorId<S>> {
         self.id.downcast_ref().copied()
+    }
+
+    pub(super) fn index(&self) -> usize {
+        self.index
     }
 
     /// Name of the type of the sensor, such as `Camera`.

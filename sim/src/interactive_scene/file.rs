@@ -2,6 +2,7 @@
 
 use super::entity::EntityCfg;
 use super::types::EntityTypes;
+use super::value::{Value, ValueError};
 use super::{SceneCfg, in_every_env};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
@@ -11,7 +12,7 @@ use serde::Deserialize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, ValueDeserializer};
+use toml::de::{DeTable, DeValue};
 
 /// What a file may hold at its top.
 const SECTIONS: [&str; 2] = ["simulation", "entities"];
@@ -147,7 +148,7 @@ impl<'a> Reader<'a> {
             merged.insert(key, value);
         }
         let value = Spanned::new(span.clone(), DeValue::Table(merged));
-        SimulationManagerCfg::deserialize(ValueDeserializer::from(value)).map_err(|e| self.located(&e, span))
+        SimulationManagerCfg::deserialize(Value(value)).map_err(|e| self.wrong(e, span))
     }
 
     /// One entity: its kind reads what is left of the table without `type`.
@@ -162,7 +163,7 @@ impl<'a> Reader<'a> {
         })?;
         let uid = table.get_key_value("uid").map(|(key, _)| key.span());
         let value = Spanned::new(span, DeValue::Table(table));
-        let mut entity = (found.read)(ValueDeserializer::from(value)).map_err(|e| self.located(&e, at))?;
+        let mut entity = (found.read)(Value(value)).map_err(|e| self.wrong(e, at))?;
         if let Some(uid) = uid.filter(|_| has_name(&entity, "uid")) {
             return Err(self.at(uid, format!("the uid of an entity is its name, {name:?}; leave `uid` out")));
         }
@@ -202,6 +203,11 @@ impl<'a> Reader<'a> {
             DeValue::Table(table) => Ok((table, span)),
             other => Err(self.at(span, format!("`{name}` is a {}, expected a table", other.type_str()))),
         }
+    }
+
+    /// An error of a value, at its own place or at `fallback`.
+    fn wrong(&self, error: ValueError, fallback: Range<usize>) -> Error {
+        self.at(error.span.unwrap_or(fallback), error.message)
     }
 
     /// An error of TOML, at its own place or at `fallback`.

@@ -6,6 +6,7 @@
 mod entity;
 mod file;
 mod types;
+mod value;
 
 pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use types::EntityTypes;
@@ -285,6 +286,19 @@ impl InteractiveScene {
     pub fn sensor_mut<S: Sensor>(&mut self, name: &str) -> Result<&mut S> {
         let id = self.sensor_id(name)?;
         self.sim.sensor_mut(id)
+    }
+
+    /// Shows the markers of a sensor from now on, or does not, whatever kind of sensor it is: see
+    /// [`SimulationManager::set_debug_vis`].
+    ///
+    /// # Errors
+    /// There is no such entity, or it is no sensor.
+    pub fn set_debug_vis(&mut self, name: &str, shown: bool) -> Result<()> {
+        let index = match self.find(name)? {
+            Handle::Sensor(sensor) => sensor.index(),
+            other => return Err(other.is_no(name, "sensor".into())),
+        };
+        self.sim.sensors.set_debug_vis(index, shown)
     }
 
     /// Number of environments.

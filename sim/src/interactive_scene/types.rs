@@ -1,18 +1,18 @@
 //! The kinds of entities that a scene file can name: one line each.
 
 use super::entity::{EntityCfg, SensorEntity};
+use super::value::{Value, ValueError};
 use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use sensors::{
-    CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
-    RayCasterCameraCfg, RayCasterCfg,
+    ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
+    MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
 use std::any::Any;
-use toml::de::ValueDeserializer;
 
 /// The kinds of entities that a scene file can name by `type`: the built-in ones, and those of your crates.
 ///
@@ -33,7 +33,7 @@ pub struct EntityTypes {
 #[derive(Clone, Debug)]
 pub(super) struct EntityType {
     pub(super) name: String,
-    pub(super) read: fn(ValueDeserializer<'_>) -> Result<EntityCfg, toml::de::Error>,
+    pub(super) read: fn(Value<'_>) -> Result<EntityCfg, ValueError>,
     /// `None` for entities of other kinds.
     pub(super) write: fn(&EntityCfg) -> Option<Result<toml::Table, toml::ser::Error>>,
 }
@@ -53,6 +53,7 @@ impl Default for EntityTypes {
             .with_sensor::<ImuCfg>("imu")
             .with_sensor::<FrameTransformerCfg>("frame_transformer")
             .with_sensor::<JointStateCfg>("joint_state")
+            .with_sensor::<ActuatorStateCfg>("actuator_state")
             .with_sensor::<JointWrenchCfg>("joint_wrench")
             .with_sensor::<MujocoSensorCfg>("mujoco_sensor")
     }

@@ -196,6 +196,12 @@ impl MjcfData {
         &self.sensors
     }
 
+    /// Names of the joints with one degree of freedom, in MuJoCo's order.
+    pub(crate) fn single_joints(&self) -> impl Iterator<Item = &str> {
+        let names = self.names.joints.iter().zip(self.model.jnt_type());
+        names.filter(|(_, kind)| matches!(words::joint(**kind), Some("hinge" | "slide"))).map(|(name, _)| name.as_str())
+    }
+
     /// Name in the scene of something of the file.
     pub(crate) fn full(&self, name: &str) -> String {
         format!("{}/{name}", self.cfg.uid)

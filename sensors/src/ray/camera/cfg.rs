@@ -79,6 +79,10 @@ impl SensorCfg for RayCasterCameraCfg {
         self.debug_vis
     }
 
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
+    }
+
     /// # Errors
     ///
     /// Sizes, lens, distance or placement that are no good; an unknown parent or target; a period that is no whole number

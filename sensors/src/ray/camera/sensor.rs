@@ -319,7 +319,7 @@ impl Sensor for RayCasterCamera {
     }
 
     /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let taken = self.shown.taken.get(env);
         taken.map_or_else(Vec::new, |taken| frustum(&taken.world_from_camera, &taken.lens, self.image_shape()))
     }

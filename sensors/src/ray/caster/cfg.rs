@@ -98,6 +98,10 @@ impl SensorCfg for RayCasterCfg {
         self.debug_vis
     }
 
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
+    }
+
     /// # Errors
     ///
     /// A pattern, a distance, an offset or a drift that is no good; an unknown parent or target; a period that is no whole

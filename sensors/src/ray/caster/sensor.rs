@@ -218,7 +218,7 @@ impl Sensor for RayCaster {
     }
 
     /// Red balls where rays hit, as in Isaac Lab; none where they miss.
-    fn markers(&self, env: usize) -> Vec<Marker> {
+    fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let hits = self.shown.points.index_axis(Axis(0), env);
         let places = hits.axis_iter(Axis(0)).map(|p| [p[0], p[1], p[2]]);
         let seen = places.filter(|p| p.iter().all(|x| x.is_finite()));

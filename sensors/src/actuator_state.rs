@@ -1,0 +1,133 @@
+//! What moves things: controls, forces and activations of actuators.
+
+use crate::error::SensorError;
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::schedule::Schedule;
+use crate::select::{at_least_one, select};
+use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::summary;
+use ndarray::{ArrayView2, ArrayView3};
+use scene::SceneState;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Configuration of an [`ActuatorState`] sensor.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ActuatorStateCfg {
+    /// The actuators to measure, by patterns of their names, in the order they are reported; `None` is all of them. The
+    /// drive of a robot's joint is called `uid/joint`, an actuator of an MJCF file `uid/actuator`; the part behind the slash
+    /// does alone.
+    pub actuators: Option<Vec<String>>,
+    /// Rate, history, latency and noise; the channels are `controls`, `forces` and `activations`.
+    pub sampling: SamplingCfg,
+}
+
+/// Controls, forces and activations of actuators in all environments; [`Sampled`] has their stamps and counts.
+#[derive(Clone, Debug)]
+pub struct ActuatorState {
+    actuators: Vec<usize>,
+    names: Vec<String>,
+    sampler: Sampler,
+}
+
+impl SensorCfg for ActuatorStateCfg {
+    type Sensor = ActuatorState;
+
+    fn requires(&self) -> Requires {
+        Requires::ACTUATORS
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.sampling.lazy_schedule(dt)
+    }
+
+    /// # Errors
+    ///
+    /// A pattern that matches nothing or an actuator that two match, no actuator at all, and what is wrong with the sampling.
+    fn build(&self, context: &SensorContext) -> Result<ActuatorState, SensorError> {
+        let all = &context.actuators;
+        let actuators = match &self.actuators {
+            Some(patterns) => select(patterns, all, "actuator")?,
+            None => (0..all.len()).collect(),
+        };
+        at_least_one(actuators.len(), ("actuator state", "actuators", "actuator"), all)?;
+        let channels = ["controls", "forces", "activations"].map(|name| Channel::new(name, actuators.len()));
+        Ok(ActuatorState {
+            names: actuators.iter().map(|&actuator| all[actuator].clone()).collect(),
+            actuators,
+            sampler: Sampler::new("actuator state", self.requires(), context, &self.sampling, &channels)?,
+        })
+    }
+}
+
+/// Writes what the sensor measures in environment `env` to `row`.
+fn read(actuators: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
+    let fields = [&state.actuator_controls, &state.actuator_forces, &state.actuator_activations];
+    let numbers = fields.into_iter().flatten().flat_map(|field| actuators.iter().map(move |&k| field[(env, k)]));
+    row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
+}
+
+impl Sensor for ActuatorState {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.update(state, |env, row| read(&self.actuators, state, env, row))
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |env, row| read(&self.actuators, state, env, row))
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |env, row| read(&self.actuators, state, env, row))
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sampler.due_in(step)
+    }
+}
+
+/// A summary of several lines.
+impl fmt::Display for ActuatorState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        summary::write(f, "Actuator state", &self.sampler, &[("actuators", &summary::list(&self.names))])
+    }
+}
+
+impl Sampled for ActuatorState {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+impl ActuatorState {
+    /// Names of the actuators, in the order of the sensor's columns.
+    pub fn actuator_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// What the actuators are told, shape \[num_envs, actuators\]: see [`SceneState::actuator_controls`].
+    pub fn controls(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("controls")
+    }
+
+    /// What the actuators exert, shape \[num_envs, actuators\]: see [`SceneState::actuator_forces`]. Captured at
+    /// [`Sampled::force_stamps`].
+    pub fn forces(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("forces")
+    }
+
+    /// Activations, shape \[num_envs, actuators\]; 0 for actuators that have none.
+    pub fn activations(&self) -> ArrayView2<'_, f64> {
+        self.sampler.values("activations")
+    }
+
+    /// Past controls, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
+    pub fn control_history(&self) -> ArrayView3<'_, f64> {
+        self.sampler.history("controls")
+    }
+
+    /// Past forces, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
+    pub fn force_history(&self) -> ArrayView3<'_, f64> {
+        self.sampler.history("forces")
+    }
+}

@@ -1,0 +1,35 @@
+//! Controls, forces and activations of drives and of the actuators of MJCF files.
+
+use crate::compile::Simulation;
+use crate::env::Env;
+use scene::SceneState;
+
+/// The drives of all robots.
+fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {
+    simulation.robots.iter().flat_map(|robot| &robot.joints).filter_map(|joint| joint.drive)
+}
+
+/// How many actuators there are.
+pub(super) fn count(simulation: &Simulation) -> usize {
+    drives(simulation).count() + simulation.parts.iter().map(|part| part.actuators.len()).sum::<usize>()
+}
+
+/// Fills the rows of environment number `i`.
+pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+    let (model, data) = (simulation.batch.model(), env.data());
+    let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);
+    let of_parts = simulation.parts.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
+    let of_parts = of_parts.map(|(&actuator, &control)| {
+        let activation = model.actuator_activation(actuator).next().map_or(0.0, |place| data.act()[place]);
+        [data.ctrl()[control], data.actuator_force()[actuator], activation]
+    });
+    let SceneState { actuator_controls, actuator_forces, actuator_activations, .. } = state;
+    for (k, numbers) in of_drives.chain(of_parts).enumerate() {
+        for (array, number) in [&mut *actuator_controls, actuator_forces, actuator_activations].into_iter().zip(numbers)
+        {
+            if let Some(array) = array {
+                array[(i, k)] = number;
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Values of a scene file as configurations read them: what is wrong is said in words of the file, with its place.
+//!
+//! TOML's own reader does not know, where one of several kinds is to be named, which there are; this one says them.
+
+use serde::de::value::StrDeserializer;
+use serde::de::{
+    self, DeserializeSeed, Deserializer, EnumAccess, IntoDeserializer, MapAccess, SeqAccess, VariantAccess, Visitor,
+};
+use std::fmt::{self, Display};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
+
+/// A value of a file, to be read.
+pub(super) struct Value<'a>(pub Spanned<DeValue<'a>>);
+
+impl<'a> Value<'a> {
+    /// Reads the value; what is found wrong with it only after it was read is wrong at its place, too.
+    fn read<T: DeserializeSeed<'a>>(self, seed: T) -> Result<T::Value, ValueError> {
+        let span = self.0.span();
+        seed.deserialize(self).map_err(|error| error.at(&span))
+    }
+}
+
+/// What is wrong with a value, and where it is.
+#[derive(Clone, Debug)]
+pub(super) struct ValueError {
+    pub message: String,
+    /// `None` where the value has no place in the file.
+    pub span: Option<Range<usize>>,
+}
+
+impl ValueError {
+    /// The error, at `span` where it has no better place.
+    fn at(mut self, span: &Range<usize>) -> Self {
+        self.span = self.span.or_else(|| Some(span.clone()).filter(|span| !span.is_empty()));
+        self
+    }
+}
+
+impl Display for ValueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for ValueError {}
+
+impl de::Error for ValueError {
+    fn custom<T: Display>(message: T) -> Self {
+        Self { message: message.to_string(), span: None }
+    }
+}
+
+/// `` `a`, `b` ``; nothing where there is nothing.
+fn quoted(names: &[&str]) -> String {
+    if names.is_empty() { String::new() } else { format!("`{}`", names.join("`, `")) }
+}
+
+/// What a value is, in the words of TOML.
+fn said(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => format!("string {text:?}"),
+        DeValue::Integer(number) => format!("integer `{number}`"),
+        DeValue::Float(number) => format!("float `{number}`"),
+        DeValue::Boolean(yes) => format!("boolean `{yes}`"),
+        DeValue::Datetime(when) => format!("date `{when}`"),
+        DeValue::Array(_) | DeValue::Table(_) => value.type_str().to_string(),
+    }
+}
+
+impl<'de> Deserializer<'de> for Value<'de> {
+    type Error = ValueError;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueError> {
+        let span = self.0.span();
+        let out_of_range = |number: &str| de::Error::custom(format!("the number {number} is beyond all that fit"));
+        let read = match self.0.into_inner() {
+            DeValue::String(text) => visitor.visit_string(text.into_owned()),
+            DeValue::Integer(number) => {
+                let (digits, radix) = (number.as_str(), number.radix());
+                match (i64::from_str_radix(digits, radix), u64::from_str_radix(digits, radix)) {
+                    (Ok(number), _) => visitor.visit_i64(number),
+                    (Err(_), Ok(number)) => visitor.visit_u64(number),
+                    (Err(_), Err(_)) => Err(out_of_range(digits)),
+                }
+            }
+            DeValue::Float(number) => match number.as_str().parse::<f64>() {
+                Ok(x) if x.is_finite() || number.as_str().contains("inf") || x.is_nan() => visitor.visit_f64(x),
+                _ => Err(out_of_range(number.as_str())),
+            },
+            DeValue::Boolean(yes) => visitor.visit_bool(yes),
+            DeValue::Datetime(when) => Err(de::Error::custom(format!("the date `{when}` is expected nowhere"))),
+            DeValue::Array(array) => visitor.visit_seq(Items(array.into_iter())),
+            DeValue::Table(table) => visitor.visit_map(Fields::new(table)),
+        };
+        read.map_err(|error| error.at(&span))
+    }
+
+    /// A value that stands there is there: TOML has no nothing.
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueError> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, ValueError> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, ValueError> {
+        if matches!(self.0.get_ref(), DeValue::Table(_)) {
+            return self.deserialize_any(visitor);
+        }
+        let message = format!("invalid type: {}, expected a table of {}", said(self.0.get_ref()), quoted(fields));
+        Err(ValueError { message, span: Some(self.0.span()) })
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, ValueError> {
+        let span = self.0.span();
+        let wrong = |found: String| Err(de::Error::custom(format!("{found}, expected one of {}", quoted(variants))));
+        let read = match self.0.into_inner() {
+            DeValue::String(name) => visitor.visit_enum(Variant { name: &name, content: None }),
+            DeValue::Table(table) => {
+                let names: Vec<String> = table.keys().map(|key| key.get_ref().to_string()).collect();
+                let mut content = table.into_iter();
+                match (content.next(), content.next()) {
+                    (Some((name, content)), None) => {
+                        let at = name.span();
+                        let chosen = Variant { name: name.get_ref(), content: Some(Value(content)) };
+                        visitor.visit_enum(chosen).map_err(|error| error.at(&at))
+                    }
+                    (None, _) => wrong("nothing is named here".into()),
+                    _ => wrong(format!("`{}` are {}", names.join("`, `"), names.len())),
+                }
+            }
+            other => wrong(format!("invalid type: {}", said(&other))),
+        };
+        read.map_err(|error| error.at(&span))
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        tuple_struct map identifier ignored_any
+    }
+}
+
+impl<'de> IntoDeserializer<'de, ValueError> for Value<'de> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+/// The items of an array.
+struct Items<'a>(<DeArray<'a> as IntoIterator>::IntoIter);
+
+impl<'de> SeqAccess<'de> for Items<'de> {
+    type Error = ValueError;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, ValueError> {
+        self.0.next().map(|item| Value(item).read(seed)).transpose()
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.0.len())
+    }
+}
+
+/// The fields of a table.
+struct Fields<'a> {
+    rest: <DeTable<'a> as IntoIterator>::IntoIter,
+    value: Option<Value<'a>>,
+}
+
+impl<'a> Fields<'a> {
+    fn new(table: DeTable<'a>) -> Self {
+        Self { rest: table.into_iter(), value: None }
+    }
+}
+
+impl<'de> MapAccess<'de> for Fields<'de> {
+    type Error = ValueError;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, ValueError> {
+        let Some((key, value)) = self.rest.next() else { return Ok(None) };
+        self.value = Some(Value(value));
+        let name: StrDeserializer<'_, ValueError> = key.get_ref().as_ref().into_deserializer();
+        seed.deserialize(name).map(Some).map_err(|error| error.at(&key.span()))
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, ValueError> {
+        // Asked for after its key.
+        let value = self.value.take().ok_or_else(|| de::Error::custom("a value without a key"))?;
+        value.read(seed)
+    }
+}
+
+/// One of several kinds, by its name, with what is said of it.
+struct Variant<'n, 'a> {
+    name: &'n str,
+    content: Option<Value<'a>>,
+}
+
+impl<'de> EnumAccess<'de> for Variant<'_, 'de> {
+    type Error = ValueError;
+    type Variant = Content<'de>;
+
+    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, Content<'de>), ValueError> {
+        let name: StrDeserializer<'_, ValueError> = self.name.into_deserializer();
+        let content = Content { name: self.name.into(), value: self.content };
+        seed.deserialize(name).map(|variant| (variant, content))
+    }
+}
+
+/// What is said of one of several kinds.
+struct Content<'a> {
+    name: String,
+    value: Option<Value<'a>>,
+}
+
+impl<'a> Content<'a> {
+    /// What is said, where something is to be said.
+    fn value(self) -> Result<Value<'a>, ValueError> {
+        let name = self.name;
+        self.value.ok_or_else(|| {
+            de::Error::custom(format!("`{name}` alone says too little, expected a table: {{ {name} = ... }}"))
+        })
+    }
+}
+
+impl<'de> VariantAccess<'de> for Content<'de> {
+    type Error = ValueError;
+
+    fn unit_variant(self) -> Result<(), ValueError> {
+        let Some(Value(value)) = self.value else { return Ok(()) };
+        if matches!(value.get_ref(), DeValue::Table(table) if table.is_empty()) {
+            return Ok(());
+        }
+        let message = format!("`{}` has nothing to set, expected its name alone", self.name);
+        Err(ValueError { message, span: Some(value.span()) })
+    }
+
+    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, ValueError> {
+        self.value()?.read(seed)
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _len: usize, visitor: V) -> Result<V::Value, ValueError> {
+        self.value()?.deserialize_any(visitor)
+    }
+
+    fn struct_variant<V: Visitor<'de>>(
+        self,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, ValueError> {
+        self.value()?.deserialize_struct("", fields, visitor)
+    }
+}
