@@ -80,6 +80,8 @@ pub(crate) struct FreeIndex {
     pub body: usize,
     /// First of its seven positions and first of its six velocities; `None` where it is fixed.
     pub joint: Option<(usize, usize)>,
+    /// Its number among the bodies that are moved by hand.
+    pub mocap: Option<usize>,
 }
 
 /// Where one joint's numbers are.
@@ -177,7 +179,7 @@ pub(crate) fn document(
         layouts.push(layout);
     }
     for object in &contents.objects {
-        scene::add_object(&mut mjcf, object);
+        scene::add_object(&mut mjcf, object, purpose);
     }
     for (index, terrain) in contents.terrains.iter().enumerate() {
         scene::add_terrain(&mut mjcf, index, terrain);
@@ -216,12 +218,14 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
         .map(|(index, terrain)| mj::Asset { name: scene::terrain_file(index), bytes: terrain.file() })
         .chain(contents.parts.iter().flat_map(|part| part.files().iter().cloned()))
         .collect();
-    let compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
+    let mut compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
         other => other.into(),
     })?;
-    let objects = find_objects(&compiled, contents)?;
+    let mut objects = find_objects(&compiled, contents)?;
+    damp_objects(&mut compiled, contents, &objects);
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
+    objects.iter_mut().for_each(|o| o.mocap = usize::try_from(model.body_mocapid()[o.body]).ok());
     let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
     let identities = identify(&model, contents, &robots, &objects, &parts);
     let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
@@ -242,9 +246,21 @@ fn missing(what: &'static str, name: &str) -> Error {
 fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<FreeIndex>> {
     let find = |object: &RigidObjectData| {
         let body = compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing("body", object.uid()))?;
-        Ok(FreeIndex { body, joint: compiled.joint_address(&format!("{}/free", object.uid())) })
+        let joint = compiled.joint_address(&format!("{}/free", object.uid()));
+        Ok(FreeIndex { body, joint, mocap: None })
     };
     contents.objects.iter().map(|object| find(object)).collect()
+}
+
+/// Damps moving and turning of objects each by its own number, which a free joint of a document cannot say.
+fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[FreeIndex]) {
+    for (object, index) in contents.objects.iter().zip(objects) {
+        if let Some((_, dof)) = index.joint {
+            let damping = compiled.dof_damping_mut();
+            damping[dof..dof + 3].fill(object.cfg().linear_damping);
+            damping[dof + 3..dof + 6].fill(object.cfg().angular_damping);
+        }
+    }
 }
 
 /// Finds everything of a part in the compiled model, by its names.
@@ -407,6 +423,7 @@ fn set_up_drives(
         let root = FreeIndex {
             body: links[data.description().root.0].0,
             joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
+            mocap: None,
         };
         indices.push(RobotIndex { joints, links, root, geoms });
     }
@@ -487,6 +504,12 @@ impl Simulation {
                 if let Some(visual) = geom.visual.and_then(|v| link.visuals.get(v)) {
                     replacements.insert(geom.geom, cache.parts(&link.name, visual));
                 }
+            }
+        }
+        for object in &contents.objects {
+            let geom = self.batch.model().id(ObjectKind::Geom, &format!("{}/visual", object.uid()));
+            if let Some(geom) = geom {
+                replacements.insert(geom, cache.object_parts(object));
             }
         }
         let visible =
@@ -579,7 +602,7 @@ impl Simulation {
     }
 }
 
-/// What parts that were MJCF files have beside joints, from an old simulation to a new one: pairs of places.
+/// What parts that were MJCF files, and objects that are moved by hand, have beside joints, from an old simulation to a new one: pairs of places.
 struct PartTransfer {
     controls: Vec<(usize, usize)>,
     activations: Vec<(usize, usize)>,
@@ -600,11 +623,15 @@ impl PartTransfer {
             parts.flat_map(|(old, new)| of(old).iter().copied().zip(of(new).iter().copied())).collect::<Vec<_>>()
         };
         let number = |model: &mj::Model, body: usize| usize::try_from(model.body_mocapid()[body]).unwrap_or(0);
+        let objects = old.objects.iter().zip(&new.objects).filter_map(|(old, new)| old.mocap.zip(new.mocap));
         let mocaps = pairs(|part| &part.mocaps).into_iter();
         Self {
             controls: pairs(|part| &part.controls),
             activations: pairs(|part| &part.activations),
-            mocaps: mocaps.map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to))).collect(),
+            mocaps: mocaps
+                .map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to)))
+                .chain(objects)
+                .collect(),
         }
     }
 

@@ -357,13 +357,14 @@ impl SimulationManager {
     /// Adds a rigid object to every environment, compiled as [`add_robot`](Self::add_robot) does.
     ///
     /// # Errors
-    /// The name is taken or a number is out of range.
+    /// The name is taken, a number is out of range, or a mesh file cannot be used.
     pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
         self.check_world_uid(&cfg.uid)?;
-        let object = RigidObjectData::new(cfg, self.contents.next_mask_id())?;
+        let mut diagnostics = Vec::new();
+        let object = RigidObjectData::new(cfg, self.contents.next_mask_id(), &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.objects.push(Arc::new(object));
-        self.replace_contents(contents, Vec::new())?;
+        self.replace_contents(contents, diagnostics)?;
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
     }
 

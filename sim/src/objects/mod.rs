@@ -2,8 +2,12 @@
 
 pub(crate) mod free_body;
 pub mod kinematics;
+pub(crate) mod mass_properties;
 pub mod mjcf_part;
+mod object_mesh;
+pub(crate) mod restitution;
 pub mod rigid_object;
+mod rigid_object_properties;
 pub mod robot;
 mod robot_drives;
 mod robot_limits;
