@@ -28,6 +28,7 @@ pub mod prelude {
         Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg,
         ObjectId, ObjectShape, PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result,
         RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError, SimulationManager,
-        SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WrenchFrame,
+        SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId,
+        WrenchFrame,
     };
 }

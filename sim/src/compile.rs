@@ -10,11 +10,12 @@ use crate::env::{Env, with_small_buffers};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
 use crate::mj::{self, ObjectKind};
-use crate::mjcf::document::Mjcf;
+use crate::mjcf::document::{Mjcf, WeldEquality};
 use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
+use crate::objects::weld::{WeldCfg, WeldIndex};
 use crate::randomization::{Maker, OwnValues, Tables};
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
@@ -30,6 +31,7 @@ pub(crate) struct Simulation {
     pub(crate) robots: Vec<RobotIndex>,
     pub(crate) objects: Vec<FreeIndex>,
     pub(crate) parts: Vec<PartIndex>,
+    pub(crate) welds: Vec<WeldIndex>,
     pub(crate) identities: Identities,
     /// Where sensors find bodies and contacts.
     pub(crate) plan: Arc<Plan>,
@@ -190,6 +192,28 @@ pub(crate) fn document(
             mjcf.excludes.push(pair.clone());
         }
     }
+    let bodies = contents.mujoco_bodies(&layouts);
+    let called = |name: &str| -> Result<Vec<String>> {
+        let places = contents.bodies_called(name)?;
+        Ok(places.map_or_else(|| vec!["world".into()], |all| all.iter().map(|&k| bodies[k].clone()).collect()))
+    };
+    for [one, other] in &contents.apart {
+        for (a, b) in called(one)?
+            .iter()
+            .flat_map(|a| called(other).map(|all| (a.clone(), all)))
+            .flat_map(|(a, all)| all.into_iter().map(move |b| (a.clone(), b)))
+        {
+            let known = |pair: &(String, String)| *pair == (a.clone(), b.clone()) || *pair == (b.clone(), a.clone());
+            if a != b && !mjcf.excludes.iter().any(known) {
+                mjcf.excludes.push((a, b));
+            }
+        }
+    }
+    for weld in &contents.welds {
+        let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
+        let (first, second) = (body(&weld.first)?, body(&weld.second)?);
+        mjcf.welds.push(WeldEquality { name: weld.uid.clone(), first, second });
+    }
     Ok((mjcf, layouts, diagnostics))
 }
 
@@ -199,6 +223,7 @@ struct Built {
     robots: Vec<RobotIndex>,
     objects: Vec<FreeIndex>,
     parts: Vec<PartIndex>,
+    welds: Vec<WeldIndex>,
     identities: Identities,
     plan: Arc<Plan>,
     start: Arc<Start>,
@@ -227,10 +252,11 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
     objects.iter_mut().for_each(|o| o.mocap = usize::try_from(model.body_mocapid()[o.body]).ok());
     let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
+    let welds = contents.welds.iter().map(|weld| find_weld(&model, weld)).collect::<Result<Vec<_>>>()?;
     let identities = identify(&model, contents, &robots, &objects, &parts);
     let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    Ok(Built { model, table, robots, objects, parts, identities, plan, start, xml: text.xml, diagnostics })
+    Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml: text.xml, diagnostics })
 }
 
 /// Threads for those who do not say how many.
@@ -261,6 +287,12 @@ fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[Fre
             damping[dof + 3..dof + 6].fill(object.cfg().angular_damping);
         }
     }
+}
+
+fn find_weld(model: &mj::Model, weld: &WeldCfg) -> Result<WeldIndex> {
+    let equality = model.id(ObjectKind::Equality, &weld.uid).ok_or_else(|| missing("weld", &weld.uid))?;
+    let bodies = [model.eq_obj1id()[equality], model.eq_obj2id()[equality]].map(|body| body.max(0) as usize);
+    Ok(WeldIndex { equality, bodies })
 }
 
 /// Finds everything of a part in the compiled model, by its names.
@@ -460,6 +492,7 @@ impl Built {
             robots: self.robots,
             objects: self.objects,
             parts: self.parts,
+            welds: self.welds,
             identities: self.identities,
             plan: self.plan,
             visible: None,
@@ -570,11 +603,18 @@ impl Simulation {
             .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
             .collect();
         let parts = PartTransfer::new(old, self);
+        // In the order in which they were added.
+        let equality = |old_weld: usize| {
+            let at = old.welds.iter().position(|weld| weld.equality == old_weld)?;
+            self.welds.get(at).map(|weld| weld.equality)
+        };
+        let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
                 old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
             let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
+            let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -593,6 +633,7 @@ impl Simulation {
                     parts.write(&part_state, data);
                     data.set_time(time);
                 });
+                env.set_welds(held);
                 if wrenches != Wrenches::default() {
                     env.set_wrenches(|mine| *mine = wrenches);
                 }

@@ -46,7 +46,7 @@ pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{
-    EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
+    EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId, WeldId,
 };
 pub use mjcf::document::{Cone, Integrator};
 pub use objects::kinematics::IkResult;
@@ -55,6 +55,7 @@ pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObje
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
+pub use objects::weld::{Weld, WeldCfg, WeldMut};
 pub use randomization::{Draw, Properties, Property, Randomization, RandomizationError};
 pub use rollout::Rollout;
 pub use sensor_list::SensorId;

@@ -13,6 +13,7 @@ use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
+use crate::objects::weld::{Weld, WeldCfg, WeldMut};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::shard::Shard;
 use crate::visible::{MaskId, Visible, VisualCache};
@@ -261,6 +262,13 @@ pub struct MjcfId {
     index: usize,
 }
 
+/// Handle of a weld; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct WeldId {
+    manager: u64,
+    index: usize,
+}
+
 /// Handle of a terrain; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TerrainId {
@@ -380,6 +388,57 @@ impl SimulationManager {
         contents.terrains.push(Arc::new(terrain));
         self.replace_contents(contents, Vec::new())?;
         Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
+    }
+
+    /// Adds a weld between two bodies that are there, compiled as [`add_robot`](Self::add_robot) does. It holds nothing until
+    /// it is [attached](WeldMut::attach).
+    ///
+    /// # Errors
+    /// The name is taken, a body is not there, it is a whole robot, both are the same or part of one, or none of them can
+    /// move.
+    pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
+        self.check_world_uid(&cfg.uid)?;
+        let model = self.simulation.batch.model();
+        let body = |name: &str| match self.contents.bodies_called(name)?.as_deref() {
+            None => Ok(0),
+            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].0),
+            Some(_) => Err(Error::Config {
+                field: "weld",
+                value: format!("{name:?}"),
+                expected: "a whole robot cannot be welded; name one of its links, such as \"arm/hand\"",
+            }),
+        };
+        let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
+        let fixed = |body: usize| model.body_weldid()[body] == 0;
+        let fail = |expected| {
+            Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
+        };
+        if first == second {
+            return fail("the two must be different bodies; what a fixed joint holds is one body");
+        }
+        if fixed(first) && fixed(second) {
+            return fail("one of the two must move by itself: both are fixed or moved by hand");
+        }
+        let mut contents = self.contents.clone();
+        contents.welds.push(Arc::new(cfg));
+        self.replace_contents(contents, Vec::new())?;
+        Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
+    }
+
+    /// Lets two things pass through each other from now on, in all environments: objects by their uid, links as `uid/link`,
+    /// all links of a robot by its uid, bodies of MJCF parts as `uid/body`, and `world`, which is the ground and all terrains.
+    /// Between links of one robot it takes pairs out of its self-collision. A link that a fixed joint holds is one body with
+    /// the link that carries it.
+    ///
+    /// # Errors
+    /// Nothing is called so; the error lists the nearest names.
+    pub fn exclude_collision(&mut self, one: &str, other: &str) -> Result<()> {
+        for name in [one, other] {
+            self.contents.bodies_called(name)?;
+        }
+        let mut contents = self.contents.clone();
+        contents.apart.push([one.into(), other.into()]);
+        self.replace_contents(contents, Vec::new())
     }
 
     /// Adds an MJCF file to every environment, compiled as [`add_robot`](Self::add_robot) does: its bodies, joints, contacts,
@@ -548,6 +607,26 @@ impl SimulationManager {
     pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
+    }
+
+    /// A weld, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn weld(&self, id: WeldId) -> Weld<'_> {
+        let index = self.index_of(id.manager, id.index);
+        Weld::new(&self.contents.welds[index], &self.simulation, index)
+    }
+
+    /// A weld, to make and to release.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        WeldMut::new(&self.contents.welds[index], &mut self.simulation, &mut self.sensors, index)
     }
 
     /// An MJCF file that is a part of the scene, to read.

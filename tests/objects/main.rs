@@ -1,12 +1,14 @@
 //! Rigid objects: their shapes, what they weigh, how they move and rub, what holds them together.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod apart;
 mod kinematic;
 mod masses;
 mod meshes;
 mod properties;
 mod refused;
 mod restitution;
+mod welds;
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};

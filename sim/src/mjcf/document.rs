@@ -34,6 +34,8 @@ pub struct Mjcf {
     pub excludes: Vec<(String, String)>,
     /// Couplings of joints.
     pub equalities: Vec<JointEquality>,
+    /// Welds that hold when they are told to.
+    pub welds: Vec<WeldEquality>,
     /// Dry friction of driven joints, as tendons of one joint each.
     pub friction_tendons: Vec<FrictionTendon>,
     /// Actuators.
@@ -365,6 +367,17 @@ pub struct JointEquality {
     pub source: Option<Source>,
 }
 
+/// `<equality><weld>` that does not hold at first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WeldEquality {
+    /// Unique name.
+    pub name: String,
+    /// The one body.
+    pub first: String,
+    /// The other one.
+    pub second: String,
+}
+
 /// `<tendon><fixed>` of one joint, with dry friction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionTendon {
@@ -434,6 +447,7 @@ impl Mjcf {
             lights: Vec::new(),
             excludes: Vec::new(),
             equalities: Vec::new(),
+            welds: Vec::new(),
             friction_tendons: Vec::new(),
             actuators: Vec::new(),
             keyframes: Vec::new(),

@@ -460,7 +460,7 @@ impl Writer {
             }
             self.close("contact");
         }
-        if !mjcf.equalities.is_empty() {
+        if !mjcf.equalities.is_empty() || !mjcf.welds.is_empty() {
             self.open(Element::new("equality"), None);
             for e in &mjcf.equalities {
                 let element = Element::new("joint")
@@ -471,6 +471,16 @@ impl Writer {
                     .numbers("solref", &[2.0 * mjcf.option.timestep, 1.0])
                     .attr("solimp", COUPLING_IMPEDANCE);
                 self.leaf(element, e.source.as_ref());
+            }
+            for weld in &mjcf.welds {
+                let element = Element::new("weld")
+                    .attr("name", &weld.name)
+                    .attr("body1", &weld.first)
+                    .attr("body2", &weld.second)
+                    .attr("active", "false")
+                    .numbers("solref", &[2.0 * mjcf.option.timestep, 1.0])
+                    .attr("solimp", COUPLING_IMPEDANCE);
+                self.leaf(element, None);
             }
             self.close("equality");
         }

@@ -17,3 +17,4 @@ mod rows;
 pub mod shape;
 pub mod terrain;
 mod terrain_file;
+pub mod weld;
