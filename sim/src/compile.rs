@@ -212,6 +212,8 @@ pub(crate) fn document(
     for weld in &contents.welds {
         let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
         let (first, second) = (body(&weld.first)?, body(&weld.second)?);
+        // MuJoCo holds them in the origin of the second: not in that of the world, which may be far away.
+        let (first, second) = if second == "world" { (second, first) } else { (first, second) };
         mjcf.welds.push(WeldEquality { name: weld.uid.clone(), first, second });
     }
     Ok((mjcf, layouts, diagnostics))

@@ -4,6 +4,7 @@ use crate::description::JointKind;
 use crate::error::{Error, Result};
 use crate::mjcf::robot::RobotLayout;
 use crate::objects::mjcf_part::MjcfData;
+use crate::objects::object_group::GroupData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
 use crate::objects::terrain::Terrain;
@@ -19,6 +20,7 @@ pub(crate) struct Contents {
     pub(crate) objects: Vec<Arc<RigidObjectData>>,
     pub(crate) terrains: Vec<Arc<Terrain>>,
     pub(crate) parts: Vec<Arc<MjcfData>>,
+    pub(crate) groups: Vec<GroupData>,
     pub(crate) welds: Vec<Arc<WeldCfg>>,
     /// Pairs of names of what never collides.
     pub(crate) apart: Vec<[String; 2]>,
@@ -33,6 +35,7 @@ impl Contents {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.parts.iter().map(|p| p.uid()));
         let objects = objects.chain(self.welds.iter().map(|w| w.uid.as_str()));
+        let objects = objects.chain(self.groups.iter().map(|g| g.uid.as_str()));
         let mut taken = self.robots.iter().map(|r| r.uid()).chain(objects);
         if taken.any(|other| other == uid) {
             return Err(Error::DuplicateUid(uid.into()));

@@ -10,6 +10,7 @@ use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
+use crate::objects::object_group::{GroupData, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
@@ -262,6 +263,13 @@ pub struct MjcfId {
     index: usize,
 }
 
+/// Handle of a group of rigid objects; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct GroupId {
+    manager: u64,
+    index: usize,
+}
+
 /// Handle of a weld; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct WeldId {
@@ -374,6 +382,30 @@ impl SimulationManager {
         contents.objects.push(Arc::new(object));
         self.replace_contents(contents, diagnostics)?;
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
+    }
+
+    /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
+    /// [`rigid_object_id`](Self::rigid_object_id) each of them is an object as any other, called `group.object`.
+    ///
+    /// # Errors
+    /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.
+    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
+        self.check_world_uid(&cfg.uid)?;
+        if cfg.objects.is_empty() {
+            let expected = "a group needs at least 1 object";
+            return Err(Error::Config { field: "objects", value: "[]".into(), expected });
+        }
+        let (mut contents, mut diagnostics) = (self.contents.clone(), Vec::new());
+        let first = contents.objects.len();
+        for mut object in cfg.objects {
+            object.uid = format!("{}.{}", cfg.uid, object.uid);
+            contents.check_uid(&object.uid)?;
+            let object = RigidObjectData::new(object, contents.next_mask_id(), &mut diagnostics)?;
+            contents.objects.push(Arc::new(object));
+        }
+        contents.groups.push(GroupData { uid: cfg.uid, objects: first..contents.objects.len() });
+        self.replace_contents(contents, diagnostics)?;
+        Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
     }
 
     /// Adds a terrain to every environment, compiled as [`add_robot`](Self::add_robot) does. It stands fixed, collides with
@@ -607,6 +639,27 @@ impl SimulationManager {
     pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
+    }
+
+    /// A group of rigid objects, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
+        let index = self.index_of(id.manager, id.index);
+        RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
+    }
+
+    /// A group of rigid objects, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        let group = &self.contents.groups[index];
+        RigidObjectGroupMut::new(group, &self.contents, &mut self.simulation, &mut self.sensors)
     }
 
     /// A weld, to read.

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod apart;
+mod groups;
 mod kinematic;
 mod masses;
 mod meshes;

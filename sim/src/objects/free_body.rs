@@ -61,6 +61,12 @@ enum Place {
     Mocap(usize),
 }
 
+/// Poses that were checked, with unit quaternions.
+pub(super) struct Poses {
+    place: Place,
+    rows: Vec<(usize, [f64; 7])>,
+}
+
 /// One body in all environments, to write.
 pub(super) struct FreeBodyMut<'a> {
     pub(super) simulation: &'a mut Simulation,
@@ -78,6 +84,20 @@ impl FreeBodyMut<'_> {
         poses: ArrayView2<'_, f64>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
+        let poses = self.check_poses(argument, poses, env_ids)?;
+        self.put_poses(&poses);
+        let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
+        self.sensors.refresh(&envs, self.simulation);
+        Ok(())
+    }
+
+    /// Poses that can be written: everything is checked.
+    pub(super) fn check_poses(
+        &self,
+        argument: &'static str,
+        poses: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Poses> {
         let place = self.place()?;
         let rows = self.check(argument, 7, "environments, x y z qw qx qy qz", poses, env_ids)?;
         for (row, (_, pose)) in rows.arrays::<7>().enumerate() {
@@ -91,9 +111,13 @@ impl FreeBodyMut<'_> {
                 });
             }
         }
-        for (env, pose) in rows.arrays::<7>() {
-            let row = to_row(&from_row(&pose));
-            let body = self.index.body;
+        Ok(Poses { place, rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect() })
+    }
+
+    /// Writes poses that were checked; sensors are to be told.
+    pub(super) fn put_poses(&mut self, poses: &Poses) {
+        let (place, body) = (poses.place, self.index.body);
+        for &(env, row) in &poses.rows {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| match place {
                     Place::Joint(qpos, dof) => {
@@ -114,8 +138,6 @@ impl FreeBodyMut<'_> {
                 });
             });
         }
-        self.sensors.refresh(rows.envs(), self.simulation);
-        Ok(())
     }
 
     /// Writes velocities of the frame, then angular velocities, in world axes.

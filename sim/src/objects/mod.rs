@@ -4,6 +4,7 @@ pub(crate) mod free_body;
 pub mod kinematics;
 pub(crate) mod mass_properties;
 pub mod mjcf_part;
+pub mod object_group;
 mod object_mesh;
 pub(crate) mod restitution;
 pub mod rigid_object;
