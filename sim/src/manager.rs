@@ -10,11 +10,9 @@ use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
-use crate::objects::object_group::{GroupData, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
 use crate::objects::terrain::{Terrain, TerrainCfg};
-use crate::objects::weld::{Weld, WeldCfg, WeldMut};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::shard::Shard;
 use crate::visible::{MaskId, Visible, VisualCache};
@@ -263,20 +261,6 @@ pub struct MjcfId {
     index: usize,
 }
 
-/// Handle of a group of rigid objects; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct GroupId {
-    manager: u64,
-    index: usize,
-}
-
-/// Handle of a weld; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct WeldId {
-    manager: u64,
-    index: usize,
-}
-
 /// Handle of a terrain; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TerrainId {
@@ -290,7 +274,7 @@ static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 /// Robots and objects in N environments. Environments never touch each other; dropping the manager frees everything.
 #[derive(Debug)]
 pub struct SimulationManager {
-    serial: u64,
+    pub(crate) serial: u64,
     pub(crate) cfg: SimulationManagerCfg,
     pub(crate) contents: Contents,
     visuals: VisualCache,
@@ -384,30 +368,6 @@ impl SimulationManager {
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
     }
 
-    /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
-    /// [`rigid_object_id`](Self::rigid_object_id) each of them is an object as any other, called `group.object`.
-    ///
-    /// # Errors
-    /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.
-    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
-        self.check_world_uid(&cfg.uid)?;
-        if cfg.objects.is_empty() {
-            let expected = "a group needs at least 1 object";
-            return Err(Error::Config { field: "objects", value: "[]".into(), expected });
-        }
-        let (mut contents, mut diagnostics) = (self.contents.clone(), Vec::new());
-        let first = contents.objects.len();
-        for mut object in cfg.objects {
-            object.uid = format!("{}.{}", cfg.uid, object.uid);
-            contents.check_uid(&object.uid)?;
-            let object = RigidObjectData::new(object, contents.next_mask_id(), &mut diagnostics)?;
-            contents.objects.push(Arc::new(object));
-        }
-        contents.groups.push(GroupData { uid: cfg.uid, objects: first..contents.objects.len() });
-        self.replace_contents(contents, diagnostics)?;
-        Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
-    }
-
     /// Adds a terrain to every environment, compiled as [`add_robot`](Self::add_robot) does. It stands fixed, collides with
     /// robots and objects, and is seen by cameras and ray casters, for which it is called by its uid.
     ///
@@ -420,57 +380,6 @@ impl SimulationManager {
         contents.terrains.push(Arc::new(terrain));
         self.replace_contents(contents, Vec::new())?;
         Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
-    }
-
-    /// Adds a weld between two bodies that are there, compiled as [`add_robot`](Self::add_robot) does. It holds nothing until
-    /// it is [attached](WeldMut::attach).
-    ///
-    /// # Errors
-    /// The name is taken, a body is not there, it is a whole robot, both are the same or part of one, or none of them can
-    /// move.
-    pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
-        self.check_world_uid(&cfg.uid)?;
-        let model = self.simulation.batch.model();
-        let body = |name: &str| match self.contents.bodies_called(name)?.as_deref() {
-            None => Ok(0),
-            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].0),
-            Some(_) => Err(Error::Config {
-                field: "weld",
-                value: format!("{name:?}"),
-                expected: "a whole robot cannot be welded; name one of its links, such as \"arm/hand\"",
-            }),
-        };
-        let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
-        let fixed = |body: usize| model.body_weldid()[body] == 0;
-        let fail = |expected| {
-            Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
-        };
-        if first == second {
-            return fail("the two must be different bodies; what a fixed joint holds is one body");
-        }
-        if fixed(first) && fixed(second) {
-            return fail("one of the two must move by itself: both are fixed or moved by hand");
-        }
-        let mut contents = self.contents.clone();
-        contents.welds.push(Arc::new(cfg));
-        self.replace_contents(contents, Vec::new())?;
-        Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
-    }
-
-    /// Lets two things pass through each other from now on, in all environments: objects by their uid, links as `uid/link`,
-    /// all links of a robot by its uid, bodies of MJCF parts as `uid/body`, and `world`, which is the ground and all terrains.
-    /// Between links of one robot it takes pairs out of its self-collision. A link that a fixed joint holds is one body with
-    /// the link that carries it.
-    ///
-    /// # Errors
-    /// Nothing is called so; the error lists the nearest names.
-    pub fn exclude_collision(&mut self, one: &str, other: &str) -> Result<()> {
-        for name in [one, other] {
-            self.contents.bodies_called(name)?;
-        }
-        let mut contents = self.contents.clone();
-        contents.apart.push([one.into(), other.into()]);
-        self.replace_contents(contents, Vec::new())
     }
 
     /// Adds an MJCF file to every environment, compiled as [`add_robot`](Self::add_robot) does: its bodies, joints, contacts,
@@ -498,14 +407,14 @@ impl SimulationManager {
     }
 
     /// Checks that nothing in the world is called `uid` yet.
-    fn check_world_uid(&self, uid: &str) -> Result<()> {
+    pub(crate) fn check_world_uid(&self, uid: &str) -> Result<()> {
         self.contents.check_uid(uid)?;
         // MuJoCo's world body and our ground are called so.
         if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
     /// Compiles `contents` and goes on with them; on an error nothing has changed.
-    fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
+    pub(crate) fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents)?;
         // Compiling says again what it said of the robots before.
         let mut known = self.simulation.diagnostics.clone();
@@ -641,47 +550,6 @@ impl SimulationManager {
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// A group of rigid objects, to read.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
-        let index = self.index_of(id.manager, id.index);
-        RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
-    }
-
-    /// A group of rigid objects, to write.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
-        let index = self.index_of(id.manager, id.index);
-        let group = &self.contents.groups[index];
-        RigidObjectGroupMut::new(group, &self.contents, &mut self.simulation, &mut self.sensors)
-    }
-
-    /// A weld, to read.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn weld(&self, id: WeldId) -> Weld<'_> {
-        let index = self.index_of(id.manager, id.index);
-        Weld::new(&self.contents.welds[index], &self.simulation, index)
-    }
-
-    /// A weld, to make and to release.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
-        let index = self.index_of(id.manager, id.index);
-        WeldMut::new(&self.contents.welds[index], &mut self.simulation, &mut self.sensors, index)
-    }
-
     /// An MJCF file that is a part of the scene, to read.
     ///
     /// # Panics
@@ -712,7 +580,7 @@ impl SimulationManager {
     }
 
     #[track_caller]
-    fn index_of(&self, manager: u64, index: usize) -> usize {
+    pub(crate) fn index_of(&self, manager: u64, index: usize) -> usize {
         assert!(manager == self.serial, "this handle is of another SimulationManager");
         index
     }

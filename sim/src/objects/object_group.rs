@@ -5,12 +5,13 @@ use super::rows::distinct_envs;
 use crate::compile::Simulation;
 use crate::contents::Contents;
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
-use crate::objects::rigid_object::RigidObjectCfg;
+use crate::manager::{EnvId, SimulationManager};
+use crate::objects::rigid_object::{RigidObjectCfg, RigidObjectData};
 use crate::sensor_list::SensorList;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Axis, Ix3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Configuration of a group of rigid objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +29,13 @@ impl Default for RigidObjectGroupCfg {
     fn default() -> Self {
         Self { uid: "group".into(), objects: Vec::new() }
     }
+}
+
+/// Handle of a group of rigid objects; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct GroupId {
+    manager: u64,
+    index: usize,
 }
 
 /// A group that was added: which of the objects it is.
@@ -146,5 +154,52 @@ impl<'a> RigidObjectGroupMut<'a> {
         let index = self.simulation.objects[object];
         let owner = self.contents.objects[object].uid();
         FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner }
+    }
+}
+
+impl SimulationManager {
+    /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
+    /// [`rigid_object_id`](Self::rigid_object_id) each of them is an object as any other, called `group.object`.
+    ///
+    /// # Errors
+    /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.
+    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
+        self.check_world_uid(&cfg.uid)?;
+        if cfg.objects.is_empty() {
+            let expected = "a group needs at least 1 object";
+            return Err(Error::Config { field: "objects", value: "[]".into(), expected });
+        }
+        let (mut contents, mut diagnostics) = (self.contents.clone(), Vec::new());
+        let first = contents.objects.len();
+        for mut object in cfg.objects {
+            object.uid = format!("{}.{}", cfg.uid, object.uid);
+            contents.check_uid(&object.uid)?;
+            let object = RigidObjectData::new(object, contents.next_mask_id(), &mut diagnostics)?;
+            contents.objects.push(Arc::new(object));
+        }
+        contents.groups.push(GroupData { uid: cfg.uid, objects: first..contents.objects.len() });
+        self.replace_contents(contents, diagnostics)?;
+        Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
+    }
+
+    /// A group of rigid objects, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
+        let index = self.index_of(id.manager, id.index);
+        RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
+    }
+
+    /// A group of rigid objects, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        let group = &self.contents.groups[index];
+        RigidObjectGroupMut::new(group, &self.contents, &mut self.simulation, &mut self.sensors)
     }
 }

@@ -1,8 +1,8 @@
 //! Welds: two bodies that are held together while somebody says so, in each environment by itself.
 
 use crate::compile::Simulation;
-use crate::error::Result;
-use crate::manager::EnvId;
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManager};
 use crate::mj;
 use crate::objects::free_body::body_pose;
 use crate::objects::rows::distinct_envs;
@@ -31,6 +31,13 @@ impl Default for WeldCfg {
     fn default() -> Self {
         Self { uid: "weld".into(), first: String::new(), second: String::new() }
     }
+}
+
+/// Handle of a weld; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct WeldId {
+    manager: u64,
+    index: usize,
 }
 
 /// Which equality a weld is, and MuJoCo's bodies that it holds together.
@@ -131,5 +138,62 @@ impl<'a> WeldMut<'a> {
         }
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
+    }
+}
+
+impl SimulationManager {
+    /// Adds a weld between two bodies that are there, compiled as [`add_robot`](Self::add_robot) does. It holds nothing until
+    /// it is [attached](WeldMut::attach).
+    ///
+    /// # Errors
+    /// The name is taken, a body is not there, it is a whole robot, both are the same or part of one, or none of them can
+    /// move.
+    pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
+        self.check_world_uid(&cfg.uid)?;
+        let model = self.simulation.batch.model();
+        let body = |name: &str| match self.contents.bodies_called(name)?.as_deref() {
+            None => Ok(0),
+            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].0),
+            Some(_) => Err(Error::Config {
+                field: "weld",
+                value: format!("{name:?}"),
+                expected: "a whole robot cannot be welded; name one of its links, such as \"arm/hand\"",
+            }),
+        };
+        let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
+        let fixed = |body: usize| model.body_weldid()[body] == 0;
+        let fail = |expected| {
+            Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
+        };
+        if first == second {
+            return fail("the two must be different bodies; what a fixed joint holds is one body");
+        }
+        if fixed(first) && fixed(second) {
+            return fail("one of the two must move by itself: both are fixed or moved by hand");
+        }
+        let mut contents = self.contents.clone();
+        contents.welds.push(Arc::new(cfg));
+        self.replace_contents(contents, Vec::new())?;
+        Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
+    }
+
+    /// A weld, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn weld(&self, id: WeldId) -> Weld<'_> {
+        let index = self.index_of(id.manager, id.index);
+        Weld::new(&self.contents.welds[index], &self.simulation, index)
+    }
+
+    /// A weld, to make and to release.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        WeldMut::new(&self.contents.welds[index], &mut self.simulation, &mut self.sensors, index)
     }
 }
