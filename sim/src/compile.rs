@@ -10,11 +10,12 @@ use crate::env::{Env, with_small_buffers};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
 use crate::mj::{self, ObjectKind};
-use crate::mjcf::document::Mjcf;
+use crate::mjcf::document::{Mjcf, WeldEquality};
 use crate::mjcf::robot::{self, Purpose, RobotLayout};
 use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
+use crate::objects::weld::{WeldCfg, WeldIndex};
 use crate::randomization::{Maker, OwnValues, Tables};
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
@@ -30,6 +31,7 @@ pub(crate) struct Simulation {
     pub(crate) robots: Vec<RobotIndex>,
     pub(crate) objects: Vec<FreeIndex>,
     pub(crate) parts: Vec<PartIndex>,
+    pub(crate) welds: Vec<WeldIndex>,
     pub(crate) identities: Identities,
     /// Where sensors find bodies and contacts.
     pub(crate) plan: Arc<Plan>,
@@ -80,6 +82,8 @@ pub(crate) struct FreeIndex {
     pub body: usize,
     /// First of its seven positions and first of its six velocities; `None` where it is fixed.
     pub joint: Option<(usize, usize)>,
+    /// Its number among the bodies that are moved by hand.
+    pub mocap: Option<usize>,
 }
 
 /// Where one joint's numbers are.
@@ -179,7 +183,7 @@ pub(crate) fn document(
         layouts.push(layout);
     }
     for object in &contents.objects {
-        scene::add_object(&mut mjcf, object);
+        scene::add_object(&mut mjcf, object, purpose);
     }
     for (index, terrain) in contents.terrains.iter().enumerate() {
         scene::add_terrain(&mut mjcf, index, terrain);
@@ -190,6 +194,30 @@ pub(crate) fn document(
             mjcf.excludes.push(pair.clone());
         }
     }
+    let bodies = contents.mujoco_bodies(&layouts);
+    let called = |name: &str| -> Result<Vec<String>> {
+        let places = contents.bodies_called(name)?;
+        Ok(places.map_or_else(|| vec!["world".into()], |all| all.iter().map(|&k| bodies[k].clone()).collect()))
+    };
+    for [one, other] in &contents.apart {
+        for (a, b) in called(one)?
+            .iter()
+            .flat_map(|a| called(other).map(|all| (a.clone(), all)))
+            .flat_map(|(a, all)| all.into_iter().map(move |b| (a.clone(), b)))
+        {
+            let known = |pair: &(String, String)| *pair == (a.clone(), b.clone()) || *pair == (b.clone(), a.clone());
+            if a != b && !mjcf.excludes.iter().any(known) {
+                mjcf.excludes.push((a, b));
+            }
+        }
+    }
+    for weld in &contents.welds {
+        let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
+        let (first, second) = (body(&weld.first)?, body(&weld.second)?);
+        // MuJoCo holds them in the origin of the second: not in that of the world, which may be far away.
+        let (first, second) = if second == "world" { (second, first) } else { (first, second) };
+        mjcf.welds.push(WeldEquality { name: weld.uid.clone(), first, second });
+    }
     Ok((mjcf, layouts, diagnostics))
 }
 
@@ -199,6 +227,7 @@ struct Built {
     robots: Vec<RobotIndex>,
     objects: Vec<FreeIndex>,
     parts: Vec<PartIndex>,
+    welds: Vec<WeldIndex>,
     identities: Identities,
     plan: Arc<Plan>,
     start: Arc<Start>,
@@ -218,17 +247,20 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
         .map(|(index, terrain)| mj::Asset { name: scene::terrain_file(index), bytes: terrain.file() })
         .chain(contents.parts.iter().flat_map(|part| part.files().iter().cloned()))
         .collect();
-    let compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
+    let mut compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
         other => other.into(),
     })?;
-    let objects = find_objects(&compiled, contents)?;
+    let mut objects = find_objects(&compiled, contents)?;
+    damp_objects(&mut compiled, contents, &objects);
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
+    objects.iter_mut().for_each(|o| o.mocap = usize::try_from(model.body_mocapid()[o.body]).ok());
     let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
+    let welds = contents.welds.iter().map(|weld| find_weld(&model, weld)).collect::<Result<Vec<_>>>()?;
     let identities = identify(&model, contents, &robots, &objects, &parts);
     let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    Ok(Built { model, table, robots, objects, parts, identities, plan, start, xml: text.xml, diagnostics })
+    Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml: text.xml, diagnostics })
 }
 
 /// Threads for those who do not say how many.
@@ -244,9 +276,27 @@ fn missing(what: &'static str, name: &str) -> Error {
 fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<FreeIndex>> {
     let find = |object: &RigidObjectData| {
         let body = compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing("body", object.uid()))?;
-        Ok(FreeIndex { body, joint: compiled.joint_address(&format!("{}/free", object.uid())) })
+        let joint = compiled.joint_address(&format!("{}/free", object.uid()));
+        Ok(FreeIndex { body, joint, mocap: None })
     };
     contents.objects.iter().map(|object| find(object)).collect()
+}
+
+/// Damps moving and turning of objects each by its own number, which a free joint of a document cannot say.
+fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[FreeIndex]) {
+    for (object, index) in contents.objects.iter().zip(objects) {
+        if let Some((_, dof)) = index.joint {
+            let damping = compiled.dof_damping_mut();
+            damping[dof..dof + 3].fill(object.cfg().linear_damping);
+            damping[dof + 3..dof + 6].fill(object.cfg().angular_damping);
+        }
+    }
+}
+
+fn find_weld(model: &mj::Model, weld: &WeldCfg) -> Result<WeldIndex> {
+    let equality = model.id(ObjectKind::Equality, &weld.uid).ok_or_else(|| missing("weld", &weld.uid))?;
+    let bodies = [model.eq_obj1id()[equality], model.eq_obj2id()[equality]].map(|body| body.max(0) as usize);
+    Ok(WeldIndex { equality, bodies })
 }
 
 /// Finds everything of a part in the compiled model, by its names.
@@ -414,6 +464,7 @@ fn set_up_drives(
         let root = FreeIndex {
             body: links[data.description().root.0].0,
             joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
+            mocap: None,
         };
         indices.push(RobotIndex { joints, links, root, geoms });
     }
@@ -450,6 +501,7 @@ impl Built {
             robots: self.robots,
             objects: self.objects,
             parts: self.parts,
+            welds: self.welds,
             identities: self.identities,
             plan: self.plan,
             visible: None,
@@ -494,6 +546,12 @@ impl Simulation {
                 if let Some(visual) = geom.visual.and_then(|v| link.visuals.get(v)) {
                     replacements.insert(geom.geom, cache.parts(&link.name, visual));
                 }
+            }
+        }
+        for object in &contents.objects {
+            let geom = self.batch.model().id(ObjectKind::Geom, &format!("{}/visual", object.uid()));
+            if let Some(geom) = geom {
+                replacements.insert(geom, cache.object_parts(object));
             }
         }
         let visible =
@@ -554,11 +612,18 @@ impl Simulation {
             .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
             .collect();
         let parts = PartTransfer::new(old, self);
+        // In the order in which they were added.
+        let equality = |old_weld: usize| {
+            let at = old.welds.iter().position(|weld| weld.equality == old_weld)?;
+            self.welds.get(at).map(|weld| weld.equality)
+        };
+        let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
                 old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
             let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
+            let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
@@ -577,6 +642,7 @@ impl Simulation {
                     parts.write(&part_state, data);
                     data.set_time(time);
                 });
+                env.set_welds(held);
                 if wrenches != Wrenches::default() {
                     env.set_wrenches(|mine| *mine = wrenches);
                 }
@@ -586,7 +652,7 @@ impl Simulation {
     }
 }
 
-/// What parts that were MJCF files have beside joints, from an old simulation to a new one: pairs of places.
+/// What parts that were MJCF files, and objects that are moved by hand, have beside joints, from an old simulation to a new one: pairs of places.
 struct PartTransfer {
     controls: Vec<(usize, usize)>,
     activations: Vec<(usize, usize)>,
@@ -607,11 +673,15 @@ impl PartTransfer {
             parts.flat_map(|(old, new)| of(old).iter().copied().zip(of(new).iter().copied())).collect::<Vec<_>>()
         };
         let number = |model: &mj::Model, body: usize| usize::try_from(model.body_mocapid()[body]).unwrap_or(0);
+        let objects = old.objects.iter().zip(&new.objects).filter_map(|(old, new)| old.mocap.zip(new.mocap));
         let mocaps = pairs(|part| &part.mocaps).into_iter();
         Self {
             controls: pairs(|part| &part.controls),
             activations: pairs(|part| &part.activations),
-            mocaps: mocaps.map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to))).collect(),
+            mocaps: mocaps
+                .map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to)))
+                .chain(objects)
+                .collect(),
         }
     }
 

@@ -2,20 +2,28 @@
 
 use crate::description::JointKind;
 use crate::error::{Error, Result};
+use crate::mjcf::robot::RobotLayout;
 use crate::objects::mjcf_part::MjcfData;
+use crate::objects::object_group::GroupData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
 use crate::objects::terrain::Terrain;
+use crate::objects::weld::WeldCfg;
+use crate::pattern;
 use sensors::EngineSensor;
 use std::sync::Arc;
 
-/// Robots, objects, terrains and MJCF files.
+/// Robots, objects, terrains, MJCF files, and what holds and what passes through each other.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) robots: Vec<Arc<RobotData>>,
     pub(crate) objects: Vec<Arc<RigidObjectData>>,
     pub(crate) terrains: Vec<Arc<Terrain>>,
     pub(crate) parts: Vec<Arc<MjcfData>>,
+    pub(crate) groups: Vec<GroupData>,
+    pub(crate) welds: Vec<Arc<WeldCfg>>,
+    /// Pairs of names of what never collides.
+    pub(crate) apart: Vec<[String; 2]>,
 }
 
 /// Mask id of the ground; links, objects and terrains come after it.
@@ -26,6 +34,8 @@ impl Contents {
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.parts.iter().map(|p| p.uid()));
+        let objects = objects.chain(self.welds.iter().map(|w| w.uid.as_str()));
+        let objects = objects.chain(self.groups.iter().map(|g| g.uid.as_str()));
         let mut taken = self.robots.iter().map(|r| r.uid()).chain(objects);
         if taken.any(|other| other == uid) {
             return Err(Error::DuplicateUid(uid.into()));
@@ -50,6 +60,41 @@ impl Contents {
         });
         let frames = self.parts.iter().flat_map(|p| p.frames().iter().map(|frame| frame.name.clone()));
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
+    }
+
+    /// Names of MuJoCo's bodies of everything in the order of [`body_names`](Self::body_names), of which links that fixed
+    /// joints hold share one.
+    pub(crate) fn mujoco_bodies(&self, layouts: &[RobotLayout]) -> Vec<String> {
+        let links = layouts.iter().flat_map(|layout| layout.links.iter().map(|frame| frame.body.clone()));
+        let frames = self.parts.iter().flat_map(|part| {
+            part.frames().iter().map(|frame| match frame.body {
+                0 => part.uid().to_string(),
+                body => part.full(&part.names().bodies[body]),
+            })
+        });
+        links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
+    }
+
+    /// Places in [`body_names`](Self::body_names) of what a name means: a body, or all links of a robot; `None` for the
+    /// world.
+    ///
+    /// # Errors
+    /// It means nothing.
+    pub(crate) fn bodies_called(&self, name: &str) -> Result<Option<Vec<usize>>> {
+        let names = self.body_names();
+        if name == "world" {
+            return Ok(None);
+        }
+        let links = format!("{name}/");
+        let is_robot = self.robots.iter().any(|robot| robot.uid() == name);
+        let means = |known: &String| known == name || is_robot && known.starts_with(&links);
+        let found: Vec<usize> = (0..names.len()).filter(|&k| means(&names[k])).collect();
+        if found.is_empty() {
+            let known = names.iter().map(String::as_str).chain(["world"]).chain(self.robots.iter().map(|r| r.uid()));
+            let candidates = pattern::closest(name, known).into_iter().map(String::from).collect();
+            return Err(Error::UnknownName { what: "body called", name: name.into(), candidates });
+        }
+        Ok(Some(found))
     }
 
     /// For every body in the order of [`body_names`](Self::body_names), the one that moves it: the first link above it that

@@ -46,6 +46,8 @@ pub enum DiagnosticKind {
     ColorClamped,
     /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
     SettingIgnored,
+    /// The surface of an object's mesh is open or encloses nothing: it weighs and turns as its convex hull.
+    OpenMesh,
     /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
     ExportReduced,
 }
@@ -73,6 +75,7 @@ impl DiagnosticKind {
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",
             Self::SettingIgnored => "setting-ignored",
+            Self::OpenMesh => "open-mesh",
             Self::ExportReduced => "export-reduced",
         }
     }

@@ -12,7 +12,9 @@
 
 use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
-use crate::mj::{self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts};
+use crate::mj::{
+    self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
+};
 use crate::wrenches::Wrenches;
 use std::cell::Cell;
 use std::sync::Arc;
@@ -82,6 +84,8 @@ struct Seldom {
     inputs: Inputs,
     /// What was captured of the last step that sensors wanted to see.
     solved: Solved,
+    /// Welds that hold: their poses are in the model.
+    welds: Vec<Weld>,
 }
 
 impl Env {
@@ -131,9 +135,43 @@ impl Env {
     pub(crate) fn set_model(&mut self, model: Model) {
         self.raw_quats.restore(&mut self.data);
         let good = self.saved();
-        self.data.set_model(model);
+        let welds = &self.seldom.welds;
+        self.data.set_model(if welds.is_empty() { model } else { model.with_welds(welds) });
         self.solved_now = true;
         self.refresh(&good);
+    }
+
+    /// Welds that hold.
+    pub(crate) fn welds(&self) -> &[Weld] {
+        &self.seldom.welds
+    }
+
+    /// Lets these welds hold, and no others; a forward pass follows.
+    pub(crate) fn set_welds(&mut self, welds: Vec<Weld>) {
+        if welds == self.seldom.welds {
+            return;
+        }
+        self.raw_quats.restore(&mut self.data);
+        let good = self.saved();
+        self.exchange_welds(welds);
+        self.solved_now = true;
+        self.refresh(&good);
+    }
+
+    /// As [`set_welds`](Self::set_welds), without the forward pass.
+    fn exchange_welds(&mut self, welds: Vec<Weld>) {
+        if welds == self.seldom.welds {
+            return;
+        }
+        for weld in &self.seldom.welds {
+            self.data.set_equality_active(weld.equality, false);
+        }
+        let model = self.data.model().with_welds(&welds);
+        self.data.set_model(model);
+        for weld in &welds {
+            self.data.set_equality_active(weld.equality, true);
+        }
+        self.seldom.welds = welds;
     }
 
     /// Sets controls, which are no state: what was computed of the state stays right.
@@ -176,6 +214,7 @@ impl Env {
         if let Some(wrenches) = &mut self.wrenches {
             wrenches.list.clear();
         }
+        self.exchange_welds(Vec::new());
         self.diverged = None;
         self.steps = 0;
         self.solved_now = true;
@@ -231,7 +270,8 @@ impl Env {
         self.save_present(&mut motion);
         inputs.save(&self.data);
         let (drives, diverged) = (self.drives.numbers(), self.diverged.clone());
-        EnvState { motion, inputs, drives, wrenches: self.wrenches().clone(), steps: self.steps, diverged }
+        let (wrenches, welds) = (self.wrenches().clone(), self.seldom.welds.clone());
+        EnvState { motion, inputs, drives, wrenches, welds, steps: self.steps, diverged }
     }
 
     /// Goes on from `state`, which is of an environment of a model with the same layout, and which
@@ -242,6 +282,8 @@ impl Env {
         let bodies = self.data.model().nbody();
         let wrenches = state.wrenches.moved(|body| (body < bodies).then_some(body));
         self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
+        let welds = state.welds.iter().filter(|weld| self.data.model().is_weld(weld.equality)).copied().collect();
+        self.exchange_welds(welds);
         self.diverged.clone_from(&state.diverged);
         self.steps = state.steps;
         self.solved_now = true;
@@ -489,6 +531,7 @@ pub(crate) struct EnvState {
     /// As [`DriveState::numbers`] gives them.
     pub drives: Vec<f64>,
     pub wrenches: Wrenches,
+    pub welds: Vec<Weld>,
     pub steps: u64,
     pub diverged: Option<Box<EnvStatus>>,
 }

@@ -35,6 +35,15 @@ pub enum Error {
         #[source]
         error: Box<scene::mesh::MeshError>,
     },
+    /// The mesh of a rigid object cannot be used.
+    #[error("object {object:?}: {error}")]
+    ObjectMesh {
+        /// The object.
+        object: String,
+        /// What is wrong with the file.
+        #[source]
+        error: Box<scene::mesh::MeshError>,
+    },
     /// A drive property or a start position is wrong.
     #[error("robot {robot:?}: {error}")]
     Plan {
@@ -174,10 +183,21 @@ pub enum Error {
     Overview(String),
     /// The object or the base of the robot stands fixed.
     #[error(
-        "{0:?} is fixed where its init_pose says; make an object BodyType::Dynamic, give a robot fix_base: false, to \
-         move it"
+        "{0:?} is fixed where its init_pose says; make an object BodyType::Dynamic (or Kinematic, to move it by hand), give \
+         a robot fix_base: false, to move it"
     )]
     FixedBody(String),
+    /// What a body must move for by itself.
+    #[error(
+        "{argument}: {object:?} is not BodyType::Dynamic: it has no velocity, mass or force of its own; write the pose of one \
+         that is Kinematic"
+    )]
+    NotDynamic {
+        /// The method.
+        argument: &'static str,
+        /// The object.
+        object: String,
+    },
     /// More robots than contact bits.
     #[error("{0} robots are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)")]
     TooManyRobots(usize),

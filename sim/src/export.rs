@@ -12,6 +12,7 @@ use crate::mjcf::robot::{MeshKey, Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::robot::RobotData;
+use crate::source::Source;
 use crate::urdf::write_urdf;
 use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,7 +50,7 @@ pub(crate) fn dump(
 
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
     let mut left_out = Vec::new();
-    let assets = export_meshes(robots, &mut empty, dir, &mut left_out)?;
+    let assets = export_meshes(contents, &mut empty, dir, &mut left_out)?;
     for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
@@ -163,7 +164,7 @@ fn two_digits(x: f64) -> f64 {
 
 /// Writes every visual mesh once, one file per material, and declares them in `mjcf`.
 fn export_meshes(
-    robots: &[Arc<RobotData>],
+    contents: &Contents,
     mjcf: &mut Mjcf,
     dir: &Path,
     left_out: &mut Vec<Diagnostic>,
@@ -171,38 +172,42 @@ fn export_meshes(
     let mut assets = VisualAssets::default();
     let mut textures: BTreeMap<TextureKey, String> = BTreeMap::new();
     let mut names = BTreeSet::new();
-    for robot in robots {
+    let mut export = |key: MeshKey, of: &str, source: Option<&Source>| -> Result<()> {
+        if assets.parts.contains_key(&key) {
+            return Ok(());
+        }
+        let mut say = |kind, message: String| left_out.push(Diagnostic::new(kind, source.cloned(), message));
+        let mesh = match scene::mesh::load(&key.path) {
+            Ok(mesh) => mesh,
+            Err(error) => {
+                assets.parts.insert(key, Vec::new());
+                let message = format!("{of}: the visual mesh is left out of the export: {error}");
+                say(DiagnosticKind::VisualMeshInvalid, message);
+                return Ok(());
+            }
+        };
+        for texture in unreadable_textures(&mesh) {
+            let message = format!("{of}: a texture is left out of the export: {texture}");
+            say(DiagnosticKind::TextureMissing, message);
+        }
+        let mesh = mesh.scaled(key.scale());
+        let parts = export_parts(&mesh, &asset_stem(&key.path), &mut names, mjcf, &mut textures, dir)?;
+        assets.parts.insert(key, parts);
+        Ok(())
+    };
+    for robot in &contents.robots {
         for link in &robot.description().links {
             for visual in &link.visuals {
-                let crate::description::Geometry::Mesh { path, scale, .. } = &visual.geometry else { continue };
-                let key = MeshKey::new(path, scale);
-                if assets.parts.contains_key(&key) {
-                    continue;
+                if let crate::description::Geometry::Mesh { path, scale, .. } = &visual.geometry {
+                    let of = format!("link {:?}", link.name);
+                    export(MeshKey::new(path, scale), &of, Some(&visual.source))?;
                 }
-                let mesh = match scene::mesh::load(path) {
-                    Ok(mesh) => mesh,
-                    Err(error) => {
-                        assets.parts.insert(key, Vec::new());
-                        left_out.push(Diagnostic::new(
-                            DiagnosticKind::VisualMeshInvalid,
-                            visual.source.clone(),
-                            format!("link {:?}: the visual mesh is left out of the export: {error}", link.name),
-                        ));
-                        continue;
-                    }
-                };
-                for texture in unreadable_textures(&mesh) {
-                    left_out.push(Diagnostic::new(
-                        DiagnosticKind::TextureMissing,
-                        visual.source.clone(),
-                        format!("link {:?}: a texture is left out of the export: {texture}", link.name),
-                    ));
-                }
-                let mesh = mesh.scaled((*scale).into());
-                let stem = asset_stem(path);
-                let parts = export_parts(&mesh, &stem, &mut names, mjcf, &mut textures, dir)?;
-                assets.parts.insert(key, parts);
             }
+        }
+    }
+    for object in &contents.objects {
+        if let Some(key) = object.mesh_key() {
+            export(key, &format!("object {:?}", object.uid()), None)?;
         }
     }
     Ok(assets)

@@ -51,10 +51,12 @@ pub use manager::{
 pub use mjcf::document::{Cone, Integrator};
 pub use objects::kinematics::IkResult;
 pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
+pub use objects::object_group::{GroupId, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
+pub use objects::weld::{Weld, WeldCfg, WeldId, WeldMut};
 pub use randomization::{Draw, Properties, Property, Randomization, RandomizationError};
 pub use rollout::Rollout;
 pub use sensor_list::SensorId;

@@ -274,7 +274,7 @@ static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 /// Robots and objects in N environments. Environments never touch each other; dropping the manager frees everything.
 #[derive(Debug)]
 pub struct SimulationManager {
-    serial: u64,
+    pub(crate) serial: u64,
     pub(crate) cfg: SimulationManagerCfg,
     pub(crate) contents: Contents,
     visuals: VisualCache,
@@ -357,13 +357,14 @@ impl SimulationManager {
     /// Adds a rigid object to every environment, compiled as [`add_robot`](Self::add_robot) does.
     ///
     /// # Errors
-    /// The name is taken or a number is out of range.
+    /// The name is taken, a number is out of range, or a mesh file cannot be used.
     pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
         self.check_world_uid(&cfg.uid)?;
-        let object = RigidObjectData::new(cfg, self.contents.next_mask_id())?;
+        let mut diagnostics = Vec::new();
+        let object = RigidObjectData::new(cfg, self.contents.next_mask_id(), &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.objects.push(Arc::new(object));
-        self.replace_contents(contents, Vec::new())?;
+        self.replace_contents(contents, diagnostics)?;
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
     }
 
@@ -406,14 +407,14 @@ impl SimulationManager {
     }
 
     /// Checks that nothing in the world is called `uid` yet.
-    fn check_world_uid(&self, uid: &str) -> Result<()> {
+    pub(crate) fn check_world_uid(&self, uid: &str) -> Result<()> {
         self.contents.check_uid(uid)?;
         // MuJoCo's world body and our ground are called so.
         if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
     /// Compiles `contents` and goes on with them; on an error nothing has changed.
-    fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
+    pub(crate) fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents)?;
         // Compiling says again what it said of the robots before.
         let mut known = self.simulation.diagnostics.clone();
@@ -598,7 +599,7 @@ impl SimulationManager {
     }
 
     #[track_caller]
-    fn index_of(&self, manager: u64, index: usize) -> usize {
+    pub(crate) fn index_of(&self, manager: u64, index: usize) -> usize {
         assert!(manager == self.serial, "this handle is of another SimulationManager");
         index
     }

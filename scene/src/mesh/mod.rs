@@ -13,6 +13,7 @@ mod load;
 mod mtl;
 mod obj;
 mod polygon;
+mod solid;
 mod stl;
 #[cfg(test)]
 mod tests_corrupt;
@@ -28,6 +29,7 @@ pub use error::MeshError;
 pub use hull::{HullCfg, HullError, convex_hull};
 pub use hull_cache::HullCache;
 pub use load::{DaeUpAxis, MeshOptions, load, load_bytes, load_with};
+pub use solid::Solid;
 pub use trimesh::MeshFault;
 pub use write::{write_binary_stl, write_obj};
 

@@ -6,6 +6,7 @@ use super::value::{Value, ValueError};
 use super::{SceneCfg, in_every_env};
 use crate::error::{Error, Result};
 use crate::manager::SimulationManagerCfg;
+use crate::objects::shape::ObjectShape;
 use crate::pattern::closest;
 use crate::source::Source;
 use serde::Deserialize;
@@ -182,7 +183,12 @@ impl<'a> Reader<'a> {
                     *path = self.beside(path);
                 }
             }
-            EntityCfg::RigidObject(object) => object.uid = uid,
+            EntityCfg::RigidObject(object) => {
+                object.uid = uid;
+                if let ObjectShape::Mesh { path, .. } = &mut object.shape {
+                    *path = self.beside(path);
+                }
+            }
             EntityCfg::Terrain(terrain) => terrain.uid = uid,
             EntityCfg::Mjcf(part) => {
                 part.uid = uid;

@@ -243,6 +243,7 @@ model_flags! {
 }
 
 model_arrays_mut! {
+    dof_damping_mut = dof_damping_mut: f64;
     dof_frictionloss_mut = dof_frictionloss_mut: f64;
     actuator_gainprm_mut = actuator_gainprm_mut: f64;
     actuator_biasprm_mut = actuator_biasprm_mut: f64;

@@ -229,15 +229,8 @@ impl Editor {
     }
 
     fn own(&self, field: &ModelArray) -> OwnArray {
-        let mut memory = vec![0_u64; field.bytes.div_ceil(8)];
         // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
-        let values = unsafe { bytes(self.copy.header(), field) };
-        for (word, chunk) in memory.iter_mut().zip(values.chunks(8)) {
-            let mut whole = [0; 8];
-            whole[..chunk.len()].copy_from_slice(chunk);
-            *word = u64::from_ne_bytes(whole);
-        }
-        OwnArray { field: *field, memory: memory.into() }
+        OwnArray::of_bytes(*field, unsafe { bytes(self.copy.header(), field) })
     }
 }
 
@@ -268,7 +261,7 @@ unsafe fn bytes<'m>(model: &'m mj::mjModel, field: &ModelArray) -> &'m [u8] {
 }
 
 /// Lets an array begin elsewhere.
-fn set_pointer(header: &mut mj::mjModel, field: &ModelArray, array: *const u8) {
+pub(super) fn set_pointer(header: &mut mj::mjModel, field: &ModelArray, array: *const u8) {
     // SAFETY: the offset is that of a pointer inside of the struct.
     let pointer = unsafe { std::ptr::from_mut(header).byte_add(field.pointer) };
     // SAFETY: a pointer stands there, and the struct is borrowed mutably.

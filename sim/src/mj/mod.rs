@@ -29,6 +29,7 @@ mod ray;
 mod state;
 mod version;
 mod vfs;
+mod weld;
 pub mod words;
 
 pub use beyond::Beyond;
@@ -47,6 +48,7 @@ pub use ray::RayHit;
 pub use state::{Inputs, Motion, RawQuats};
 pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
+pub use weld::Weld;
 
 pub use mujoco_sys::{
     mjCNSTR_FRICTION_DOF, mjCNSTR_FRICTION_TENDON, mjGEOM_BOX, mjGEOM_CAPSULE, mjGEOM_CYLINDER, mjGEOM_ELLIPSOID,

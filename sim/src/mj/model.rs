@@ -73,10 +73,24 @@ pub(super) struct Header {
 }
 
 /// An array that a model has for itself. Nothing writes to it once the model is made.
+#[derive(Clone)]
 pub(super) struct OwnArray {
     pub(super) field: ModelArray,
     /// In units that are aligned for every kind of element.
     pub(super) memory: Box<[u64]>,
+}
+
+impl OwnArray {
+    /// An array of these bytes, as many as the field has.
+    pub(super) fn of_bytes(field: ModelArray, values: &[u8]) -> Self {
+        let mut memory = vec![0_u64; field.bytes.div_ceil(8)];
+        for (word, chunk) in memory.iter_mut().zip(values.chunks(8)) {
+            let mut whole = [0; 8];
+            whole[..chunk.len()].copy_from_slice(chunk);
+            *word = u64::from_ne_bytes(whole);
+        }
+        Self { field, memory: memory.into() }
+    }
 }
 
 impl std::fmt::Debug for Header {
@@ -165,6 +179,11 @@ impl Model {
     /// it has the size of its field.
     pub(super) unsafe fn with_arrays(&self, header: mj::mjModel, own: Arc<[OwnArray]>) -> Self {
         Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own }))
+    }
+
+    /// The arrays that it has for itself.
+    pub(super) fn own(&self) -> &[OwnArray] {
+        &self.0.own
     }
 
     /// The model as it was compiled: one allocation.

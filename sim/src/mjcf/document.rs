@@ -34,6 +34,8 @@ pub struct Mjcf {
     pub excludes: Vec<(String, String)>,
     /// Couplings of joints.
     pub equalities: Vec<JointEquality>,
+    /// Welds that hold when they are told to.
+    pub welds: Vec<WeldEquality>,
     /// Dry friction of driven joints, as tendons of one joint each.
     pub friction_tendons: Vec<FrictionTendon>,
     /// Actuators.
@@ -173,6 +175,8 @@ pub struct Body {
     pub inertial: Option<Inertial>,
     /// Joints to the parent, in order.
     pub joints: Vec<Joint>,
+    /// Moved by hand: a child of the world without joints, with a pose of its own in every environment.
+    pub mocap: bool,
     /// Shapes.
     pub geoms: Vec<Geom>,
     /// Named frames.
@@ -259,12 +263,34 @@ pub struct Geom {
     pub role: GeomRole,
     /// Sliding, torsional and rolling friction; the document's default if unset.
     pub friction: Option<[f64; 3]>,
+    /// How contacts give way; MuJoCo's defaults if unset.
+    pub surface: Option<Surface>,
     /// Colour; MuJoCo's grey if unset.
     pub rgba: Option<[f64; 4]>,
     /// Name of a material.
     pub material: Option<String>,
     /// Where it is described.
     pub source: Option<Source>,
+}
+
+/// How contacts of a geom give way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Distance at which contacts begin to push \[m\].
+    pub margin: f64,
+    /// MuJoCo's `solref`, `solimp` and `solmix`; its defaults if unset.
+    pub solver: Option<ContactSolver>,
+}
+
+/// Reference, impedance and weight of contacts, as MuJoCo has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSolver {
+    /// `solref`.
+    pub reference: [f64; 2],
+    /// `solimp`.
+    pub impedance: [f64; 5],
+    /// `solmix`.
+    pub weight: f64,
 }
 
 /// What a geom is for.
@@ -341,6 +367,17 @@ pub struct JointEquality {
     pub source: Option<Source>,
 }
 
+/// `<equality><weld>` that does not hold at first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WeldEquality {
+    /// Unique name.
+    pub name: String,
+    /// The one body.
+    pub first: String,
+    /// The other one.
+    pub second: String,
+}
+
 /// `<tendon><fixed>` of one joint, with dry friction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionTendon {
@@ -393,6 +430,7 @@ impl Mjcf {
             pose: Pose::identity(),
             inertial: None,
             joints: Vec::new(),
+            mocap: false,
             geoms: Vec::new(),
             sites: Vec::new(),
             source: None,
@@ -409,6 +447,7 @@ impl Mjcf {
             lights: Vec::new(),
             excludes: Vec::new(),
             equalities: Vec::new(),
+            welds: Vec::new(),
             friction_tendons: Vec::new(),
             actuators: Vec::new(),
             keyframes: Vec::new(),

@@ -1,9 +1,15 @@
 //! What is in the world beside robots: the ground, terrain, objects, lights.
 
-use super::document::{Body, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, Mjcf, Shape};
+use super::document::{
+    Body, ContactSolver, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, MeshAsset, MeshContent, Mjcf, Shape,
+    Surface,
+};
+use super::robot::Purpose;
+use crate::objects::mass_properties::MassProperties;
+use crate::objects::restitution;
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
 use crate::objects::terrain::Terrain;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use scene::Pose;
 
 /// Contact bit of the ground and of objects.
@@ -32,6 +38,7 @@ pub fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
         pose: Pose::identity(),
         role: WORLD_CONTACT,
         friction: None,
+        surface: None,
         rgba: Some([r, g, b, 1.0]),
         material: None,
         source: None,
@@ -60,39 +67,98 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
         pose: cfg.init_pose * lowest,
         role: WORLD_CONTACT,
         friction: cfg.friction,
+        surface: None,
         rgba: Some(cfg.rgba),
         material: None,
         source: None,
     });
 }
 
-/// Adds a rigid object: a body called by its uid, with the geom `uid/shape` and the joint `uid/free`.
-pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData) {
+/// Adds a rigid object: a body called by its uid, with the geom `uid/shape`, the joint `uid/free`, and, where a file says
+/// what it looks like, geoms called `uid/visual`.
+pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Purpose<'_>) {
     let cfg = object.cfg();
-    let (mass, moments) = object.inertia();
+    let MassProperties { mass, com, axes, moments } = *object.mass_properties();
     let moves = cfg.body_type == BodyType::Dynamic;
-    let free = Joint::free(format!("{}/free", cfg.uid), None);
-    let inertial = Inertial { mass, com: Vector3::zeros(), axes: UnitQuaternion::identity(), moments, source: None };
+    let mut free = Joint::free(format!("{}/free", cfg.uid), None);
+    if cfg.linear_damping == cfg.angular_damping {
+        free.damping = cfg.linear_damping;
+    } else if matches!(purpose, Purpose::Export(_)) {
+        mjcf.comments.push(format!(
+            "{}: linear damping {} N s/m and angular damping {} N m s/rad are not in this file: a free joint has one.",
+            cfg.uid, cfg.linear_damping, cfg.angular_damping
+        ));
+    }
+    let shape = format!("{}/shape", cfg.uid);
+    if let Some(mesh) = object.mesh() {
+        let (vertices, triangles) = (mesh.hull.positions.clone(), mesh.hull.triangles.clone());
+        let content = MeshContent::Inline { vertices, triangles };
+        mjcf.meshes.push(MeshAsset { name: shape.clone(), content, visual: false, source: None });
+    }
+    let visuals = visuals(object, purpose);
+    let role = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: visuals.is_empty() };
+    let solver = cfg.restitution.map(|wanted| ContactSolver {
+        reference: restitution::solref(wanted, mjcf.option.timestep),
+        impedance: restitution::IMPEDANCE,
+        weight: restitution::WEIGHT,
+    });
+    let collision = Geom {
+        name: Some(shape.clone()),
+        shape: cfg.shape.to_mjcf(shape),
+        pose: Pose::identity(),
+        role,
+        friction: cfg.friction,
+        surface: Some(Surface { margin: cfg.contact_margin, solver }),
+        rgba: Some(cfg.rgba),
+        material: None,
+        source: None,
+    };
     mjcf.bodies.push(Body {
         name: cfg.uid.clone(),
         parent: 0,
         pose: cfg.init_pose,
-        inertial: moves.then_some(inertial),
+        inertial: moves.then_some(Inertial { mass, com, axes, moments, source: None }),
         joints: if moves { vec![free] } else { Vec::new() },
-        geoms: vec![Geom {
-            name: Some(format!("{}/shape", cfg.uid)),
-            shape: cfg.shape.to_mjcf(),
-            pose: Pose::identity(),
-            role: WORLD_CONTACT,
-            friction: cfg.friction,
-            rgba: Some(cfg.rgba),
-            material: None,
-            source: None,
-        }],
+        mocap: cfg.body_type == BodyType::Kinematic,
+        geoms: std::iter::once(collision).chain(visuals).collect(),
         sites: Vec::new(),
         source: None,
     });
 }
+
+/// What is seen of an object that does not look like what collides: in a run a proxy that only has a pose, elsewhere the
+/// parts of its file.
+fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
+    let cfg = object.cfg();
+    let Some(key) = object.mesh_key() else { return Vec::new() };
+    let visual = |name: String, shape, rgba, material| Geom {
+        name: Some(name),
+        shape,
+        pose: Pose::identity(),
+        role: GeomRole::Visual,
+        friction: None,
+        surface: None,
+        rgba,
+        material,
+        source: None,
+    };
+    let name = format!("{}/visual", cfg.uid);
+    match purpose {
+        Purpose::Run { .. } => vec![visual(name, Shape::Sphere(PROXY), None, None)],
+        Purpose::Export(assets) => {
+            let parts = assets.parts.get(&key).into_iter().flatten().enumerate();
+            parts
+                .map(|(k, part)| {
+                    let rgba = part.material.is_none().then_some(cfg.rgba);
+                    visual(format!("{name}{k}"), Shape::Mesh(part.mesh.clone()), rgba, part.material.clone())
+                })
+                .collect()
+        }
+    }
+}
+
+/// Size of a proxy \[m\]: it has a pose, no mass and no contact.
+const PROXY: f64 = 1e-3;
 
 /// Adds a light from above.
 pub fn add_light(mjcf: &mut Mjcf, name: &str, direction: Vector3<f64>, color: [f64; 3]) {

@@ -3,7 +3,8 @@
 //! What differs between the lines of MuJoCo is decided here and nowhere else.
 
 use super::document::{
-    Actuator, Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf, Shape,
+    Actuator, Body, Cone, ContactSolver, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf,
+    Shape,
 };
 use super::part::PartLines;
 use crate::mj::{CompileError, Target};
@@ -328,7 +329,7 @@ impl Writer {
             match visit {
                 Visit::Enter(index) => {
                     let body = &mjcf.bodies[index];
-                    let element = Element::new("body").attr("name", &body.name).pose(&body.pose);
+                    let element = self.body(body, children[index].is_empty());
                     self.open(element, body.source.as_ref());
                     self.body_content(body);
                     stack.push(Visit::Leave);
@@ -339,6 +340,20 @@ impl Writer {
         }
         self.part_lines(mjcf, |part| &part.bodies);
         self.close("worldbody");
+    }
+
+    fn body(&self, body: &Body, is_leaf: bool) -> Element {
+        let mut element = Element::new("body").attr("name", &body.name).pose(&body.pose);
+        if body.mocap {
+            element = element.attr("mocap", "true");
+        }
+        let is_free = body.joints.iter().any(|joint| joint.kind == JointType::Free);
+        if self.target == Target::V4 && is_free && is_leaf {
+            // Else 4.x keeps only the diagonal of the inertia matrix of a centred body that carries no other, and an
+            // environment cannot have another centre of mass; 2.2.2 does not know the attribute.
+            element = element.attr("simple", "false");
+        }
+        element
     }
 
     fn body_content(&mut self, body: &Body) {
@@ -421,6 +436,15 @@ impl Writer {
         if let Some(friction) = &geom.friction {
             element = element.numbers("friction", friction);
         }
+        if let Some(surface) = &geom.surface {
+            if surface.margin != 0.0 {
+                element = element.attr("margin", number(surface.margin));
+            }
+            if let Some(ContactSolver { reference, impedance, weight }) = &surface.solver {
+                let element_with = element.numbers("solref", reference).numbers("solimp", impedance);
+                element = element_with.attr("solmix", number(*weight));
+            }
+        }
         element = element.opt("material", geom.material.as_ref());
         if let Some(rgba) = &geom.rgba {
             element = element.numbers("rgba", rgba);
@@ -436,7 +460,7 @@ impl Writer {
             }
             self.close("contact");
         }
-        if !mjcf.equalities.is_empty() {
+        if !mjcf.equalities.is_empty() || !mjcf.welds.is_empty() {
             self.open(Element::new("equality"), None);
             for e in &mjcf.equalities {
                 let element = Element::new("joint")
@@ -447,6 +471,16 @@ impl Writer {
                     .numbers("solref", &[2.0 * mjcf.option.timestep, 1.0])
                     .attr("solimp", COUPLING_IMPEDANCE);
                 self.leaf(element, e.source.as_ref());
+            }
+            for weld in &mjcf.welds {
+                let element = Element::new("weld")
+                    .attr("name", &weld.name)
+                    .attr("body1", &weld.first)
+                    .attr("body2", &weld.second)
+                    .attr("active", "false")
+                    .numbers("solref", &[2.0 * mjcf.option.timestep, 1.0])
+                    .attr("solimp", COUPLING_IMPEDANCE);
+                self.leaf(element, None);
             }
             self.close("equality");
         }

@@ -6,7 +6,7 @@ use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::mj;
-use crate::objects::rows::{Rows, Table};
+use crate::objects::rows::{Rows, Table, distinct_envs};
 use crate::sensor_list::SensorList;
 use ::scene::Pose;
 use ::scene::pose::{from_row, to_row};
@@ -52,6 +52,21 @@ impl FreeBody<'_> {
     }
 }
 
+/// Where a body that can be put somewhere keeps its pose.
+#[derive(Clone, Copy)]
+enum Place {
+    /// First position and first degree of freedom of its joint.
+    Joint(usize, usize),
+    /// Its number among the bodies that are moved by hand.
+    Mocap(usize),
+}
+
+/// Poses that were checked, with unit quaternions.
+pub(super) struct Poses {
+    place: Place,
+    rows: Vec<(usize, [f64; 7])>,
+}
+
 /// One body in all environments, to write.
 pub(super) struct FreeBodyMut<'a> {
     pub(super) simulation: &'a mut Simulation,
@@ -69,7 +84,21 @@ impl FreeBodyMut<'_> {
         poses: ArrayView2<'_, f64>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let (qpos, dof) = self.joint()?;
+        let poses = self.check_poses(argument, poses, env_ids)?;
+        self.put_poses(&poses);
+        let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
+        self.sensors.refresh(&envs, self.simulation);
+        Ok(())
+    }
+
+    /// Poses that can be written: everything is checked.
+    pub(super) fn check_poses(
+        &self,
+        argument: &'static str,
+        poses: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Poses> {
+        let place = self.place()?;
         let rows = self.check(argument, 7, "environments, x y z qw qx qy qz", poses, env_ids)?;
         for (row, (_, pose)) in rows.arrays::<7>().enumerate() {
             let norm = pose[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
@@ -82,25 +111,33 @@ impl FreeBodyMut<'_> {
                 });
             }
         }
-        for (env, pose) in rows.arrays::<7>() {
-            let row = to_row(&from_row(&pose));
-            let body = self.index.body;
+        Ok(Poses { place, rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect() })
+    }
+
+    /// Writes poses that were checked; sensors are to be told.
+    pub(super) fn put_poses(&mut self, poses: &Poses) {
+        let (place, body) = (poses.place, self.index.body);
+        for &(env, row) in &poses.rows {
             self.simulation.batch.write(env, |env| {
-                env.write(|data| {
-                    // The angular velocity is kept in the world, as it is read; MuJoCo keeps it in the body.
-                    let before = body_pose(data, body).rotation;
-                    let turned = from_row(&row).rotation.inverse() * before;
-                    let v = &mut data.qvel_mut()[dof + 3..dof + 6];
-                    let angular = turned * Vector3::new(v[0], v[1], v[2]);
-                    if before.coords != from_row(&row).rotation.coords {
-                        v.copy_from_slice(angular.as_slice());
+                env.write(|data| match place {
+                    Place::Joint(qpos, dof) => {
+                        // The angular velocity is kept in the world, as it is read; MuJoCo keeps it in the body.
+                        let before = body_pose(data, body).rotation;
+                        let turned = from_row(&row).rotation.inverse() * before;
+                        let v = &mut data.qvel_mut()[dof + 3..dof + 6];
+                        let angular = turned * Vector3::new(v[0], v[1], v[2]);
+                        if before.coords != from_row(&row).rotation.coords {
+                            v.copy_from_slice(angular.as_slice());
+                        }
+                        data.qpos_mut()[qpos..qpos + 7].copy_from_slice(&row);
                     }
-                    data.qpos_mut()[qpos..qpos + 7].copy_from_slice(&row);
+                    Place::Mocap(mocap) => {
+                        data.mocap_pos_mut()[3 * mocap..3 * mocap + 3].copy_from_slice(&row[..3]);
+                        data.mocap_quat_mut()[4 * mocap..4 * mocap + 4].copy_from_slice(&row[3..]);
+                    }
                 });
             });
         }
-        self.sensors.refresh(rows.envs(), self.simulation);
-        Ok(())
     }
 
     /// Writes velocities of the frame, then angular velocities, in world axes.
@@ -122,7 +159,10 @@ impl FreeBodyMut<'_> {
         env_ids: Option<&[EnvId]>,
         arm: impl Fn(&mj::Data) -> Vector3<f64>,
     ) -> Result<()> {
-        let (_, dof) = self.joint()?;
+        let dof = match self.place()? {
+            Place::Joint(_, dof) => dof,
+            Place::Mocap(_) => return Err(Error::NotDynamic { argument, object: self.owner.into() }),
+        };
         let rows = self.check(argument, 6, "environments, vx vy vz wx wy wz", velocities, env_ids)?;
         for (env, v) in rows.arrays::<6>() {
             let body = self.index.body;
@@ -140,8 +180,10 @@ impl FreeBodyMut<'_> {
         Ok(())
     }
 
-    fn joint(&self) -> Result<(usize, usize)> {
-        self.index.joint.ok_or_else(|| Error::FixedBody(self.owner.into()))
+    fn place(&self) -> Result<Place> {
+        let FreeIndex { joint, mocap, .. } = self.index;
+        let joint = joint.map(|(qpos, dof)| Place::Joint(qpos, dof));
+        joint.or(mocap.map(Place::Mocap)).ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
     fn check<'v>(
@@ -153,6 +195,7 @@ impl FreeBodyMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<Rows<'v>> {
         let of = |_| format!("{:?}", self.owner);
+        distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         Rows::check(Table { argument, meaning, columns, of: &of }, values, env_ids, self.simulation.batch.num_envs())
     }
 }

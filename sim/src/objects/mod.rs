@@ -1,9 +1,15 @@
 //! What is added to a simulation: handle, configuration and data views of each kind in one file.
 
+mod apart;
 pub(crate) mod free_body;
 pub mod kinematics;
+pub(crate) mod mass_properties;
 pub mod mjcf_part;
+pub mod object_group;
+mod object_mesh;
+pub(crate) mod restitution;
 pub mod rigid_object;
+mod rigid_object_properties;
 pub mod robot;
 mod robot_drives;
 mod robot_limits;
@@ -13,3 +19,4 @@ mod rows;
 pub mod shape;
 pub mod terrain;
 mod terrain_file;
+pub mod weld;

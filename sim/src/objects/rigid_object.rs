@@ -1,14 +1,18 @@
 //! Rigid objects: props that robots see, push and hold.
 
+use super::mass_properties::MassProperties;
+use super::object_mesh::ObjectMesh;
+use super::restitution;
 use super::shape::ObjectShape;
 use crate::compile::Simulation;
+use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
+use crate::mjcf::robot::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::robot::check_pose;
 use crate::sensor_list::SensorList;
 use ::scene::Pose;
-use nalgebra::Vector3;
 use ndarray::{Array2, AsArray, Ix2};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -21,7 +25,11 @@ pub enum BodyType {
     /// Falls, is pushed and held.
     #[default]
     Dynamic,
-    /// Stands fixed in the environment and is in the way of others.
+    /// Is where it is put, in every environment by itself, and pushes others without being pushed. MuJoCo gives such a body
+    /// a place and no velocity: it pushes what it is put into, which sinks in by 0.04 s times the speed, and does not drag
+    /// along what lies on it. It does not collide with what is fixed or moved by hand, too.
+    Kinematic,
+    /// Stands fixed in all environments in the same place, and is in the way of others.
     Static,
 }
 
@@ -42,10 +50,30 @@ pub struct RigidObjectCfg {
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
     /// MuJoCo takes the larger of the two surfaces that touch.
     pub friction: Option<[f64; 3]>,
+    /// Centre of mass in the object's frame \[m\]; that of the shape where `None`.
+    pub center_of_mass: Option<[f64; 3]>,
+    /// Moments of inertia about the centre of mass along x, y and z of the object's frame \[kg m²\]; those of the shape,
+    /// filled evenly, where `None`.
+    pub inertia: Option<[f64; 3]>,
+    /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`.
+    pub linear_damping: f64,
+    /// Torque against its angular velocity \[N m s/rad\]: `-angular_damping w`.
+    pub angular_damping: f64,
+    /// The part of the velocity that is left after a bounce, 0.14 to 1; MuJoCo's soft contacts, which leave about 0.1, where
+    /// `None`.
+    ///
+    /// MuJoCo has no restitution: this is a contact that is a spring and a damper (`solref` below 0) for about ten steps.
+    /// What comes with v sinks in by up to `3.2 v dt` meanwhile, so that a ball that is to bounce wants a small time step.
+    /// Where in a step the surfaces meet makes up to 0.08 less or 0.04 more of it at 0.2, 0.02 less or 0.03 more at 0.8. It
+    /// holds for an impact through the centre of mass. Of two such surfaces the one that bounces less counts; against one that has none, this one's.
+    pub restitution: Option<f64>,
+    /// Distance at which contacts begin to push \[m\], as if the shape were larger by it. The larger of the two surfaces
+    /// counts on MuJoCo 2.2.2, their sum on 4.x.
+    pub contact_margin: f64,
     /// Pose at the start, in the environment.
     #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Colour and opacity, 0..=1.
+    /// Colour and opacity, 0..=1; of a mesh, where its file gives none.
     pub rgba: [f64; 4],
     /// What kind of thing it is, for the table of mask ids; `object` where `None`.
     pub semantic_class: Option<String>,
@@ -61,6 +89,12 @@ impl Default for RigidObjectCfg {
             mass: None,
             density: 1000.0,
             friction: None,
+            center_of_mass: None,
+            inertia: None,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            restitution: None,
+            contact_margin: 0.0,
             init_pose: Pose::identity(),
             rgba: [0.6, 0.6, 0.6, 1.0],
             semantic_class: None,
@@ -73,27 +107,50 @@ impl Default for RigidObjectCfg {
 pub struct RigidObjectData {
     cfg: RigidObjectCfg,
     mask_id: i32,
+    mesh: Option<ObjectMesh>,
+    mass_properties: MassProperties,
 }
 
 impl RigidObjectData {
-    /// Checks every number.
-    pub(crate) fn new(cfg: RigidObjectCfg, mask_id: i32) -> Result<Self> {
+    /// Checks every number and reads the mesh.
+    pub(crate) fn new(cfg: RigidObjectCfg, mask_id: i32, diagnostics: &mut Vec<Diagnostic>) -> Result<Self> {
         let fail = |field, value: &dyn std::fmt::Debug, expected| {
             Err(Error::Config { field, value: format!("{value:?}"), expected })
         };
         if !cfg.shape.sizes().iter().all(|s| s.is_finite() && (1e-6..=1e6).contains(s)) {
-            return fail("shape", &cfg.shape, "every size must be 1e-6 to 1e6 metres");
+            return fail("shape", &cfg.shape, "every size must be 1e-6 to 1e6 metres, every scale 1e-6 to 1e6");
         }
         if !(cfg.density.is_finite() && cfg.density > 0.0) {
             return fail("density", &cfg.density, "it must be above 0 kg/m³, such as 1000 for water");
         }
-        let (mass, moments) = inertia(&cfg);
-        if cfg.body_type == BodyType::Dynamic && !(mass.is_finite() && mass > 1e-12 && moments.min() > 1e-14) {
-            return fail(
-                "mass",
-                &mass,
-                "MuJoCo moves nothing lighter than 1e-12 kg or with a moment below 1e-14 kg m²",
-            );
+        if let Some(com) = cfg.center_of_mass
+            && !com.iter().all(|x| x.is_finite())
+        {
+            return fail("center_of_mass", &com, "the three coordinates must be finite");
+        }
+        if let Some(moments) = cfg.inertia {
+            let (sum, largest) = (moments.iter().sum::<f64>(), moments.iter().copied().fold(0.0, f64::max));
+            if !(moments.iter().all(|m| m.is_finite() && *m > 1e-14) && 2.0 * largest <= sum) {
+                let expected = "the moments must be above 1e-14 kg m², and none larger than the sum of the others";
+                return fail("inertia", &moments, expected);
+            }
+        }
+        for (field, value) in [("linear_damping", cfg.linear_damping), ("angular_damping", cfg.angular_damping)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return fail(field, &value, "it must be a finite number >= 0");
+            }
+            if value > 0.0 && cfg.body_type != BodyType::Dynamic {
+                return fail(field, &value, "only what is BodyType::Dynamic is damped; leave it 0");
+            }
+        }
+        if let Some(restitution) = cfg.restitution
+            && !(restitution::LEAST..=1.0).contains(&restitution)
+        {
+            let expected = "it must be 0.14 to 1; leave it out for contacts that hardly bounce";
+            return fail("restitution", &restitution, expected);
+        }
+        if !(cfg.contact_margin.is_finite() && cfg.contact_margin >= 0.0) {
+            return fail("contact_margin", &cfg.contact_margin, "it must be a distance >= 0 in metres");
         }
         if let Some(friction) = cfg.friction
             && !friction.iter().all(|f| f.is_finite() && *f >= 0.0)
@@ -104,7 +161,14 @@ impl RigidObjectData {
             return fail("rgba", &cfg.rgba, "each component must be 0 to 1");
         }
         check_pose("init_pose", &cfg.init_pose)?;
-        Ok(Self { cfg, mask_id })
+        let mesh = ObjectMesh::of(&cfg.uid, &cfg.shape, diagnostics)?;
+        let mass_properties = MassProperties::of(&cfg, mesh.as_ref());
+        let MassProperties { mass, moments, .. } = mass_properties;
+        if cfg.body_type == BodyType::Dynamic && !(mass.is_finite() && mass > 1e-12 && moments.min() > 1e-14) {
+            let expected = "MuJoCo moves nothing lighter than 1e-12 kg or with a moment below 1e-14 kg m²";
+            return fail("mass", &mass, expected);
+        }
+        Ok(Self { cfg, mask_id, mesh, mass_properties })
     }
 
     /// Name of the object.
@@ -122,23 +186,30 @@ impl RigidObjectData {
         self.mask_id
     }
 
-    /// Mass \[kg\] and principal moments along x, y, z \[kg m²\].
-    pub(crate) fn inertia(&self) -> (f64, Vector3<f64>) {
-        inertia(&self.cfg)
+    pub(crate) fn mass_properties(&self) -> &MassProperties {
+        &self.mass_properties
     }
-}
 
-fn inertia(cfg: &RigidObjectCfg) -> (f64, Vector3<f64>) {
-    let mass = cfg.mass.unwrap_or(cfg.density * cfg.shape.volume());
-    (mass, mass * cfg.shape.unit_moments())
+    /// What collides and is seen, where it is a mesh.
+    pub(crate) fn mesh(&self) -> Option<&ObjectMesh> {
+        self.mesh.as_ref()
+    }
+
+    /// The file that says what it looks like.
+    pub(crate) fn mesh_key(&self) -> Option<MeshKey> {
+        match &self.cfg.shape {
+            ObjectShape::Mesh { path, scale, .. } => Some(MeshKey::new(path, &(*scale).into())),
+            _ => None,
+        }
+    }
 }
 
 /// A rigid object, to read. Arrays have one row per environment.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidObject<'a> {
-    data: &'a Arc<RigidObjectData>,
-    simulation: &'a Simulation,
-    index: usize,
+    pub(super) data: &'a Arc<RigidObjectData>,
+    pub(super) simulation: &'a Simulation,
+    pub(super) index: usize,
 }
 
 impl<'a> RigidObject<'a> {
@@ -165,10 +236,10 @@ impl<'a> RigidObject<'a> {
         self.data.mask_id
     }
 
-    /// Mass \[kg\], as configured. A mass that was drawn for an environment is not here: see
-    /// [`properties`](crate::SimulationManager::properties).
+    /// Mass \[kg\], as configured, whatever moves it. What it is in each environment says
+    /// [`get_mass`](Self::get_mass).
     pub fn mass(&self) -> f64 {
-        self.data.inertia().0
+        self.data.mass_properties.mass
     }
 
     /// Pose of its frame in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
@@ -176,7 +247,8 @@ impl<'a> RigidObject<'a> {
         self.body().poses()
     }
 
-    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where it is static.
+    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where it is
+    /// not dynamic.
     pub fn get_velocity(&self) -> Array2<f64> {
         self.body().velocities()
     }
@@ -185,10 +257,10 @@ impl<'a> RigidObject<'a> {
 /// A rigid object, to write.
 #[derive(Debug)]
 pub struct RigidObjectMut<'a> {
-    data: &'a Arc<RigidObjectData>,
-    simulation: &'a mut Simulation,
-    sensors: &'a mut SensorList,
-    index: usize,
+    pub(super) data: &'a Arc<RigidObjectData>,
+    pub(super) simulation: &'a mut Simulation,
+    pub(super) sensors: &'a mut SensorList,
+    pub(super) index: usize,
 }
 
 impl<'a> RigidObjectMut<'a> {
@@ -208,11 +280,12 @@ impl<'a> RigidObjectMut<'a> {
 
     /// Puts the object somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] for `env_ids` (all where `None`;
     /// a single row is for all of them). Quaternions are normalised; velocities, which are in world axes, stay. A forward
-    /// pass follows, so that everything that is read afterwards belongs to the new state.
+    /// pass follows, so that everything that is read afterwards belongs to the new state. A kinematic object stays there until
+    /// it is put elsewhere or reset.
     ///
     /// # Errors
-    /// The object is static; wrong shape, unknown environment, a value that is not finite, a quaternion of length zero;
-    /// then nothing is written.
+    /// The object is static; wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
+    /// quaternion of length zero; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.body().write_poses("write_pose", poses.into(), env_ids)
@@ -222,7 +295,7 @@ impl<'a> RigidObjectMut<'a> {
     /// [`write_pose`](Self::write_pose).
     ///
     /// # Errors
-    /// As [`write_pose`](Self::write_pose).
+    /// As [`write_pose`](Self::write_pose); a kinematic object has no velocity, either.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_velocity<'t>(
         &mut self,

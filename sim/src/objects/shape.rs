@@ -1,12 +1,15 @@
 //! Shapes of rigid objects: what they weigh and how they turn.
 
 use crate::mjcf::document::Shape;
+use ::scene::mesh::{HullCfg, TriMesh};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
 
-/// The shape of a rigid object; its frame is in the middle, the axis of round shapes is z.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The shape of a rigid object; its frame is in the middle of its extent, the axis of round shapes is z. The frame of a mesh
+/// is that of its file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum ObjectShape {
@@ -34,12 +37,50 @@ pub enum ObjectShape {
         /// Length of the cylindrical part \[m\].
         length: f64,
     },
+    /// A cone, base down: the base is at -height/2, the tip at +height/2. MuJoCo has none: what collides and is seen is the
+    /// pyramid with 64 sides inside of it, 0.12 % of the radius within. It weighs and turns as the round one.
+    Cone {
+        /// Radius of the base \[m\].
+        radius: f64,
+        /// From the base to the tip \[m\].
+        height: f64,
+    },
+    /// A mesh file: STL, OBJ, DAE or GLB.
+    ///
+    /// What is seen, by cameras and by ray casters, are the triangles of the file. What collides is their convex hull, as with
+    /// the links of a robot: MuJoCo's contacts are those of convex shapes, so that nothing lies in the hollow of a bowl that
+    /// is one mesh. A hollow thing is several objects that hold together, or a terrain.
+    ///
+    /// Mass and moments are those of what the triangles enclose, filled evenly. Where the surface is open or encloses nothing,
+    /// they are those of the hull, and a diagnostic says so.
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// Factors along the axes of the file; they may be negative, which mirrors.
+        #[serde(default = "no_scale")]
+        scale: [f64; 3],
+        /// How the hull is simplified.
+        #[serde(default)]
+        hull: HullCfg,
+    },
 }
+
+fn no_scale() -> [f64; 3] {
+    [1.0; 3]
+}
+
+/// Corners of the base of a cone.
+const CONE_SIDES: u32 = 64;
 
 impl ObjectShape {
     /// A cube with edges of `size` \[m\].
     pub const fn cube(size: f64) -> Self {
         Self::Box { size: [size; 3] }
+    }
+
+    /// A mesh file as it is.
+    pub fn mesh(path: impl Into<PathBuf>) -> Self {
+        Self::Mesh { path: path.into(), scale: no_scale(), hull: HullCfg::default() }
     }
 
     /// The sizes that must be positive.
@@ -48,26 +89,40 @@ impl ObjectShape {
             Self::Box { size } => size.to_vec(),
             Self::Sphere { radius } => vec![radius],
             Self::Cylinder { radius, length } | Self::Capsule { radius, length } => vec![radius, length],
+            Self::Cone { radius, height } => vec![radius, height],
+            Self::Mesh { scale, .. } => scale.map(f64::abs).to_vec(),
         }
     }
 
-    /// Volume \[m³\].
-    pub fn volume(&self) -> f64 {
+    /// Volume \[m³\]; `None` for a mesh, whose file says it.
+    pub fn volume(&self) -> Option<f64> {
         let ball = |r: f64| 4.0 / 3.0 * PI * r.powi(3);
         let tube = |r: f64, l: f64| PI * r * r * l;
-        match *self {
+        Some(match *self {
             Self::Box { size: [x, y, z] } => x * y * z,
             Self::Sphere { radius } => ball(radius),
             Self::Cylinder { radius, length } => tube(radius, length),
             Self::Capsule { radius, length } => tube(radius, length) + ball(radius),
+            Self::Cone { radius, height } => tube(radius, height) / 3.0,
+            Self::Mesh { .. } => return None,
+        })
+    }
+
+    /// Centre of mass where the shape is filled evenly \[m\]: that of a cone is a quarter of its height above the base.
+    /// `None` for a mesh.
+    pub fn center(&self) -> Option<Vector3<f64>> {
+        match *self {
+            Self::Cone { height, .. } => Some(Vector3::new(0.0, 0.0, -height / 4.0)),
+            Self::Mesh { .. } => None,
+            _ => Some(Vector3::zeros()),
         }
     }
 
-    /// Principal moments of inertia of a body of this shape, filled evenly with mass 1 kg, about its middle along x, y, z
-    /// \[m²\]. Source: the textbook formulas; a capsule is a cylinder and two half balls, whose centres of mass are 3/8 of
-    /// the radius from their flat sides.
-    pub fn unit_moments(&self) -> Vector3<f64> {
-        match *self {
+    /// Principal moments of inertia of a body of this shape, filled evenly with mass 1 kg, about its centre of mass along x,
+    /// y, z \[m²\]; `None` for a mesh. Source: the textbook formulas; a capsule is a cylinder and two half balls, whose centres
+    /// of mass are 3/8 of the radius from their flat sides.
+    pub fn unit_moments(&self) -> Option<Vector3<f64>> {
+        Some(match *self {
             Self::Box { size: [x, y, z] } => {
                 let [x, y, z] = [x * x, y * y, z * z];
                 Vector3::new(y + z, x + z, x + y) / 12.0
@@ -84,18 +139,38 @@ impl ObjectShape {
                     tube * (3.0 * r * r + l * l) / 12.0 + ball * (0.4 * r * r + l * l / 4.0 + 3.0 / 8.0 * r * l);
                 Vector3::new(across, across, tube * 0.5 * r * r + ball * 0.4 * r * r)
             }
-        }
+            Self::Cone { radius: r, height: h } => {
+                let across = 3.0 / 20.0 * r * r + 3.0 / 80.0 * h * h;
+                Vector3::new(across, across, 0.3 * r * r)
+            }
+            Self::Mesh { .. } => return None,
+        })
     }
 
-    /// MuJoCo's shape.
-    pub(crate) fn to_mjcf(self) -> Shape {
-        match self {
+    /// MuJoCo's shape; `mesh` is the name of the hull where it has none.
+    pub(crate) fn to_mjcf(&self, mesh: String) -> Shape {
+        match *self {
             Self::Box { size } => Shape::Box(size.map(|s| s / 2.0)),
             Self::Sphere { radius } => Shape::Sphere(radius),
             Self::Cylinder { radius, length } => Shape::Cylinder(radius, length / 2.0),
             Self::Capsule { radius, length } => Shape::Capsule(radius, length / 2.0),
+            Self::Cone { .. } | Self::Mesh { .. } => Shape::Mesh(mesh),
         }
     }
+}
+
+/// The pyramid that stands for a cone.
+pub(crate) fn cone(radius: f64, height: f64) -> TriMesh {
+    let corner = |k: u32| {
+        let (sin, cos) = (TAU * f64::from(k) / f64::from(CONE_SIDES)).sin_cos();
+        [radius * cos, radius * sin, -height / 2.0].map(|x| x as f32)
+    };
+    let mut positions: Vec<[f32; 3]> = (0..CONE_SIDES).map(corner).collect();
+    let tip = CONE_SIDES;
+    positions.push([0.0, 0.0, (height / 2.0) as f32]);
+    let sides = (0..CONE_SIDES).map(|k| [k, (k + 1) % CONE_SIDES, tip]);
+    let base = (1..CONE_SIDES - 1).map(|k| [0, k + 1, k]);
+    TriMesh::from_triangles(positions, sides.chain(base).collect())
 }
 
 #[cfg(test)]
@@ -117,9 +192,9 @@ mod tests {
                 "<mujoco><worldbody><body><freejoint/><geom density='1000' {attributes}/></body></worldbody></mujoco>"
             );
             let model = mj::compile(&xml, &[]).expect("compiles").into_model();
-            let mass = 1000.0 * shape.volume();
+            let mass = 1000.0 * shape.volume().expect("no mesh");
             assert!((model.body_mass()[1] / mass - 1.0).abs() < 1e-12, "{shape:?}");
-            let mut expected: Vec<f64> = (mass * shape.unit_moments()).iter().copied().collect();
+            let mut expected: Vec<f64> = (mass * shape.unit_moments().expect("no mesh")).iter().copied().collect();
             let mut found = model.body_inertia()[3..6].to_vec();
             // MuJoCo sorts principal moments in some versions.
             expected.sort_by(f64::total_cmp);
@@ -128,5 +203,27 @@ mod tests {
                 assert!((a / b - 1.0).abs() < 1e-9, "{shape:?}: {expected:?} {found:?}");
             }
         }
+    }
+
+    /// The pyramid has the volume of a cone over a polygon: n/2 r² sin(2π/n) h/3, and its moments go to those of the cone as
+    /// the base goes to a circle: with 64 corners by 2π²/(3·64²) = 0.16 % in area, twice that in the moment about the axis.
+    #[test]
+    fn a_pyramid_of_64_sides_is_nearly_a_cone() {
+        let (radius, height) = (0.3, 0.8);
+        let (shape, solid) = (ObjectShape::Cone { radius, height }, cone(radius, height).solid().expect("closed"));
+        let polygon = 32.0 * radius * radius * (TAU / 64.0).sin() * height / 3.0;
+        // Corners are in single precision.
+        assert!((solid.volume / polygon - 1.0).abs() < 1e-6);
+        let volume = shape.volume().expect("no mesh");
+        assert!((volume - PI * 0.09 * 0.8 / 3.0).abs() < 1e-15);
+        assert!((solid.volume / volume - 1.0).abs() < 0.002, "{}", solid.volume);
+        assert!((solid.center - shape.center().expect("no mesh")).norm() < 1e-6);
+        let tensor = |k: usize| (solid.second_moment.trace() - solid.second_moment[(k, k)]) / solid.volume;
+        for (k, moment) in shape.unit_moments().expect("no mesh").iter().enumerate() {
+            assert!((tensor(k) / moment - 1.0).abs() < 0.004, "axis {k}: {} {moment}", tensor(k));
+        }
+        // Control: about the middle of the extent the moment across is another one.
+        let middle = 3.0 / 20.0 * 0.09 + 3.0 / 80.0 * 0.64 + 0.04;
+        assert!((tensor(0) / middle - 1.0).abs() > 0.3);
     }
 }

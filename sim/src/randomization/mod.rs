@@ -51,7 +51,7 @@ impl Simulation {
     }
 
     /// Changes the properties of environments; on an error none has changed.
-    fn change_properties(
+    pub(crate) fn change_properties(
         &mut self,
         envs: &[usize],
         mut change: impl FnMut(usize, &mut Properties) -> Result<()>,

@@ -10,8 +10,8 @@ pub enum Property {
     /// Mass of a link or object \[kg\], 1 number. Setting it scales the moments of inertia in the same proportion, from
     /// their nominal ones, as another density would.
     Mass,
-    /// Centre of mass in the link's (object's) own frame \[m\], 3 numbers. With MuJoCo 4.x not of a link that moves freely
-    /// and is nominally centred: see [`RandomizationError::DiagonalInertia`](super::RandomizationError).
+    /// Centre of mass in the link's (object's) own frame \[m\], 3 numbers. With MuJoCo 4.x not of a body of an MJCF
+    /// file that moves freely and is nominally centred: see [`RandomizationError::DiagonalInertia`](super::RandomizationError).
     CenterOfMass,
     /// Principal moments of inertia about the centre of mass \[kg m²\], 3 numbers; the axes stay.
     Inertia,

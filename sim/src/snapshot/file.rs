@@ -5,7 +5,7 @@
 //! ```
 //!
 //! All numbers are little-endian. Magic, length and checksum stand in these places in every format, so that a damaged file
-//! is told from one of another version. The content of format 1: MuJoCo's version, the lines of the layout, the
+//! is told from one of another version. The content of format 2: MuJoCo's version, the lines of the layout, the
 //! environments.
 
 use super::bytes::{Malformed, Reader, Writer};
@@ -14,7 +14,7 @@ use super::{Entry, Snapshot, SnapshotError};
 use crate::drive::table::numbers_fault;
 use crate::env::{Divergence, EnvState, EnvStatus};
 use crate::error::{Error, Result};
-use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning};
+use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning, Weld};
 use crate::wrenches::Wrenches;
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// As PNG's: a byte that is no text, a name, and ends of lines that programs which treat files as text change.
 const MAGIC: [u8; 8] = *b"\x89KTS\r\n\x1a\n";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const CHECKSUM: usize = 32;
 /// Magic, length, format.
 const HEADER: usize = 8 + 8 + 4;
@@ -131,7 +131,7 @@ fn read_content(reader: &mut Reader<'_>) -> Result<Snapshot, Malformed> {
 }
 
 fn write_entry(entry: &Entry, out: &mut Writer) {
-    let EnvState { motion, inputs, drives, wrenches, steps, diverged } = &entry.state;
+    let EnvState { motion, inputs, drives, wrenches, welds, steps, diverged } = &entry.state;
     let (values, active) = inputs.values();
     out.u64(entry.env as u64);
     out.u64(*steps);
@@ -140,6 +140,11 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
     out.flags(active);
     out.numbers(drives);
     out.numbers(&wrenches.numbers());
+    out.u64(welds.len() as u64);
+    for weld in welds {
+        out.u64(weld.equality as u64);
+        out.numbers(&weld.pose);
+    }
     let Some(EnvStatus::Diverged { step, reason }) = diverged.as_deref() else { return out.u8(0) };
     match reason {
         Divergence::Warning(warning) => {
@@ -184,6 +189,8 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
     }
     let wrenches = finite(reader, "a wrench is not finite")?;
     let wrenches = Wrenches::from_numbers(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
+    // A number, and seven of a list with its length.
+    let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -203,8 +210,19 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
         Some(reason) => Some(Box::new(EnvStatus::Diverged { step: steps(reader)?, reason })),
     };
     let inputs = Inputs::from_values(values, active);
-    let state = EnvState { motion, inputs, drives, wrenches, steps: done, diverged };
+    let state = EnvState { motion, inputs, drives, wrenches, welds, steps: done, diverged };
     Ok(Entry { env, state })
+}
+
+fn read_weld(reader: &mut Reader<'_>) -> Result<Weld, Malformed> {
+    let equality = usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))?;
+    let pose: [f64; 7] = reader.numbers()?.try_into().map_err(|_| Malformed("a weld has not all its numbers"))?;
+    let length = pose[3..].iter().map(|q| q * q).sum::<f64>();
+    if pose.iter().all(|number| number.is_finite()) && (length - 1.0).abs() < 1e-6 {
+        Ok(Weld { equality, pose })
+    } else {
+        Err(Malformed("the pose of a weld is none"))
+    }
 }
 
 #[cfg(test)]
@@ -300,8 +318,8 @@ mod tests {
     fn other_files_formats_and_engines_are_told_apart() {
         assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::Foreign { .. })));
         let snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
-        let other = decode(&snapshot.encode(2, &mj::version_string()));
-        assert!(matches!(other, Err(SnapshotError::Format { found: 2, supported: 1, .. })));
+        let other = decode(&snapshot.encode(1, &mj::version_string()));
+        assert!(matches!(other, Err(SnapshotError::Format { found: 1, supported: 2, .. })));
         let other = decode(&snapshot.encode(FORMAT, "3.9.9"));
         assert!(matches!(other, Err(SnapshotError::Mujoco { found, .. }) if found == "3.9.9"));
     }

@@ -34,6 +34,9 @@ impl Layout {
             let by_hand = if model.body_mocapid()[body] >= 0 { " moved by hand" } else { "" };
             lines.push(format!("body {:?}{by_hand}", name(ObjectKind::Body, body)));
         }
+        for weld in (0..model.neq()).filter(|&equality| model.is_weld(equality)) {
+            lines.push(format!("weld {:?}", name(ObjectKind::Equality, weld)));
+        }
         for actuator in 0..model.nactuator() {
             lines.push(format!("actuator {:?}", name(ObjectKind::Actuator, actuator)));
         }

@@ -2,7 +2,7 @@
 //!
 //! A snapshot holds everything that decides how an environment goes on: time, positions with quaternions as they were
 //! before they were normalised, velocities, activations, the solver's warm start, what users set (controls, applied forces,
-//! bodies moved by hand, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
+//! bodies moved by hand, welds that hold and how, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
 //! on links, the count of steps, and whether and why it has diverged. Going on from it is bit-identical in any environment
 //! with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
 //! threads.

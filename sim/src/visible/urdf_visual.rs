@@ -1,10 +1,12 @@
-//! Visuals of URDF files: what is drawn in place of their proxy geoms.
+//! Visuals of URDF files and of objects that are meshes: what is drawn in place of their proxy geoms.
 
 use super::Part;
 use crate::description::{Geometry, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mjcf::robot::MeshKey;
-use scene::mesh::{MeshMaterial, TextureSource};
+use crate::objects::rigid_object::RigidObjectData;
+use crate::source::Source;
+use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
 use scene::{Material, RenderMesh, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
@@ -17,9 +19,22 @@ pub(crate) type Replacements = HashMap<usize, Vec<Part>>;
 /// Visual meshes and textures that were read: adding a robot reads only what is new.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct VisualCache {
-    meshes: BTreeMap<MeshKey, Arc<[Part]>>,
+    meshes: BTreeMap<MeshKey, Arc<[MeshPart]>>,
     textures: HashMap<TextureSourceKey, Option<Arc<Texture>>>,
     diagnostics: Vec<Diagnostic>,
+}
+
+/// A part of a mesh file, and its material where the file has one.
+#[derive(Clone, Debug)]
+struct MeshPart {
+    shape: scene::Shape,
+    material: Option<Material>,
+}
+
+/// Whose look is read, as diagnostics say it.
+struct Of {
+    name: String,
+    source: Option<Source>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -36,9 +51,9 @@ impl VisualCache {
 
     /// What is drawn for a visual.
     pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
+        let of = Of { name: format!("link {link:?}"), source: Some(visual.source.clone()) };
         let own = visual.material.as_ref().map(|m| {
-            let texture =
-                m.texture.as_ref().and_then(|path| self.texture(&TextureSource::File(path.clone()), link, visual));
+            let texture = m.texture.as_ref().and_then(|path| self.texture(&TextureSource::File(path.clone()), &of));
             let rgba = m.rgba.map(|c| c.map(|x| x as f32));
             (rgba, texture)
         });
@@ -61,11 +76,11 @@ impl VisualCache {
                 let key = MeshKey::new(path, scale);
                 let known = self.meshes.get(&key).cloned();
                 let parts = known.unwrap_or_else(|| {
-                    let parts: Arc<[Part]> = self.load(link, visual, path, (*scale).into()).into();
+                    let parts: Arc<[MeshPart]> = self.load(&of, path, (*scale).into()).into();
                     self.meshes.insert(key, Arc::clone(&parts));
                     parts
                 });
-                let mut parts = parts.to_vec();
+                let mut parts = drawn(&parts, &Material::default());
                 // A material of the URDF goes over those of the mesh file, as in exports.
                 if let Some((rgba, texture)) = own {
                     for part in &mut parts {
@@ -82,45 +97,57 @@ impl VisualCache {
         }
     }
 
+    /// What is drawn for an object that is a mesh.
+    pub(crate) fn object_parts(&mut self, object: &RigidObjectData) -> Vec<Part> {
+        let of = Of { name: format!("object {:?}", object.uid()), source: None };
+        let Some((key, mesh)) = object.mesh_key().zip(object.mesh().and_then(|mesh| mesh.seen.as_ref())) else {
+            return Vec::new();
+        };
+        let known = self.meshes.get(&key).cloned();
+        let parts = known.unwrap_or_else(|| {
+            let parts: Arc<[MeshPart]> = self.mesh_parts(&of, mesh).into();
+            self.meshes.insert(key, Arc::clone(&parts));
+            parts
+        });
+        drawn(&parts, &Material::from_rgba(object.cfg().rgba.map(|c| c as f32)))
+    }
+
     /// The parts of a mesh file, one for each material.
-    fn load(&mut self, link: &str, visual: &Visual, path: &Path, scale: [f64; 3]) -> Vec<Part> {
-        let mesh = match scene::mesh::load(path) {
-            Ok(mesh) => mesh.scaled(scale),
+    fn load(&mut self, of: &Of, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
+        match scene::mesh::load(path) {
+            Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),
             Err(error) => {
                 self.diagnostics.push(Diagnostic::new(
                     DiagnosticKind::VisualMeshInvalid,
-                    visual.source.clone(),
-                    format!("link {link:?}: the visual mesh is not drawn: {error}"),
+                    of.source.clone(),
+                    format!("{}: the visual mesh is not drawn: {error}", of.name),
                 ));
-                return Vec::new();
+                Vec::new()
             }
-        };
-        let whole = mesh.parts.len() == 1;
-        let parts = mesh.parts.clone();
-        parts
-            .iter()
-            .map(|part| {
-                let material = part.material.and_then(|m| mesh.materials.get(m));
-                let triangles = if whole {
-                    RenderMesh::new(&mesh, RenderMesh::CREASE)
-                } else {
-                    RenderMesh::of_part(&mesh, part, RenderMesh::CREASE)
-                };
-                Part {
-                    shape: Mesh { mesh: Arc::new(triangles) }.into(),
-                    material: self.material(material, link, visual),
-                }
-            })
-            .collect()
+        }
     }
 
-    fn material(&mut self, material: Option<&MeshMaterial>, link: &str, visual: &Visual) -> Material {
-        let Some(material) = material else { return Material::default() };
-        let texture = material.texture.as_ref().and_then(|source| self.texture(source, link, visual));
+    fn mesh_parts(&mut self, of: &Of, mesh: &TriMesh) -> Vec<MeshPart> {
+        let whole = mesh.parts.len() == 1;
+        let part = |part: &scene::mesh::MeshPart| {
+            let material = part.material.and_then(|m| mesh.materials.get(m));
+            let triangles = if whole {
+                RenderMesh::new(mesh, RenderMesh::CREASE)
+            } else {
+                RenderMesh::of_part(mesh, part, RenderMesh::CREASE)
+            };
+            let material = material.map(|material| self.material(material, of));
+            MeshPart { shape: Mesh { mesh: Arc::new(triangles) }.into(), material }
+        };
+        mesh.parts.iter().map(part).collect()
+    }
+
+    fn material(&mut self, material: &MeshMaterial, of: &Of) -> Material {
+        let texture = material.texture.as_ref().and_then(|source| self.texture(source, of));
         Material { rgba: material.rgba, texture, ..Material::default() }
     }
 
-    fn texture(&mut self, source: &TextureSource, link: &str, visual: &Visual) -> Option<Arc<Texture>> {
+    fn texture(&mut self, source: &TextureSource, of: &Of) -> Option<Arc<Texture>> {
         let key = match source {
             TextureSource::File(path) => TextureSourceKey::File(path.clone()),
             TextureSource::Embedded(bytes) => TextureSourceKey::Embedded(bytes.clone()),
@@ -131,14 +158,20 @@ impl VisualCache {
         let texture = read_texture(source).map_err(|reason| {
             self.diagnostics.push(Diagnostic::new(
                 DiagnosticKind::TextureMissing,
-                visual.source.clone(),
-                format!("link {link:?}: a texture is not drawn: {reason}"),
+                of.source.clone(),
+                format!("{}: a texture is not drawn: {reason}", of.name),
             ));
         });
         let texture = texture.ok().map(Arc::new);
         self.textures.insert(key, texture.clone());
         texture
     }
+}
+
+/// Parts with their own materials, or `otherwise`.
+fn drawn(parts: &[MeshPart], otherwise: &Material) -> Vec<Part> {
+    let material = |part: &MeshPart| part.material.clone().unwrap_or_else(|| otherwise.clone());
+    parts.iter().map(|part| Part { shape: part.shape.clone(), material: material(part) }).collect()
 }
 
 fn read_texture(source: &TextureSource) -> Result<Texture, String> {

@@ -1,0 +1,150 @@
+//! What a closed mesh encloses: volume, centre and second moments, exactly for its triangles.
+//!
+//! Every triangle and a point make a tetrahedron; signed, they add up to the solid. For a tetrahedron with corners 0, a, b, c
+//! and `d = a · (b × c)` the volume is `d/6`, the first moment `d/24 (a + b + c)`, and the second moment
+//! `d/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)` with `s = a + b + c`. Source: Tonon, "Explicit exact formulas for the 3-D
+//! tetrahedron inertia tensor in terms of its vertex coordinates", Journal of Mathematics and Statistics 1(1), 2004.
+
+use super::TriMesh;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// What a closed surface encloses, in the axes of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solid {
+    /// Volume \[m³\], positive.
+    pub volume: f64,
+    /// Centre of volume \[m\].
+    pub center: Vector3<f64>,
+    /// Integral of `r rᵀ` over the volume \[m⁵\], with `r` from the centre.
+    pub second_moment: Matrix3<f64>,
+}
+
+impl TriMesh {
+    /// Whether the surface has no rim: every edge is passed as often in the one direction as in the other. Vertices in the
+    /// same place are one; triangles that are only an edge do not count.
+    pub fn is_closed(&self) -> bool {
+        // -0 and 0 are the same place.
+        let place = |vertex: u32| self.positions[vertex as usize].map(|x| (x + 0.0).to_bits());
+        let mut edges: HashMap<[[u32; 3]; 2], i64> = HashMap::new();
+        for triangle in &self.triangles {
+            let corners = triangle.map(place);
+            for k in 0..3 {
+                let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                if from < to {
+                    *edges.entry([from, to]).or_default() += 1;
+                } else if to < from {
+                    *edges.entry([to, from]).or_default() -= 1;
+                }
+            }
+        }
+        !edges.is_empty() && edges.values().all(|&count| count == 0)
+    }
+
+    /// What the surface encloses; `None` where it is not [closed](Self::is_closed) or encloses nothing. A surface that is
+    /// inside out encloses what it would with its front outside; where parts overlap, the volume counts twice.
+    pub fn solid(&self) -> Option<Solid> {
+        if !self.is_closed() {
+            return None;
+        }
+        // About the middle, so that a small part far from the origin loses no digits.
+        let (low, high) = self.bounds()?;
+        let middle = Vector3::from_fn(|i, _| (f64::from(low[i]) + f64::from(high[i])) / 2.0);
+        let (mut volume, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| Vector3::from(self.positions[i as usize].map(f64::from)) - middle);
+            let d = a.dot(&b.cross(&c));
+            let sum = a + b + c;
+            volume += d / 6.0;
+            first += sum * (d / 24.0);
+            let squares = a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose();
+            second += squares * (d / 120.0);
+        }
+        let side = volume.signum();
+        let (volume, first, second) = (volume * side, first * side, second * side);
+        let extent = (Vector3::from(high.map(f64::from)) - Vector3::from(low.map(f64::from))).norm();
+        // Less than rounding in single precision leaves of a body of this size.
+        if volume.is_nan() || volume <= 1e-9 * extent.powi(3) {
+            return None;
+        }
+        let center = first / volume;
+        Some(Solid { volume, center: middle + center, second_moment: second - center * center.transpose() * volume })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+    use crate::pose::from_xyz_rpy;
+
+    fn corner() -> TriMesh {
+        let positions = vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
+        TriMesh::from_triangles(positions, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    }
+
+    /// A brick as an STL file has it: no two triangles share a vertex.
+    fn brick([x, y, z]: [f32; 3]) -> TriMesh {
+        let corners: Vec<[f32; 3]> =
+            (0..8).map(|k| [x * ((k & 1) as f32), y * ((k >> 1 & 1) as f32), z * ((k >> 2) as f32)]).collect();
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        let positions: Vec<[f32; 3]> = faces.flatten().map(|k: usize| corners[k]).collect();
+        let triangles = (0..12).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        TriMesh::from_triangles(positions, triangles)
+    }
+
+    /// A tetrahedron with unit legs: ∫x² = 1/60, ∫xy = 1/120 about the corner, its centre at 1/4 (textbook integrals).
+    #[test]
+    fn a_corner_has_the_integrals_of_a_simplex() {
+        let solid = corner().solid().unwrap();
+        assert!((solid.volume - 1.0 / 6.0).abs() < 1e-15);
+        assert!((solid.center - Vector3::repeat(0.25)).norm() < 1e-15);
+        let (diagonal, mixed) = (1.0 / 60.0 - 1.0 / 96.0, 1.0 / 120.0 - 1.0 / 96.0);
+        let expected = Matrix3::from_fn(|i, j| if i == j { diagonal } else { mixed });
+        assert!((solid.second_moment - expected).norm() < 1e-15, "{}", solid.second_moment);
+        // Control: about the corner it is another one.
+        assert!((solid.second_moment - expected.add_scalar(1.0 / 96.0)).norm() > 1e-3);
+    }
+
+    /// A brick: V a²/12 along each axis, wherever it stands, however it is turned, whichever side is out.
+    #[test]
+    fn a_brick_is_that_of_the_textbook_in_every_place() {
+        let size = [0.25_f32, 0.5, 1.5];
+        let volume: f64 = size.iter().map(|x| f64::from(*x)).product();
+        let own = Matrix3::from_diagonal(&Vector3::from(size.map(|x| volume * f64::from(x).powi(2) / 12.0)));
+        let middle = Vector3::from(size.map(|x| f64::from(x) / 2.0));
+        let solid = brick(size).solid().unwrap();
+        assert!((solid.volume - volume).abs() < 1e-15 && (solid.center - middle).norm() < 1e-15);
+        assert!((solid.second_moment - own).norm() < 1e-15);
+        // Positions in single precision: 2^-24 of 10 m, on sides of 0.25 m.
+        let pose = from_xyz_rpy([7.0, -9.0, 3.0], [0.3, -0.4, 0.5]);
+        let turned = pose.rotation.to_rotation_matrix();
+        let moved = brick(size).transformed(&pose).solid().unwrap_or_else(|| panic!("bits of shared corners agree"));
+        assert!((moved.volume / volume - 1.0).abs() < 1e-5, "{}", moved.volume);
+        assert!((moved.center - (pose * nalgebra::Point3::from(middle)).coords).norm() < 1e-5);
+        let expected = turned.matrix() * own * turned.matrix().transpose();
+        assert!((moved.second_moment - expected).norm() < 1e-5 * expected.norm());
+        let mut inside_out = brick(size);
+        inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        assert!((inside_out.signed_volume() + volume).abs() < 1e-12);
+        assert!((inside_out.solid().unwrap().volume - volume).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_has_a_rim_or_no_inside_is_no_solid() {
+        let mut open = brick([1.0, 1.0, 1.0]);
+        assert!(open.is_closed());
+        open.triangles.pop();
+        assert!(!open.is_closed() && open.solid().is_none());
+        // One face turned over is not closed, either.
+        let mut turned = brick([1.0, 1.0, 1.0]);
+        turned.triangles[3].swap(0, 1);
+        assert!(turned.solid().is_none());
+        // Both sides of a sheet: closed, and nothing inside.
+        let positions = vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
+        let sheet = TriMesh::from_triangles(positions, vec![[0, 1, 2], [0, 2, 1]]);
+        assert!(sheet.is_closed() && sheet.solid().is_none());
+        assert!(TriMesh::default().solid().is_none());
+    }
+}

@@ -1,0 +1,205 @@
+//! Groups: several rigid objects behind one name, written and read together.
+
+use super::free_body::{FreeBody, FreeBodyMut};
+use super::rows::distinct_envs;
+use crate::compile::Simulation;
+use crate::contents::Contents;
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManager};
+use crate::objects::rigid_object::{RigidObjectCfg, RigidObjectData};
+use crate::sensor_list::SensorList;
+use ndarray::{Array2, Array3, ArrayView3, AsArray, Axis, Ix3};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Configuration of a group of rigid objects.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigidObjectGroupCfg {
+    /// Name of the group, unique in the simulation.
+    pub uid: String,
+    /// Its objects, in the order in which they are read and written. In the simulation each is called by the group's name, a
+    /// point and its own: `blocks.red`.
+    pub objects: Vec<RigidObjectCfg>,
+}
+
+impl Default for RigidObjectGroupCfg {
+    /// A group of nothing, which is to be filled in.
+    fn default() -> Self {
+        Self { uid: "group".into(), objects: Vec::new() }
+    }
+}
+
+/// Handle of a group of rigid objects; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct GroupId {
+    manager: u64,
+    index: usize,
+}
+
+/// A group that was added: which of the objects it is.
+#[derive(Clone, Debug)]
+pub(crate) struct GroupData {
+    pub(crate) uid: String,
+    pub(crate) objects: Range<usize>,
+}
+
+/// A group of rigid objects, to read. Arrays have one row per environment and object.
+#[derive(Clone, Copy, Debug)]
+pub struct RigidObjectGroup<'a> {
+    data: &'a GroupData,
+    contents: &'a Contents,
+    simulation: &'a Simulation,
+}
+
+impl<'a> RigidObjectGroup<'a> {
+    pub(crate) fn new(data: &'a GroupData, contents: &'a Contents, simulation: &'a Simulation) -> Self {
+        Self { data, contents, simulation }
+    }
+
+    /// Name of the group.
+    pub fn uid(&self) -> &'a str {
+        &self.data.uid
+    }
+
+    /// Number of objects.
+    pub fn len(&self) -> usize {
+        self.data.objects.len()
+    }
+
+    /// Whether it has no objects, which no group that was added is.
+    pub fn is_empty(&self) -> bool {
+        self.data.objects.is_empty()
+    }
+
+    /// Names of the objects in the simulation, `group.object`, in order.
+    pub fn names(&self) -> Vec<&'a str> {
+        self.contents.objects[self.data.objects.clone()].iter().map(|object| object.uid()).collect()
+    }
+
+    /// Poses of the objects in the environment: `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, K, 7).
+    pub fn get_pose(&self) -> Array3<f64> {
+        self.gather(|body| body.poses())
+    }
+
+    /// Velocities of the objects' frames, then angular velocities, in world axes \[m/s, rad/s\], shape (N, K, 6).
+    pub fn get_velocity(&self) -> Array3<f64> {
+        self.gather(|body| body.velocities())
+    }
+
+    fn gather(&self, read: impl Fn(FreeBody<'_>) -> Array2<f64>) -> Array3<f64> {
+        let indices = &self.simulation.objects[self.data.objects.clone()];
+        let each: Vec<Array2<f64>> =
+            indices.iter().map(|&index| read(FreeBody { simulation: self.simulation, index })).collect();
+        let width = each.first().map_or(0, Array2::ncols);
+        Array3::from_shape_fn((self.simulation.batch.num_envs(), each.len(), width), |(i, k, c)| each[k][(i, c)])
+    }
+}
+
+/// A group of rigid objects, to write.
+#[derive(Debug)]
+pub struct RigidObjectGroupMut<'a> {
+    data: &'a GroupData,
+    contents: &'a Contents,
+    simulation: &'a mut Simulation,
+    sensors: &'a mut SensorList,
+}
+
+impl<'a> RigidObjectGroupMut<'a> {
+    pub(crate) fn new(
+        data: &'a GroupData,
+        contents: &'a Contents,
+        simulation: &'a mut Simulation,
+        sensors: &'a mut SensorList,
+    ) -> Self {
+        Self { data, contents, simulation, sensors }
+    }
+
+    /// The group, to read.
+    pub fn read(&self) -> RigidObjectGroup<'_> {
+        RigidObjectGroup::new(self.data, self.contents, self.simulation)
+    }
+
+    /// Puts the objects somewhere, as [`RigidObjectMut::write_pose`](crate::RigidObjectMut::write_pose) does one: poses
+    /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (environments, K, 7), for `env_ids` (all where `None`; a
+    /// single row is for all of them).
+    ///
+    /// # Errors
+    /// One of the objects is static; wrong shape, unknown environment, or one that is named twice, a value that is not finite,
+    /// a quaternion of length zero; then nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
+        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let (rows, objects, numbers) = poses.dim();
+        if ![1, envs.len()].contains(&rows) || objects != self.data.objects.len() || numbers != 7 {
+            let (found, expected) = (poses.shape().to_vec(), vec![envs.len(), self.data.objects.len(), 7]);
+            let meaning = "environments, objects, x y z qw qx qy qz";
+            return Err(Error::Shape { argument, found, expected, meaning });
+        }
+        let mut checked = Vec::new();
+        for k in 0..objects {
+            checked.push(self.body(k).check_poses(argument, poses.index_axis(Axis(1), k), env_ids)?);
+        }
+        for (k, poses) in checked.iter().enumerate() {
+            self.body(k).put_poses(poses);
+        }
+        self.sensors.refresh(&envs, self.simulation);
+        Ok(())
+    }
+
+    fn body(&mut self, k: usize) -> FreeBodyMut<'_> {
+        let object = self.data.objects.start + k;
+        let index = self.simulation.objects[object];
+        let owner = self.contents.objects[object].uid();
+        FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner }
+    }
+}
+
+impl SimulationManager {
+    /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
+    /// [`rigid_object_id`](Self::rigid_object_id) each of them is an object as any other, called `group.object`.
+    ///
+    /// # Errors
+    /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.
+    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
+        self.check_world_uid(&cfg.uid)?;
+        if cfg.objects.is_empty() {
+            let expected = "a group needs at least 1 object";
+            return Err(Error::Config { field: "objects", value: "[]".into(), expected });
+        }
+        let (mut contents, mut diagnostics) = (self.contents.clone(), Vec::new());
+        let first = contents.objects.len();
+        for mut object in cfg.objects {
+            object.uid = format!("{}.{}", cfg.uid, object.uid);
+            contents.check_uid(&object.uid)?;
+            let object = RigidObjectData::new(object, contents.next_mask_id(), &mut diagnostics)?;
+            contents.objects.push(Arc::new(object));
+        }
+        contents.groups.push(GroupData { uid: cfg.uid, objects: first..contents.objects.len() });
+        self.replace_contents(contents, diagnostics)?;
+        Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
+    }
+
+    /// A group of rigid objects, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
+        let index = self.index_of(id.manager, id.index);
+        RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
+    }
+
+    /// A group of rigid objects, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
+        let index = self.index_of(id.manager, id.index);
+        let group = &self.contents.groups[index];
+        RigidObjectGroupMut::new(group, &self.contents, &mut self.simulation, &mut self.sensors)
+    }
+}

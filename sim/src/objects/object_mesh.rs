@@ -1,0 +1,61 @@
+//! Meshes of rigid objects: what collides, what is seen, what is inside.
+
+use super::shape::{ObjectShape, cone};
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::error::{Error, Result};
+use crate::inertia::RigidInertia;
+use ::scene::mesh::{HullCache, Solid, TriMesh};
+use nalgebra::Matrix3;
+use std::sync::Arc;
+
+/// The mesh of an object.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectMesh {
+    /// What collides: convex.
+    pub(crate) hull: Arc<TriMesh>,
+    /// What is seen, where it is not the hull: the triangles of a file.
+    pub(crate) seen: Option<Arc<TriMesh>>,
+    /// What it would weigh with 1 kg/m³; `None` where the shape says it.
+    pub(crate) inertia: Option<RigidInertia>,
+}
+
+impl ObjectMesh {
+    /// The mesh of a shape; `None` where MuJoCo has the shape.
+    pub(crate) fn of(uid: &str, shape: &ObjectShape, diagnostics: &mut Vec<Diagnostic>) -> Result<Option<Self>> {
+        let (path, scale, cfg) = match shape {
+            ObjectShape::Cone { radius, height } => {
+                let hull = Arc::new(cone(*radius, *height));
+                return Ok(Some(Self { hull, seen: None, inertia: None }));
+            }
+            ObjectShape::Mesh { path, scale, hull } => (path, *scale, hull),
+            _ => return Ok(None),
+        };
+        let failed = |error| Error::ObjectMesh { object: uid.into(), error: Box::new(error) };
+        let seen = ::scene::mesh::load(path).map_err(failed)?.scaled(scale);
+        let hull = HullCache::default_location().hull_of_file(path, scale, cfg).map_err(failed)?;
+        let solid = match seen.solid() {
+            Some(solid) => Some(solid),
+            None => {
+                diagnostics.push(Diagnostic::new(
+                    DiagnosticKind::OpenMesh,
+                    None,
+                    format!(
+                        "object {uid:?}: {}: the surface is open or encloses nothing; mass, centre of mass and moments are \
+                         those of its convex hull",
+                        path.display()
+                    ),
+                ));
+                hull.solid()
+            }
+        };
+        // Hulls are closed and have a volume: what is flat was made thicker.
+        let inertia = Some(solid.map_or(RigidInertia::ZERO, |solid| inertia(&solid)));
+        Ok(Some(Self { hull: Arc::new(hull), seen: Some(Arc::new(seen)), inertia }))
+    }
+}
+
+/// Mass properties of a solid of 1 kg/m³: `I = tr(Σ) 1 - Σ`.
+fn inertia(solid: &Solid) -> RigidInertia {
+    let tensor = Matrix3::identity() * solid.second_moment.trace() - solid.second_moment;
+    RigidInertia { mass: solid.volume, com: solid.center, inertia: tensor }
+}

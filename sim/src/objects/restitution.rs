@@ -1,0 +1,87 @@
+//! Restitution by MuJoCo's contacts, which have none.
+//!
+//! A contact of MuJoCo is a spring and a damper that can only push: with `solref = (-k, -b)` and a constant impedance the
+//! distance x of two surfaces that meet with a load between them obeys `x'' = -b x' - k x` while the force is above zero
+//! (MuJoCo's documentation, "Constraint model": `a1 = d aref + (1 - d) a0` with `aref = -b/d x' - k/d x`; k and b
+//! are per unit of mass). What flies off again has the part
+//!
+//! ```text
+//! e = exp(-β/ω atan2(2 β ω, β² - ω²)),   β = b/2, ω = sqrt(k - β²)
+//! ```
+//!
+//! of its velocity: 1 without damping, exp(-2) = 0.135 at critical damping. Source: Schwager, Pöschel, "Coefficient of
+//! restitution and linear-dashpot model revisited", Granular Matter 9, 2007, equation 21. It depends on the damping ratio
+//! `ζ = β/sqrt k` alone; the stiffness is chosen for the time step.
+
+use std::f64::consts::PI;
+
+/// The least restitution there is a damping for below the critical one: a little above exp(-2).
+pub(crate) const LEAST: f64 = 0.14;
+
+/// Steps that a contact without damping takes. More are more exact, and softer: what comes with v sinks in by
+/// `v STEPS h / π`.
+const STEPS: f64 = 10.0;
+
+/// Impedance of such a contact, the same at every depth: the formula asks for a constant, and MuJoCo's largest default
+/// leaves room to it.
+pub(crate) const IMPEDANCE: [f64; 5] = [0.95, 0.95, 0.001, 0.5, 2.0];
+
+/// Weight of its impedance against that of other surfaces, which have 1.
+pub(crate) const WEIGHT: f64 = 1e6;
+
+/// Restitution of a contact with a damping ratio of 0 to below 1.
+fn restitution(ratio: f64) -> f64 {
+    let omega = (1.0 - ratio * ratio).sqrt();
+    (-ratio / omega * (2.0 * ratio * omega).atan2(ratio * ratio - omega * omega)).exp()
+}
+
+/// MuJoCo's `solref` of surfaces with this restitution, [`LEAST`] to 1, in steps of `timestep` \[s\].
+pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
+    // Falls from 1 to exp(-2): halving finds the damping ratio to the last bit.
+    let (mut low, mut high) = (0.0, 1.0 - 1e-12);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if restitution(middle) > restitution_wanted { low = middle } else { high = middle }
+    }
+    let ratio = if restitution_wanted >= 1.0 { 0.0 } else { (low + high) / 2.0 };
+    let frequency = PI / (STEPS * timestep);
+    // MuJoCo takes 0 for a positive number, which means something else.
+    let damping = (2.0 * ratio * frequency).max(1e-9);
+    [-frequency * frequency, -damping]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Integrates the contact with steps of a ten-thousandth of it.
+    fn bounce(stiffness: f64, damping: f64) -> f64 {
+        let h = PI / stiffness.sqrt() * 1e-4;
+        let (mut x, mut v) = (0.0_f64, -1.0_f64);
+        loop {
+            let force = -stiffness * x - damping * v;
+            if force <= 0.0 {
+                return v;
+            }
+            // The midpoint rule: an error of the square of the step.
+            let (xm, vm) = (x + v * h / 2.0, v + force * h / 2.0);
+            x += vm * h;
+            v += (-stiffness * xm - damping * vm) * h;
+        }
+    }
+
+    #[test]
+    fn the_damping_gives_the_restitution() {
+        for wanted in [0.14, 0.2, 0.35, 0.5, 0.75, 0.9, 0.99] {
+            let [stiffness, damping] = solref(wanted, 0.002).map(|x| -x);
+            let found = bounce(stiffness, damping);
+            assert!((found - wanted).abs() < 1e-5, "{wanted}: {found}");
+            assert!((stiffness.sqrt() * 0.002 * STEPS / PI - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(solref(1.0, 0.01)[1], -1e-9);
+        assert!((restitution(1.0 - 1e-9) - (-2.0_f64).exp()).abs() < 1e-4);
+        // Control: twice the damping is another restitution.
+        let [stiffness, damping] = solref(0.5, 0.002).map(|x| -x);
+        assert!((bounce(stiffness, 2.0 * damping) - 0.5).abs() > 0.1);
+    }
+}

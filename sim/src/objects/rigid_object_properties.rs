@@ -1,0 +1,219 @@
+//! What a rigid object weighs and how it rubs in each environment, while the simulation runs; forces on it.
+//!
+//! An environment whose object differs from the others gets a model of its own, in which only the arrays that differ are its
+//! own memory: see [`randomization`](crate::randomization), whose properties these are.
+
+use crate::env::Env;
+use crate::error::{Error, Result};
+use crate::manager::EnvId;
+use crate::mj::Model;
+use crate::objects::rigid_object::{BodyType, RigidObject, RigidObjectMut};
+use crate::objects::rows::{Rows, Table, distinct_envs};
+use crate::randomization::Property;
+use crate::wrenches::{Wrench, WrenchFrame};
+use nalgebra::{UnitQuaternion, Vector3};
+use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix1, Ix2};
+
+/// What stands for the robot in the wrenches of objects: there are fewer robots.
+const OBJECTS: usize = 1 << 20;
+
+impl RigidObject<'_> {
+    /// Mass in each environment \[kg\], shape (N), as MuJoCo has it; that of the configuration where the object is not
+    /// dynamic.
+    pub fn get_mass(&self) -> Array1<f64> {
+        let nominal = self.data.mass_properties().mass;
+        self.numbers(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec()).remove_axis(Axis(1))
+    }
+
+    /// Centre of mass in the object's frame in each environment \[m\], shape (N, 3).
+    pub fn get_center_of_mass(&self) -> Array2<f64> {
+        let nominal = self.data.mass_properties().com.iter().copied().collect();
+        self.numbers(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
+    }
+
+    /// Principal moments of inertia about the centre of mass in each environment \[kg m²\], shape (N, 3). Their axes are those
+    /// of the object's frame, but for a mesh, of which the largest moment is the first.
+    pub fn get_inertia(&self) -> Array2<f64> {
+        let nominal = self.data.mass_properties().moments.iter().copied().collect();
+        self.numbers(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())
+    }
+
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] in each environment, shape (N, 3).
+    pub fn get_friction(&self) -> Array2<f64> {
+        let mut values = Array2::zeros((self.simulation.batch.num_envs(), 3));
+        let body = self.simulation.objects[self.index].body;
+        self.simulation.batch.for_each(|i, env| {
+            let model = env.data().model();
+            // The first shape is the one that collides.
+            if let Ok(geom) = usize::try_from(model.body_geomadr()[body]) {
+                (0..3).for_each(|k| values[(i, k)] = model.geom_friction()[3 * geom + k]);
+            }
+        });
+        values
+    }
+
+    /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes with the object where
+    /// it is \[N, N m\], shape (N, 6).
+    pub fn get_external_wrench(&self) -> Array2<f64> {
+        let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
+        self.simulation.batch.for_each(|i, env: &Env| {
+            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of == (OBJECTS, self.index)) {
+                let [force, torque] = wrench.in_world(env.data());
+                force.iter().chain(&torque).enumerate().for_each(|(k, value)| wrenches[(i, k)] = *value);
+            }
+        });
+        wrenches
+    }
+
+    /// Numbers of its body in each environment; those of the configuration where MuJoCo has none.
+    fn numbers(&self, width: usize, nominal: Vec<f64>, read: impl Fn(&Model, usize) -> Vec<f64>) -> Array2<f64> {
+        let body = self.simulation.objects[self.index].body;
+        let moves = self.cfg().body_type == BodyType::Dynamic;
+        let mut values = Array2::zeros((self.simulation.batch.num_envs(), width));
+        self.simulation.batch.for_each(|i, env| {
+            let row = if moves { read(env.data().model(), body) } else { nominal.clone() };
+            row.into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
+        });
+        values
+    }
+}
+
+impl RigidObjectMut<'_> {
+    /// Sets the mass \[kg\] of the object in `env_ids` (all where `None`): one number for each, or one for all of them. The
+    /// moments of inertia change in the same proportion, from those of the configuration, as with another density. It stays
+    /// through a reset; a forward pass follows.
+    ///
+    /// # Errors
+    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a mass that is not finite or
+    /// below 1e-15 kg; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_mass<'t>(&mut self, masses: impl AsArray<'t, f64, Ix1>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let masses = masses.into().insert_axis(Axis(1));
+        self.set("set_mass", "environments, 1", &[Property::Mass], masses, env_ids)
+    }
+
+    /// Sets the centre of mass in the object's frame \[m\]: rows of 3, as in [`set_mass`](Self::set_mass).
+    ///
+    /// # Errors
+    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is not finite;
+    /// then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_center_of_mass<'t>(
+        &mut self,
+        centers: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (argument, meaning) = ("set_center_of_mass", "environments, x y z");
+        self.set(argument, meaning, &[Property::CenterOfMass], centers.into(), env_ids)
+    }
+
+    /// Sets the principal moments of inertia \[kg m²\], as [`get_inertia`](RigidObject::get_inertia) gives them: rows of 3, as in
+    /// [`set_mass`](Self::set_mass).
+    ///
+    /// # Errors
+    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, moments that no body has; then
+    /// nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_inertia<'t>(&mut self, moments: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let (argument, meaning) = ("set_inertia", "environments, three moments");
+        self.set(argument, meaning, &[Property::Inertia], moments.into(), env_ids)
+    }
+
+    /// Sets sliding friction, torsional \[m\] and rolling \[m\]: rows of 3, as in [`set_mass`](Self::set_mass). MuJoCo takes the
+    /// larger of the two surfaces that touch: for a slippery object the ground must be slippery, too.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown environment, or one that is named twice, a coefficient that is negative or not finite; then
+    /// nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_friction<'t>(&mut self, frictions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let properties = [Property::Friction, Property::TorsionalFriction, Property::RollingFriction];
+        let meaning = "environments, sliding torsional rolling";
+        self.set("set_friction", meaning, &properties, frictions.into(), env_ids)
+    }
+
+    /// Sets properties from rows, one after the other.
+    fn set(
+        &mut self,
+        argument: &'static str,
+        meaning: &'static str,
+        properties: &[Property],
+        values: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        if properties[0] != Property::Friction {
+            self.check_dynamic(argument)?;
+        }
+        let uid = self.data.uid();
+        let columns = properties.iter().map(|property| property.width()).sum();
+        let rows = self.rows(argument, meaning, columns, values, env_ids)?;
+        let given: Vec<(usize, Vec<f64>)> = rows.iter().map(|(env, row)| (env, row.to_vec())).collect();
+        self.simulation.change_properties(rows.envs(), |env, changed| {
+            let row = given.iter().find(|(of, _)| *of == env).map_or(&[][..], |(_, row)| row);
+            let mut rest = row;
+            for &property in properties {
+                let (mine, others) = rest.split_at(property.width().min(rest.len()));
+                changed.set(property, uid, mine)?;
+                rest = others;
+            }
+            Ok(())
+        })?;
+        self.sensors.refresh(rows.envs(), self.simulation);
+        Ok(())
+    }
+
+    /// Applies a force \[N\] in the centre of mass and a torque \[N m\] from the next step on, until they are set again or the
+    /// environment is reset; zeros end them. Both have rows of 3 for `env_ids` (all where `None`; a single row is for all of
+    /// them). With [`WrenchFrame::Link`] both are in the axes of the object and turn with it, from step to step.
+    ///
+    /// # Errors
+    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not finite;
+    /// then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_external_wrench<'f, 't>(
+        &mut self,
+        forces: impl AsArray<'f, f64, Ix2>,
+        torques: impl AsArray<'t, f64, Ix2>,
+        frame: WrenchFrame,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (argument, meaning) = ("set_external_wrench", "environments, x y z");
+        self.check_dynamic(argument)?;
+        let forces = self.rows("set_external_wrench (forces)", meaning, 3, forces.into(), env_ids)?;
+        let torques = self.rows("set_external_wrench (torques)", meaning, 3, torques.into(), env_ids)?;
+        let of = (OBJECTS, self.index);
+        let body = self.simulation.objects[self.index].body;
+        for ((env, force), (_, torque)) in forces.arrays::<3>().zip(torques.arrays::<3>()) {
+            let (force, torque) = (Vector3::from(force), Vector3::from(torque));
+            let axes = (frame == WrenchFrame::Link).then(UnitQuaternion::identity);
+            let acts = force != Vector3::zeros() || torque != Vector3::zeros();
+            self.simulation.batch.write(env, |env| {
+                env.set_wrenches(|wrenches| {
+                    wrenches.replace(of, acts.then_some(Wrench { of, body, axes, force, torque }));
+                });
+            });
+        }
+        Ok(())
+    }
+
+    fn check_dynamic(&self, argument: &'static str) -> Result<()> {
+        if self.data.cfg().body_type == BodyType::Dynamic {
+            return Ok(());
+        }
+        Err(Error::NotDynamic { argument, object: self.data.uid().into() })
+    }
+
+    fn rows<'v>(
+        &self,
+        argument: &'static str,
+        meaning: &'static str,
+        columns: usize,
+        values: ArrayView2<'v, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rows<'v>> {
+        let num_envs = self.simulation.batch.num_envs();
+        distinct_envs(argument, env_ids, num_envs)?;
+        let of = |_| format!("object {:?}", self.data.uid());
+        Rows::check(Table { argument, meaning, columns, of: &of }, values, env_ids, num_envs)
+    }
+}
