@@ -3,6 +3,7 @@
 
 pub(crate) mod arm;
 pub(crate) mod cloud;
+pub(crate) mod motion;
 pub(crate) mod panel;
 pub(crate) mod picture;
 pub(crate) mod stage;
