@@ -12,18 +12,16 @@
 
 mod launcher;
 
-use clap::{CommandFactory, FromArgMatches, Parser};
-use kinetoscope::ndarray::Array2;
+use clap::Parser;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sim::Cone;
-use launcher::motion::{Motion, pose};
-use launcher::{Launcher, Progress, arm, picture, stage};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use launcher::motion::Motion;
+use launcher::trial::{self, Album};
+use launcher::{Launcher, Progress, grip, stage};
+use nalgebra::Vector3;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Grasps cubes, lifts them by 0.2 m, holds them for 2 s, puts them on a shelf, and counts.
@@ -60,27 +58,19 @@ const AT_REST_HEIGHT: f64 = 3e-3;
 /// ... and it moves no faster than this \[m/s, rad/s\].
 const AT_REST_SPEED: f64 = 0.01;
 
-/// The hand is tilted by this \[rad\], fingers down: then the thumb's tip and the fingers' tips, closed on a cube, are at
-/// the same height.
-const TILT: f64 = 20f64.to_radians();
-/// The middle of the cube between the tips, in the tilted hand: ahead of the palm's frame, to the side of the thumb, below
-/// \[m\]. Forward kinematics of the URDF: tips are 0.103 below, the table 0.117; the fingers that close are 0.01 and 0.03
-/// to the side, the thumb 0.02.
+/// The middle of the cube in the hand, ahead of the palm's frame, to the side of the thumb, below \[m\]. The fingers that
+/// close are 0.01 and 0.03 to the side, the thumb 0.02; the table is 5 mm below their tips.
 const GRIP: [f64; 3] = [0.0707, -0.02, -0.087];
 /// Fingers close until they meet the cube, with this effort each \[N m\]: 9.5 N at the tip, 0.105 m of joint and follower
 /// away. The thumb holds its place against both with up to 2 N m.
 const FINGER_EFFORT: f64 = 1.0;
+/// Hand open, thumb up.
+const OPEN: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.0), ("LEFT_HAND_INDEX", 0.35), ("LEFT_HAND_MIDDLE", 0.35)];
+/// The thumb at the cube, the fingers as far as they get.
+const CLOSED: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.18), ("LEFT_HAND_INDEX", 1.2), ("LEFT_HAND_MIDDLE", 1.2)];
 
 fn main() -> ExitCode {
-    // A launcher's flag, with another default.
-    let command = Args::command().mut_arg("num_envs", |flag| flag.default_value("16"));
-    let args = Args::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit());
-    let mut enough = false;
-    let code = launcher::run("grasp", || {
-        enough = run(&args)?;
-        Ok(())
-    });
-    if enough || code != ExitCode::SUCCESS { code } else { ExitCode::FAILURE }
+    trial::run("grasp", || run(&trial::parse()))
 }
 
 fn run(args: &Args) -> launcher::Result<bool> {
@@ -93,9 +83,10 @@ fn run(args: &Args) -> launcher::Result<bool> {
         arena_space: args.launcher.arena_space.unwrap_or(1.8),
         ..args.launcher.simulation()?
     })?;
-    let robot = sim.add_robot(robot_cfg()?)?;
+    let robot = sim.add_robot(grip::robot_cfg(&OPEN, FINGER_EFFORT)?)?;
     let cube = add_things(&mut sim)?;
-    let camera = sim.add_sensor("camera", camera_cfg())?;
+    let out = args.launcher.out.clone();
+    let mut album = Album::new(&mut sim, "grasp", out, [1.25, -0.65, 0.75], [0.45, 0.05, 0.25])?;
     sim.randomize(&Randomization::new().with(Property::Mass, "cube", Draw::Set(MASSES)), None)?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
@@ -105,32 +96,26 @@ fn run(args: &Args) -> launcher::Result<bool> {
             eprintln!("warning: {left_out}");
         }
     }
-    let cubes = scatter(&mut sim, cube, args.launcher.seed)?;
+    let cubes = scatter(&mut sim, cube)?;
+    let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).get_pose());
+    let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
 
-    let progress = Progress::new(&args.launcher, (17.0 / sim.cfg().physics_dt) as u64);
-    let album = Album::new(args.launcher.out.clone(), camera)?;
-    let tip = Tip::of_part("arm").at("left_hand_base").with_tcp(hand_from_grip());
+    let progress = Progress::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
+    let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
-    let above = |poses: &[Pose], height: f64| -> Vec<Pose> {
-        poses.iter().map(|pose| Pose::translation(0.0, 0.0, height) * pose).collect()
-    };
-    let places = |sim: &SimulationManager| -> Vec<Pose> {
-        sim.rigid_object(cube).get_pose().rows().into_iter().map(pose).collect()
-    };
-
     progress.say("To the cubes...");
     let grips: Vec<Pose> = cubes.iter().map(grip_of).collect();
     motion.reach(&above(&grips, 0.12), 2.0)?;
     motion.line(&grips, 1.5)?;
-    album.add(motion.sim, "1_around")?;
+    album.add(motion.sim)?;
     progress.say("Closing the hands...");
     let start: Vec<f64> = places(motion.sim).iter().map(|cube| cube.translation.z).collect();
     motion.joints(&CLOSED, 1.0)?;
-    album.add(motion.sim, "2_closed")?;
+    album.add(motion.sim)?;
     progress.say("Lifting...");
     motion.line(&above(&grips, LIFT_COMMAND), 1.5)?;
     motion.wait(0.3, |_| ())?;
-    album.add(motion.sim, "3_lifted")?;
+    album.add(motion.sim)?;
     progress.say("Holding...");
     let mut rises = vec![f64::INFINITY; start.len()];
     let mut held = 0;
@@ -140,23 +125,21 @@ fn run(args: &Args) -> launcher::Result<bool> {
             *rise = rise.min(cube.translation.z - start);
         }
     })?;
-    album.add(motion.sim, "4_held")?;
+    album.add(motion.sim)?;
     progress.say("To the shelf...");
     // The cube lies in the hand a little otherwise than planned: the plan goes on from where it is.
-    let down: Vec<Pose> = places(motion.sim)
-        .iter()
-        .zip(&above(&grips, LIFT_COMMAND))
-        .map(|(cube, grip)| shelf_place() * upright(cube).inv_mul(grip))
-        .collect();
+    let lifted = above(&grips, LIFT_COMMAND);
+    let from_cube = |(cube, grip): (&Pose, &Pose)| shelf_place() * upright(cube).inv_mul(grip);
+    let down: Vec<Pose> = places(motion.sim).iter().zip(&lifted).map(from_cube).collect();
     motion.line(&above(&down, 0.1), 2.5)?;
     motion.line(&down, 1.5)?;
     motion.wait(0.3, |_| ())?;
-    album.add(motion.sim, "5_on_the_shelf")?;
+    album.add(motion.sim)?;
     progress.say("Letting go...");
     motion.joints(&OPEN, 1.0)?;
     motion.line(&above(&down, 0.12), 1.0)?;
     motion.wait(1.0, |_| ())?;
-    album.add(motion.sim, "6_let_go")?;
+    album.add(motion.sim)?;
 
     let (steps, planned) = (motion.step(), motion.planned().to_vec());
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
@@ -176,18 +159,16 @@ fn run(args: &Args) -> launcher::Result<bool> {
             "lowest_rise": Some(rises[env]).filter(|rise| rise.is_finite()), "end": to_row(&poses[env]),
             "speed": speed, "lifted": lifted, "on_shelf": rests, "success": success,
         }));
-        let word = |yes: bool| if yes { "yes" } else { "no" };
         println!(
             "environment {env:>2}: {mass:.3} kg, way planned: {}, held at {:+.4} m: {}, on the shelf: {}",
-            word(planned[env]),
+            trial::word(planned[env]),
             rises[env],
-            word(lifted),
-            word(rests),
+            trial::word(lifted),
+            trial::word(rests),
         );
     }
     let successes = table.iter().filter(|row| row["success"] == true).count();
-    // 15 of 16.
-    let needed = sim.num_envs() - sim.num_envs() / 16;
+    let needed = trial::needed(sim.num_envs());
     println!("\n{successes} of {} cubes were lifted, held and put down; {needed} are enough", sim.num_envs());
     println!("{steps} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
     if let Some(out) = &args.launcher.out {
@@ -206,31 +187,6 @@ fn run(args: &Args) -> launcher::Result<bool> {
         "warnings": sim.warning_counts(),
     }))?;
     Ok(successes >= needed)
-}
-
-/// Hand open, the thumb opposite the fingers.
-const OPEN: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.0), ("LEFT_HAND_INDEX", 0.35), ("LEFT_HAND_MIDDLE", 0.35)];
-/// The thumb at the cube, the fingers as far as they get.
-const CLOSED: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.18), ("LEFT_HAND_INDEX", 1.2), ("LEFT_HAND_MIDDLE", 1.2)];
-
-/// The arm bent over the table, ring finger and pinky out of the way.
-fn robot_cfg() -> launcher::Result<RobotCfg> {
-    let cfg = arm::bundled()?;
-    let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6), ("JOINT6", FRAC_PI_2)];
-    let thumb = [("LEFT_HAND_THUMB2", FRAC_PI_2)];
-    let init_qpos = elbow.iter().chain(&thumb).chain(&OPEN).map(|&(joint, q)| (joint.to_string(), q)).collect();
-    let max_effort = Some([("LEFT_HAND_INDEX|LEFT_HAND_MIDDLE", FINGER_EFFORT)].into());
-    Ok(RobotCfg { init_qpos, drive: DriveCfg { max_effort, ..cfg.drive }, ..cfg })
-}
-
-/// Where the hand holds: x ahead, y to the side of the fingers without thumb, z up, in the frame of the palm.
-fn hand_from_grip() -> Pose {
-    // Of the palm: y are straight fingers, z is where it looks, x is to the side.
-    let (sin, cos) = TILT.sin_cos();
-    let (ahead, side, up) = (Vector3::new(0.0, cos, -sin), Vector3::x(), Vector3::new(0.0, -sin, -cos));
-    let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[ahead, side, up]));
-    let rotation = UnitQuaternion::from_rotation_matrix(&axes);
-    Pose::from_parts((rotation * Vector3::from(GRIP)).into(), rotation)
 }
 
 /// How to hold a cube: from that of its four sides that looks most to the arm.
@@ -291,52 +247,12 @@ fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
 }
 
 /// Puts each cube elsewhere on its table; where they are then.
-fn scatter(sim: &mut SimulationManager, cube: ObjectId, seed: u64) -> launcher::Result<Vec<Pose>> {
-    let first = sim.cfg().first_env();
-    let poses: Vec<Pose> = (0..sim.num_envs())
-        .map(|env| {
-            let mut random = Random::keyed(seed, (first + env) as u64, "cube");
-            let mut within = |most: f64| most * (2.0 * random.uniform() - 1.0);
-            let [x, y, z] = [TABLE[0] + within(SCATTER), TABLE[1] + within(SCATTER), TABLE[2] + EDGE / 2.0];
-            from_xyz_rpy([x, y, z], [0.0, 0.0, within(TURN)])
-        })
-        .collect();
-    let rows = Array2::from_shape_fn((poses.len(), 7), |(env, k)| to_row(&poses[env])[k]);
-    sim.rigid_object_mut(cube).write_pose(&rows, None)?;
+fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result<Vec<Pose>> {
+    let place = |[x, y, turn]: [f64; 3]| {
+        let place = [TABLE[0] + SCATTER * x, TABLE[1] + SCATTER * y, TABLE[2] + EDGE / 2.0];
+        from_xyz_rpy(place, [0.0, 0.0, TURN * turn])
+    };
+    let poses: Vec<Pose> = grip::scatter(sim, "cube").into_iter().map(place).collect();
+    sim.rigid_object_mut(cube).write_pose(&trial::rows(&poses), None)?;
     Ok(poses)
-}
-
-/// Looks at the table and the shelf of the first environments.
-fn camera_cfg() -> CameraCfg {
-    let (eye, target, up) = ([1.35, -0.55, 0.85], [0.45, 0.05, 0.35], [0.0, 0.0, 1.0]);
-    CameraCfg {
-        intrinsics: Intrinsics::Fovy { radians: 45f64.to_radians() },
-        extrinsics: Extrinsics { placement: Placement::LookAt { eye, target, up }, ..Default::default() },
-        env_ids: Some(vec![0]),
-        ..Default::default()
-    }
-}
-
-/// Pictures of the first environment.
-struct Album {
-    out: Option<PathBuf>,
-    camera: SensorId<Camera>,
-}
-
-impl Album {
-    fn new(out: Option<PathBuf>, camera: SensorId<Camera>) -> launcher::Result<Self> {
-        if let Some(out) = &out {
-            std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
-        }
-        Ok(Self { out, camera })
-    }
-
-    fn add(&self, sim: &SimulationManager, name: &str) -> launcher::Result {
-        let Some(out) = &self.out else { return Ok(()) };
-        let camera = sim.sensor(self.camera)?;
-        let (height, width) = camera.image_shape();
-        let color = camera.color()?;
-        let color = color.as_slice().ok_or("the picture is not in one piece")?;
-        picture::write_png(&out.join(format!("grasp_{name}.png")), &picture::color_picture([width, height], color))
-    }
 }

@@ -23,11 +23,12 @@ pub mod prelude {
         JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg, Sampled, SamplingCfg, TargetFrameCfg,
     };
     pub use sim::{
-        ActuatorIndex, ActuatorModel, BodyType, ComponentCfg, DcMotor, DelayedPd, Diagnostic, Draw, DriveCfg,
-        DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, IdealPd, IkCfg, IkResult, IkTask,
-        Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId, NameCase, NameCaseCfg,
-        ObjectId, ObjectShape, PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result,
-        RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError, SimulationManager,
-        SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WrenchFrame,
+        ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
+        Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, IdealPd,
+        IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg, MjcfId,
+        NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties, Property, Randomization,
+        RandomizationError, Result, RigidObjectCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
+        SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
+        WrenchFrame,
     };
 }

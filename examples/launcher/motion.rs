@@ -1,9 +1,8 @@
 //! Movements of an arm and a hand: planned by inverse kinematics, played as position targets in all environments.
 
-use super::{Progress, Result};
-use kinetoscope::ndarray::{Array2, ArrayView1, Axis};
+use super::{Progress, Result, trial};
+use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::pose::from_row;
 
 /// Distance of points on a straight line that inverse kinematics are solved for \[m\].
 const SPACING: f64 = 0.02;
@@ -59,8 +58,7 @@ impl<'a> Motion<'a> {
     /// Goes to one pose per environment on a straight line from where the targets put the frame now.
     pub(crate) fn line(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
-        let from: Vec<Pose> =
-            self.sim.robot(self.robot).compute_fk(&start, self.tip, None)?.rows().into_iter().map(pose).collect();
+        let from = trial::poses(&self.sim.robot(self.robot).compute_fk(&start, self.tip, None)?);
         let length = from.iter().zip(poses).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
         let points = (length.fold(0.0, f64::max) / SPACING).ceil().max(1.0) as usize;
         let mut way = vec![start];
@@ -135,9 +133,4 @@ impl<'a> Motion<'a> {
         }
         Ok(())
     }
-}
-
-/// A pose of a row `[x, y, z, qw, qx, qy, qz]`.
-pub(crate) fn pose(row: ArrayView1<'_, f64>) -> Pose {
-    from_row(&std::array::from_fn(|k| row[k]))
 }

@@ -306,7 +306,7 @@ fn identify(
                 id: data.mask_id(geom.link),
                 object: data.uid().into(),
                 link: Some(data.description().links[geom.link].name.clone()),
-                class: "robot".into(),
+                class: data.semantic_class().into(),
                 body: Some((first + geom.link) as u32),
             };
         }

@@ -9,7 +9,7 @@ use crate::objects::terrain::Terrain;
 use sensors::EngineSensor;
 use std::sync::Arc;
 
-/// Robots, objects, terrains and MJCF files.
+/// Robots (and articulations that are none), objects, terrains and MJCF files.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) robots: Vec<Arc<RobotData>>,

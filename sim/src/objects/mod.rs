@@ -1,5 +1,6 @@
 //! What is added to a simulation: handle, configuration and data views of each kind in one file.
 
+pub mod articulation;
 pub(crate) mod free_body;
 pub mod kinematics;
 pub mod mjcf_part;
