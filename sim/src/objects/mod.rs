@@ -7,6 +7,7 @@ pub mod mjcf_part;
 pub mod rigid_object;
 pub mod robot;
 mod robot_drives;
+mod robot_joints;
 mod robot_limits;
 mod robot_state;
 mod robot_wrenches;
