@@ -46,11 +46,10 @@ pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{
-    ArticulationId, EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg,
-    TerrainId,
+    EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
 };
 pub use mjcf::document::{Cone, Integrator};
-pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationMut};
+pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
 pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};

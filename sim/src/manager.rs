@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::mj;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
-use crate::objects::articulation::{Articulation, ArticulationCfg, ArticulationMut};
 use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut, Role};
@@ -248,13 +247,6 @@ pub struct RobotId {
     index: usize,
 }
 
-/// Handle of an articulation; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ArticulationId {
-    manager: u64,
-    index: usize,
-}
-
 /// Handle of a rigid object; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ObjectId {
@@ -350,24 +342,11 @@ impl SimulationManager {
     /// # Errors
     /// Anything wrong with the files, names, drives or meshes of the robot.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
-        let index = self.add_as(cfg, Role::Robot)?;
-        Ok(RobotId { manager: self.serial, index })
+        self.add_as(cfg, Role::Robot)
     }
 
-    /// Adds an articulation that is no robot to every environment, such as a cabinet with drawers or a door, compiled as
-    /// [`add_robot`](Self::add_robot) does. Sensors and [`properties`](Self::properties) know its links and joints as those
-    /// of robots, as `uid/link` and `uid/joint`.
-    ///
-    /// # Errors
-    /// As [`add_robot`](Self::add_robot).
-    pub fn add_articulation(&mut self, cfg: ArticulationCfg) -> Result<ArticulationId> {
-        let (cfg, class) = cfg.into_robot();
-        let index = self.add_as(cfg, Role::Articulation(class))?;
-        Ok(ArticulationId { manager: self.serial, index })
-    }
-
-    /// Adds a robot, or an articulation that is none; its place among both.
-    fn add_as(&mut self, cfg: RobotCfg, role: Role) -> Result<usize> {
+    /// Adds a robot, or an articulation that is none.
+    pub(crate) fn add_as(&mut self, cfg: RobotCfg, role: Role) -> Result<RobotId> {
         self.contents.check_uid(&cfg.uid)?;
         if self.contents.robots.len() >= MAX_ROBOTS {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
@@ -377,7 +356,7 @@ impl SimulationManager {
         let mut contents = self.contents.clone();
         contents.robots.push(Arc::new(robot));
         self.replace_contents(contents, diagnostics)?;
-        Ok(self.contents.robots.len() - 1)
+        Ok(RobotId { manager: self.serial, index: self.contents.robots.len() - 1 })
     }
 
     /// Adds a rigid object to every environment, compiled as [`add_robot`](Self::add_robot) does.
@@ -555,24 +534,6 @@ impl SimulationManager {
         RobotMut::new(&self.contents.robots[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// An articulation, to read.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn articulation(&self, id: ArticulationId) -> Articulation<'_> {
-        self.robot(RobotId { manager: id.manager, index: id.index })
-    }
-
-    /// An articulation, to write.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn articulation_mut(&mut self, id: ArticulationId) -> ArticulationMut<'_> {
-        self.robot_mut(RobotId { manager: id.manager, index: id.index })
-    }
-
     /// A rigid object, to read.
     ///
     /// # Panics
@@ -633,26 +594,24 @@ impl SimulationManager {
     /// # Errors
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        let index = self.find_robot(uid, "robot", RobotData::is_robot)?;
-        Ok(RobotId { manager: self.serial, index })
+        self.find_robot(uid, "robot", RobotData::is_robot)
     }
 
-    /// The articulation called `uid`.
-    ///
-    /// # Errors
-    /// There is none; the error lists those there are.
-    pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
-        let index = self.find_robot(uid, "articulation", |robot| !robot.is_robot())?;
-        Ok(ArticulationId { manager: self.serial, index })
-    }
-
-    fn find_robot(&self, uid: &str, what: &'static str, wanted: impl Fn(&RobotData) -> bool) -> Result<usize> {
-        let mut among = self.contents.robots.iter().enumerate().filter(|(_, robot)| wanted(robot));
-        let found = among.clone().find(|(_, robot)| robot.uid() == uid);
-        found.map(|(index, _)| index).ok_or_else(|| Error::UnknownName {
+    /// Of those robots that are `wanted`, the one called `uid`.
+    pub(crate) fn find_robot(
+        &self,
+        uid: &str,
+        what: &'static str,
+        wanted: impl Fn(&RobotData) -> bool,
+    ) -> Result<RobotId> {
+        let robots = self.contents.robots.iter();
+        let among: Vec<(usize, &str)> =
+            robots.enumerate().filter(|(_, robot)| wanted(robot)).map(|(index, robot)| (index, robot.uid())).collect();
+        let found = among.iter().find(|(_, of)| *of == uid);
+        found.map(|&(index, _)| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
             what,
             name: uid.into(),
-            candidates: among.by_ref().map(|(_, robot)| robot.uid().to_string()).collect(),
+            candidates: among.iter().map(|(_, uid)| (*uid).into()).collect(),
         })
     }
 

@@ -1,8 +1,8 @@
 //! What a scene can hold: robots, articulations, rigid objects, terrain, MJCF files, and sensors of any crate.
 
 use crate::error::{Error, Result};
-use crate::manager::{ArticulationId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
-use crate::objects::articulation::ArticulationCfg;
+use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::objects::articulation::{ArticulationCfg, ArticulationId};
 use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;

@@ -11,10 +11,8 @@ pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{
-    ArticulationId, EnvId, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
-};
-use crate::objects::articulation::{Articulation, ArticulationMut};
+use crate::manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
+use crate::objects::articulation::{Articulation, ArticulationId, ArticulationMut};
 use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};

@@ -1,7 +1,9 @@
 //! Articulations that are no robots: drawers, doors, lids, whatever has joints that are moved from outside.
 
 use crate::drive::{DriveCfg, DriveType};
-use crate::objects::robot::{Robot, RobotCfg, RobotMut};
+use crate::error::Result;
+use crate::manager::{RobotId, SimulationManager};
+use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
 use crate::urdf::UrdfCfg;
 use ::scene::Pose;
 use ::scene::mesh::HullCfg;
@@ -73,6 +75,10 @@ impl ArticulationCfg {
     }
 }
 
+/// Handle of an articulation; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ArticulationId(RobotId);
+
 /// An articulation, to read: everything that can be read of a robot. It has no control parts.
 pub type Articulation<'a> = Robot<'a>;
 
@@ -80,3 +86,42 @@ pub type Articulation<'a> = Robot<'a>;
 /// [`write_qpos`](RobotMut::write_qpos) puts them somewhere, [`set_qf`](RobotMut::set_qf) pushes them, and
 /// [`set_qpos`](RobotMut::set_qpos) does nothing.
 pub type ArticulationMut<'a> = RobotMut<'a>;
+
+impl SimulationManager {
+    /// Adds an articulation that is no robot to every environment, such as a cabinet with drawers or a door, compiled as
+    /// [`add_robot`](Self::add_robot) does. Sensors and [`properties`](Self::properties) know its links and joints as those
+    /// of robots, as `uid/link` and `uid/joint`. There may be 30 robots and articulations.
+    ///
+    /// # Errors
+    /// As [`add_robot`](Self::add_robot).
+    pub fn add_articulation(&mut self, cfg: ArticulationCfg) -> Result<ArticulationId> {
+        let (cfg, class) = cfg.into_robot();
+        self.add_as(cfg, Role::Articulation(class)).map(ArticulationId)
+    }
+
+    /// An articulation, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn articulation(&self, id: ArticulationId) -> Articulation<'_> {
+        self.robot(id.0)
+    }
+
+    /// An articulation, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn articulation_mut(&mut self, id: ArticulationId) -> ArticulationMut<'_> {
+        self.robot_mut(id.0)
+    }
+
+    /// The articulation called `uid`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
+        self.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
+    }
+}
