@@ -6,7 +6,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::Robot;
 use std::f64::consts::FRAC_PI_2;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Which arm and which hand.
 #[derive(Clone, Debug, Args)]
@@ -31,28 +31,37 @@ impl ArmWithHand {
     /// # Errors
     /// A file is neither there nor an asset.
     pub(crate) fn cfg(&self) -> Result<RobotCfg> {
-        let hand = ComponentCfg {
-            transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
-            ..ComponentCfg::new("hand", user_or_asset(&self.hand_urdf)?)
-        };
-        Ok(RobotCfg {
-            uid: "sr5".into(),
-            urdf: UrdfCfg {
-                components: vec![ComponentCfg::new("arm", user_or_asset(&self.arm_urdf)?), hand],
-                ..Default::default()
-            },
-            control_parts: vec![
-                ("arm".into(), vec![self.arm_joints.clone()]),
-                ("hand".into(), vec![self.hand_joints.clone()]),
-            ],
-            drive: DriveCfg {
-                stiffness: [(&*self.arm_joints, 1e4), (&*self.hand_joints, 1e3)].into(),
-                damping: [(&*self.arm_joints, 1e3), (&*self.hand_joints, 1e2)].into(),
-                ..Default::default()
-            },
-            ..Default::default()
-        })
+        merged(&self.arm_urdf, &self.hand_urdf, &self.arm_joints, &self.hand_joints)
     }
+}
+
+/// The bundled arm and hand, with the tutorial's gains.
+///
+/// # Errors
+/// The assets are not there.
+pub(crate) fn bundled() -> Result<RobotCfg> {
+    merged(Path::new("sr5/SR5.urdf"), Path::new("revo1_left/revo1_left.urdf"), "JOINT[1-6]", "LEFT_.*")
+}
+
+fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str) -> Result<RobotCfg> {
+    let hand = ComponentCfg {
+        transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
+        ..ComponentCfg::new("hand", user_or_asset(hand_urdf)?)
+    };
+    Ok(RobotCfg {
+        uid: "sr5".into(),
+        urdf: UrdfCfg {
+            components: vec![ComponentCfg::new("arm", user_or_asset(arm_urdf)?), hand],
+            ..Default::default()
+        },
+        control_parts: vec![("arm".into(), vec![arm_joints.into()]), ("hand".into(), vec![hand_joints.into()])],
+        drive: DriveCfg {
+            stiffness: [(arm_joints, 1e4), (hand_joints, 1e3)].into(),
+            damping: [(arm_joints, 1e3), (hand_joints, 1e2)].into(),
+            ..Default::default()
+        },
+        ..Default::default()
+    })
 }
 
 /// The link that the hand hangs on, as `uid/link`.

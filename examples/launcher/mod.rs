@@ -3,10 +3,13 @@
 
 pub(crate) mod arm;
 pub(crate) mod cloud;
+pub(crate) mod grip;
+pub(crate) mod motion;
 pub(crate) mod npy;
 pub(crate) mod panel;
 pub(crate) mod picture;
 pub(crate) mod stage;
+pub(crate) mod trial;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};

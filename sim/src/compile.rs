@@ -8,7 +8,6 @@ use crate::drive::table::{Drive, DriveTable, Gains, Realization};
 use crate::drive::{DriveModel, implicit};
 use crate::env::{Env, with_small_buffers};
 use crate::error::{Error, Result};
-use crate::manager::SimulationManagerCfg;
 use crate::mj::{self, ObjectKind};
 use crate::mjcf::document::{Mjcf, WeldEquality};
 use crate::mjcf::robot::{self, Purpose, RobotLayout};
@@ -17,6 +16,7 @@ use crate::objects::mjcf_part::MjcfData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::weld::{WeldCfg, WeldIndex};
 use crate::randomization::{Maker, OwnValues, Tables};
+use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
@@ -363,7 +363,7 @@ fn identify(
                 id: data.mask_id(geom.link),
                 object: data.uid().into(),
                 link: Some(data.description().links[geom.link].name.clone()),
-                class: "robot".into(),
+                class: data.semantic_class().into(),
                 body: Some((first + geom.link) as u32),
             };
         }

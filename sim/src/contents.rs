@@ -13,7 +13,7 @@ use crate::pattern;
 use sensors::EngineSensor;
 use std::sync::Arc;
 
-/// Robots, objects, terrains, MJCF files, and what holds and what passes through each other.
+/// Robots (and articulations that are none), objects, terrains, MJCF files, and what holds and what passes through each other.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) robots: Vec<Arc<RobotData>>,

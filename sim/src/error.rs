@@ -199,7 +199,9 @@ pub enum Error {
         object: String,
     },
     /// More robots than contact bits.
-    #[error("{0} robots are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)")]
+    #[error(
+        "{0} robots and articulations are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)"
+    )]
     TooManyRobots(usize),
     /// No such name.
     #[error("there is no {what} {name:?}; {}", candidates_sentence(.candidates))]

@@ -31,6 +31,7 @@ pub mod randomization;
 pub mod rollout;
 mod sensor_list;
 mod shard;
+mod simulation_cfg;
 pub mod snapshot;
 pub mod source;
 pub mod urdf;
@@ -45,10 +46,9 @@ pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
-pub use manager::{
-    EnvId, GroundCfg, LightCfg, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId,
-};
+pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
 pub use mjcf::document::{Cone, Integrator};
+pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
 pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::object_group::{GroupId, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
@@ -61,6 +61,7 @@ pub use randomization::{Draw, Properties, Property, Randomization, Randomization
 pub use rollout::Rollout;
 pub use sensor_list::SensorId;
 pub use shard::{Shard, ShardError};
+pub use simulation_cfg::{GroundCfg, LightCfg, SimulationManagerCfg};
 pub use snapshot::{Snapshot, SnapshotError};
 pub use source::Source;
 pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};

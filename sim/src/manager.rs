@@ -7,14 +7,13 @@ use crate::diagnostic::{Diagnostic, count_by_name};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::mj;
-use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::mjcf::scene::MAX_ROBOTS;
 use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
-use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut};
+use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::sensor_list::{SensorId, SensorList};
-use crate::shard::Shard;
+use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::Marker;
 use nalgebra::Vector3;
@@ -25,216 +24,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SimulationManagerCfg {
-    /// Number of environments.
-    pub num_envs: usize,
-    /// Step of the simulation \[s\].
-    pub physics_dt: f64,
-    /// MuJoCo steps in one `physics_dt`.
-    pub substeps: u32,
-    /// Gravity \[m/s²\].
-    #[serde(with = "scene::file_format::vector")]
-    pub gravity: Vector3<f64>,
-    /// Integrator.
-    pub integrator: Integrator,
-    /// Friction cone.
-    pub cone: Cone,
-    /// Ratio of frictional to normal impedance; larger values slip less.
-    pub impratio: f64,
-    /// Largest number of solver iterations in a step.
-    pub solver_iterations: u32,
-    /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
-    pub friction: [f64; 3],
-    /// Seed of random numbers. The physics has none; the noise of sensors and the draws of properties are keyed by this seed,
-    /// the global index of the environment and what they are for.
-    pub seed: u64,
-    /// Threads that step; every core where unset.
-    pub threads: Option<usize>,
-    /// Distance of environments in the overview \[m\].
-    pub arena_space: f64,
-    /// Which part of the environments this process has, where several simulate together.
-    pub shard: Shard,
-    /// Ground plane at z = 0; `None` for none.
-    #[serde(with = "scene::file_format::or_false")]
-    pub ground: Option<GroundCfg>,
-    /// Lights.
-    pub lights: Vec<LightCfg>,
-}
-
-/// A ground plane at z = 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GroundCfg {
-    /// Half of the side that is drawn \[m\]; the plane itself is infinite.
-    pub half_size: f64,
-    /// Colour, 0..=1.
-    pub color: [f64; 3],
-    /// Whether cameras see squares of half a metre, a little lighter and darker than the colour.
-    pub checker: bool,
-}
-
-impl Default for GroundCfg {
-    fn default() -> Self {
-        Self { half_size: 50.0, color: [0.45, 0.47, 0.5], checker: true }
-    }
-}
-
-/// A directional light.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LightCfg {
-    /// Direction in which it shines.
-    #[serde(with = "scene::file_format::vector")]
-    pub direction: Vector3<f64>,
-    /// Colour, 0..=1.
-    pub color: [f64; 3],
-}
-
-impl Default for LightCfg {
-    fn default() -> Self {
-        Self { direction: Vector3::new(-0.3, 0.4, -1.0), color: [0.8, 0.8, 0.8] }
-    }
-}
-
-impl Default for SimulationManagerCfg {
-    fn default() -> Self {
-        Self {
-            num_envs: 1,
-            physics_dt: 0.01,
-            substeps: 1,
-            gravity: Vector3::new(0.0, 0.0, -9.81),
-            integrator: Integrator::Euler,
-            cone: Cone::Pyramidal,
-            impratio: 1.0,
-            solver_iterations: 100,
-            friction: [1.0, 0.005, 0.0001],
-            seed: 0,
-            threads: None,
-            arena_space: 5.0,
-            shard: Shard::default(),
-            ground: Some(GroundCfg::default()),
-            lights: vec![LightCfg::default()],
-        }
-    }
-}
-
-impl SimulationManagerCfg {
-    /// For hands that hold things: elliptic cones that do not slip.
-    pub fn manipulation() -> Self {
-        Self { cone: Cone::Elliptic, impratio: 10.0, ..Self::default() }
-    }
-
-    /// For robots on legs: 200 Hz, and elliptic friction cones that are a hundred times as stiff along the ground as the
-    /// default, where loaded feet creep apart until the robot kneels.
-    pub fn legged() -> Self {
-        Self { physics_dt: 0.005, cone: Cone::Elliptic, impratio: 100.0, ..Self::default() }
-    }
-
-    /// Checks every number.
-    ///
-    /// # Errors
-    /// The first field that is out of range.
-    pub fn validate(&self) -> Result<()> {
-        let fail = |field, value: &dyn std::fmt::Display, expected| {
-            Err(Error::Config { field, value: value.to_string(), expected })
-        };
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        if self.num_envs == 0 {
-            return fail("num_envs", &0, "a simulation needs at least 1 environment");
-        }
-        if self.num_envs > MAX_ENVS {
-            return fail("num_envs", &self.num_envs, "one process can hold at most 1048576 environments");
-        }
-        let Shard { rank, world } = self.shard;
-        if rank >= world || world.checked_mul(self.num_envs).is_none() {
-            return fail(
-                "shard",
-                &format!("rank {rank} of {world}"),
-                "the rank must be 0 to the number of processes - 1",
-            );
-        }
-        if !positive(self.physics_dt) || self.physics_dt > 1.0 {
-            return fail("physics_dt", &self.physics_dt, "it must be above 0 and at most 1 second, such as 0.01");
-        }
-        if self.substeps == 0 || self.substeps > 10_000 {
-            return fail("substeps", &self.substeps, "it must be 1 to 10000");
-        }
-        if self.physics_dt / f64::from(self.substeps) < 1e-9 {
-            return fail("physics_dt", &self.physics_dt, "physics_dt / substeps must be at least 1e-9 seconds");
-        }
-        if !self.gravity.iter().all(|g| g.is_finite()) {
-            return fail(
-                "gravity",
-                &format!("{:?}", self.gravity.as_slice()),
-                "it must be finite, such as (0, 0, -9.81)",
-            );
-        }
-        if !positive(self.impratio) {
-            return fail("impratio", &self.impratio, "it must be above 0");
-        }
-        if self.solver_iterations == 0 || self.solver_iterations > 1_000_000 {
-            return fail("solver_iterations", &self.solver_iterations, "it must be 1 to 1000000");
-        }
-        if !self.friction.iter().all(|f| f.is_finite() && *f >= 0.0) {
-            return fail("friction", &format!("{:?}", self.friction), "the three coefficients must be >= 0");
-        }
-        if let Some(threads) = self.threads
-            && !(1..=1024).contains(&threads)
-        {
-            return fail("threads", &threads, "it must be 1 to 1024; leave it out to use every core");
-        }
-        if !(self.arena_space.is_finite() && self.arena_space >= 0.0) {
-            return fail("arena_space", &self.arena_space, "it must be a distance >= 0 in metres");
-        }
-        if let Some(ground) = &self.ground
-            && !positive(ground.half_size)
-        {
-            return fail("ground.half_size", &ground.half_size, "it must be above 0 metres");
-        }
-        if let Some(ground) = &self.ground
-            && !ground.color.iter().all(|c| (0.0..=1.0).contains(c))
-        {
-            return fail("ground.color", &format!("{:?}", ground.color), "each component must be 0 to 1");
-        }
-        for light in &self.lights {
-            if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
-                return fail(
-                    "lights.direction",
-                    &format!("{:?}", light.direction.as_slice()),
-                    "it must be a finite vector other than zero",
-                );
-            }
-            if !light.color.iter().all(|c| (0.0..=1.0).contains(c)) {
-                return fail("lights.color", &format!("{:?}", light.color), "each component must be 0 to 1");
-            }
-        }
-        Ok(())
-    }
-
-    /// Global index of the first environment of this process.
-    pub fn first_env(&self) -> usize {
-        self.shard.rank * self.num_envs
-    }
-
-    pub(crate) fn physics_option(&self) -> PhysicsOption {
-        PhysicsOption {
-            timestep: self.physics_dt / f64::from(self.substeps),
-            gravity: self.gravity,
-            integrator: self.integrator,
-            cone: self.cone,
-            impratio: self.impratio,
-            iterations: self.solver_iterations,
-            friction: self.friction,
-        }
-    }
-}
-
-/// More environments than any machine steps; keeps a typing error from filling the memory.
-const MAX_ENVS: usize = 1 << 20;
 
 /// Index of an environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -342,12 +131,17 @@ impl SimulationManager {
     /// # Errors
     /// Anything wrong with the files, names, drives or meshes of the robot.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
+        self.add_as(cfg, Role::Robot)
+    }
+
+    /// Adds a robot, or an articulation that is none.
+    pub(crate) fn add_as(&mut self, cfg: RobotCfg, role: Role) -> Result<RobotId> {
         self.contents.check_uid(&cfg.uid)?;
         if self.contents.robots.len() >= MAX_ROBOTS {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }
         let mut diagnostics = Vec::new();
-        let robot = RobotData::load(cfg, &self.cfg, self.contents.next_mask_id(), &mut diagnostics)?;
+        let robot = RobotData::load(cfg, role, &self.cfg, self.contents.next_mask_id(), &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.robots.push(Arc::new(robot));
         self.replace_contents(contents, diagnostics)?;
@@ -609,11 +403,24 @@ impl SimulationManager {
     /// # Errors
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        let index = self.contents.robots.iter().position(|r| r.uid() == uid);
-        index.map(|index| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
-            what: "robot",
+        self.find_robot(uid, "robot", RobotData::is_robot)
+    }
+
+    /// Of those robots that are `wanted`, the one called `uid`.
+    pub(crate) fn find_robot(
+        &self,
+        uid: &str,
+        what: &'static str,
+        wanted: impl Fn(&RobotData) -> bool,
+    ) -> Result<RobotId> {
+        let robots = self.contents.robots.iter();
+        let among: Vec<(usize, &str)> =
+            robots.enumerate().filter(|(_, robot)| wanted(robot)).map(|(index, robot)| (index, robot.uid())).collect();
+        let found = among.iter().find(|(_, of)| *of == uid);
+        found.map(|&(index, _)| RobotId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
+            what,
             name: uid.into(),
-            candidates: self.contents.robots.iter().map(|r| r.uid().to_string()).collect(),
+            candidates: among.iter().map(|(_, uid)| (*uid).into()).collect(),
         })
     }
 

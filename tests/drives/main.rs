@@ -11,6 +11,7 @@ mod limits;
 mod mimic;
 mod modes;
 mod native;
+mod resistance;
 mod robots;
 mod run_time;
 mod soft;

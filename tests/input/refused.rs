@@ -251,7 +251,7 @@ fn thirty_robots_are_the_most() {
             Ok(_) => assert!(i < 30),
             Err(error) => {
                 assert!(i >= 30, "{error}");
-                assert!(error.to_string().contains("30 robots are the most"), "{error}");
+                assert!(error.to_string().contains("30 robots and articulations are the most"), "{error}");
                 refused += 1;
             }
         }

@@ -85,6 +85,14 @@ const TABLE: &[Run] = &[
     ),
     run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
     run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
+    run_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json"),
+    // Hands that slip: the control of the run above.
+    run_of("grasp", &[1], "--headless --friction 0.02"),
+    run_of("grasp", &[2], "--headless --friction=-1"),
+    run_of("open_drawer", &[0], "--headless --out {out}/open_drawer --report {out}/open_drawer.json"),
+    // Drawers that are stuck: the control of the run above.
+    run_of("open_drawer", &[1], "--headless --slide-friction 500"),
+    run_of("open_drawer", &[2], "--headless --slide-friction 0"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",

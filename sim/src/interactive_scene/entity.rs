@@ -1,7 +1,8 @@
-//! What a scene can hold: robots, rigid objects, terrain, MJCF files, and sensors of any crate.
+//! What a scene can hold: robots, articulations, rigid objects, terrain, MJCF files, and sensors of any crate.
 
 use crate::error::{Error, Result};
 use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::objects::articulation::{ArticulationCfg, ArticulationId};
 use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
@@ -17,6 +18,8 @@ use std::fmt::Debug;
 pub enum EntityCfg {
     /// A robot. Its uid is the name of the entity.
     Robot(Box<RobotCfg>),
+    /// An articulation that is no robot. Its uid is the name of the entity.
+    Articulation(Box<ArticulationCfg>),
     /// A rigid object. Its uid is the name of the entity.
     RigidObject(Box<RigidObjectCfg>),
     /// A terrain. Its uid is the name of the entity.
@@ -30,6 +33,12 @@ pub enum EntityCfg {
 impl From<RobotCfg> for EntityCfg {
     fn from(cfg: RobotCfg) -> Self {
         Self::Robot(Box::new(cfg))
+    }
+}
+
+impl From<ArticulationCfg> for EntityCfg {
+    fn from(cfg: ArticulationCfg) -> Self {
+        Self::Articulation(Box::new(cfg))
     }
 }
 
@@ -130,6 +139,7 @@ pub(super) fn short_name<T>() -> &'static str {
 #[derive(Debug)]
 pub(super) enum Handle {
     Robot(RobotId),
+    Articulation(ArticulationId),
     RigidObject(ObjectId),
     Terrain(TerrainId),
     Mjcf(MjcfId),
@@ -141,6 +151,9 @@ impl Handle {
     pub(super) fn add(sim: &mut SimulationManager, uid: &str, cfg: &EntityCfg) -> Result<Self> {
         match cfg {
             EntityCfg::Robot(cfg) => sim.add_robot(RobotCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Robot),
+            EntityCfg::Articulation(cfg) => {
+                sim.add_articulation(ArticulationCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Articulation)
+            }
             EntityCfg::RigidObject(cfg) => {
                 sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::RigidObject)
             }
@@ -156,6 +169,7 @@ impl Handle {
     pub(super) fn is_no(&self, name: &str, wanted: String) -> Error {
         let found = match self {
             Self::Robot(_) => "robot".into(),
+            Self::Articulation(_) => "articulation".into(),
             Self::RigidObject(_) => "rigid object".into(),
             Self::Terrain(_) => "terrain".into(),
             Self::Mjcf(_) => "MJCF part".into(),

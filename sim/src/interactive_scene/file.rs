@@ -5,10 +5,11 @@ use super::types::EntityTypes;
 use super::value::{Value, ValueError};
 use super::{SceneCfg, in_every_env};
 use crate::error::{Error, Result};
-use crate::manager::SimulationManagerCfg;
 use crate::objects::shape::ObjectShape;
 use crate::pattern::closest;
+use crate::simulation_cfg::SimulationManagerCfg;
 use crate::source::Source;
+use crate::urdf::UrdfCfg;
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -91,9 +92,7 @@ impl SceneCfg {
 
 /// Whether a field of an entity is its name, which files give as the key of its table.
 fn has_name(entity: &EntityCfg, field: &str) -> bool {
-    let named =
-        matches!(entity, EntityCfg::Robot(_) | EntityCfg::RigidObject(_) | EntityCfg::Terrain(_) | EntityCfg::Mjcf(_));
-    field == "uid" && named
+    field == "uid" && !matches!(entity, EntityCfg::Sensor(_))
 }
 
 /// One file that is being read.
@@ -178,10 +177,11 @@ impl<'a> Reader<'a> {
         match entity {
             EntityCfg::Robot(robot) => {
                 robot.uid = uid;
-                let components = robot.urdf.components.iter_mut().map(|component| &mut component.urdf);
-                for path in components.chain(robot.urdf.packages.values_mut()) {
-                    *path = self.beside(path);
-                }
+                self.place_urdf(&mut robot.urdf);
+            }
+            EntityCfg::Articulation(articulation) => {
+                articulation.uid = uid;
+                self.place_urdf(&mut articulation.urdf);
             }
             EntityCfg::RigidObject(object) => {
                 object.uid = uid;
@@ -195,6 +195,14 @@ impl<'a> Reader<'a> {
                 part.place_beside(|path| self.beside(path));
             }
             EntityCfg::Sensor(_) => {}
+        }
+    }
+
+    /// Makes the paths of URDF files relative to the file.
+    fn place_urdf(&self, urdf: &mut UrdfCfg) {
+        let components = urdf.components.iter_mut().map(|component| &mut component.urdf);
+        for path in components.chain(urdf.packages.values_mut()) {
+            *path = self.beside(path);
         }
     }
 

@@ -12,13 +12,15 @@ pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, SimulationManagerCfg, TerrainId};
+use crate::manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::objects::articulation::{Articulation, ArticulationId, ArticulationMut};
 use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::terrain::Terrain;
 use crate::pattern::{closest, in_every_env};
 use crate::sensor_list::SensorId;
+use crate::simulation_cfg::SimulationManagerCfg;
 use crate::source::Source;
 use entity::{Handle, short_name};
 use ndarray::Array2;
@@ -69,7 +71,8 @@ impl SceneCfg {
         Self { simulation, ..Self::default() }
     }
 
-    /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), a
+    /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), an
+    /// [`ArticulationCfg`](crate::ArticulationCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), a
     /// [`TerrainCfg`](crate::TerrainCfg), or the configuration of any sensor.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
@@ -184,6 +187,34 @@ impl InteractiveScene {
     pub fn robot_mut(&mut self, name: &str) -> Result<RobotMut<'_>> {
         let id = self.robot_id(name)?;
         Ok(self.sim.robot_mut(id))
+    }
+
+    /// The handle of an articulation that is no robot.
+    ///
+    /// # Errors
+    /// There is no such entity, or it is no such articulation.
+    pub fn articulation_id(&self, name: &str) -> Result<ArticulationId> {
+        match self.find(name)? {
+            Handle::Articulation(id) => Ok(*id),
+            other => Err(other.is_no(name, "articulation".into())),
+        }
+    }
+
+    /// An articulation, to read.
+    ///
+    /// # Errors
+    /// As [`articulation_id`](Self::articulation_id).
+    pub fn articulation(&self, name: &str) -> Result<Articulation<'_>> {
+        Ok(self.sim.articulation(self.articulation_id(name)?))
+    }
+
+    /// An articulation, to write.
+    ///
+    /// # Errors
+    /// As [`articulation_id`](Self::articulation_id).
+    pub fn articulation_mut(&mut self, name: &str) -> Result<ArticulationMut<'_>> {
+        let id = self.articulation_id(name)?;
+        Ok(self.sim.articulation_mut(id))
     }
 
     /// The handle of a rigid object.

@@ -2,6 +2,7 @@
 
 use super::entity::{EntityCfg, SensorEntity};
 use super::value::{Value, ValueError};
+use crate::objects::articulation::ArticulationCfg;
 use crate::objects::mjcf_part::MjcfCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
@@ -39,10 +40,11 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, rigid objects, terrain, MJCF files and the built-in sensors.
+    /// Robots, articulations, rigid objects, terrain, MJCF files and the built-in sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
+            .with::<ArticulationCfg>("articulation")
             .with::<RigidObjectCfg>("rigid_object")
             .with::<TerrainCfg>("terrain")
             .with::<MjcfCfg>("mjcf")
@@ -108,6 +110,14 @@ impl Kind for RobotCfg {
 
     fn of(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Robot(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for ArticulationCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Articulation(cfg) = entity { Some(cfg) } else { None }
     }
 }
 

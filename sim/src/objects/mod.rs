@@ -1,6 +1,7 @@
 //! What is added to a simulation: handle, configuration and data views of each kind in one file.
 
 mod apart;
+pub mod articulation;
 pub(crate) mod free_body;
 pub mod kinematics;
 pub(crate) mod mass_properties;
@@ -12,6 +13,7 @@ pub mod rigid_object;
 mod rigid_object_properties;
 pub mod robot;
 mod robot_drives;
+mod robot_joints;
 mod robot_limits;
 mod robot_state;
 mod robot_wrenches;

@@ -7,7 +7,7 @@ use crate::drive::plan::{JointPlan, plan};
 use crate::drive::table::Gains;
 use crate::drive::{ActuatorSpec, DriveCfg, DriveModel};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManagerCfg};
+use crate::manager::EnvId;
 use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
@@ -15,6 +15,7 @@ use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
 use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
+use crate::simulation_cfg::SimulationManagerCfg;
 use crate::urdf::{UrdfCfg, assemble};
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
@@ -92,12 +93,23 @@ pub struct RobotData {
     parts: BTreeMap<String, Vec<usize>>,
     hulls: BTreeMap<MeshKey, TriMesh>,
     first_mask_id: i32,
+    role: Role,
+}
+
+/// What it was added as.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// By `add_robot`.
+    Robot,
+    /// By `add_articulation`, with its semantic class.
+    Articulation(String),
 }
 
 impl RobotData {
     /// Reads the files, resolves names, drives and meshes.
     pub(crate) fn load(
         cfg: RobotCfg,
+        role: Role,
         manager: &SimulationManagerCfg,
         first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
@@ -138,7 +150,7 @@ impl RobotData {
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
-        Ok(Self { cfg, description, plans, joint_names, parts, hulls, first_mask_id })
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls, first_mask_id, role })
     }
 
     /// Name of the robot.
@@ -149,6 +161,19 @@ impl RobotData {
     /// The configuration it was added with.
     pub fn cfg(&self) -> &RobotCfg {
         &self.cfg
+    }
+
+    /// What kind of thing it is, for the table of mask ids.
+    pub(crate) fn semantic_class(&self) -> &str {
+        match &self.role {
+            Role::Robot => "robot",
+            Role::Articulation(class) => class,
+        }
+    }
+
+    /// Whether it was added as a robot, and not as another articulation.
+    pub(crate) fn is_robot(&self) -> bool {
+        self.role == Role::Robot
     }
 
     /// The merged robot as its files describe it, with its payloads.

@@ -1,8 +1,8 @@
 //! Drives of a robot while it runs: gains and drive types per joint and per environment.
 //!
 //! Gains are in the memory of each environment, not in MuJoCo's model, so that environments may differ at no cost to those
-//! that do not. Friction and rotor inertia are in the model: they are set when the robot is added
-//! ([`DriveCfg`](crate::DriveCfg)).
+//! that do not. Friction and rotor inertia are in the model: see [`set_friction`](RobotMut::set_friction) and
+//! [`set_armature`](RobotMut::set_armature).
 
 use crate::compile::JointIndexing;
 use crate::drive::plan::{PlanError, effective_inertias};

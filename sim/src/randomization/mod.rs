@@ -50,6 +50,16 @@ impl Simulation {
         Properties::new(tables, own, &env.drives)
     }
 
+    /// Reads a property of one number, no gain, of what is called `name` in every environment; nothing where it has none.
+    pub(crate) fn property_of_all(&self, property: Property, name: &str, mut read: impl FnMut(usize, f64)) {
+        let table = self.tables().get(property);
+        let Some(element) = table.names.iter().position(|of| of == name) else { return };
+        for (env, own) in self.own_values.iter().enumerate() {
+            let own = own.as_ref().and_then(|own| own[property as usize].as_ref());
+            read(env, own.map_or(table.nominal[element], |values| values[element]));
+        }
+    }
+
     /// Changes the properties of environments; on an error none has changed.
     pub(crate) fn change_properties(
         &mut self,

@@ -18,8 +18,8 @@ pub(crate) use identity::{Identities, Owner, of_simulation};
 pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
-use crate::manager::GroundCfg;
 use crate::mj::{Data, Model};
+use crate::simulation_cfg::GroundCfg;
 use scene::shape::Plane;
 use scene::{Headlight, Instance, Light, Material, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::sync::Arc;

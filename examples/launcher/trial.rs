@@ -1,0 +1,103 @@
+//! Examples that try something in many environments and count: 16 of them, and what counts as enough.
+
+use super::{Result, picture};
+use clap::Parser;
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::{from_row, to_row};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// The flags, with 16 environments where nobody says how many.
+pub(crate) fn parse<A: Parser>() -> A {
+    let command = A::command().mut_arg("num_envs", |flag| flag.default_value("16"));
+    A::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit())
+}
+
+/// How many of the environments have to succeed: all but one in 16.
+pub(crate) fn needed(num_envs: usize) -> usize {
+    num_envs - num_envs / 16
+}
+
+/// Runs an example that says whether enough succeeded: exit code 0, 1 where fewer did, 2 for an error.
+pub(crate) fn run(name: &str, example: impl FnOnce() -> Result<bool>) -> ExitCode {
+    let mut enough = false;
+    let code = super::run(name, || {
+        enough = example()?;
+        Ok(())
+    });
+    if enough || code != ExitCode::SUCCESS { code } else { ExitCode::FAILURE }
+}
+
+/// `yes` or `no`.
+pub(crate) fn word(yes: bool) -> &'static str {
+    if yes { "yes" } else { "no" }
+}
+
+/// Rows `[x, y, z, qw, qx, qy, qz]` as poses.
+pub(crate) fn poses(rows: &Array2<f64>) -> Vec<Pose> {
+    rows.rows().into_iter().map(|row| from_row(&std::array::from_fn(|k| row[k]))).collect()
+}
+
+/// Poses as rows `[x, y, z, qw, qx, qy, qz]`.
+pub(crate) fn rows(poses: &[Pose]) -> Array2<f64> {
+    Array2::from_shape_fn((poses.len(), 7), |(env, k)| to_row(&poses[env])[k])
+}
+
+/// Poses at another place, by a vector in the axes of the environment \[m\].
+pub(crate) fn moved(poses: &[Pose], by: impl Fn(&Pose) -> [f64; 3]) -> Vec<Pose> {
+    poses.iter().map(|pose| Pose::translation(by(pose)[0], by(pose)[1], by(pose)[2]) * pose).collect()
+}
+
+/// Pictures of the first environment, `NAME_1.png` and so on.
+#[derive(Debug)]
+pub(crate) struct Album {
+    out: Option<PathBuf>,
+    name: &'static str,
+    camera: SensorId<Camera>,
+    taken: usize,
+}
+
+impl Album {
+    /// A camera that looks from `eye` to `target`; pictures go to the folder `out`, if there is one.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub(crate) fn new(
+        sim: &mut SimulationManager,
+        name: &'static str,
+        out: Option<PathBuf>,
+        eye: [f64; 3],
+        target: [f64; 3],
+    ) -> Result<Self> {
+        if let Some(out) = &out {
+            std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()))?;
+        }
+        let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
+        let camera = sim.add_sensor(
+            "camera",
+            CameraCfg {
+                intrinsics: Intrinsics::Fovy { radians: 40f64.to_radians() },
+                extrinsics: Extrinsics { placement, ..Default::default() },
+                env_ids: Some(vec![0]),
+                ..Default::default()
+            },
+        )?;
+        Ok(Self { out, name, camera, taken: 0 })
+    }
+
+    /// Takes the next picture.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn add(&mut self, sim: &SimulationManager) -> Result {
+        let Some(out) = &self.out else { return Ok(()) };
+        self.taken += 1;
+        let camera = sim.sensor(self.camera)?;
+        let (height, width) = camera.image_shape();
+        let color = camera.color()?;
+        let color = color.as_slice().ok_or("the picture is not in one piece")?;
+        let file = out.join(format!("{}_{}.png", self.name, self.taken));
+        picture::write_png(&file, &picture::color_picture([width, height], color))
+    }
+}

@@ -1,0 +1,191 @@
+//! An arm finds a cabinet, lays its fingers behind the handle of the drawer and pulls it open, in 16 environments with
+//! cabinets at other places. The drawer is passive: damping and dry friction are all that its slide has, and fingers are
+//! all that moves it. Cabinets stand free on the floor; nothing is written into the state after the start.
+//!
+//! ```text
+//! cargo run --release --example open_drawer -- --headless --out pictures
+//! cargo run --release --example open_drawer -- --headless --slide-friction 500
+//! ```
+//!
+//! The exit code is 0 where at least 15 of 16 drawers are open, 1 where fewer are (the second command, whose drawers are
+//! stuck), 2 where something is wrong.
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
+use launcher::motion::Motion;
+use launcher::trial::{self, Album};
+use launcher::{Launcher, Progress, grip, stage, user_or_asset};
+use nalgebra::Vector3;
+use serde_json::json;
+use std::f64::consts::PI;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Opens drawers by 0.15 m and counts.
+#[derive(Debug, Parser)]
+#[command(name = "open_drawer")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// Dry friction of the drawer's slide [N]; above 0
+    #[arg(long, alias = "slide_friction", default_value_t = 2.0)]
+    slide_friction: f64,
+}
+
+/// Where the cabinet stands, its front towards the arm: middle of where it may be, and how far from there at most \[m\].
+const PLACE: [f64; 2] = [0.98, 0.0];
+const SCATTER: [f64; 2] = [0.03, 0.08];
+/// It is turned by at most this \[rad\].
+const TURN: f64 = 0.2;
+/// The handle in the frame of the drawer \[m\].
+const HANDLE: [f64; 3] = [0.073, 0.0, 0.0];
+
+/// How far drawers have to be open in the end \[m\]; the hand goes further, because the handle has some play in it.
+const OPEN_BY: f64 = 0.15;
+const PULL: f64 = 0.2;
+/// They are at rest then \[m/s\], ...
+const AT_REST: f64 = 0.01;
+/// ... and the cabinet is where it was \[m\].
+const CABINET_STAYS: f64 = 0.02;
+
+/// The handle in the hand, ahead of the palm's frame and below \[m\]: bent fingers are 12 mm behind it.
+const GRIP: [f64; 3] = [0.09, 0.0, -0.08];
+/// The largest effort of fingers \[N m\]: 19 N at each tip.
+const FINGER_EFFORT: f64 = 2.0;
+/// Fingers bent, so that they fit between handle and drawer.
+const BENT: [(&str, f64); 5] = [
+    ("LEFT_HAND_THUMB1", 0.0),
+    ("LEFT_HAND_INDEX", 0.6),
+    ("LEFT_HAND_MIDDLE", 0.6),
+    ("LEFT_HAND_RING", 0.6),
+    ("LEFT_HAND_PINKY", 0.6),
+];
+/// Fingers and thumb around the handle.
+const HOOKED: [(&str, f64); 5] = [
+    ("LEFT_HAND_THUMB1", 0.5),
+    ("LEFT_HAND_INDEX", 1.1),
+    ("LEFT_HAND_MIDDLE", 1.1),
+    ("LEFT_HAND_RING", 1.1),
+    ("LEFT_HAND_PINKY", 1.1),
+];
+
+fn main() -> ExitCode {
+    trial::run("open_drawer", || run(&trial::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result<bool> {
+    let manipulation = SimulationManagerCfg::manipulation();
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        physics_dt: 0.005,
+        cone: manipulation.cone,
+        impratio: manipulation.impratio,
+        arena_space: args.launcher.arena_space.unwrap_or(2.2),
+        ..args.launcher.simulation()?
+    })?;
+    let robot = sim.add_robot(grip::robot_cfg(&BENT, FINGER_EFFORT)?)?;
+    let [x, y] = PLACE;
+    let cabinet = sim.add_articulation(ArticulationCfg {
+        uid: "cabinet".into(),
+        urdf: UrdfCfg::single(user_or_asset(Path::new("cabinet/cabinet.urdf"))?),
+        fix_base: false,
+        init_pose: from_xyz_rpy([x, y, 0.0], [0.0, 0.0, PI]),
+        ..Default::default()
+    })?;
+    let out = args.launcher.out.clone();
+    let mut album = Album::new(&mut sim, "open_drawer", out, [0.3, -1.2, 0.75], [0.55, 0.0, 0.2])?;
+    let friction = Draw::Set([args.slide_friction; 2]);
+    sim.randomize(&Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", friction), None)?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    if let Some(dir) = &args.launcher.dump {
+        for left_out in sim.dump(dir)? {
+            eprintln!("warning: {left_out}");
+        }
+    }
+    let stands = scatter(&mut sim, cabinet)?;
+
+    let progress = Progress::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
+    let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
+    let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)
+        .iter()
+        // The hand looks into the drawer, which looks at the hand.
+        .map(|drawer| drawer * from_xyz_rpy(HANDLE, [0.0, 0.0, PI]))
+        .collect();
+    let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
+    let pulled = trial::moved(&handles, |handle| (handle.rotation * Vector3::new(-PULL, 0.0, 0.0)).into());
+    let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
+    progress.say("To the handles...");
+    motion.reach(&above(&handles, 0.1), 2.0)?;
+    motion.line(&handles, 1.5)?;
+    album.add(motion.sim)?;
+    progress.say("Closing the hands...");
+    motion.joints(&HOOKED, 1.0)?;
+    album.add(motion.sim)?;
+    progress.say("Pulling...");
+    motion.line(&pulled, 2.5)?;
+    motion.wait(0.5, |_| ())?;
+    album.add(motion.sim)?;
+    progress.say("Letting go...");
+    motion.joints(&BENT, 0.5)?;
+    motion.line(&above(&pulled, 0.1), 1.0)?;
+    motion.wait(1.0, |_| ())?;
+    album.add(motion.sim)?;
+
+    let (steps, planned) = (motion.step(), motion.planned().to_vec());
+    let rate = progress.env_steps_per_second(steps, sim.num_envs());
+    let view = sim.articulation(cabinet);
+    let (open, speed, ends) = (view.get_qpos(), view.get_qvel(), trial::poses(&view.get_root_pose()));
+    let mut table = Vec::new();
+    for env in 0..sim.num_envs() {
+        let (open, speed) = (open[(env, 0)], speed[(env, 0)].abs());
+        let shift = (ends[env].translation.vector - stands[env].translation.vector).norm();
+        let (is_open, stays) = (open >= OPEN_BY && speed < AT_REST, shift < CABINET_STAYS);
+        let success = planned[env] && is_open && stays;
+        table.push(json!({
+            "env": env, "cabinet": to_row(&stands[env]), "planned": planned[env], "open": open, "speed": speed,
+            "cabinet_shift": shift, "success": success,
+        }));
+        println!(
+            "environment {env:>2}: way planned: {}, open by {open:.4} m: {}, the cabinet moved by {:.1} mm: {}",
+            trial::word(planned[env]),
+            trial::word(is_open),
+            1e3 * shift,
+            if stays { "it stood" } else { "too far" },
+        );
+    }
+    let successes = table.iter().filter(|row| row["success"] == true).count();
+    let needed = trial::needed(sim.num_envs());
+    println!("\n{successes} of {} drawers were opened; {needed} are enough", sim.num_envs());
+    println!("{steps} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
+    if let Some(out) = &args.launcher.out {
+        stage::write(&mut sim, &[], [4.2, -5.2, 3.6], [0.4, 0.0, 0.0], &out.join("open_drawer_all.png"))?;
+    }
+    args.launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": sim.num_envs(),
+        "steps": steps,
+        "slide_friction": args.slide_friction,
+        "successes": successes,
+        "needed": needed,
+        "success_rate": successes as f64 / sim.num_envs() as f64,
+        "environments": table,
+        "env_steps_per_second": rate,
+        "warnings": sim.warning_counts(),
+    }))?;
+    Ok(successes >= needed)
+}
+
+/// Puts each cabinet elsewhere on the floor; where they are then.
+fn scatter(sim: &mut SimulationManager, cabinet: ArticulationId) -> launcher::Result<Vec<Pose>> {
+    let place = |[x, y, turn]: [f64; 3]| {
+        let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, 0.0];
+        from_xyz_rpy(place, [0.0, 0.0, PI + TURN * turn])
+    };
+    let poses: Vec<Pose> = grip::scatter(sim, "cabinet").into_iter().map(place).collect();
+    sim.articulation_mut(cabinet).write_root_pose(&trial::rows(&poses), None)?;
+    Ok(poses)
+}

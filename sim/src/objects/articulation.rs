@@ -1,0 +1,127 @@
+//! Articulations that are no robots: drawers, doors, lids, whatever has joints that are moved from outside.
+
+use crate::drive::{DriveCfg, DriveType};
+use crate::error::Result;
+use crate::manager::{RobotId, SimulationManager};
+use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
+use crate::urdf::UrdfCfg;
+use ::scene::Pose;
+use ::scene::mesh::HullCfg;
+use serde::{Deserialize, Serialize};
+
+/// Configuration of an articulation.
+///
+/// It is passive unless `drive` says otherwise: its joints have the limits, the damping and the dry friction of the file,
+/// and nothing holds or moves them but what touches them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArticulationCfg {
+    /// Name of the articulation, unique in the simulation; prefix of its names in MuJoCo.
+    pub uid: String,
+    /// The URDF files.
+    #[serde(deserialize_with = "crate::file_format::file_or_table")]
+    pub urdf: UrdfCfg,
+    /// Whether the root link stands fixed in the environment. One that stands free can be put elsewhere in each environment.
+    pub fix_base: bool,
+    /// Pose of the root link in the environment.
+    #[serde(with = "scene::file_format::pose")]
+    pub init_pose: Pose,
+    /// Start positions by joint pattern \[rad or m\]; 0 where none matches.
+    #[serde(with = "scene::file_format::pairs")]
+    pub init_qpos: Vec<(String, f64)>,
+    /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive.
+    pub drive: Option<DriveCfg>,
+    /// Whether its links collide with each other.
+    pub self_collision: bool,
+    /// How collision meshes become convex hulls.
+    pub hull: HullCfg,
+    /// What kind of thing it is, for the table of mask ids; `articulation` where `None`.
+    pub semantic_class: Option<String>,
+}
+
+impl Default for ArticulationCfg {
+    fn default() -> Self {
+        let robot = RobotCfg::default();
+        Self {
+            uid: "articulation".into(),
+            urdf: UrdfCfg::default(),
+            fix_base: robot.fix_base,
+            init_pose: robot.init_pose,
+            init_qpos: robot.init_qpos,
+            drive: None,
+            self_collision: robot.self_collision,
+            hull: robot.hull,
+            semantic_class: None,
+        }
+    }
+}
+
+impl ArticulationCfg {
+    /// The robot that moves like it, and its class.
+    pub(crate) fn into_robot(self) -> (RobotCfg, String) {
+        let passive = || DriveCfg { drive_type: DriveType::None, ..Default::default() };
+        let robot = RobotCfg {
+            uid: self.uid,
+            urdf: self.urdf,
+            fix_base: self.fix_base,
+            init_pose: self.init_pose,
+            init_qpos: self.init_qpos,
+            drive: self.drive.unwrap_or_else(passive),
+            self_collision: self.self_collision,
+            hull: self.hull,
+            ..RobotCfg::default()
+        };
+        (robot, self.semantic_class.unwrap_or_else(|| "articulation".into()))
+    }
+}
+
+/// Handle of an articulation; valid for the manager that made it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ArticulationId(RobotId);
+
+/// An articulation, to read: everything that can be read of a robot. It has no control parts.
+pub type Articulation<'a> = Robot<'a>;
+
+/// An articulation, to write: everything that can be done with a robot. Joints without a drive have no targets:
+/// [`write_qpos`](RobotMut::write_qpos) puts them somewhere, [`set_qf`](RobotMut::set_qf) pushes them, and
+/// [`set_qpos`](RobotMut::set_qpos) does nothing.
+pub type ArticulationMut<'a> = RobotMut<'a>;
+
+impl SimulationManager {
+    /// Adds an articulation that is no robot to every environment, such as a cabinet with drawers or a door, compiled as
+    /// [`add_robot`](Self::add_robot) does. Sensors and [`properties`](Self::properties) know its links and joints as those
+    /// of robots, as `uid/link` and `uid/joint`. There may be 30 robots and articulations.
+    ///
+    /// # Errors
+    /// As [`add_robot`](Self::add_robot).
+    pub fn add_articulation(&mut self, cfg: ArticulationCfg) -> Result<ArticulationId> {
+        let (cfg, class) = cfg.into_robot();
+        self.add_as(cfg, Role::Articulation(class)).map(ArticulationId)
+    }
+
+    /// An articulation, to read.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn articulation(&self, id: ArticulationId) -> Articulation<'_> {
+        self.robot(id.0)
+    }
+
+    /// An articulation, to write.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn articulation_mut(&mut self, id: ArticulationId) -> ArticulationMut<'_> {
+        self.robot_mut(id.0)
+    }
+
+    /// The articulation called `uid`.
+    ///
+    /// # Errors
+    /// There is none; the error lists those there are.
+    pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
+        self.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
+    }
+}

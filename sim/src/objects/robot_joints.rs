@@ -1,0 +1,146 @@
+//! What resists the joints of a robot beside its drives, while it runs: dry friction, damping and rotor inertia, per joint
+//! and per environment.
+//!
+//! They are in MuJoCo's model: an environment that gets others has these arrays for itself. They are among its
+//! [`properties`](crate::SimulationManager::properties), so that random draws and these setters work on the same numbers.
+
+use crate::error::{Error, Result};
+use crate::manager::EnvId;
+use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::rows::Numbers;
+use crate::randomization::Property;
+use ndarray::{Array2, ArrayView1, ArrayView2, AsArray, Ix2};
+
+impl Robot<'_> {
+    /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints that have none.
+    pub fn get_friction(&self) -> Array2<f64> {
+        self.property(Property::DryFriction)
+    }
+
+    /// Viscous damping of the joints themselves \[N m s/rad or N s/m\], shape (N, dof); 0 for joints that have none. The
+    /// damping of the drives is not part of it: see [`get_damping`](Self::get_damping).
+    pub fn get_joint_damping(&self) -> Array2<f64> {
+        self.property(Property::JointDamping)
+    }
+
+    /// Rotor inertia of the joints \[kg m² or kg\], shape (N, dof).
+    pub fn get_armature(&self) -> Array2<f64> {
+        self.property(Property::Armature)
+    }
+
+    /// A property of one number of every joint in every environment.
+    fn property(&self, property: Property) -> Array2<f64> {
+        let mut values = Array2::zeros((self.simulation.batch.num_envs(), self.dof()));
+        for (joint, mut column) in values.columns_mut().into_iter().enumerate() {
+            self.simulation.property_of_all(property, &property_name(self, joint), |env, value| column[env] = value);
+        }
+        values
+    }
+}
+
+impl RobotMut<'_> {
+    /// Sets the dry friction of joints \[N m or N\], above 0. Rows are for `env_ids` (all where `None`; a single row is for all
+    /// of them), columns for `joint_ids` (all where `None`). It is a property of the environment and stays through a reset;
+    /// [`reset_properties`](crate::SimulationManager::reset_properties) gives back what the robot was added with. A forward
+    /// pass follows.
+    ///
+    /// Only joints that were added with some have a constraint for it ([`DriveCfg::friction`](crate::DriveCfg), or the
+    /// file's `<dynamics friction="..">`): a little is enough.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use sim::{ArticulationCfg, EnvId, SimulationManager, SimulationManagerCfg, UrdfCfg};
+    /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-joints-{}.urdf", std::process::id()));
+    /// # std::fs::write(&urdf, "<robot name='r'><link name='a'/><link name='b'><inertial><mass value='1'/>
+    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link><joint name='slide' type='prismatic'>
+    /// #   <parent link='a'/><child link='b'/><axis xyz='1 0 0'/><limit lower='0' upper='1' effort='9' velocity='1'/>
+    /// #   <dynamics damping='0' friction='2'/></joint></robot>")?;
+    ///
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() })?;
+    /// let drawer = sim.add_articulation(ArticulationCfg { urdf: UrdfCfg::single(&urdf), ..Default::default() })?;
+    /// # std::fs::remove_file(&urdf)?;
+    /// sim.articulation_mut(drawer).set_friction(&array![[30.0]], None, Some(&[EnvId(1)]))?;
+    /// assert_eq!(sim.articulation(drawer).get_friction(), array![[2.0], [30.0]]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or not above 0; a
+    /// joint that was added without dry friction. Then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_friction<'t>(
+        &mut self,
+        values: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.set_property("set_friction", Property::DryFriction, values.into(), joint_ids, env_ids)
+    }
+
+    /// Sets the viscous damping of joints themselves \[N m s/rad or N s/m\]; that of drives stays. Only joints that were added
+    /// with some can be told another (the file's `<dynamics damping="..">`). Otherwise as
+    /// [`set_friction`](Self::set_friction).
+    ///
+    /// # Errors
+    /// As [`set_friction`](Self::set_friction), but 0 is a damping.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_joint_damping<'t>(
+        &mut self,
+        values: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.set_property("set_joint_damping", Property::JointDamping, values.into(), joint_ids, env_ids)
+    }
+
+    /// Sets the rotor inertia of joints \[kg m² or kg\]; otherwise as [`set_friction`](Self::set_friction). What was derived
+    /// from it when the robot was added stays: gains of drive type `acceleration`, warnings of instability.
+    ///
+    /// # Errors
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
+    /// nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_armature<'t>(
+        &mut self,
+        values: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.set_property("set_armature", Property::Armature, values.into(), joint_ids, env_ids)
+    }
+
+    /// Sets a property of one number of joints, after everything was checked.
+    fn set_property(
+        &mut self,
+        argument: &'static str,
+        property: Property,
+        values: ArrayView2<'_, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let write = self.checked_numbers(argument, Numbers::Gain, values, joint_ids, env_ids)?;
+        let names: Vec<String> = write.joints.iter().map(|&joint| property_name(&self.read(), joint)).collect();
+        if property == Property::DryFriction {
+            for (row, (_, frictions)) in write.rows.iter().enumerate() {
+                if let Some(column) = frictions.iter().position(|friction| *friction <= 0.0) {
+                    let of = format!("joint {:?}", self.data.joint_names()[write.joints[column]]);
+                    let expected = "above 0: it may be small".into();
+                    return Err(Error::OutOfRange { argument, row, column, of, value: frictions[column], expected });
+                }
+            }
+        }
+        let rows: Vec<(usize, ArrayView1<'_, f64>)> = write.rows.iter().collect();
+        self.simulation.change_properties(write.rows.envs(), |env, properties| {
+            // `rows` and the environments are the same list.
+            let Some((_, row)) = rows.iter().find(|(of, _)| *of == env) else { return Ok(()) };
+            names.iter().zip(row).try_for_each(|(name, value)| properties.set(property, name, &[*value]))
+        })?;
+        self.sensors.refresh(write.rows.envs(), self.simulation);
+        Ok(())
+    }
+}
+
+/// What a joint is called among properties.
+fn property_name(robot: &Robot<'_>, joint: usize) -> String {
+    format!("{}/{}", robot.uid(), robot.joint_names()[joint])
+}

@@ -1,0 +1,149 @@
+//! Dry friction, damping and rotor inertia of joints that are changed while they run, per joint and per environment.
+//!
+//! A slide of mass m with damping b and rotor inertia a, without other loads, has after one step of MuJoCo's Euler, which
+//! integrates damping implicitly, the speed v (m + a) / (m + a + h b); pushed by F from rest, h F / (m + a + h b). Both are a
+//! handful of operations: 1e-12. Under dry friction f alone it comes to rest after m v² / 2 f; the constraint is soft, and
+//! short steps are off by h v: 1 %. Controls: environments that were not named do what they did before, to the last bit.
+
+use crate::worlds::*;
+use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::prelude::*;
+
+const EXACT: f64 = 1e-12;
+const H: f64 = 0.01;
+const M: [f64; 2] = [2.0, 0.5];
+const ENVS: usize = 3;
+
+/// Two slides that do not feel each other.
+fn slides(damping: f64, friction: f64, drive: DriveCfg, dt: f64) -> World {
+    let slide = |name: &str, m: f64| Joint { damping, friction, ..Joint::slide(name, m) };
+    let cfg = SimulationManagerCfg { num_envs: ENVS, ..at_dt(dt, weightless()) };
+    world(&[slide("a", M[0]), slide("b", M[1])], drive, cfg)
+}
+
+fn passive() -> DriveCfg {
+    DriveCfg { drive_type: DriveType::None, ..Default::default() }
+}
+
+fn close(found: &Array2<f64>, expected: impl Fn(usize, usize) -> f64) {
+    for ((env, joint), &found) in found.indexed_iter() {
+        assert_close(found, expected(env, joint), EXACT, &format!("environment {env}, joint {joint}"));
+    }
+}
+
+#[test]
+fn rotor_inertia_makes_a_joint_slow() {
+    let mut world = slides(0.0, 0.0, passive(), H);
+    assert_eq!(world.view().get_armature(), Array2::<f64>::zeros((ENVS, 2)));
+    let mut robot = world.sim.robot_mut(world.robot);
+    robot.set_armature(&array![[3.0], [0.25]], Some(&[JointIndex(1)]), Some(&[EnvId(2), EnvId(0)])).unwrap();
+    robot.set_qf(&array![[4.0, 4.0]], None, None).unwrap();
+    let armature = array![[0.0, 0.25], [0.0, 0.0], [0.0, 3.0]];
+    assert_eq!(world.view().get_armature(), armature);
+    world.step(1);
+    let v = world.view().get_qvel();
+    close(&v, |env, joint| H * 4.0 / (M[joint] + armature[(env, joint)]));
+    let mut other = slides(0.0, 0.0, passive(), H);
+    other.sim.robot_mut(other.robot).set_qf(&array![[4.0, 4.0]], None, None).unwrap();
+    other.step(1);
+    assert_eq!(v.row(1), other.view().get_qvel().row(1), "bit for bit");
+}
+
+#[test]
+fn damping_of_a_joint_is_not_that_of_its_drive() {
+    // A drive without stiffness and damping: an implicit row that gives nothing.
+    for drive in [passive(), gains(0.0, 0.0)] {
+        let mut world = slides(1.5, 0.0, drive, H);
+        assert_eq!(world.view().get_joint_damping(), Array2::<f64>::from_elem((ENVS, 2), 1.5));
+        let before = world.view().get_damping();
+        let mut robot = world.sim.robot_mut(world.robot);
+        robot.set_joint_damping(&array![[40.0, 0.0]], None, Some(&[EnvId(1)])).unwrap();
+        robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
+        let damping = array![[1.5, 1.5], [40.0, 0.0], [1.5, 1.5]];
+        assert_eq!((world.view().get_joint_damping(), world.view().get_damping()), (damping.clone(), before));
+        world.step(1);
+        close(&world.view().get_qvel(), |env, joint| M[joint] / (M[joint] + H * damping[(env, joint)]));
+    }
+}
+
+#[test]
+fn dry_friction_stops_a_joint_sooner() {
+    for drive in [passive(), gains(0.0, 0.0)] {
+        let mut world = slides(0.0, 1.0, drive, 5e-4);
+        let mut robot = world.sim.robot_mut(world.robot);
+        robot.set_friction(&array![[4.0, 0.5]], None, Some(&[EnvId(1)])).unwrap();
+        robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
+        let friction = array![[1.0, 1.0], [4.0, 0.5], [1.0, 1.0]];
+        assert_eq!(world.view().get_friction(), friction);
+        world.step(6000);
+        let (view, limits) = (world.view(), world.view().get_friction());
+        for ((env, joint), &way) in view.get_qpos().indexed_iter() {
+            let expected = M[joint] / (2.0 * limits[(env, joint)]);
+            assert!((way / expected - 1.0).abs() < 0.01, "environment {env}, joint {joint}: {way}, not {expected}");
+        }
+        assert_eq!(view.get_qpos().row(0), view.get_qpos().row(2), "bit for bit");
+    }
+}
+
+#[test]
+fn they_stay_until_they_are_changed() {
+    let mut world = slides(1.5, 1.0, gains(10.0, 1.0), H);
+    let nominal = |world: &World| {
+        let view = world.view();
+        (view.get_friction(), view.get_joint_damping(), view.get_armature())
+    };
+    let at_first = nominal(&world);
+    let mut robot = world.sim.robot_mut(world.robot);
+    robot.set_friction(&array![[0.5, 2.5]], None, Some(&[EnvId(1)])).unwrap();
+    robot.set_joint_damping(&array![[0.25, 8.0]], None, Some(&[EnvId(1)])).unwrap();
+    robot.set_armature(&array![[0.125, 0.75]], None, Some(&[EnvId(1)])).unwrap();
+    let set = nominal(&world);
+    assert_eq!(set.0.row(1), array![0.5, 2.5]);
+    assert_eq!(set.1.row(1), array![0.25, 8.0]);
+    assert_eq!(set.2.row(1), array![0.125, 0.75]);
+    world.sim.reset(None).unwrap();
+    assert_eq!(nominal(&world), set, "through a reset");
+    world.sim.add_rigid_object(RigidObjectCfg::default()).unwrap();
+    assert_eq!(nominal(&world), set, "when more is added");
+    // They are the environment's properties, by the same numbers.
+    let properties = world.sim.properties(EnvId(1)).unwrap();
+    let uid = world.view().uid().to_string();
+    assert_eq!(properties.get(Property::DryFriction, &format!("{uid}/b")).unwrap(), [2.5]);
+    assert_eq!(properties.get(Property::Armature, &format!("{uid}/a")).unwrap(), [0.125]);
+    assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "others share everything");
+    world.sim.reset_properties(None).unwrap();
+    assert_eq!(nominal(&world), at_first);
+}
+
+#[test]
+fn mistakes_are_named_and_change_nothing() {
+    let mut world = slides(1.5, 1.0, passive(), H);
+    let before = world.view().get_friction();
+    let mut robot = world.sim.robot_mut(world.robot);
+    for bad in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
+        let error = robot.set_friction(&array![[2.0, bad]], None, None).unwrap_err().to_string();
+        assert!(error.contains("set_friction") && error.contains("\"b\""), "{bad}: {error}");
+    }
+    for bad in [f64::NAN, f64::INFINITY, -1.0] {
+        let error = robot.set_joint_damping(&array![[bad, 2.0]], None, None).unwrap_err().to_string();
+        assert!(error.contains("set_joint_damping") && error.contains("\"a\""), "{bad}: {error}");
+        let error = robot.set_armature(&array![[bad, 2.0]], None, None).unwrap_err().to_string();
+        assert!(error.contains("set_armature") && error.contains("\"a\""), "{bad}: {error}");
+    }
+    assert!(matches!(robot.set_friction(&array![[1.0]], None, None), Err(Error::Shape { .. })));
+    let nowhere = Some(&[EnvId(ENVS)][..]);
+    assert!(matches!(robot.set_armature(&array![[1.0, 1.0]], None, nowhere), Err(Error::UnknownIndex { .. })));
+    let none = Some(&[JointIndex(2)][..]);
+    assert!(matches!(robot.set_armature(&array![[1.0]], none, None), Err(Error::UnknownIndex { .. })));
+    let twice = Some(&[JointIndex(0), JointIndex(0)][..]);
+    assert!(matches!(robot.set_friction(&array![[1.0, 1.0]], twice, None), Err(Error::Repeated { .. })));
+    assert_eq!(world.view().get_friction(), before);
+
+    let mut bare = slides(0.0, 0.0, gains(10.0, 1.0), H);
+    let mut robot = bare.sim.robot_mut(bare.robot);
+    let error = robot.set_friction(&array![[1.0, 1.0]], None, None).unwrap_err().to_string();
+    assert!(error.contains("dry friction") && error.contains("/a"), "{error}");
+    let error = robot.set_joint_damping(&array![[1.0, 1.0]], None, None).unwrap_err().to_string();
+    assert!(error.contains("damping") && error.contains("/a"), "{error}");
+    assert_eq!(bare.view().get_friction(), Array2::<f64>::zeros((ENVS, 2)));
+}
