@@ -105,7 +105,12 @@ impl SimulationManager {
     pub fn control_names(&self) -> Vec<String> {
         let parts = self.contents.parts.iter();
         let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.full(name)));
-        self.contents.joint_names().iter().cloned().chain(actuators).collect()
+        let drives = self
+            .contents
+            .robots
+            .iter()
+            .flat_map(|robot| robot.joint_names().iter().map(|joint| format!("{}/{joint}", robot.uid())));
+        drives.chain(actuators).collect()
     }
 
     /// Names of the columns of a [rollout](Self::rollout)'s states: `qpos uid/joint` for each position, then
