@@ -213,10 +213,10 @@ pub(crate) fn document(
     }
     for weld in &contents.welds {
         let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
-        let (first, second) = (body(&weld.first)?, body(&weld.second)?);
-        // MuJoCo holds them in the origin of the second: not in that of the world, which may be far away.
-        let (first, second) = if second == "world" { (second, first) } else { (first, second) };
-        mjcf.welds.push(WeldEquality { name: weld.uid.clone(), first, second });
+        let (first, second) = (body(&weld.cfg.first)?, body(&weld.cfg.second)?);
+        // MuJoCo holds them in the origin of the second: not in that of something fixed, which may be far away.
+        let (first, second) = if weld.second_is_fixed { (second, first) } else { (first, second) };
+        mjcf.welds.push(WeldEquality { name: weld.cfg.uid.clone(), first, second });
     }
     Ok((mjcf, layouts, diagnostics))
 }
@@ -256,7 +256,7 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
     objects.iter_mut().for_each(|o| o.mocap = usize::try_from(model.body_mocapid()[o.body]).ok());
     let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
-    let welds = contents.welds.iter().map(|weld| find_weld(&model, weld)).collect::<Result<Vec<_>>>()?;
+    let welds = contents.welds.iter().map(|weld| find_weld(&model, &weld.cfg)).collect::<Result<Vec<_>>>()?;
     let identities = identify(&model, contents, &robots, &objects, &parts);
     let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));

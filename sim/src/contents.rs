@@ -8,7 +8,7 @@ use crate::objects::object_group::GroupData;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
 use crate::objects::terrain::Terrain;
-use crate::objects::weld::WeldCfg;
+use crate::objects::weld::WeldData;
 use crate::pattern;
 use sensors::EngineSensor;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ pub(crate) struct Contents {
     pub(crate) terrains: Vec<Arc<Terrain>>,
     pub(crate) parts: Vec<Arc<MjcfData>>,
     pub(crate) groups: Vec<GroupData>,
-    pub(crate) welds: Vec<Arc<WeldCfg>>,
+    pub(crate) welds: Vec<WeldData>,
     /// Pairs of names of what never collides.
     pub(crate) apart: Vec<[String; 2]>,
 }
@@ -34,7 +34,7 @@ impl Contents {
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.parts.iter().map(|p| p.uid()));
-        let objects = objects.chain(self.welds.iter().map(|w| w.uid.as_str()));
+        let objects = objects.chain(self.welds.iter().map(|w| w.cfg.uid.as_str()));
         let objects = objects.chain(self.groups.iter().map(|g| g.uid.as_str()));
         let mut taken = self.robots.iter().map(|r| r.uid()).chain(objects);
         if taken.any(|other| other == uid) {

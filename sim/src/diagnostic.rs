@@ -46,7 +46,8 @@ pub enum DiagnosticKind {
     ColorClamped,
     /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
     SettingIgnored,
-    /// The surface of an object's mesh is open or encloses nothing: it weighs and turns as its convex hull.
+    /// The surface of an object's mesh is open, encloses nothing, or is inside out in a part: it weighs and turns as its convex
+    /// hull.
     OpenMesh,
     /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
     ExportReduced,

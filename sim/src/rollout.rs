@@ -75,6 +75,12 @@ fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>)
     }
 }
 
+/// The environment's model, in which none of its welds hold: a row has those of its own start.
+fn without_welds(env: &Env) -> mj::Model {
+    let model = env.data().model();
+    if env.welds().is_empty() { model.clone() } else { model.with_welds(&[]) }
+}
+
 /// Does one row in `env`, whose model is the row's.
 fn roll(
     env: &mut Env,
@@ -169,16 +175,17 @@ impl SimulationManager {
         let work = Mutex::new(rows.iter().zip(states.outer_iter_mut()).zip(&mut results).enumerate());
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
         let run = || -> Result<()> {
-            let mut copy: Option<Env> = None;
+            // With the model it was made of: a row with welds leaves it with a model of its own.
+            let mut copy: Option<(&mj::Model, Env)> = None;
             while let Some((k, ((row, states), result))) = next() {
-                let mut env = match copy.take().filter(|env| env.data().model().is(&row.model)) {
-                    Some(env) => env,
+                let mut env = match copy.take().filter(|(model, _)| model.is(&row.model)) {
+                    Some((_, env)) => env,
                     None => Env::with_drives(&row.model, row.drives.clone())?,
                 };
                 let mine = controls.index_axis(ndarray::Axis(0), if controls.shape()[0] == 1 { 0 } else { k });
                 *result = Some(roll(&mut env, row, &columns, substeps, mine, states));
-                // A row that needed more room leaves a copy with a model of its own: `is` tells.
-                copy = Some(env);
+                // A row that needed more room leaves a copy with larger buffers: the next one starts with small ones.
+                copy = (env.growths() == 0).then_some((&row.model, env));
             }
             Ok(())
         };
@@ -216,13 +223,16 @@ impl SimulationManager {
 
     fn rows(&self, envs: &[usize], start: Option<&Snapshot>) -> Result<Vec<Row>> {
         let states = start.map(|start| start.states_for(envs.len(), &self.simulation)).transpose()?;
+        // One for all rows of an environment, so that they share a copy.
+        let mut models: Vec<Option<mj::Model>> = vec![None; self.num_envs()];
         let row = |(k, &env): (usize, &usize)| {
             self.simulation.batch.read(env, |here| {
                 let start = match (start, &states) {
                     (Some(start), Some(states)) => start.entries()[states[k]].state.clone(),
                     _ => here.remember(),
                 };
-                Row { env, model: here.data().model().clone(), drives: here.drives.clone(), start }
+                let model = models[env].get_or_insert_with(|| without_welds(here)).clone();
+                Row { env, model, drives: here.drives.clone(), start }
             })
         };
         Ok(envs.iter().enumerate().map(row).collect())

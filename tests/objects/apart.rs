@@ -28,7 +28,9 @@ fn objects_pass_through_each_other() {
     assert!((block - 0.2).abs() < 1e-3 && (ball - 0.5).abs() < 1e-3, "the control: {block} {ball}");
     let (mut sim, ids) = stack();
     sim.exclude_collision("ball", "block").unwrap();
+    let model = sim.batch().model().clone();
     sim.exclude_collision("block", "ball").unwrap();
+    assert!(sim.batch().model().is(&model), "known already: nothing is compiled");
     let [block, ball] = heights(&mut sim, ids);
     assert!((block - 0.2).abs() < 1e-3 && (ball - 0.1).abs() < 1e-3, "inside of it, on the ground: {block} {ball}");
 }
@@ -75,6 +77,10 @@ fn names_that_mean_nothing() {
     for (one, other) in [("bal", "block"), ("block", "bal"), ("ground", "bal")] {
         let error = sim.exclude_collision(one, other).unwrap_err();
         assert!(matches!(&error, Error::UnknownName { what: "body called", .. }), "{error}");
+    }
+    for name in ["ball", "world"] {
+        let error = sim.exclude_collision(name, name).unwrap_err();
+        assert!(matches!(error, Error::Config { field: "exclude_collision", .. }), "{error}");
     }
     let error = sim.exclude_collision("bal", "block").unwrap_err().to_string();
     assert!(error.contains("\"ball\""), "{error}");

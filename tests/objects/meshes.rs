@@ -3,7 +3,7 @@
 use super::{Files, brick, channel, empty, object, weightless};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::mesh::write_binary_stl;
+use kinetoscope::scene::mesh::{TriMesh, write_binary_stl};
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
@@ -200,6 +200,23 @@ fn an_open_mesh_weighs_as_its_hull() {
     // The corners of the brick are all there: the hull is the brick.
     assert!((sim.rigid_object(id).mass() - 62.5).abs() < 1e-9, "{}", sim.rigid_object(id).mass());
     assert!((&sim.rigid_object(id).get_center_of_mass() - &array![[0.25, 0.25, 0.125]]).iter().all(|d| d.abs() < 1e-9));
+}
+
+/// Two bricks of which one is inside out: said, and weighed as the hull, not as their difference.
+#[test]
+fn a_mesh_that_is_inside_out_in_part_weighs_as_its_hull() {
+    let files = Files::new();
+    let (mut mesh, other) = (brick([0.5; 3], [0.0; 3]), brick([0.5, 0.5, 0.25], [1.0, 0.0, 0.0]));
+    mesh.positions.extend(&other.positions);
+    mesh.triangles.extend(other.triangles.iter().map(|&[a, b, c]| [b + 8, a + 8, c + 8]));
+    let mesh = TriMesh::from_triangles(mesh.positions, mesh.triangles);
+    let mut sim = empty(1);
+    let id = sim.add_rigid_object(object("odd", ObjectShape::mesh(files.obj("o.obj", &mesh)), [0.0; 3])).unwrap();
+    let [diagnostic] = sim.diagnostics() else { panic!("{:?}", sim.diagnostics()) };
+    assert_eq!(diagnostic.kind.name(), "open-mesh");
+    // The outline in x and z is a square and a half, and a trapezoid 1 m long between them and down to 0.25 m.
+    let outline = 0.5 * 0.5 + (0.5 + 0.25) / 2.0 * 1.0;
+    assert!((sim.rigid_object(id).mass() - 1000.0 * 0.5 * outline).abs() < 1e-6, "{}", sim.rigid_object(id).mass());
 }
 
 /// What is exported has the hull to collide and the mesh to be seen, and weighs the same.

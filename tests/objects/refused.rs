@@ -17,6 +17,12 @@ fn configurations_that_cannot_be() {
         ("inertia", RigidObjectCfg { inertia: Some([1.0, 1.0, 3.0]), ..cube() }),
         ("inertia", RigidObjectCfg { inertia: Some([1.0, 0.0, 1.0]), ..cube() }),
         ("inertia", RigidObjectCfg { inertia: Some([1.0, nan, 1.0]), ..cube() }),
+        // By the last bit: 0.237 + 0.694 is below 0.931 in double precision, while twice 0.931 is not above the sum.
+        ("inertia", RigidObjectCfg { inertia: Some([0.237, 0.694, 0.931]), ..cube() }),
+        ("mass", RigidObjectCfg { mass: Some(-1.0), ..cube() }),
+        ("mass", RigidObjectCfg { mass: Some(0.0), ..cube() }),
+        ("mass", RigidObjectCfg { mass: Some(nan), body_type: BodyType::Static, ..cube() }),
+        ("mass", RigidObjectCfg { mass: Some(-1.0), body_type: BodyType::Kinematic, ..cube() }),
         ("linear_damping", RigidObjectCfg { linear_damping: -1.0, ..cube() }),
         ("angular_damping", RigidObjectCfg { angular_damping: infinite, ..cube() }),
         ("linear_damping", RigidObjectCfg { linear_damping: 1.0, body_type: BodyType::Kinematic, ..cube() }),

@@ -1,7 +1,7 @@
 //! Welds: what is held moves as one, in the environment where it is held, and snapshots know it.
 
 use super::{object, weightless};
-use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::ndarray::{Array2, Array3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
 
@@ -182,6 +182,87 @@ fn masses_and_additions_keep_what_is_held() {
     assert!(apart(&relative(&sim, ids, 1), &before) < 1e-4);
 }
 
+/// Held to something that stands far away, as to the world: it hangs where it was, neither lower nor turned.
+#[test]
+fn what_is_far_and_fixed_holds() {
+    for (body_type, turned) in [BodyType::Static, BodyType::Kinematic].iter().flat_map(|t| [(*t, false), (*t, true)]) {
+        let cfg = SimulationManagerCfg { ground: None, physics_dt: 2e-3, ..Default::default() };
+        let mut sim = SimulationManager::new(cfg).unwrap();
+        let cube = |uid, x| RigidObjectCfg { mass: Some(0.3), ..object(uid, ObjectShape::cube(0.05), [x, 0.0, 1.0]) };
+        sim.add_rigid_object(RigidObjectCfg { body_type, ..cube("wall", 1000.0) }).unwrap();
+        let id = sim.add_rigid_object(cube("hung", 0.0)).unwrap();
+        let pair = if turned { ["wall", "hung"] } else { ["hung", "wall"] };
+        let held = sim.add_weld(weld(pair[0], pair[1])).unwrap();
+        assert_eq!([sim.weld(held).cfg().first.as_str(), sim.weld(held).cfg().second.as_str()], pair);
+        sim.weld_mut(held).attach(None).unwrap();
+        // A quarter of a turn in the time, if nothing held it.
+        sim.rigid_object_mut(id).write_velocity(&array![[0.0, 0.0, 0.0, 0.0, 0.0, 1.5]], None).unwrap();
+        sim.update(500);
+        let found = pose(&sim.rigid_object(id).get_pose(), 0);
+        let off = (found.translation.vector - nalgebra::Vector3::new(0.0, 0.0, 1.0)).norm();
+        // One step of 1.5 rad/s before it is stopped, twice over; 1e-4 of the weight.
+        assert!(
+            off < 1e-5 && found.rotation.angle() < 1e-2,
+            "{body_type:?} {pair:?}: {off} {}",
+            found.rotation.angle()
+        );
+    }
+}
+
+/// A snapshot knows between which bodies a weld is: of another scene where they are others.
+#[test]
+fn snapshots_know_between_whom() {
+    let build = |second: &str| {
+        let mut sim = weightless(1);
+        cubes(&mut sim);
+        sim.add_rigid_object(object("third", ObjectShape::cube(0.1), [0.0, 3.0, 0.0])).unwrap();
+        let held = sim.add_weld(weld("first", second)).unwrap();
+        sim.weld_mut(held).attach(None).unwrap();
+        sim
+    };
+    let (mut sim, mut other) = (build("second"), build("third"));
+    let snapshot = sim.snapshot(None).unwrap();
+    let error = other.restore(&snapshot, None).unwrap_err().to_string();
+    assert!(error.contains("\"second\"") && error.contains("\"third\""), "{error}");
+    // Controls.
+    sim.restore(&snapshot, None).unwrap();
+    build("second").restore(&snapshot, None).unwrap();
+}
+
+/// A rollout starts with the welds of its start, whatever holds in the environment.
+#[test]
+fn rollouts_hold_what_their_start_holds() {
+    let mut sim = weightless(2);
+    let ids = cubes(&mut sim);
+    let held = sim.add_weld(weld("first", "second")).unwrap();
+    push(&mut sim, ids[0], 2.0);
+    sim.update(5);
+    let loose = sim.snapshot(Some(SECOND)).unwrap();
+    sim.weld_mut(held).attach(Some(SECOND)).unwrap();
+    sim.update(5);
+    let tight = sim.snapshot(Some(SECOND)).unwrap();
+    let controls = Array3::zeros((1, 40, 0));
+    let rows = [EnvId(1); 3];
+    for (here, start) in [(&tight, &loose), (&loose, &tight), (&tight, &tight), (&loose, &loose)] {
+        sim.restore(here, Some(SECOND)).unwrap();
+        let rollout = sim.rollout(&controls, Some(start), Some(&rows)).unwrap();
+        sim.restore(start, Some(SECOND)).unwrap();
+        for step in 0..40 {
+            sim.update(1);
+            let now: Vec<f64> = sim.batch().read(1, |env| [env.data().qpos(), env.data().qvel()].concat());
+            for row in 0..3 {
+                let found = rollout.states.index_axis(Axis(0), row);
+                assert_eq!(found.row(step).to_vec(), now, "row {row}, step {step}");
+            }
+        }
+        let expected = sim.weld(held).is_attached()[1];
+        let moved = sim.rigid_object(ids[1]).get_velocity()[(1, 0)] != 0.0;
+        assert!(moved == expected && expected == std::ptr::eq(start, &tight));
+        sim.restore(&rollout.end, Some(&rows)).unwrap();
+        assert_eq!(sim.weld(held).is_attached().to_vec(), [false, expected]);
+    }
+}
+
 #[test]
 fn welds_that_cannot_be() {
     let mut sim = weightless(2);
@@ -190,11 +271,17 @@ fn welds_that_cannot_be() {
     sim.add_robot(RobotCfg { uid: "arm".into(), urdf, ..Default::default() }).unwrap();
     let wall = RigidObjectCfg { body_type: BodyType::Static, ..object("wall", ObjectShape::cube(0.1), [9.0; 3]) };
     sim.add_rigid_object(wall).unwrap();
+    let text = r#"<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
+        <body name="tail" pos="0.3 0 0"><geom size="0.1"/></body></body></worldbody></mujoco>"#;
+    sim.add_mjcf(MjcfCfg::text("part", text)).unwrap();
     let error = sim.add_weld(weld("first", "secnd")).unwrap_err();
     assert!(matches!(&error, Error::UnknownName { candidates, .. } if candidates[0] == "second"), "{error}");
-    for (first, second, says) in
-        [("first", "first", "different bodies"), ("wall", "world", "must move"), ("first", "arm", "one of its links")]
-    {
+    for (first, second, says) in [
+        ("first", "first", "different bodies"),
+        ("part/trunk", "part/tail", "different bodies"),
+        ("wall", "world", "must move"),
+        ("first", "arm", "one of its links"),
+    ] {
         let error = sim.add_weld(weld(first, second)).unwrap_err();
         assert!(matches!(error, Error::Config { field: "weld", .. }) && error.to_string().contains(says), "{error}");
     }

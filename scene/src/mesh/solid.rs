@@ -41,8 +41,12 @@ impl TriMesh {
         !edges.is_empty() && edges.values().all(|&count| count == 0)
     }
 
-    /// What the surface encloses; `None` where it is not [closed](Self::is_closed) or encloses nothing. A surface that is
+    /// What the surface encloses; `None` where it is not [closed](Self::is_closed), encloses nothing, or where the numbers are
+    /// those of no body: a centre outside its bounds, more volume than these have, a second moment below 0. A surface that is
     /// inside out encloses what it would with its front outside; where parts overlap, the volume counts twice.
+    ///
+    /// Parts count with their side: one that is inside out, within another, is a hollow. Beside the others it takes its volume
+    /// away from theirs, which is found where it is large or far away, and not where it is small.
     pub fn solid(&self) -> Option<Solid> {
         if !self.is_closed() {
             return None;
@@ -68,7 +72,13 @@ impl TriMesh {
             return None;
         }
         let center = first / volume;
-        Some(Solid { volume, center: middle + center, second_moment: second - center * center.transpose() * volume })
+        let second_moment = second - center * center.transpose() * volume;
+        let size = Vector3::from_fn(|i, _| f64::from(high[i]) - f64::from(low[i]));
+        // Rounding of sums over all triangles, and of a thin body's small moment.
+        let inside = (0..3).all(|i| center[i].abs() <= size[i] / 2.0 + 1e-6 * extent);
+        let fits = volume <= size.product() * (1.0 + 1e-6);
+        let possible = second_moment.symmetric_eigenvalues().min() >= -1e-9 * second_moment.norm();
+        (inside && fits && possible).then_some(Solid { volume, center: middle + center, second_moment })
     }
 }
 
@@ -129,6 +139,36 @@ mod tests {
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         assert!((inside_out.signed_volume() + volume).abs() < 1e-12);
         assert!((inside_out.solid().unwrap().volume - volume).abs() < 1e-15);
+    }
+
+    fn both(mut a: TriMesh, b: &TriMesh) -> TriMesh {
+        let first = a.positions.len() as u32;
+        a.positions.extend(&b.positions);
+        a.triangles.extend(b.triangles.iter().map(|t| t.map(|k| k + first)));
+        TriMesh::from_triangles(a.positions, a.triangles)
+    }
+
+    fn turned_inside_out(mut mesh: TriMesh) -> TriMesh {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        mesh
+    }
+
+    /// Two closed shells of which one is inside out: no body has the difference of their volumes and moments.
+    #[test]
+    fn a_part_that_is_inside_out_makes_no_solid() {
+        let at = |mesh: TriMesh, x| mesh.transformed(&from_xyz_rpy([x, 0.0, 0.0], [0.0; 3]));
+        let (large, small) = (brick([1.0, 1.0, 1.0]), brick([0.5, 0.5, 0.5]));
+        for part in [at(large.clone(), 1.5), at(small.clone(), 1.5)] {
+            let good = both(large.clone(), &part);
+            assert!((good.solid().unwrap().volume - 1.0 - part.solid().unwrap().volume).abs() < 1e-6);
+            let bad = both(large.clone(), &turned_inside_out(part));
+            assert!(bad.is_closed() && bad.solid().is_none());
+        }
+        // Within the other it is a hollow.
+        let hollow = both(large.clone(), &turned_inside_out(at(small, 0.25)));
+        assert!((hollow.solid().unwrap().volume - 0.875).abs() < 1e-6);
+        // The same twice is more than there is room for.
+        assert!(both(large.clone(), &large).solid().is_none());
     }
 
     #[test]

@@ -54,6 +54,9 @@ use std::path::Path;
 /// type = "contact_sensor"
 /// bodies = ["{ENV_REGEX_NS}/cube"]
 /// ```
+///
+/// Groups of objects, welds and pairs that never collide are no entities: add them to the simulation of the scene that runs
+/// ([`add_weld`](SimulationManager::add_weld), [`exclude_collision`](SimulationManager::exclude_collision)).
 #[derive(Clone, Debug, Default)]
 pub struct SceneCfg {
     /// The simulation itself: number of environments, time step, ground, lights.

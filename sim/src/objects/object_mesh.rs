@@ -40,8 +40,8 @@ impl ObjectMesh {
                     DiagnosticKind::OpenMesh,
                     None,
                     format!(
-                        "object {uid:?}: {}: the surface is open or encloses nothing; mass, centre of mass and moments are \
-                         those of its convex hull",
+                        "object {uid:?}: {}: the surface is open, encloses nothing, or is inside out in a part; mass, centre \
+                         of mass and moments are those of its convex hull",
                         path.display()
                     ),
                 ));

@@ -22,9 +22,10 @@ pub(crate) const LEAST: f64 = 0.14;
 /// `v STEPS h / π`.
 const STEPS: f64 = 10.0;
 
-/// Impedance of such a contact, the same at every depth: the formula asks for a constant, and MuJoCo's largest default
-/// leaves room to it.
-pub(crate) const IMPEDANCE: [f64; 5] = [0.95, 0.95, 0.001, 0.5, 2.0];
+/// Impedance d of such a contact, the same at every depth: the formula asks for a constant. It is the largest that MuJoCo
+/// takes (`mjMAXIMP`): with pyramidal cones a contact yields `mu² (1 + mu²) / 2` times as much as `(1 - d) / d` says (the
+/// rows of its edges), so that a smaller d would make the bounce depend on the friction.
+pub(crate) const IMPEDANCE: [f64; 5] = [0.9999, 0.9999, 0.001, 0.5, 2.0];
 
 /// Weight of its impedance against that of other surfaces, which have 1.
 pub(crate) const WEIGHT: f64 = 1e6;

@@ -31,8 +31,9 @@ impl RigidObject<'_> {
         self.numbers(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
     }
 
-    /// Principal moments of inertia about the centre of mass in each environment \[kg m²\], shape (N, 3). Their axes are those
-    /// of the object's frame, but for a mesh, of which the largest moment is the first.
+    /// Principal moments of inertia about the centre of mass in each environment \[kg m²\], shape (N, 3). They are
+    /// those along x, y and z of the object's frame; those of a mesh whose configuration names no `inertia` are along its
+    /// principal axes, the largest first.
     pub fn get_inertia(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().moments.iter().copied().collect();
         self.numbers(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())

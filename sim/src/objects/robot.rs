@@ -651,8 +651,8 @@ impl<'a> RobotMut<'a> {
     /// which are in world axes, stay. A forward pass follows.
     ///
     /// # Errors
-    /// The base is fixed; wrong shape, unknown environment, a value that is not finite, a quaternion of length zero; then
-    /// nothing is written.
+    /// The base is fixed; wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
+    /// quaternion of length zero; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_root_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.root().write_poses("write_root_pose", poses.into(), env_ids)

@@ -51,8 +51,10 @@ pub enum ObjectShape {
     /// the links of a robot: MuJoCo's contacts are those of convex shapes, so that nothing lies in the hollow of a bowl that
     /// is one mesh. A hollow thing is several objects that hold together, or a terrain.
     ///
-    /// Mass and moments are those of what the triangles enclose, filled evenly. Where the surface is open or encloses nothing,
-    /// they are those of the hull, and a diagnostic says so.
+    /// Mass and moments are those of what the triangles enclose, filled evenly. Where the surface is open, encloses nothing,
+    /// or has numbers that no body has (a part beside the others is inside out), they are those of the hull, and a diagnostic
+    /// says so. Parts that overlap count twice where the bounds have room for it; a part beside the others that is inside out
+    /// and small goes unseen.
     Mesh {
         /// The file.
         path: PathBuf,

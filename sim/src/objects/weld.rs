@@ -40,6 +40,14 @@ pub struct WeldId {
     index: usize,
 }
 
+/// A weld that was added.
+#[derive(Clone, Debug)]
+pub(crate) struct WeldData {
+    pub(crate) cfg: Arc<WeldCfg>,
+    /// Whether the second body is fixed or moved by hand, and the first is not.
+    pub(crate) second_is_fixed: bool,
+}
+
 /// Which equality a weld is, and MuJoCo's bodies that it holds together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeldIndex {
@@ -146,7 +154,7 @@ impl SimulationManager {
     /// it is [attached](WeldMut::attach).
     ///
     /// # Errors
-    /// The name is taken, a body is not there, it is a whole robot, both are the same or part of one, or none of them can
+    /// The name is taken, a body is not there, it is a whole robot, both are the same or held together by fixed joints, or none of them can
     /// move.
     pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
         self.check_world_uid(&cfg.uid)?;
@@ -161,18 +169,20 @@ impl SimulationManager {
             }),
         };
         let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
-        let fixed = |body: usize| model.body_weldid()[body] == 0;
+        // What no joint holds apart moves as one; with 0 it is fixed or moved by hand.
+        let [one, other] = [first, second].map(|body| model.body_weldid()[body]);
         let fail = |expected| {
             Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
         };
-        if first == second {
+        if first == second || one == other && one != 0 {
             return fail("the two must be different bodies; what a fixed joint holds is one body");
         }
-        if fixed(first) && fixed(second) {
+        if one == other {
             return fail("one of the two must move by itself: both are fixed or moved by hand");
         }
+        let second_is_fixed = other == 0;
         let mut contents = self.contents.clone();
-        contents.welds.push(Arc::new(cfg));
+        contents.welds.push(WeldData { cfg: Arc::new(cfg), second_is_fixed });
         self.replace_contents(contents, Vec::new())?;
         Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
     }
@@ -184,7 +194,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn weld(&self, id: WeldId) -> Weld<'_> {
         let index = self.index_of(id.manager, id.index);
-        Weld::new(&self.contents.welds[index], &self.simulation, index)
+        Weld::new(&self.contents.welds[index].cfg, &self.simulation, index)
     }
 
     /// A weld, to make and to release.
@@ -194,6 +204,6 @@ impl SimulationManager {
     #[track_caller]
     pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        WeldMut::new(&self.contents.welds[index], &mut self.simulation, &mut self.sensors, index)
+        WeldMut::new(&self.contents.welds[index].cfg, &mut self.simulation, &mut self.sensors, index)
     }
 }

@@ -167,8 +167,9 @@ impl SimulationManager {
         })
     }
 
-    /// Memory that an environment's properties take \[bytes\]: the struct and the arrays of the model that it does not share,
-    /// and the values as they were set; 0 where they are nominal. One whole copy of the model is kept beside, for all.
+    /// Memory that an environment's properties take \[bytes\]: the struct and the arrays of the model that it does not share
+    /// (with those of the welds that hold in it), and the values as they were set; 0 where all properties are nominal, whatever
+    /// welds hold. One whole copy of the model is kept beside, for all.
     ///
     /// # Errors
     /// There is no such environment.

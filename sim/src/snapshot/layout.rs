@@ -35,7 +35,12 @@ impl Layout {
             lines.push(format!("body {:?}{by_hand}", name(ObjectKind::Body, body)));
         }
         for weld in (0..model.neq()).filter(|&equality| model.is_weld(equality)) {
-            lines.push(format!("weld {:?}", name(ObjectKind::Equality, weld)));
+            // The pose of a weld is that of the one in the other: it means nothing between other bodies.
+            let sites = model.equality_is_between_sites(weld);
+            let kind = if sites { ObjectKind::Site } else { ObjectKind::Body };
+            let held = |of: &[i32]| name(kind, usize::try_from(of[weld]).unwrap_or(0));
+            let (first, second) = (held(model.eq_obj1id()), held(model.eq_obj2id()));
+            lines.push(format!("weld {:?} of {first:?} and {second:?}", name(ObjectKind::Equality, weld)));
         }
         for actuator in 0..model.nactuator() {
             lines.push(format!("actuator {:?}", name(ObjectKind::Actuator, actuator)));
