@@ -57,6 +57,9 @@ const HOLD: f64 = 2.0;
 const AT_REST_HEIGHT: f64 = 3e-3;
 /// ... and it moves no faster than this \[m/s, rad/s\].
 const AT_REST_SPEED: f64 = 0.01;
+/// The hand has let go when the cube's middle is farther from the palm's frame than this \[m\]: it is 0.114 away in the hand,
+/// and 0.22 once the hand has risen from it.
+const LET_GO: f64 = 0.17;
 
 /// The middle of the cube in the hand, ahead of the palm's frame, to the side of the thumb, below \[m\]. The fingers that
 /// close are 0.01 and 0.03 to the side, the thumb 0.02; the table is 5 mm below their tips.
@@ -146,6 +149,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let held = held as f64 * sim.cfg().physics_dt;
     let mut table = Vec::new();
     let (poses, velocities) = (places(&sim), sim.rigid_object(cube).get_velocity());
+    let (palms, diverged) = (trial::poses(&sim.robot(robot).link_pose(grip::PALM)?), trial::diverged(&sim));
     for env in 0..sim.num_envs() {
         let mass = sim.properties(EnvId(env))?.get(Property::Mass, "cube")?[0];
         let lifted = held >= HOLD - 1e-9 && rises[env] >= LIFT;
@@ -153,18 +157,21 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let speed = velocities.row(env).iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let inside = on_shelf.x.abs().max(on_shelf.y.abs()) < SHELF_SIDE / 2.0;
         let rests = inside && (on_shelf.z - EDGE / 2.0).abs() < AT_REST_HEIGHT && speed < AT_REST_SPEED;
-        let success = planned[env] && lifted && rests;
+        let let_go = (palms[env].translation.vector - poses[env].translation.vector).norm() > LET_GO;
+        let success = planned[env] && lifted && rests && let_go && diverged[env].is_none();
         table.push(json!({
             "env": env, "mass": mass, "start": to_row(&cubes[env]), "planned": planned[env],
             "lowest_rise": Some(rises[env]).filter(|rise| rise.is_finite()), "end": to_row(&poses[env]),
-            "speed": speed, "lifted": lifted, "on_shelf": rests, "success": success,
+            "speed": speed, "lifted": lifted, "on_shelf": rests, "let_go": let_go,
+            "diverged": diverged[env], "success": success,
         }));
         println!(
-            "environment {env:>2}: {mass:.3} kg, way planned: {}, held at {:+.4} m: {}, on the shelf: {}",
+            "environment {env:>2}: {mass:.3} kg, way planned: {}, held at {:+.4} m: {}, on the shelf: {}, let go: {}",
             trial::word(planned[env]),
             rises[env],
             trial::word(lifted),
             trial::word(rests),
+            trial::word(let_go),
         );
     }
     let successes = table.iter().filter(|row| row["success"] == true).count();

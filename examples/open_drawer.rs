@@ -139,15 +139,16 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
     let view = sim.articulation(cabinet);
     let (open, speed, ends) = (view.get_qpos(), view.get_qvel(), trial::poses(&view.get_root_pose()));
+    let diverged = trial::diverged(&sim);
     let mut table = Vec::new();
     for env in 0..sim.num_envs() {
         let (open, speed) = (open[(env, 0)], speed[(env, 0)].abs());
         let shift = (ends[env].translation.vector - stands[env].translation.vector).norm();
         let (is_open, stays) = (open >= OPEN_BY && speed < AT_REST, shift < CABINET_STAYS);
-        let success = planned[env] && is_open && stays;
+        let success = planned[env] && is_open && stays && diverged[env].is_none();
         table.push(json!({
             "env": env, "cabinet": to_row(&stands[env]), "planned": planned[env], "open": open, "speed": speed,
-            "cabinet_shift": shift, "success": success,
+            "cabinet_shift": shift, "diverged": diverged[env], "success": success,
         }));
         println!(
             "environment {env:>2}: way planned: {}, open by {open:.4} m: {}, the cabinet moved by {:.1} mm: {}",

@@ -29,6 +29,17 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result<bool>) -> ExitCod
     if enough || code != ExitCode::SUCCESS { code } else { ExitCode::FAILURE }
 }
 
+/// For each environment, why it could not be stepped on; `None` where all went well. What it shows is its last good state,
+/// which is no result.
+pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
+    let mut reasons = vec![None; sim.num_envs()];
+    for (env, reason) in sim.diverged() {
+        eprintln!("warning: environment {} diverged: {reason}", env.0);
+        reasons[env.0] = Some(reason);
+    }
+    reasons
+}
+
 /// `yes` or `no`.
 pub(crate) fn word(yes: bool) -> &'static str {
     if yes { "yes" } else { "no" }

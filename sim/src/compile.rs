@@ -444,6 +444,7 @@ fn set_up_drives(
         for damped in &layout.damped {
             let (_, dof) = compiled.joint_address(&damped.joint).ok_or_else(|| missing("joint", &damped.joint))?;
             table.damped.extend((dof..dof + damped.dofs).map(|dof| (dof, damped.damping)));
+            table.undamped_armature.extend(std::iter::repeat_n(damped.armature, damped.dofs));
         }
         let links = layout
             .links

@@ -15,9 +15,14 @@ fn near(found: f64, expected: f64) {
 
 /// How far it slides from a speed until it stands.
 fn slides(speed: f64, friction: f64) -> f64 {
+    heavy_slides(MASS, speed, friction)
+}
+
+/// The same of another inertia.
+fn heavy_slides(mass: f64, speed: f64, friction: f64) -> f64 {
     let rest = friction / DAMPING;
-    let time = MASS / DAMPING * (1.0 + speed / rest).ln();
-    MASS / DAMPING * speed - rest * time
+    let time = mass / DAMPING * (1.0 + speed / rest).ln();
+    mass / DAMPING * speed - rest * time
 }
 
 #[test]
@@ -42,6 +47,36 @@ fn with_a_robots_drive_it_would_not_slide() {
     sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
     sim.update(1000);
     assert!(sim.articulation(id).get_qpos()[(0, 0)].abs() < 1e-3, "held at its target");
+}
+
+#[test]
+fn friction_and_rotor_inertia_of_its_own_leave_it_passive() {
+    let (friction, rotor) = (3.0, 2.0);
+    // Without a drive, and with one of which they take the place.
+    let other = DriveCfg {
+        drive_type: DriveType::None,
+        friction: Some(50.0.into()),
+        armature: 70.0.into(),
+        ..Default::default()
+    };
+    for drive in [None, Some(other)] {
+        let mut sim = sim(1);
+        let own = ArticulationCfg {
+            friction: Some(friction.into()),
+            armature: Some([("drawer_.*", rotor)].into()),
+            drive,
+            ..cabinet()
+        };
+        let id = sim.add_articulation(own).unwrap();
+        assert_eq!(sim.articulation(id).get_friction(), array![[friction]]);
+        near(sim.articulation(id).get_armature()[(0, 0)], rotor);
+        sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
+        sim.update(1000);
+        near(sim.articulation(id).get_qpos()[(0, 0)], heavy_slides(MASS + rotor, 0.5, friction));
+        assert_eq!(sim.articulation(id).get_qf(), array![[0.0]], "no drive gives anything");
+    }
+    // Control: the file's friction and no rotor take it elsewhere.
+    assert!((slides(0.5, FRICTION) / heavy_slides(MASS + rotor, 0.5, friction) - 1.0).abs() > 0.1);
 }
 
 #[test]

@@ -66,9 +66,25 @@ fn damping_of_a_joint_is_not_that_of_its_drive() {
     }
 }
 
+/// Implicit damping has a half of its own in MuJoCo's armature, of which nothing shows.
+#[test]
+fn rotor_inertia_is_what_was_asked_for_to_the_last_bit() {
+    let (rotor, damping) = (1e-3, 40.0);
+    // The control: what is found where the half is taken off again.
+    assert_ne!((rotor + H * damping) - H * damping, rotor);
+    let mut world = slides(damping, 0.0, DriveCfg { armature: rotor.into(), ..gains(0.0, 0.0) }, H);
+    assert_eq!(world.view().get_armature(), Array2::from_elem((ENVS, 2), rotor));
+    let read = world.view().get_armature();
+    world.sim.robot_mut(world.robot).set_armature(&read, None, None).unwrap();
+    assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "nothing is another");
+}
+
 #[test]
 fn dry_friction_stops_a_joint_sooner() {
-    for drive in [passive(), gains(0.0, 0.0)] {
+    // An explicit model beside a row, or beside an actuator.
+    let beside = |model| DriveCfg { model, actuators: vec![("a".into(), IdealPd {}.into())], ..gains(0.0, 0.0) };
+    let explicit = [beside(DriveModel::Implicit), beside(DriveModel::Actuator)];
+    for drive in [passive(), gains(0.0, 0.0)].into_iter().chain(explicit) {
         let mut world = slides(0.0, 1.0, drive, 5e-4);
         let mut robot = world.sim.robot_mut(world.robot);
         robot.set_friction(&array![[4.0, 0.5]], None, Some(&[EnvId(1)])).unwrap();
@@ -113,6 +129,62 @@ fn they_stay_until_they_are_changed() {
     assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "others share everything");
     world.sim.reset_properties(None).unwrap();
     assert_eq!(nominal(&world), at_first);
+}
+
+/// A snapshot holds the state, and what a drive was told; these belong to the environment.
+#[test]
+fn restoring_a_snapshot_leaves_them() {
+    let mut world = slides(1.5, 1.0, gains(10.0, 1.0), H);
+    let (snapshot, stiffness) = (world.sim.snapshot(None).unwrap(), world.view().get_stiffness());
+    let mut robot = world.sim.robot_mut(world.robot);
+    robot.set_stiffness(&array![[70.0, 80.0]], None, None).unwrap();
+    let set = [array![[0.5, 2.5]], array![[0.25, 8.0]], array![[0.125, 0.75]]];
+    robot.set_friction(&set[0], None, None).unwrap();
+    robot.set_joint_damping(&set[1], None, None).unwrap();
+    robot.set_armature(&set[2], None, None).unwrap();
+    world.sim.restore(&snapshot, None).unwrap();
+    let view = world.view();
+    assert_eq!(view.get_stiffness(), stiffness, "control: what is restored");
+    for (found, set) in [view.get_friction(), view.get_joint_damping(), view.get_armature()].iter().zip(&set) {
+        assert_eq!(found, set.broadcast((ENVS, 2)).unwrap());
+    }
+
+    // Both halves of the damping that is integrated with the drives stay: the model's and the environment's.
+    let mut world = slides(1.5, 0.0, gains(0.0, 0.0), H);
+    let snapshot = world.sim.snapshot(None).unwrap();
+    let damping = [40.0, 8.0];
+    world.sim.robot_mut(world.robot).set_joint_damping(&array![damping], None, None).unwrap();
+    world.sim.restore(&snapshot, None).unwrap();
+    world.sim.robot_mut(world.robot).write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
+    world.step(1);
+    close(&world.view().get_qvel(), |_, joint| M[joint] / (M[joint] + H * damping[joint]));
+}
+
+#[test]
+fn what_is_read_can_be_set() {
+    let joints = [Joint { damping: 1.5, friction: 1.0, ..Joint::slide("a", M[0]) }, Joint::slide("b", M[1])];
+    for drive in [passive(), gains(10.0, 1.0)] {
+        let mut world = world(&joints, drive, SimulationManagerCfg { num_envs: ENVS, ..weightless() });
+        let (friction, damping, armature) =
+            (world.view().get_friction(), world.view().get_joint_damping(), world.view().get_armature());
+        assert_eq!((friction.row(0), damping.row(0)), (array![1.0, 0.0].view(), array![1.5, 0.0].view()));
+        let mut robot = world.sim.robot_mut(world.robot);
+        robot.set_friction(&friction, None, None).unwrap();
+        robot.set_joint_damping(&damping, None, None).unwrap();
+        robot.set_armature(&armature, None, None).unwrap();
+        // Both at once: what joint b has none of stays 0.
+        robot.set_friction(&array![[2.0, 0.0]], None, Some(&[EnvId(1)])).unwrap();
+        robot.set_joint_damping(&array![[0.0, 0.0]], None, Some(&[EnvId(2)])).unwrap();
+        let expected = (array![[1.0, 0.0], [2.0, 0.0], [1.0, 0.0]], array![[1.5, 0.0], [1.5, 0.0], [0.0, 0.0]]);
+        assert_eq!((world.view().get_friction(), world.view().get_joint_damping()), expected);
+        // Controls: 0 is no friction of joint a, and joint b cannot have any.
+        let mut robot = world.sim.robot_mut(world.robot);
+        let error = robot.set_friction(&array![[0.0, 0.0]], None, None).unwrap_err().to_string();
+        assert!(error.contains("\"a\""), "{error}");
+        let error = robot.set_friction(&array![[1.0, 0.1]], None, None).unwrap_err().to_string();
+        assert!(error.contains("/b"), "{error}");
+        assert_eq!((world.view().get_friction(), world.view().get_joint_damping()), expected);
+    }
 }
 
 #[test]

@@ -18,10 +18,19 @@ struct Run {
     example: &'static str,
     args: &'static str,
     exits: &'static [i32],
+    /// What its report has to say.
+    report: Requirement,
 }
 
+/// Says what is wrong with a report.
+type Requirement = fn(&Value) -> Result<(), String>;
+
 const fn run_of(example: &'static str, exits: &'static [i32], args: &'static str) -> Run {
-    Run { example, args, exits }
+    trial_of(example, exits, args, anything)
+}
+
+const fn trial_of(example: &'static str, exits: &'static [i32], args: &'static str, report: Requirement) -> Run {
+    Run { example, args, exits, report }
 }
 
 /// A new example needs at least one row here: what it does on good input, and its exit code on bad input.
@@ -85,13 +94,20 @@ const TABLE: &[Run] = &[
     ),
     run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
     run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
-    run_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json"),
-    // Hands that slip: the control of the run above.
-    run_of("grasp", &[1], "--headless --friction 0.02"),
+    trial_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json", enough_succeeded),
+    // Two cubes that are taken from another side than their first, and arrive turned.
+    trial_of("grasp", &[0], "--headless --seed 5 --report {out}/grasp_turned.json", enough_succeeded),
+    // Hands that slip: the control of the runs above.
+    trial_of("grasp", &[1], "--headless --friction 0.02 --report {out}/grasp_slips.json", none_lifted),
     run_of("grasp", &[2], "--headless --friction=-1"),
-    run_of("open_drawer", &[0], "--headless --out {out}/open_drawer --report {out}/open_drawer.json"),
+    trial_of(
+        "open_drawer",
+        &[0],
+        "--headless --out {out}/open_drawer --report {out}/open_drawer.json",
+        enough_succeeded,
+    ),
     // Drawers that are stuck: the control of the run above.
-    run_of("open_drawer", &[1], "--headless --slide-friction 500"),
+    trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction 0"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
@@ -147,8 +163,10 @@ fn run_row(ready: &Ready, row: &Run, out: &Path) -> Outcome {
         let expected = expected.join(" or ");
         return Err(failure(format!("`{} {}` ended with {code}, expected {expected}", row.example, args.join(" "))));
     }
-    if let (0, Some(report)) = (code, flag_value(&args, "--report")) {
-        check_report(Path::new(report)).map_err(|reason| failure(format!("the report {report}: {reason}")))?;
+    // Bad input ends before there is anything to report.
+    if let (0 | 1, Some(report)) = (code, flag_value(&args, "--report")) {
+        check_report(Path::new(report), row.report)
+            .map_err(|reason| failure(format!("the report {report}: {reason}")))?;
     }
     Ok(())
 }
@@ -161,14 +179,71 @@ fn flag_value<'a>(args: &'a [String], flag: &str) -> Option<&'a str> {
     args.iter().position(|arg| arg == flag).and_then(|at| args.get(at + 1)).map(String::as_str)
 }
 
-/// A report is a JSON object that says something.
-fn check_report(path: &Path) -> Result<(), String> {
+/// A report is a JSON object that says something, and what the run requires.
+fn check_report(path: &Path, required: Requirement) -> Result<(), String> {
     let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
     match serde_json::from_str::<Value>(&text) {
-        Ok(Value::Object(fields)) if !fields.is_empty() => Ok(()),
+        Ok(report) if report.as_object().is_some_and(|fields| !fields.is_empty()) => required(&report),
         Ok(_) => Err("not a JSON object with fields".to_string()),
         Err(e) => Err(format!("not JSON: {e}")),
     }
+}
+
+fn anything(_: &Value) -> Result<(), String> {
+    Ok(())
+}
+
+/// How many environments the examples that count have where nobody says how many.
+const TRIALS: u64 = 16;
+
+/// Of 16 environments as many succeeded as are needed, and those that did have not diverged.
+fn enough_succeeded(report: &Value) -> Result<(), String> {
+    let succeeded = trials(report)?.iter().filter(|row| row["success"] == true && row["diverged"].is_null()).count();
+    let (successes, needed) = (number(report, "successes")?, number(report, "needed")?);
+    if succeeded as f64 != successes {
+        return Err(format!("{successes} successes are claimed, {succeeded} environments have one"));
+    }
+    if needed < 15.0 || successes < needed {
+        return Err(format!("{successes} successes where {needed} are needed, which should be 15 at least"));
+    }
+    Ok(())
+}
+
+/// No environment succeeded, because no cube was lifted. Where hands go afterwards depends on where cubes are left.
+fn none_lifted(report: &Value) -> Result<(), String> {
+    none(report, |row| Ok(row["lifted"] != false))
+}
+
+/// No environment succeeded, though hands went everywhere, because no drawer opened as far as it should.
+fn none_opened(report: &Value) -> Result<(), String> {
+    none(report, |row| Ok(row["planned"] != true || number(row, "open")? >= 0.15))
+}
+
+/// No environment succeeded, and in none is true what should not be; all of them ran to the end.
+fn none(report: &Value, wrong: impl Fn(&Value) -> Result<bool, String>) -> Result<(), String> {
+    let successes = number(report, "successes")?;
+    if successes != 0.0 {
+        return Err(format!("{successes} successes in a run that is to fail"));
+    }
+    for (env, row) in trials(report)?.iter().enumerate() {
+        if !row["diverged"].is_null() || wrong(row)? {
+            return Err(format!("environment {env} did not fail as it should: {row}"));
+        }
+    }
+    Ok(())
+}
+
+/// The environments of a report, of which there are 16.
+fn trials(report: &Value) -> Result<&[Value], String> {
+    let rows = report["environments"].as_array().map(Vec::as_slice).unwrap_or_default();
+    match (number(report, "num_envs")?, rows.len() as u64) {
+        (claimed, TRIALS) if claimed == TRIALS as f64 => Ok(rows),
+        (claimed, rows) => Err(format!("{claimed} environments, {rows} reported, expected {TRIALS}")),
+    }
+}
+
+fn number(of: &Value, field: &str) -> Result<f64, String> {
+    of[field].as_f64().ok_or_else(|| format!("no number {field:?} in {of}"))
 }
 
 /// Names of `examples/x.rs` and `examples/x/main.rs`.
@@ -201,6 +276,7 @@ fn table_gaps(examples: &[String]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     fn names(names: &[&str]) -> Vec<String> {
         names.iter().map(|name| (*name).to_string()).collect()
@@ -240,12 +316,53 @@ mod tests {
     fn an_empty_or_broken_report_is_found() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let path = dir.path().join("report.json");
-        assert!(check_report(&path).is_err());
+        assert!(check_report(&path, anything).is_err());
         for text in ["", "{}", "[1]", "{\"steps\": NaN}"] {
             fs::write(&path, text).expect("writable");
-            assert!(check_report(&path).is_err(), "{text}");
+            assert!(check_report(&path, anything).is_err(), "{text}");
         }
         fs::write(&path, "{\"steps\": 400}").expect("writable");
-        assert!(check_report(&path).is_ok());
+        assert!(check_report(&path, anything).is_ok());
+    }
+    /// A report of 16 environments, the first of which is `odd` and the others `rest`.
+    fn trial(successes: u64, odd: &Value, rest: &Value) -> Value {
+        let environments: Vec<&Value> = std::iter::once(odd).chain(std::iter::repeat_n(rest, 15)).collect();
+        json!({ "num_envs": 16, "successes": successes, "needed": 15, "environments": environments })
+    }
+
+    #[test]
+    fn trials_have_to_succeed_in_enough_environments() {
+        let good = json!({ "success": true, "diverged": null });
+        let bad = json!({ "success": false, "diverged": null });
+        assert_eq!(enough_succeeded(&trial(16, &good, &good)), Ok(()));
+        assert_eq!(enough_succeeded(&trial(15, &bad, &good)), Ok(()));
+        assert!(enough_succeeded(&trial(1, &good, &bad)).is_err(), "too few");
+        assert!(enough_succeeded(&trial(16, &bad, &good)).is_err(), "another number than is claimed");
+        let diverged = json!({ "success": true, "diverged": "step 7: bad acceleration" });
+        assert!(enough_succeeded(&trial(16, &diverged, &good)).is_err());
+        let mut few = trial(16, &good, &good);
+        few["needed"] = json!(1);
+        assert!(enough_succeeded(&few).is_err(), "{few}");
+        few["num_envs"] = json!(4);
+        assert!(enough_succeeded(&few).is_err(), "{few}");
+        assert!(enough_succeeded(&json!({ "steps": 4 })).is_err());
+    }
+
+    #[test]
+    fn controls_have_to_fail_as_they_should() {
+        let row = |lifted: bool, planned: bool, open: f64| {
+            let diverged = Value::Null;
+            json!({ "success": false, "diverged": diverged, "lifted": lifted, "planned": planned, "open": open })
+        };
+        let good = row(false, true, 0.0);
+        for control in [none_lifted, none_opened] {
+            assert_eq!(control(&trial(0, &good, &good)), Ok(()));
+            assert!(control(&trial(1, &good, &good)).is_err());
+            assert!(control(&trial(0, &json!({ "planned": true }), &good)).is_err(), "says nothing");
+            assert!(control(&json!({ "successes": 0, "num_envs": 16, "environments": [] })).is_err());
+        }
+        assert!(none_lifted(&trial(0, &row(true, true, 0.0), &good)).is_err());
+        assert!(none_opened(&trial(0, &row(false, true, 0.16), &good)).is_err());
+        assert!(none_opened(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
     }
 }

@@ -86,6 +86,8 @@ pub struct DriveTable {
     pub models: Vec<DriveActuator>,
     /// Degrees of freedom whose viscous damping moved from the model to [`implicit`], with its coefficient.
     pub damped: Vec<(usize, f64)>,
+    /// Of each of them, the armature without what implicit damping adds to it \[kg m² or kg\].
+    pub undamped_armature: Vec<f64>,
 }
 
 /// The explicit model of a drive.

@@ -126,6 +126,8 @@ pub struct DampedJoint {
     pub dofs: usize,
     /// The damping of each \[N m s/rad or N s/m\].
     pub damping: f64,
+    /// The armature of each without that half \[kg m² or kg\].
+    pub armature: f64,
 }
 
 /// A link's frame in its body.
@@ -447,9 +449,10 @@ impl Emitter<'_, '_> {
         for joint in joints {
             let damping = std::mem::take(&mut joint.damping);
             if damping > 0.0 {
+                let armature = joint.armature;
                 joint.armature += self.mjcf.option.timestep * damping;
                 let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
-                self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping });
+                self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping, armature });
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Articulations that are no robots: drawers, doors, lids, whatever has joints that are moved from outside.
 
-use crate::drive::{DriveCfg, DriveType};
+use crate::drive::{DriveCfg, DriveType, PerJoint};
 use crate::error::Result;
 use crate::manager::{RobotId, SimulationManager};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
@@ -29,8 +29,13 @@ pub struct ArticulationCfg {
     /// Start positions by joint pattern \[rad or m\]; 0 where none matches.
     #[serde(with = "scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
-    /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive.
+    /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive. One
+    /// that is given has the stiffness and damping of [`DriveCfg::default`], a robot's, where it names no others.
     pub drive: Option<DriveCfg>,
+    /// Dry friction \[N m or N\]; where unset, that of `drive`, or else the URDF's. It leaves joints passive.
+    pub friction: Option<PerJoint>,
+    /// Rotor inertia \[kg m² or kg\]; where unset, that of `drive`, or else 0. It leaves joints passive.
+    pub armature: Option<PerJoint>,
     /// Whether its links collide with each other.
     pub self_collision: bool,
     /// How collision meshes become convex hulls.
@@ -49,6 +54,8 @@ impl Default for ArticulationCfg {
             init_pose: robot.init_pose,
             init_qpos: robot.init_qpos,
             drive: None,
+            friction: None,
+            armature: None,
             self_collision: robot.self_collision,
             hull: robot.hull,
             semantic_class: None,
@@ -60,13 +67,15 @@ impl ArticulationCfg {
     /// The robot that moves like it, and its class.
     pub(crate) fn into_robot(self) -> (RobotCfg, String) {
         let passive = || DriveCfg { drive_type: DriveType::None, ..Default::default() };
+        let drive = self.drive.unwrap_or_else(passive);
+        let (friction, armature) = (self.friction.or(drive.friction), self.armature.unwrap_or(drive.armature));
         let robot = RobotCfg {
             uid: self.uid,
             urdf: self.urdf,
             fix_base: self.fix_base,
             init_pose: self.init_pose,
             init_qpos: self.init_qpos,
-            drive: self.drive.unwrap_or_else(passive),
+            drive: DriveCfg { friction, armature, ..drive },
             self_collision: self.self_collision,
             hull: self.hull,
             ..RobotCfg::default()

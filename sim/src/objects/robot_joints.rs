@@ -40,12 +40,15 @@ impl Robot<'_> {
 
 impl RobotMut<'_> {
     /// Sets the dry friction of joints \[N m or N\], above 0. Rows are for `env_ids` (all where `None`; a single row is for all
-    /// of them), columns for `joint_ids` (all where `None`). It is a property of the environment and stays through a reset;
-    /// [`reset_properties`](crate::SimulationManager::reset_properties) gives back what the robot was added with. A forward
-    /// pass follows.
+    /// of them), columns for `joint_ids` (all where `None`). A forward pass follows.
     ///
-    /// Only joints that were added with some have a constraint for it ([`DriveCfg::friction`](crate::DriveCfg), or the
-    /// file's `<dynamics friction="..">`): a little is enough.
+    /// It is a property of the environment: it stays through a reset, and, unlike
+    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::snapshot) is restored;
+    /// [`reset_properties`](crate::SimulationManager::reset_properties) gives back what the robot was added with.
+    ///
+    /// Only joints that were added with some have a constraint for it ([`DriveCfg::friction`](crate::DriveCfg::friction), or
+    /// the file's `<dynamics friction="..">`): a little is enough. The others can be told 0, which they have: what
+    /// [`get_friction`](Robot::get_friction) returns can be set.
     ///
     /// ```
     /// use ndarray::array;
@@ -65,8 +68,8 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or not above 0; a
-    /// joint that was added without dry friction. Then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or negative; 0 for a
+    /// joint with dry friction, or more than 0 for one that was added without. Then nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_friction<'t>(
         &mut self,
@@ -78,11 +81,11 @@ impl RobotMut<'_> {
     }
 
     /// Sets the viscous damping of joints themselves \[N m s/rad or N s/m\]; that of drives stays. Only joints that were added
-    /// with some can be told another (the file's `<dynamics damping="..">`). Otherwise as
-    /// [`set_friction`](Self::set_friction).
+    /// with some can be told another (the file's `<dynamics damping="..">`), the others 0. Otherwise as
+    /// [`set_friction`](Self::set_friction): it is a property, which [snapshots](crate::snapshot) do not hold.
     ///
     /// # Errors
-    /// As [`set_friction`](Self::set_friction), but 0 is a damping.
+    /// As [`set_friction`](Self::set_friction), but 0 is a damping for every joint.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_joint_damping<'t>(
         &mut self,
@@ -93,8 +96,10 @@ impl RobotMut<'_> {
         self.set_property("set_joint_damping", Property::JointDamping, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets the rotor inertia of joints \[kg m² or kg\]; otherwise as [`set_friction`](Self::set_friction). What was derived
-    /// from it when the robot was added stays: gains of drive type `acceleration`, warnings of instability.
+    /// Sets the rotor inertia of joints \[kg m² or kg\], also of joints that were added without
+    /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). Otherwise as [`set_friction`](Self::set_friction): it is a
+    /// property, which [snapshots](crate::snapshot) do not hold. What was derived from it when the robot was added stays: gains
+    /// of drive type `acceleration`, warnings of instability.
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
@@ -120,9 +125,11 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let write = self.checked_numbers(argument, Numbers::Gain, values, joint_ids, env_ids)?;
         let names: Vec<String> = write.joints.iter().map(|&joint| property_name(&self.read(), joint)).collect();
+        let known = self.simulation.properties_named(property, &names);
         if property == Property::DryFriction {
             for (row, (_, frictions)) in write.rows.iter().enumerate() {
-                if let Some(column) = frictions.iter().position(|friction| *friction <= 0.0) {
+                let wrong = |(friction, known): (&f64, &bool)| *known && *friction <= 0.0;
+                if let Some(column) = frictions.iter().zip(&known).position(wrong) {
                     let of = format!("joint {:?}", self.data.joint_names()[write.joints[column]]);
                     let expected = "above 0: it may be small".into();
                     return Err(Error::OutOfRange { argument, row, column, of, value: frictions[column], expected });
@@ -133,7 +140,9 @@ impl RobotMut<'_> {
         self.simulation.change_properties(write.rows.envs(), |env, properties| {
             // `rows` and the environments are the same list.
             let Some((_, row)) = rows.iter().find(|(of, _)| *of == env) else { return Ok(()) };
-            names.iter().zip(row).try_for_each(|(name, value)| properties.set(property, name, &[*value]))
+            // A joint without the property has 0 of it.
+            let changes = names.iter().zip(&known).zip(row).filter(|((_, known), value)| **known || **value != 0.0);
+            changes.map(|((name, _), value)| properties.set(property, name, &[*value])).collect()
         })?;
         self.sensors.refresh(write.rows.envs(), self.simulation);
         Ok(())

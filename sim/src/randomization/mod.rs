@@ -60,6 +60,12 @@ impl Simulation {
         }
     }
 
+    /// Whether there is something of each of these names that has the property.
+    pub(crate) fn properties_named(&self, property: Property, names: &[String]) -> Vec<bool> {
+        let table = self.tables().get(property);
+        names.iter().map(|name| table.names.contains(name)).collect()
+    }
+
     /// Changes the properties of environments; on an error none has changed.
     pub(crate) fn change_properties(
         &mut self,

@@ -1,7 +1,7 @@
 //! Where the properties of a compiled scene are, what they are called, and what they nominally are.
 
 use super::Property;
-use crate::drive::table::{DriveTable, Realization};
+use crate::drive::table::{Drive, DriveTable, Realization};
 use crate::mj::{self, Model, ObjectKind};
 
 /// All that has one property.
@@ -133,9 +133,9 @@ pub(super) fn dofs_of(model: &Model, joint: usize) -> std::ops::Range<usize> {
 
 /// The armature without what implicit damping adds to it: `h B`, see [`crate::drive::implicit`].
 pub(super) fn user_armature(model: &Model, drives: &DriveTable, dof: usize) -> f64 {
-    match drives.damped.iter().find(|(of, _)| *of == dof) {
-        // Rounding may leave a hair below 0.
-        Some((_, damping)) => (model.dof_armature()[dof] - model.timestep() * damping).max(0.0),
+    match drives.damped.iter().position(|(of, _)| *of == dof) {
+        // To take `h B` off again would lose bits.
+        Some(k) => drives.undamped_armature[k],
         None => model.dof_armature()[dof],
     }
 }
@@ -144,18 +144,18 @@ pub(super) fn user_armature(model: &Model, drives: &DriveTable, dof: usize) -> f
 pub(super) enum FrictionPlace {
     /// Its own.
     Joint,
-    /// A fixed tendon's: the joint's own row carries its drive.
+    /// A fixed tendon's: the joint's own row carries its drive, or could.
     Tendon(usize),
 }
 
-/// Where the dry friction of a joint is; `None` where its drive takes the place and there is none.
+/// Where the dry friction of a joint is; `None` where its drive takes the place and there is none. Which joints have a tendon
+/// was decided when the scene was written: wherever drives are rows, all that have a drive, an explicit model's too.
 pub(super) fn friction_place(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionPlace> {
-    let dof = model.jnt_dofadr()[joint] as usize;
-    let driven =
-        |drive: &crate::drive::table::Drive| drive.dof == dof && matches!(drive.realization, Realization::Row { .. });
-    if !drives.drives.iter().any(driven) {
-        return Some(FrictionPlace::Joint);
-    }
     let tendon = format!("{}/friction", model.name(ObjectKind::Joint, joint)?);
-    model.id(ObjectKind::Tendon, &tendon).map(FrictionPlace::Tendon)
+    if let Some(tendon) = model.id(ObjectKind::Tendon, &tendon) {
+        return Some(FrictionPlace::Tendon(tendon));
+    }
+    let dof = model.jnt_dofadr()[joint] as usize;
+    let is_row = |drive: &Drive| drive.dof == dof && matches!(drive.realization, Realization::Row { .. });
+    (!drives.drives.iter().any(is_row)).then_some(FrictionPlace::Joint)
 }
