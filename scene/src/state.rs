@@ -42,7 +42,9 @@ pub struct SceneState {
     /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
     pub joint_velocities: Option<Array2<f64>>,
     /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
-    /// MJCF files, the sum of what the file's actuators exert on the joint; after a reset, on the state as it is.
+    /// MJCF files, MuJoCo's `qfrc_actuator`: the sum of what the file's actuators exert on the joint, with the compensation of
+    /// gravity that is the actuators' (`actuatorgravcomp`), within the joint's `actuatorfrcrange` (MuJoCo 2.2.2 has neither of
+    /// these two); after a reset, on the state as it is.
     pub joint_efforts: Option<Array2<f64>>,
     /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
     /// of an MJCF file is told, in the unit that the file gives it.
@@ -50,7 +52,8 @@ pub struct SceneState {
     /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
     /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
     pub actuator_forces: Option<Array2<f64>>,
-    /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none.
+    /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none. Of those that have several (MuJoCo
+    /// 4.x: `actdim`), the last one, which is what their force is made of.
     pub actuator_activations: Option<Array2<f64>>,
     /// Contacts with forces.
     pub contacts: Option<Contacts>,
@@ -113,7 +116,8 @@ impl SceneState {
 
     /// Takes over from `other` the environments where `chosen` is true: steps, times, and the fields that this state has.
     /// `false`, and nothing is taken over, where `other` is not of the same scene: it lacks a field of this one, or has
-    /// another number of anything. Allocates only for more contacts than there ever were.
+    /// another number of anything. Allocates only where the list of contacts has no room for those of before and those of after
+    /// together: the new list is made behind the old one, and the room stays.
     #[must_use]
     pub fn take_over(&mut self, other: &Self, chosen: &[bool]) -> bool {
         if !(chosen.len() == self.num_envs() && self.fits(other)) {
@@ -229,7 +233,7 @@ fn copy_rows<T: Clone, D: RemoveAxis>(
 impl Contacts {
     /// Takes over the environments where `chosen` is true from contacts of as many environments.
     fn take_over(&mut self, other: &Self, chosen: &[bool]) {
-        // The new list grows behind the old one, which then goes: no memory of its own.
+        // The new list grows behind the old one, which then goes: it allocates only while both together are more than ever.
         let old = self.list.len();
         for (env, chosen) in chosen.iter().enumerate() {
             let mine = self.first[env]..self.first[env + 1];

@@ -4,6 +4,7 @@ use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor};
 use scene::SceneState;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A sensor, eager or [lazy](crate::SensorCfg::lazy), as an owner keeps it: everything that happens is told to the slot, and
@@ -84,9 +85,10 @@ impl SensorSlot {
         kept.take_over(state, &self.due)
     }
 
-    /// From now on the sensor has something to measure.
+    /// From now on the sensor has something to measure, unless it failed.
     fn wait(&mut self) {
         if self.due.contains(&true)
+            && !self.has_failed()
             && let Some(holder) = self.ready.take()
         {
             *self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner) = holder;
@@ -154,17 +156,25 @@ impl SensorSlot {
     ///
     /// # Errors
     ///
-    /// Why it failed.
+    /// Why it failed. A panic of the sensor goes on to who reads first; after that it has failed.
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
+        let mut panic = None;
         let measured = self.ready.get_or_init(|| {
             let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-            // One that panics is not put back: nobody knows what it would say.
-            let mut holder = waiting.take();
-            if let (Some(holder), Some(kept)) = (&mut holder, &self.kept) {
-                holder.ask(|sensor| sensor.update(kept));
+            let mut holder = waiting.take()?;
+            if let Some(kept) = &self.kept {
+                let measure = AssertUnwindSafe(|| holder.ask(|sensor| sensor.update(kept)));
+                // One that panics is not put back: nobody knows what it would say.
+                if let Err(cause) = catch_unwind(measure) {
+                    panic = Some(cause);
+                    return None;
+                }
             }
-            holder
+            Some(holder)
         });
+        if let Some(cause) = panic {
+            resume_unwind(cause);
+        }
         match measured {
             Some(Holder { fault: None, sensor }) => Ok(sensor.as_ref()),
             Some(Holder { fault: Some(fault), .. }) => Err(fault),

@@ -37,7 +37,7 @@ pub struct ContactSensorCfg {
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
     /// Show a red ball at every body that is touched, and an arrow of its net normal force, 1 m for 500 N
-    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    /// ([`Sensor::markers`](crate::Sensor::markers)): the forces of the last measurement, where the bodies are at present.
     pub debug_vis: bool,
 }
 

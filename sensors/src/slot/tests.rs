@@ -190,6 +190,10 @@ fn a_lazy_sensor_says_what_is_wrong_when_it_is_read() {
     let mut slot = counting(Counting { panics: true, ..Counting::default() });
     slot.update(&state([2; ENVS], [0; ENVS]));
     let read = std::panic::AssertUnwindSafe(|| slot.sensor().is_ok());
-    assert!(std::panic::catch_unwind(read).is_err());
+    let cause = std::panic::catch_unwind(read).unwrap_err();
+    assert_eq!(cause.downcast_ref::<&str>(), Some(&"told to"));
+    assert!(slot.has_failed(), "known at once");
+    slot.update(&state([4; ENVS], [0; ENVS]));
+    assert!(slot.has_failed(), "and for good");
     assert_eq!(slot.sensor().unwrap_err(), &SensorError::BrokenOff);
 }

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 /// Rays from farther away than this many times the largest coordinate are cast one by one: their positions at the tree are
 /// not known well enough in double precision for the lines to be right to single precision.
-const FAR: f64 = (1u32 << 20) as f64;
+pub(crate) const FAR: f64 = (1u32 << 20) as f64;
 /// A part of the largest coordinate: chords between depths closer than this are not sloped.
 const THIN: f64 = 1e-4;
 

@@ -6,7 +6,7 @@
 mod beam;
 mod build;
 
-pub(crate) use beam::{Beam, Walked};
+pub(crate) use beam::{Beam, FAR, Walked};
 
 use super::Ray;
 use super::vector::{V3, along};

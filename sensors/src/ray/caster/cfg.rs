@@ -37,6 +37,10 @@ const MAX_BYTES: u64 = 64 << 30;
 /// assert_eq!(scanner.pattern.rays()?.len(), 187);
 /// # Ok::<(), sensors::SensorError>(())
 /// ```
+///
+/// When rays first run side by side within about 7° of an axis of a mesh, lists of what is seen along that axis are made, once
+/// for each mesh and axis: that allocates, mostly at the reset right after the sensor is built, but in a later step where rays
+/// or meshes turn to another axis only then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCfg {

@@ -197,6 +197,30 @@ fn rays_between_columns_are_not_lost() {
     assert!(without.wrong > 10, "{without:?}");
 }
 
+/// From so far away that where rays are at the mesh is rounding, columns would hit what the boxes of the tree hide: these rays
+/// are left to the tree. The control: from closer, columns are looked at.
+#[test]
+fn rays_from_very_far_are_left_to_the_tree() {
+    let mut dice = Dice(57);
+    let tree = Arc::new(MeshTree::of_triangles(sheet(&mut dice, 25, 0.0)));
+    let mut count = |sizes: f64| {
+        let mut ray = |_| {
+            let direction = unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), -1.0]).unwrap();
+            // The sheet is 3 m wide.
+            Ray { origin: along(dice.point(1.6), -3.0 * sizes, direction), direction }
+        };
+        let rays: Vec<Ray> = (0..16_000).map(&mut ray).collect();
+        compare(&tree, tree.columns(ABOVE), &rays, f64::INFINITY)
+    };
+    for sizes in [1e10, 1e11, 1e12] {
+        let count = count(sizes);
+        assert_eq!((count.wrong, count.columns), (0, 0), "{sizes}: {count:?}");
+        assert!(count.hits > 8000, "{sizes}: {count:?}");
+    }
+    let near = count(1e3);
+    assert!(near.wrong == 0 && near.columns == near.packets && near.hits > 8000, "{near:?}");
+}
+
 /// Columns are for meshes that are spread out, of triangles of about the same size.
 #[test]
 fn some_meshes_have_no_columns() {

@@ -16,6 +16,7 @@
 
 use super::MeshTree;
 use crate::lanes::{D, D3, Simd};
+use crate::ray::bvh::FAR;
 use crate::ray::packet::{Packet, WIDTH};
 use crate::ray::shape::{Touch, Touches};
 use crate::ray::triangle::{ShearPacket, Triangle, distances, normals};
@@ -202,7 +203,8 @@ struct Pairs {
 }
 
 impl Columns {
-    /// What the rays of a packet touch, all of which are steep; false where too much is in their columns.
+    /// What the rays of a packet touch, all of which are steep; false where too much is in their columns, or where they begin
+    /// so far away that rounding could put them into triangles whose boxes they miss in the tree.
     #[inline(always)]
     pub(crate) fn touch_packet<S: Simd>(
         &self,
@@ -213,6 +215,9 @@ impl Columns {
         touches: &mut Touches,
     ) -> bool {
         let (origin, by) = (shear.origin(), shear.by());
+        if origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).most() > FAR * self.reach {
+            return false;
+        }
         let (ends, [[left, bottom], [right, top]]) = self.passed(s, &origin, &by);
         let mut crowd = 0;
         for k in 0..WIDTH {
