@@ -5,8 +5,10 @@ use scene::SceneState;
 use scene::state::{Contact, Contacts};
 use sensors::{
     ContactSensorCfg, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, Requires,
-    SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext, SensorSlot, TargetFrameCfg,
+    SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot, TargetFrameCfg,
 };
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn state() -> SceneState {
     let contact = Contact {
@@ -81,22 +83,69 @@ fn no_sensor_allocates_when_it_measures() {
         assert_eq!(count.count_total, 0, "{sensor:?}");
         state.step.fill(0);
     }
-    // Lazy ones, which are read every seven steps: what they keep is allocated at the first reset.
+    // Lazy ones, which are read every seven steps and written to every eleven: what they keep is allocated at the first reset.
+    let mut states = [[3, 3], [0, 5], [6, 1]].map(|counts| with_contacts(&state, counts));
     for sensor in sensors {
+        let measured = Arc::new(AtomicUsize::new(0));
+        let sensor = Box::new(Counted { sensor, measured: Arc::clone(&measured) });
         let mut slot = SensorSlot::new(sensor, Requires::present_in(&state), Some(schedule), 2);
-        slot.reset(&[0, 1], &state);
+        slot.reset(&[0, 1], &states[0]);
         let mut steps = |slot: &mut SensorSlot| {
+            let (before, mut asked) = (measured.load(Ordering::Relaxed), 0);
             for step in 1..=50 {
-                state.step.fill(step);
-                slot.update(&state);
-                slot.refresh(&[1], &state);
-                assert!(step % 7 > 0 || slot.sensor().is_ok());
+                let state = &mut states[step % 3];
+                state.step.fill(step as u64);
+                slot.update(state);
+                if step % 11 == 0 {
+                    slot.refresh(&[1], state);
+                    asked += 1;
+                }
+                if step % 7 == 0 {
+                    assert!(slot.sensor().is_ok());
+                    asked += 1;
+                }
             }
-            state.step.fill(0);
-            slot.reset(&[0, 1], &state);
+            // Every second step is due, and one that was due lies between any two of these.
+            assert_eq!((asked, measured.load(Ordering::Relaxed) - before), (11, 11), "{slot:?}");
+            states[0].step.fill(0);
+            slot.reset(&[0, 1], &states[0]);
         };
-        // The list of contacts grows once.
+        // The list of contacts grows in the first round.
         steps(&mut slot);
         assert_eq!(allocation_counter::measure(|| steps(&mut slot)).count_total, 0, "{slot:?}");
+    }
+}
+
+/// The same with other numbers of contacts.
+fn with_contacts(state: &SceneState, counts: [usize; 2]) -> SceneState {
+    let contact = state.contacts.as_ref().expect("there are some").list[0];
+    let [a, b] = counts;
+    let contacts = Contacts { first: vec![0, a, a + b], list: vec![contact; a + b] };
+    SceneState { contacts: Some(contacts), ..state.clone() }
+}
+
+/// A sensor, and how often it measured because it was due.
+#[derive(Debug)]
+struct Counted {
+    sensor: Box<dyn Sensor>,
+    measured: Arc<AtomicUsize>,
+}
+
+impl Sensor for Counted {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.measured.fetch_add(1, Ordering::Relaxed);
+        self.sensor.update(state)
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sensor.reset(env_ids, state)
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.sensor.refresh(env_ids, state)
+    }
+
+    fn due_in(&self, step: &[u64]) -> u64 {
+        self.sensor.due_in(step)
     }
 }

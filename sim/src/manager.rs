@@ -92,7 +92,7 @@ impl SimulationManager {
         let contents = Contents::default();
         let simulation = compile(&cfg, &contents)?;
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
-        let sensors = SensorList::new(cfg.substeps);
+        let sensors = SensorList::new(serial, cfg.substeps);
         let visuals = VisualCache::default();
         let draws = vec![0; cfg.num_envs];
         Ok(Self {
@@ -250,6 +250,10 @@ impl SimulationManager {
     ///
     /// # Errors
     /// The sensor failed, in an earlier step or now.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         self.sensors.get(id)
     }
@@ -258,6 +262,10 @@ impl SimulationManager {
     ///
     /// # Errors
     /// The sensor failed in an earlier step.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn sensor_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.sensors.get_mut(id)
     }
@@ -272,8 +280,12 @@ impl SimulationManager {
     ///
     /// # Errors
     /// There is no such sensor.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
-        self.sensors.debug_vis(id.index())
+        self.sensors.debug_vis(self.sensors.index_of(id))
     }
 
     /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
@@ -281,8 +293,12 @@ impl SimulationManager {
     ///
     /// # Errors
     /// There is no such sensor.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
-        self.sensors.set_debug_vis(id.index(), shown)
+        self.sensors.set_debug_vis(self.sensors.index_of(id), shown)
     }
 
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.

@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 /// Handle of a sensor; valid for the manager that made it.
 pub struct SensorId<S> {
+    manager: u64,
     index: usize,
     sensor: PhantomData<fn() -> S>,
 }
@@ -66,6 +67,8 @@ impl Entry {
 /// All sensors and the state they read.
 #[derive(Default)]
 pub(crate) struct SensorList {
+    /// The manager whose sensors they are.
+    manager: u64,
     entries: Vec<Entry>,
     state: SceneState,
     /// Which of them the current steps make due.
@@ -84,8 +87,8 @@ impl std::fmt::Debug for SensorList {
 
 impl SensorList {
     /// No sensors yet, in a simulation of `substeps` MuJoCo steps in a physics step.
-    pub(crate) fn new(substeps: u32) -> Self {
-        Self { substeps, ..Self::default() }
+    pub(crate) fn new(manager: u64, substeps: u32) -> Self {
+        Self { manager, substeps, ..Self::default() }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -135,7 +138,7 @@ impl SensorList {
         slot.sensor().map_err(|error| wrong(error.clone()))?;
         self.state = state;
         self.entries.push(Entry { uid, requires, debug_vis, lazy, build, slot: Ok(slot) });
-        Ok(SensorId { index: self.entries.len() - 1, sensor: PhantomData })
+        Ok(SensorId { manager: self.manager, index: self.entries.len() - 1, sensor: PhantomData })
     }
 
     /// Builds all sensors anew for a simulation that was compiled again; their histories start again.
@@ -246,9 +249,23 @@ impl SensorList {
         self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
 
+    /// The place of a sensor in the list.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub(crate) fn index_of<S>(&self, id: SensorId<S>) -> usize {
+        assert!(id.manager == self.manager, "this handle is of another SimulationManager");
+        id.index
+    }
+
     /// The sensor of a handle.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub(crate) fn get<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
-        let entry = self.entry(id.index)?;
+        let entry = self.entry(self.index_of(id))?;
         let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))?;
         let any: &dyn Any = sensor;
         any.downcast_ref::<S>().ok_or_else(|| Error::UnknownName {
@@ -259,6 +276,10 @@ impl SensorList {
     }
 
     /// The sensor of a handle, to change.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
     pub(crate) fn get_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.get(id)?;
         let count = self.entries.len();

@@ -263,3 +263,22 @@ fn what_is_wrong_is_said() {
     let text = sim.add_sensor("beyond", beyond).unwrap_err().to_string();
     assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
 }
+
+/// As for robots: a handle of one manager names nothing of another, though that has a sensor of the same kind in its place.
+#[test]
+fn handles_are_of_one_manager() {
+    let [(mut sim, _), (mut other, _)] = [arm(1), arm(1)];
+    let id = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+    let own = other.add_sensor("joints", JointStateCfg::default()).unwrap();
+    assert!(sim.sensor(id).is_ok() && sim.sensor_mut(id).is_ok() && sim.debug_vis(id).is_ok());
+    assert!(other.sensor(own).is_ok(), "the control");
+    let mut says = |ask: &dyn Fn(&mut SimulationManager)| {
+        let asked = std::panic::AssertUnwindSafe(|| ask(&mut other));
+        *std::panic::catch_unwind(asked).unwrap_err().downcast::<&str>().unwrap()
+    };
+    let wrong = "this handle is of another SimulationManager";
+    assert_eq!(says(&|other| assert!(other.sensor(id).is_ok())), wrong);
+    assert_eq!(says(&|other| assert!(other.sensor_mut(id).is_ok())), wrong);
+    assert_eq!(says(&|other| assert!(other.debug_vis(id).is_ok())), wrong);
+    assert_eq!(says(&|other| assert!(other.set_debug_vis(id, true).is_ok())), wrong);
+}

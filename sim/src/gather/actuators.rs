@@ -20,7 +20,8 @@ pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut Sce
     let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);
     let of_parts = simulation.parts.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
     let of_parts = of_parts.map(|(&actuator, &control)| {
-        let activation = model.actuator_activation(actuator).next().map_or(0.0, |place| data.act()[place]);
+        // Of several, the last one is what MuJoCo's force is made of.
+        let activation = model.actuator_activation(actuator).next_back().map_or(0.0, |place| data.act()[place]);
         [data.ctrl()[control], data.actuator_force()[actuator], activation]
     });
     let SceneState { actuator_controls, actuator_forces, actuator_activations, .. } = state;
