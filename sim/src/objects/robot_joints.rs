@@ -141,8 +141,8 @@ impl RobotMut<'_> {
             // `rows` and the environments are the same list.
             let Some((_, row)) = rows.iter().find(|(of, _)| *of == env) else { return Ok(()) };
             // A joint without the property has 0 of it.
-            let changes = names.iter().zip(&known).zip(row).filter(|((_, known), value)| **known || **value != 0.0);
-            changes.map(|((name, _), value)| properties.set(property, name, &[*value])).collect()
+            let mut changes = names.iter().zip(&known).zip(row).filter(|((_, known), value)| **known || **value != 0.0);
+            changes.try_for_each(|((name, _), value)| properties.set(property, name, &[*value]))
         })?;
         self.sensors.refresh(write.rows.envs(), self.simulation);
         Ok(())
