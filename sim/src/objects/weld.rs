@@ -154,8 +154,8 @@ impl SimulationManager {
     /// it is [attached](WeldMut::attach).
     ///
     /// # Errors
-    /// The name is taken, a body is not there, it is a whole robot, both are the same or held together by fixed joints, or none of them can
-    /// move.
+    /// The name is taken, a body is not there, it is a whole robot, both are the same or held together by fixed joints, or
+    /// none of them can move.
     pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
         self.check_world_uid(&cfg.uid)?;
         let model = self.simulation.batch.model();
@@ -169,8 +169,11 @@ impl SimulationManager {
             }),
         };
         let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
-        // What no joint holds apart moves as one; with 0 it is fixed or moved by hand.
-        let [one, other] = [first, second].map(|body| model.body_weldid()[body]);
+        // What no joint holds apart moves as one; with 0 it is fixed or moved by hand (4.x gives that its own number).
+        let [one, other] = [first, second].map(|body| {
+            let carrier = model.body_weldid()[body] as usize;
+            if model.body_mocapid()[carrier] >= 0 { 0 } else { carrier }
+        });
         let fail = |expected| {
             Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
         };
