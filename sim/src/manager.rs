@@ -101,7 +101,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
-            crew: Crew::default(),
+            crew: Crew::new(Arc::new(mj::StayingThreads::default())),
             diagnostics: Vec::new(),
             simulation,
             sensors,

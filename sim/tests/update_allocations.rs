@@ -1,7 +1,7 @@
 //! After the first steps, stepping and measuring allocates nothing on the calling thread.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use sensors::camera::{CameraCfg, Extrinsics};
+use sensors::camera::{CameraCfg, Extrinsics, Placement};
 use sensors::ray::pattern::Grid;
 use sensors::{
     ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
@@ -75,6 +75,36 @@ fn updates_allocate_nothing() {
     }
     let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
     assert_eq!(control, 1, "the control: the counter counts");
+}
+
+/// Pictures that are drawn at every step, each environment by one thread or all threads together on one. What a thread
+/// needs is chance: there are at most 400 updates until twenty in a row allocate nothing.
+#[test]
+fn pictures_allocate_nothing() {
+    for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
+        let mut sim = world(threads);
+        let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
+        let extrinsics = |x: f64| {
+            let placement = Placement::LookAt { eye: [x, -1.0, 0.8], target: [0.2, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
+            Extrinsics { placement, ..Extrinsics::default() }
+        };
+        let all = sim.add_sensor("all", CameraCfg { extrinsics: extrinsics(1.0), ..base.clone() }).unwrap();
+        let some = CameraCfg { extrinsics: extrinsics(-0.5), env_ids: Some(vec![2, 0, 3]), ..base };
+        let some = sim.add_sensor("some", some).unwrap();
+        let mut in_a_row = 0;
+        for _ in 0..400 {
+            let allocations = allocation_counter::measure(|| sim.update(1)).count_total;
+            in_a_row = if allocations == 0 { in_a_row + 1 } else { 0 };
+            if in_a_row == 20 {
+                break;
+            }
+        }
+        assert_eq!(in_a_row, 20, "{threads} threads, {width} x {height}");
+        let (all, some) = (sim.sensor(all).unwrap(), sim.sensor(some).unwrap());
+        // Also at the reset with which they begin.
+        let pictures = 1 + all.frame_counts()[0];
+        assert_eq!((all.draws(), some.draws()), (4 * pictures, 3 * pictures), "they are drawn when they are due");
+    }
 }
 
 /// Actuator models compute and remember without allocating.

@@ -2,19 +2,19 @@
 
 use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
+use crate::crew::Crew;
 use crate::resolve::plan::{Plan, estimate};
-use crate::share::share;
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
 use std::sync::{Mutex, PoisonError};
 
-/// Less work than this is drawn on the calling thread: starting another takes some 0.05 ms \[ns\].
+/// Less work than this is drawn on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
 const WORTH_A_THREAD: usize = 1_000_000;
 /// Parts that each thread gets, about: the last ones decide how long the others wait.
 const PARTS: usize = 8;
 
 /// A shot and where its pictures go.
-type Job<'a> = (Shot<'a>, FrameMut<'a>);
+pub(super) type Job<'a> = (Shot<'a>, FrameMut<'a>);
 
 /// Draws batches of frames on several threads; keeps the scratch memory of each. The bits do not depend on the number of
 /// threads.
@@ -25,12 +25,20 @@ type Job<'a> = (Shot<'a>, FrameMut<'a>);
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
     plans: Vec<Plan>,
+    crew: Crew,
 }
 
 impl ParallelRasterizer {
-    /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1.
+    /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The others start with each
+    /// batch and end with it: see [`with_crew`](Self::with_crew).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        Self { rasterizers: vec![Rasterizer::new(cfg); threads.max(1)], plans: Vec::new() }
+        Self { rasterizers: vec![Rasterizer::new(cfg); threads.max(1)], plans: Vec::new(), crew: Crew::default() }
+    }
+
+    /// Draws on the threads of `crew`. With those of a simulation nothing is allocated after the first batches.
+    pub fn with_crew(mut self, crew: Crew) -> Self {
+        self.crew = crew;
+        self
     }
 
     /// Number of threads, the calling one included.
@@ -57,7 +65,7 @@ impl ParallelRasterizer {
     ///
     /// Of the first shot that cannot be drawn, with its index; the others are drawn nevertheless.
     pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
-        let Self { rasterizers, plans } = self;
+        let Self { rasterizers, plans, crew } = self;
         let Some(cfg) = rasterizers.first().map(|r| r.cfg) else { return Ok(()) };
         let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
         let threads = rasterizers.len().min(cost / (WORTH_A_THREAD / 2)).max(1);
@@ -73,12 +81,12 @@ impl ParallelRasterizer {
         };
         let (alone, together) = jobs.split_at_mut(count - together);
         let first = alone.len();
-        share(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
+        crew.share(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
             failure.note(index, rasterizer.render_shot(shot, frame));
         });
         if !together.is_empty() {
             plans.resize_with(plans.len().max(together.len()), Plan::default);
-            draw_together(rasterizers, &mut plans[..together.len()], together, |index, result| {
+            draw_together(crew, rasterizers, &mut plans[..together.len()], together, |index, result| {
                 failure.note(first + index, result);
             });
         }
@@ -103,26 +111,29 @@ impl Failure {
 
 /// Draws a few shots, each by all threads.
 fn draw_together(
+    crew: &Crew,
     rasterizers: &mut [Rasterizer],
     plans: &mut [Plan],
     jobs: &mut [Job<'_>],
     note: impl Fn(usize, Result<(), RenderError>) + Sync,
 ) {
     let parts = (PARTS * rasterizers.len()).div_ceil(jobs.len());
-    share(rasterizers, plans.iter_mut().zip(&*jobs).enumerate(), |rasterizer, (index, (plan, (shot, frame)))| {
+    crew.share(rasterizers, plans.iter_mut().zip(&*jobs).enumerate(), |rasterizer, (index, (plan, (shot, frame)))| {
         note(index, plan.prepare(rasterizer.cfg, shot, frame));
     });
     if plans.iter().any(Plan::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);
         let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
-        share(rasterizers, bands, |rasterizer, (scene, band)| rasterizer.brush.shadow(rasterizer.level, scene, band));
+        crew.share(rasterizers, bands, |rasterizer, (scene, band)| {
+            rasterizer.brush.shadow(rasterizer.level, scene, band);
+        });
     }
     let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
         let (shot, frame) = (job.0, &mut job.1);
         let bands = bands(plan, &shot, frame, parts);
         bands.map(move |band| (plan, shot, band))
     });
-    share(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
+    crew.share(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
         rasterizer.brush.paint(rasterizer.level, plan, &shot, &mut frame, first..first + rows);
     });
 }

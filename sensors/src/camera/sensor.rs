@@ -7,7 +7,7 @@ use super::extrinsics::{CameraConvention, Poses};
 use super::frustum::frustum;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::mounts::{Mount, Mounts, chosen_rows};
-use super::parallel::ParallelRasterizer;
+use super::parallel::{Job, ParallelRasterizer};
 use super::rasterizer::Shot;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
@@ -90,6 +90,9 @@ struct Desk {
     rasterizer: ParallelRasterizer,
     /// The canvas, while it is not in `Camera::drawn`.
     canvas: Option<Canvas>,
+    /// Lists that are empty between drawings: their memory is kept.
+    views: Vec<View>,
+    jobs: Vec<Job<'static>>,
 }
 
 impl Lens {
@@ -187,7 +190,8 @@ impl Camera {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
-        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads);
+        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
+        let canvas = Some(Canvas::new(pictures, rows));
         Self {
             lens,
             scene,
@@ -203,7 +207,7 @@ impl Camera {
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
-            desk: Mutex::new(Desk { rasterizer, canvas: Some(Canvas::new(pictures, rows)) }),
+            desk: Mutex::new(Desk { rasterizer, canvas, views: Vec::new(), jobs: Vec::new() }),
             draws: AtomicU64::new(0),
             env_ids,
         }
@@ -515,16 +519,18 @@ impl Camera {
     fn draw(&self) -> Canvas {
         let rows = self.mounts.len();
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let desk = &mut *desk;
         // It is missing only where a drawing panicked.
         let mut canvas = desk.canvas.take().unwrap_or_else(|| {
             Canvas::new(Pictures::new(self.channels, rows, self.lens.width, self.lens.height), rows)
         });
-        let drawn: Vec<usize> = (0..rows).filter(|&row| canvas.stale[row]).collect();
-        let views: Vec<View> = drawn.iter().map(|&row| self.view_of(row)).collect();
-        let mut frames = canvas.pictures.frames_mut(rows);
-        let mut jobs = Vec::with_capacity(drawn.len());
-        let stale = frames.drain(..).enumerate().filter(|(row, _)| canvas.stale[*row]);
-        for ((row, frame), view) in stale.zip(&views) {
+        let Canvas { pictures, stale, failure } = &mut canvas;
+        let is_stale = |row: &usize| stale[*row];
+        desk.views.clear();
+        desk.views.extend((0..rows).filter(is_stale).map(|row| self.view_of(row)));
+        let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(&mut desk.jobs));
+        let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row));
+        for ((row, frame), view) in frames.zip(&desk.views) {
             let poses = row_of(&self.captures.poses, row);
             let lights = Some(row_of(&self.captures.lights, row));
             jobs.push((Shot { scene: &self.scene, poses, view, lights }, frame));
@@ -538,12 +544,15 @@ impl Camera {
         for (_, frame) in &mut jobs {
             miss.into_iter().for_each(|value| frame.replace_misses(value));
         }
-        drop(jobs);
-        self.draws.fetch_add(drawn.len() as u64, Ordering::Relaxed);
-        canvas.failure = result.err().map(|(job, error)| CameraError::Draw { env: self.env_ids[drawn[job]], error });
+        self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
+        desk.jobs = emptied(jobs);
+        *failure = result.err().and_then(|(job, error)| {
+            let row = (0..rows).filter(is_stale).nth(job)?;
+            Some(CameraError::Draw { env: self.env_ids[row], error })
+        });
         // After a failure it is not known which are good.
-        if canvas.failure.is_none() {
-            canvas.stale.fill(false);
+        if failure.is_none() {
+            stale.fill(false);
         }
         canvas
     }
@@ -576,6 +585,13 @@ impl fmt::Display for Camera {
         writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
         write!(f, "  channels           : {}", self.channels.names().join(", "))
     }
+}
+
+/// The memory of a list for another list: of the same type, but for what it borrows.
+fn emptied<T, U>(mut list: Vec<T>) -> Vec<U> {
+    list.clear();
+    // Collected in place.
+    list.into_iter().filter_map(|_| None).collect()
 }
 
 /// A row of an array that the camera allocated itself, in C order.

@@ -197,15 +197,12 @@ macro_rules! channels {
             }
 
             /// Every view borrowed for drawing, in order.
-            pub fn frames_mut(&mut self, views: usize) -> Vec<FrameMut<'_>> {
-                let mut frames: Vec<_> = (0..views).map(|_| FrameMut::default()).collect();
-                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+            pub fn frames_mut(&mut self, views: usize) -> impl Iterator<Item = FrameMut<'_>> {
+                $(let mut $field = self.$field.as_mut().and_then(|array| array.as_slice_mut()).map(|numbers| {
                     let each = (numbers.len() / views.max(1)).max(1);
-                    for (frame, numbers) in frames.iter_mut().zip(numbers.chunks_exact_mut(each)) {
-                        frame.$field = Some(numbers);
-                    }
-                })*
-                frames
+                    numbers.chunks_exact_mut(each)
+                });)*
+                (0..views).map(move |_| FrameMut { $($field: $field.as_mut().and_then(Iterator::next),)* })
             }
         }
 

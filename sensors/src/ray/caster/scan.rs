@@ -1,15 +1,14 @@
 //! Rays of many environments at once, on several threads.
 
 use super::order::neighbours_together;
-use crate::crew::{Crew, Work};
+use crate::crew::Crew;
 use crate::ray::world::FixedWorld;
 use crate::ray::{Ray, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
 use ndarray::Array2;
 use scene::PoseF64;
 use std::fmt;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::Arc;
 
 /// Rays that one thread takes at a time, at most.
 const PART: usize = 1024;
@@ -54,37 +53,30 @@ impl Rays for Vec<Ray> {
 
 /// Casts the rays of a sensor in many environments. The bits do not depend on the number of threads, and nothing is
 /// allocated after the first times.
+#[derive(Clone)]
 pub(crate) struct Scan<R: Rays> {
     crew: Crew,
-    /// Where the hits of an environment are among those of the last cast.
-    slots: Vec<usize>,
-    round: Arc<Round<R>>,
-}
-
-/// What the threads share.
-#[derive(Debug)]
-struct Round<R: Rays> {
     targets: Arc<RayTargets>,
     rays: R,
     /// The order in which they are cast.
     order: Option<Vec<u32>>,
-    task: RwLock<Task<R::View>>,
-    /// The next part that somebody takes.
-    next: AtomicUsize,
-    /// What a thread needs, for each of them.
-    desks: Vec<Mutex<Desk>>,
-    /// Hits of up to [`PART`] rays each: all parts of a view, then those of the next.
-    parts: Vec<Mutex<Vec<RayHit>>>,
-}
-
-/// What is to be cast.
-#[derive(Clone, Debug)]
-struct Task<V> {
-    max_distance: f64,
     /// What does not move, in each environment; mostly one and the same.
     fixed: Vec<Arc<FixedWorld>>,
+    max_distance: f64,
+    task: Task<R::View>,
+    /// What a thread needs, for each of them.
+    desks: Vec<Desk>,
+    /// Hits of up to [`PART`] rays each: all parts of a view, then those of the next.
+    parts: Vec<Vec<RayHit>>,
+}
+
+/// What was cast last.
+#[derive(Clone, Debug)]
+struct Task<V> {
     /// Environments and their views.
     views: Vec<(usize, V)>,
+    /// Where an environment is among the views.
+    slots: Vec<usize>,
     /// Where the targets are that may move, view after view.
     poses: Vec<PoseF64>,
 }
@@ -92,6 +84,8 @@ struct Task<V> {
 #[derive(Clone, Debug)]
 struct Desk {
     world: RayWorld,
+    /// The view that the world is placed for.
+    placed: usize,
     rays: Vec<Ray>,
 }
 
@@ -100,131 +94,98 @@ impl<R: Rays> Scan<R> {
     pub(crate) fn new(targets: RayTargets, rays: R, max_distance: f64, context: &SensorContext) -> Self {
         let (n, count) = (context.num_envs, rays.count());
         let targets = Arc::new(targets);
-        let desk = || Desk { world: RayWorld::new(&targets), rays: Vec::with_capacity(PART.min(count)) };
-        let nothing = Arc::new(FixedWorld::default());
+        let desk =
+            || Desk { world: RayWorld::new(&targets), placed: NOWHERE, rays: Vec::with_capacity(PART.min(count)) };
         let of_view = || (0..count).step_by(PART).map(|first| vec![RayHit::MISS; PART.min(count - first)]);
-        let task = Task { max_distance, fixed: vec![nothing; n], views: Vec::with_capacity(n), poses: Vec::new() };
-        let round = Round {
-            task: RwLock::new(task),
-            next: AtomicUsize::new(0),
-            desks: (0..context.threads.max(1)).map(|_| Mutex::new(desk())).collect(),
-            parts: (0..n).flat_map(|_| of_view()).map(Mutex::new).collect(),
-            targets,
+        Self {
+            crew: context.crew.clone(),
             order: rays.order(),
             rays,
-        };
-        Self { crew: context.crew.clone(), slots: vec![NOWHERE; n], round: Arc::new(round) }
+            fixed: vec![Arc::new(FixedWorld::default()); n],
+            max_distance,
+            task: Task { views: Vec::with_capacity(n), slots: vec![NOWHERE; n], poses: Vec::new() },
+            desks: (0..context.threads.max(1)).map(|_| desk()).collect(),
+            parts: (0..n).flat_map(|_| of_view()).collect(),
+            targets,
+        }
     }
 
     pub(crate) fn targets(&self) -> &RayTargets {
-        &self.round.targets
+        &self.targets
     }
 
     /// The rays, in their own frame.
     pub(crate) fn rays(&self) -> &R {
-        &self.round.rays
+        &self.rays
     }
 
     /// Looks where things are that do not move, in an environment where somebody may have moved them.
     pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>) {
-        let (targets, poses) = (&self.round.targets, row(poses, env));
-        let mut task = write(&self.round.task);
+        let (targets, poses) = (&self.targets, row(poses, env));
         let is_here = |fixed: &Arc<FixedWorld>| fixed.is_at(targets, poses);
-        if is_here(&task.fixed[env]) {
+        if is_here(&self.fixed[env]) {
             return;
         }
         // They are at the same places in most environments.
-        let known = task.fixed.first().filter(|first| is_here(first)).map(Arc::clone);
-        task.fixed[env] = known.unwrap_or_else(|| Arc::new(FixedWorld::new(targets, poses)));
+        let known = self.fixed.first().filter(|first| is_here(first)).map(Arc::clone);
+        self.fixed[env] = known.unwrap_or_else(|| Arc::new(FixedWorld::new(targets, poses)));
     }
 
     /// Casts the rays of the environments `envs`, with the view that `view` gives for each; `poses` are those of the
     /// instances in all environments. One that is named twice is cast once.
     pub(crate) fn cast(&mut self, envs: &[usize], poses: &Array2<PoseF64>, mut view: impl FnMut(usize) -> R::View) {
-        let mut task = write(&self.round.task);
-        for (env, _) in task.views.drain(..) {
-            self.slots[env] = NOWHERE;
+        let Task { views, slots, poses: moved } = &mut self.task;
+        for (env, _) in views.drain(..) {
+            slots[env] = NOWHERE;
         }
-        task.poses.clear();
+        moved.clear();
         for &env in envs {
-            if self.slots[env] == NOWHERE {
-                self.slots[env] = task.views.len();
-                task.views.push((env, view(env)));
-                task.poses.extend(self.round.targets.moving_poses(row(poses, env)));
+            if slots[env] == NOWHERE {
+                slots[env] = views.len();
+                views.push((env, view(env)));
+                moved.extend(self.targets.moving_poses(row(poses, env)));
             }
         }
-        let count = task.views.len() * self.round.rays.count();
-        drop(task);
-        self.round.next.store(0, Ordering::Relaxed);
-        let threads = (count / WORTH_A_THREAD).clamp(1, self.round.desks.len());
-        self.crew.run(threads, &self.round);
+        let (per_view, moving) = (self.per_view(), self.targets.moving_count());
+        let Self { crew, rays, order, fixed, max_distance, task, desks, parts, .. } = self;
+        let threads = (task.views.len() * rays.count() / WORTH_A_THREAD).clamp(1, desks.len());
+        let desks = &mut desks[..threads];
+        desks.iter_mut().for_each(|desk| desk.placed = NOWHERE);
+        let parts = parts[..per_view * task.views.len()].iter_mut().enumerate();
+        let (rays, order, fixed, task, max_distance) = (&*rays, order.as_deref(), &*fixed, &*task, *max_distance);
+        crew.share(desks, parts, |desk, (part, hits)| {
+            let (at, first) = (part / per_view, part % per_view * PART);
+            let (env, view) = &task.views[at];
+            if desk.placed != at {
+                desk.world.place_with(&fixed[*env], &task.poses[at * moving..(at + 1) * moving]);
+                desk.placed = at;
+            }
+            desk.rays.clear();
+            let range = first..first + hits.len();
+            match order {
+                Some(order) => rays.add(view, order[range].iter().map(|&k| k as usize), &mut desk.rays),
+                None => rays.add(view, range, &mut desk.rays),
+            }
+            desk.world.cast(&desk.rays, max_distance, hits);
+        });
     }
 
     /// Shows the hits of an environment of the last cast, in any order, with the index of the ray.
     pub(crate) fn each_hit(&self, env: usize, mut show: impl FnMut(usize, &RayHit)) {
-        let (slot, per_view) = (self.slots[env], self.round.per_view());
-        let first = if slot == NOWHERE { self.round.parts.len() } else { slot * per_view };
-        for (part, hits) in self.round.parts.iter().skip(first).take(per_view).enumerate() {
+        let (slot, per_view) = (self.task.slots[env], self.per_view());
+        let first = if slot == NOWHERE { self.parts.len() } else { slot * per_view };
+        for (part, hits) in self.parts.iter().skip(first).take(per_view).enumerate() {
             let first = part * PART;
-            match &self.round.order {
-                Some(order) => lock(hits).iter().zip(&order[first..]).for_each(|(hit, &k)| show(k as usize, hit)),
-                None => lock(hits).iter().zip(first..).for_each(|(hit, k)| show(k, hit)),
+            match &self.order {
+                Some(order) => hits.iter().zip(&order[first..]).for_each(|(hit, &k)| show(k as usize, hit)),
+                None => hits.iter().zip(first..).for_each(|(hit, k)| show(k, hit)),
             }
         }
     }
-}
 
-impl<R: Rays> Round<R> {
     /// Parts of a view.
     fn per_view(&self) -> usize {
         self.rays.count().div_ceil(PART)
-    }
-}
-
-impl<R: Rays> Work for Round<R> {
-    fn work(&self, desk: usize) {
-        let task = read(&self.task);
-        let mut desk = lock(&self.desks[desk]);
-        let Desk { world, rays } = &mut *desk;
-        let (per_view, moving) = (self.per_view(), self.targets.moving_count());
-        let mut placed = NOWHERE;
-        loop {
-            let part = self.next.fetch_add(1, Ordering::Relaxed);
-            if part >= per_view * task.views.len() {
-                return;
-            }
-            let (at, first) = (part / per_view, part % per_view * PART);
-            let (env, view) = &task.views[at];
-            if placed != at {
-                world.place_with(&task.fixed[*env], &task.poses[at * moving..(at + 1) * moving]);
-                placed = at;
-            }
-            let mut hits = lock(&self.parts[part]);
-            rays.clear();
-            let range = first..first + hits.len();
-            match &self.order {
-                Some(order) => self.rays.add(view, order[range].iter().map(|&k| k as usize), rays),
-                None => self.rays.add(view, range, rays),
-            }
-            world.cast(rays, task.max_distance, &mut hits);
-        }
-    }
-}
-
-/// A scan of its own: clones cast at the same time.
-impl<R: Rays> Clone for Scan<R> {
-    fn clone(&self) -> Self {
-        let Round { targets, rays, order, task, desks, parts, .. } = &*self.round;
-        let round = Round {
-            targets: Arc::clone(targets),
-            rays: rays.clone(),
-            order: order.clone(),
-            task: RwLock::new(read(task).clone()),
-            next: AtomicUsize::new(0),
-            desks: desks.iter().map(|desk| Mutex::new(lock(desk).clone())).collect(),
-            parts: parts.iter().map(|hits| Mutex::new(lock(hits).clone())).collect(),
-        };
-        Self { crew: self.crew.clone(), slots: self.slots.clone(), round: Arc::new(round) }
     }
 }
 
@@ -232,24 +193,11 @@ impl<R: Rays> Clone for Scan<R> {
 impl<R: Rays> fmt::Debug for Scan<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Scan")
-            .field("rays", &self.round.rays.count())
-            .field("targets", &self.round.targets.len())
-            .field("environments", &self.slots.len())
+            .field("rays", &self.rays.count())
+            .field("targets", &self.targets.len())
+            .field("environments", &self.task.slots.len())
             .finish_non_exhaustive()
     }
-}
-
-/// A lock of ours is poisoned only where casting panicked, which was raised again.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn read<T>(task: &RwLock<T>) -> RwLockReadGuard<'_, T> {
-    task.read().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn write<T>(task: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
-    task.write().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A row of an array in C order.

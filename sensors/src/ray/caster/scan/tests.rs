@@ -1,8 +1,10 @@
 //! Scans on several threads: the same bits, and no allocation on any of them.
 
 use super::*;
+use crate::crew::{ScopedThreads, Threads};
 use scene::shape::{Plane, Sphere};
 use scene::{Instance, Material, RenderScene};
+use std::sync::{Barrier, Mutex, PoisonError};
 
 const ENVS: usize = 6;
 /// Not a whole number of parts.
@@ -86,57 +88,50 @@ fn only_what_was_cast_is_shown_and_clones_are_apart() {
     assert_eq!((bits(&scan), count(&other, 4), count(&other, 2)), (before, 0, RAYS));
 }
 
-/// Work that counts what it allocates, on whichever thread.
-struct Counted {
-    round: Arc<Round<Vec<Ray>>>,
-    /// Allocations of desk 0 and of all others, and parts that the others took.
-    allocations: [AtomicUsize; 2],
-    helped: AtomicUsize,
+/// Threads that count what is allocated at their desks.
+#[derive(Debug, Default)]
+struct Counting {
+    /// Allocations and visits, of desk 0 and of all others.
+    seen: Mutex<[(u64, usize); 2]>,
 }
 
-impl Work for Counted {
-    fn work(&self, desk: usize) {
-        let before = self.round.next.load(Ordering::Relaxed);
-        let counted = allocation_counter::measure(|| self.round.work(desk)).count_total;
-        self.allocations[desk.min(1)].fetch_add(counted as usize, Ordering::Relaxed);
-        if desk > 0 && before < self.round.parts.len() {
-            self.helped.fetch_add(1, Ordering::Relaxed);
-        }
+impl Threads for Counting {
+    fn run(&self, desks: usize, work: &(dyn Fn(usize) + Sync)) {
+        // Together: whoever came first would do it all.
+        let turn = Barrier::new(desks);
+        ScopedThreads.run(desks, &|desk| {
+            turn.wait();
+            let allocations = allocation_counter::measure(|| work(desk)).count_total;
+            let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            let seen = &mut seen[desk.min(1)];
+            *seen = (seen.0 + allocations, seen.1 + 1);
+        });
     }
 }
 
 /// 6 environments of 3172 rays are worth four threads. Neither the calling thread nor the others allocate.
 #[test]
 fn casting_allocates_nothing_on_any_thread() {
+    let counting = Arc::new(Counting::default());
     let mut scan = scan(4);
+    scan.crew = Crew::new(Arc::<Counting>::clone(&counting));
     let all: Vec<usize> = (0..ENVS).collect();
     let states: Vec<_> = (0..4).map(poses).collect();
     all.iter().for_each(|&env| scan.settle(env, &states[0]));
-    // Everybody's first time: threads start, and every desk finds out how much scratch memory it needs.
-    scan.cast(&all, &states[0], view);
-    for desk in 0..4 {
-        scan.round.next.store(0, Ordering::Relaxed);
-        scan.round.work(desk);
+    // Everybody's first time: every desk finds out how much scratch memory it needs.
+    let crew = std::mem::take(&mut scan.crew);
+    for _ in 0..4 {
+        scan.desks.rotate_left(1);
+        let mut rest = scan.desks.split_off(1);
+        scan.cast(&all, &states[0], view);
+        scan.desks.append(&mut rest);
     }
-    let threads = format!("{:?}", scan.crew);
-    let counted = allocation_counter::measure(|| states.iter().for_each(|poses| scan.cast(&all, poses, view)));
-    assert_eq!(counted.count_total, 0, "the calling thread");
-    let counted = Arc::new(Counted {
-        round: Arc::clone(&scan.round),
-        allocations: Default::default(),
-        helped: AtomicUsize::new(0),
-    });
-    // On a busy machine the others may come late.
-    for _ in 0..1000 {
-        scan.round.next.store(0, Ordering::Relaxed);
-        scan.crew.run(4, &counted);
-        if counted.helped.load(Ordering::Relaxed) > 8 {
-            break;
-        }
+    scan.crew = crew;
+    for _ in 0..10 {
+        states.iter().for_each(|poses| scan.cast(&all, poses, view));
     }
-    assert!(counted.helped.load(Ordering::Relaxed) > 8, "others helped");
-    assert_eq!(counted.allocations.each_ref().map(|n| n.load(Ordering::Relaxed)), [0, 0]);
-    assert_eq!((threads.as_str(), format!("{:?}", scan.crew)), ("Crew { threads: 3 }", threads.clone()), "they stay");
+    let seen = *counting.seen.lock().unwrap_or_else(PoisonError::into_inner);
+    assert_eq!(seen, [(0, 40), (0, 120)], "allocations and visits of the calling thread and of the others");
     let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
     assert_eq!(control, 1, "the control: the counter counts");
 }

@@ -1,0 +1,155 @@
+use super::*;
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::ThreadId;
+
+fn me() -> ThreadId {
+    std::thread::current().id()
+}
+
+/// What was taken: number, desk, thread.
+type Taken = Vec<(usize, usize, ThreadId)>;
+
+/// Takes numbers up to `count`, slowly; fails at `fail`.
+fn numbers(threads: &StayingThreads, desks: usize, count: usize, fail: Option<usize>) -> Taken {
+    let (next, taken) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    threads.run(desks, &|desk| {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= count {
+                return;
+            }
+            assert!(fail != Some(number), "told to fail");
+            lock(&taken).push((number, desk, me()));
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+    });
+    taken.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[test]
+fn everything_is_done_once_by_threads_that_stay() {
+    let threads = StayingThreads::default();
+    let mut seen = BTreeSet::new();
+    for round in 0..20 {
+        let taken = numbers(&threads, 3, 10, None);
+        let mut numbers: Vec<usize> = taken.iter().map(|(number, ..)| *number).collect();
+        numbers.sort_unstable();
+        assert!(numbers.iter().copied().eq(0..10), "round {round}: {numbers:?}");
+        assert!(taken.iter().all(|(_, desk, thread)| *desk < 3 && (*desk == 0) == (*thread == me())));
+        seen.extend(taken.iter().map(|(_, _, thread)| format!("{thread:?}")));
+    }
+    assert!((2..=3).contains(&seen.len()), "{seen:?}");
+    assert_eq!(format!("{threads:?}"), "StayingThreads { started: 2 }");
+}
+
+/// What the caller borrows is written to by others, and is the caller's again afterwards.
+#[test]
+fn work_borrows() {
+    let threads = StayingThreads::default();
+    let mut helped = 0;
+    for round in 1..=200 {
+        let mut parts = vec![[0usize; 64]; 32];
+        let hands: Vec<_> = parts.iter_mut().map(Mutex::new).collect();
+        let next = AtomicUsize::new(0);
+        let others = AtomicUsize::new(0);
+        threads.run(4, &|desk| {
+            while let Some(part) = hands.get(next.fetch_add(1, Ordering::Relaxed)) {
+                lock(part).fill(round);
+                others.fetch_add(desk.min(1), Ordering::Relaxed);
+                std::thread::yield_now();
+            }
+        });
+        drop(hands);
+        assert!(parts.iter().flatten().all(|&number| number == round));
+        helped += others.into_inner();
+    }
+    assert!(helped > 0, "the control: somebody else than the caller wrote");
+}
+
+#[test]
+fn one_thread_and_busy_threads_work_alone() {
+    let threads = StayingThreads::default();
+    assert_eq!(numbers(&threads, 1, 5, None).len(), 5);
+    assert_eq!(format!("{threads:?}"), "StayingThreads { started: 0 }");
+    // While they do one thing, somebody else asks them to do another.
+    let (there, over) = (AtomicBool::new(false), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            threads.run(2, &|_| {
+                there.store(true, Ordering::Relaxed);
+                while !over.load(Ordering::Relaxed) {
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+            });
+        });
+        while !there.load(Ordering::Relaxed) {
+            std::thread::yield_now();
+        }
+        let taken = numbers(&threads, 2, 5, None);
+        over.store(true, Ordering::Relaxed);
+        assert!(taken.iter().all(|(_, desk, thread)| *desk == 0 && *thread == me()));
+        assert_eq!(taken.len(), 5);
+    });
+}
+
+#[test]
+fn threads_end_with_their_owner() {
+    let threads = StayingThreads::default();
+    numbers(&threads, 3, 5, None);
+    let shared = Arc::downgrade(&threads.shared);
+    assert_eq!(shared.strong_count(), 3, "its owner and two threads");
+    drop(threads);
+    assert_eq!(shared.strong_count(), 0);
+}
+
+/// A panic reaches the caller, whichever thread it was on, and the threads go on.
+#[test]
+fn panics_reach_the_caller() {
+    let threads = StayingThreads::default();
+    for fail in 0..6 {
+        let run = || numbers(&threads, 3, 10, Some(fail));
+        assert!(catch_unwind(AssertUnwindSafe(run)).is_err(), "{fail}");
+    }
+    assert_eq!(numbers(&threads, 3, 10, None).len(), 10);
+}
+
+/// Root cause: whoever dismissed next took the panic. A caller that waited for its helper had already taken its work
+/// from the board, so that another caller could put up its own there before the first one woke: that one's dismissal
+/// then took the note of the panic. The board is one caller's now until that caller has dismissed everybody.
+#[test]
+fn a_panic_reaches_its_own_caller_only() {
+    let threads = StayingThreads::default();
+    for round in 0..300 {
+        let (there, now) = (AtomicBool::new(false), AtomicBool::new(false));
+        // Fails at any desk but the first, when told.
+        let fails_late = |desk| {
+            if desk == 0 {
+                // Until a helper came: who is late is not waited for.
+                while !there.load(Ordering::Relaxed) {
+                    std::thread::yield_now();
+                }
+                return;
+            }
+            there.store(true, Ordering::Relaxed);
+            while !now.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            // Without the words that a panic hook prints 300 times.
+            resume_unwind(Box::new("told to fail"));
+        };
+        std::thread::scope(|scope| {
+            let first = scope.spawn(|| catch_unwind(AssertUnwindSafe(|| threads.run(2, &fails_late))).is_err());
+            // The helper is at its desk, and its caller waits for it.
+            while !there.load(Ordering::Relaxed) || lock(&threads.shared.board).work.is_some() {
+                std::thread::yield_now();
+            }
+            now.store(true, Ordering::Relaxed);
+            while !first.is_finished() {
+                let run = catch_unwind(AssertUnwindSafe(|| threads.run(2, &|_| ())));
+                assert!(run.is_ok(), "round {round}: the panic of another caller's work");
+            }
+            assert!(first.join().unwrap_or(false), "round {round}: its own panic did not reach it");
+        });
+    }
+}
