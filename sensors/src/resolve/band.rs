@@ -85,7 +85,8 @@ impl Brush {
             painter.draw(s, tile, projection, shot.scene, &list.placed, item);
         }
         tile.settle();
-        let context = plan.context(shot, projection);
+        let wants_detail = frame.wants(Stage::Detail);
+        let context = plan.context(shot, projection, wants_detail);
         let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
         if veils {
             veiled.copy(tile);
@@ -95,7 +96,7 @@ impl Brush {
         }
         let size = [projection.width, projection.height];
         let wants_color = frame.wants(Stage::Color);
-        let wants_geometry = frame.wants(Stage::Geometry);
+        let wants_geometry = wants_detail || frame.wants(Stage::Geometry);
         let mut pixels = PixelGroup::default();
         for (block, row, [x, y]) in groups(tile, size) {
             let at = tile.samples(block, 0) + row * LANES;
@@ -109,6 +110,9 @@ impl Brush {
             }
             // Without the instruction set: with it, normals become scattered writes, which are slower.
             write(frame, Stage::Geometry, &pixels, [x, y], size, top);
+            if wants_detail {
+                write(frame, Stage::Detail, &pixels, [x, y], size, top);
+            }
         }
         if !wants_color {
             return;

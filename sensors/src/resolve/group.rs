@@ -23,6 +23,8 @@ pub(crate) struct Context<'a> {
     pub(crate) shadows: &'a [ShadowMap],
     /// Width of a pixel at depth 1.
     pub(crate) pixel: f32,
+    /// Whether channels of [`Stage::Detail`](crate::camera::channel::Stage::Detail) are wanted.
+    pub(crate) detail: bool,
 }
 
 impl<'a> Context<'a> {
@@ -103,7 +105,6 @@ fn resolve_lanes<S: Simd>(
     let direction = projection.world_directions(s, u, v);
     let length = direction.dot(direction).sqrt();
     let view = if colors.is_some() { direction.scale(1.0 / length) } else { direction };
-    let zero = splat(s, 0.0);
     let nothing = splat_u(s, NOTHING);
     let missed = ids.simd_eq(nothing);
     let mut depth = splat(s, f32::INFINITY);
@@ -129,9 +130,11 @@ fn resolve_lanes<S: Simd>(
         if pixels.is_some() {
             depth = select(here, at.depth, depth);
             normal = V3::select(here, at.normal, normal);
-            shading = V3::select(here, at.shading, shading);
-            position = V3::select(here, at.position, position);
             mask = select_i(here, splat_i(s, source.instance.mask_id), mask);
+            if context.detail {
+                shading = V3::select(here, at.shading, shading);
+                position = V3::select(here, at.position, position);
+            }
         }
         if colors.is_some() {
             let Context { scene, lighting, shadows, pixel, .. } = *context;
@@ -142,20 +145,22 @@ fn resolve_lanes<S: Simd>(
     }
     if let Some(pixels) = &mut pixels {
         store(depth, &mut pixels.depth);
-        store(depth * length, &mut pixels.distance);
         pixels.mask = mask.array();
-        for (to, v) in [(&mut pixels.normal, normal), (&mut pixels.shading_normal, shading)] {
-            store(v.x, &mut to[0]);
-            store(v.y, &mut to[1]);
-            store(v.z, &mut to[2]);
+        store_v3(normal, &mut pixels.normal);
+        if context.detail {
+            store(depth * length, &mut pixels.distance);
+            store_v3(shading, &mut pixels.shading_normal);
+            store_v3(V3::select(missed, none, position), &mut pixels.position);
         }
-        store(select(missed, zero, position.x), &mut pixels.position[0]);
-        store(select(missed, zero, position.y), &mut pixels.position[1]);
-        store(select(missed, zero, position.z), &mut pixels.position[2]);
     }
     if let Some(colors) = &mut colors {
-        store(color.x, &mut colors[0]);
-        store(color.y, &mut colors[1]);
-        store(color.z, &mut colors[2]);
+        store_v3(color, colors);
     }
+}
+
+#[inline(always)]
+fn store_v3<S: Simd>(v: V3<S>, to: &mut [[f32; LANES]; 3]) {
+    store(v.x, &mut to[0]);
+    store(v.y, &mut to[1]);
+    store(v.z, &mut to[2]);
 }

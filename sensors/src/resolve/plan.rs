@@ -110,8 +110,8 @@ impl Plan {
         (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
 
-    /// What all pixels need.
-    pub(crate) fn context<'a>(&'a self, shot: &Shot<'a>, projection: &'a Projection) -> Context<'a> {
+    /// What all pixels need; `detail` says whether channels of that stage are wanted.
+    pub(crate) fn context<'a>(&'a self, shot: &Shot<'a>, projection: &'a Projection, detail: bool) -> Context<'a> {
         Context {
             projection,
             scene: shot.scene,
@@ -120,6 +120,7 @@ impl Plan {
             lighting: &self.lighting,
             shadows: &self.shadows[..self.maps],
             pixel: 1.0 / projection.fx.min(projection.fy),
+            detail,
         }
     }
 }

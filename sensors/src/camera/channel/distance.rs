@@ -13,7 +13,7 @@ impl Channel for Distance {
     const NAME: &'static str = "distance";
     const ALIASES: &'static [&'static str] = &["distance_to_camera"];
     const COMPONENTS: usize = 1;
-    const STAGE: Stage = Stage::Geometry;
+    const STAGE: Stage = Stage::Detail;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {

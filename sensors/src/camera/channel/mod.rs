@@ -48,6 +48,8 @@ impl Default for PixelGroup {
 pub enum Stage {
     /// As soon as it is known what each pixel centre sees.
     Geometry,
+    /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
+    Detail,
     /// After light, transparency and multisampling.
     Color,
 }

@@ -13,7 +13,7 @@ impl Channel for Position {
     const NAME: &'static str = "position";
     const ALIASES: &'static [&'static str] = &["positions", "position_map"];
     const COMPONENTS: usize = 3;
-    const STAGE: Stage = Stage::Geometry;
+    const STAGE: Stage = Stage::Detail;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {

@@ -13,7 +13,7 @@ impl Channel for ShadingNormal {
     const NAME: &'static str = "shading_normal";
     const ALIASES: &'static [&'static str] = &["shading_normals", "smooth_normals"];
     const COMPONENTS: usize = 3;
-    const STAGE: Stage = Stage::Geometry;
+    const STAGE: Stage = Stage::Detail;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {
