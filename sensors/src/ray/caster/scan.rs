@@ -93,7 +93,7 @@ impl<R: Rays> Scan<R> {
     /// Nothing is known yet of where things are that do not move.
     pub(crate) fn new(targets: RayTargets, rays: R, max_distance: f64, context: &SensorContext) -> Self {
         let (n, count) = (context.num_envs, rays.count());
-        let targets = Arc::new(targets);
+        let (targets, nothing) = (Arc::new(targets), Arc::new(FixedWorld::default()));
         let desk =
             || Desk { world: RayWorld::new(&targets), placed: NOWHERE, rays: Vec::with_capacity(PART.min(count)) };
         let of_view = || (0..count).step_by(PART).map(|first| vec![RayHit::MISS; PART.min(count - first)]);
@@ -101,7 +101,7 @@ impl<R: Rays> Scan<R> {
             crew: context.crew.clone(),
             order: rays.order(),
             rays,
-            fixed: vec![Arc::new(FixedWorld::default()); n],
+            fixed: vec![nothing; n],
             max_distance,
             task: Task { views: Vec::with_capacity(n), slots: vec![NOWHERE; n], poses: Vec::new() },
             desks: (0..context.threads.max(1)).map(|_| desk()).collect(),
