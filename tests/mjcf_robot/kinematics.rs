@@ -43,9 +43,9 @@ fn links_are_where_mujoco_has_bodies_and_sites() {
     let links: Vec<String> = sim.robot(id).link_names().into_iter().map(String::from).collect();
     let mut farthest = 0.0f64;
     for qpos in rows.axis_chunks_iter(Axis(0), 2) {
-        let computed = sim.robot(id).compute_link_fk(&qpos, None).unwrap();
+        let computed = sim.robot(id).compute_link_fk(qpos, None).unwrap();
         assert_eq!(computed.dim(), (2, links.len(), 7));
-        sim.robot_mut(id).write_qpos(&qpos, None, None).unwrap();
+        sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
         let read = sim.robot(id).get_link_poses();
         for env in 0..2 {
             for (link, name) in links.iter().enumerate() {

@@ -230,7 +230,7 @@ impl RobotData {
         &self.plans
     }
 
-    /// Names of the movable joints in the order of the merged URDF.
+    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
     }
@@ -421,12 +421,13 @@ impl<'a> Robot<'a> {
         self.data.plans.len()
     }
 
-    /// Names of the movable joints in the order of the merged URDF.
+    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
     pub fn joint_names(&self) -> &'a [String] {
         &self.data.joint_names
     }
 
-    /// Names of all links, fused ones included, in the order of the merged URDF.
+    /// Names of all links, fused ones included, in the order of the merged URDF; of an MJCF file its bodies, then its named
+    /// sites.
     pub fn link_names(&self) -> Vec<&'a str> {
         self.data.description.named_links().iter().map(|l| l.name.as_str()).collect()
     }

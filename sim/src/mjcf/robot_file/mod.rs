@@ -226,16 +226,15 @@ impl RobotFile {
         fix_base: bool,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> BTreeMap<usize, Inertial> {
-        let still = self.still_bodies(fix_base);
         let mut loaded = BTreeMap::new();
-        for body in 1..self.model.nbody() {
+        for (body, &still) in self.still_bodies(fix_base).iter().enumerate().skip(1) {
             let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
             let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
             let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
             if links.iter().map(mass).sum::<f64>() == self.model.body_mass()[body] {
                 continue;
             }
-            let rigid = RigidBody { links, moves: !still[body] };
+            let rigid = RigidBody { links, moves: !still };
             if let Some(fused) = fuse(description, &rigid, diagnostics) {
                 let (mass, com) = (fused.inertia.mass, fused.inertia.com);
                 let (moments, axes) = fused.inertia.principal();
