@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release --example add_sensors_on_robot -- --headless --num-envs 2 --steps 1000 --out pictures
 //! cargo run --release --example add_sensors_on_robot -- --headless --steps 12000 --reset-every 0 --payload 5
+//! cargo run --release --example add_sensors_on_robot -- --headless --robot quadruped/quadruped.xml
 //! ```
 
 mod launcher;
@@ -24,7 +25,7 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// URDF of a quadruped with ANYmal's joint names
+    /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names; in an MJCF file it starts as high as the file says
     #[arg(long, default_value = "quadruped/quadruped.urdf")]
     robot: PathBuf,
     /// Steps between resets with other joint angles; 0 for none
@@ -124,16 +125,22 @@ fn run(args: &Args) -> launcher::Result {
 
 /// ANYmal's start: 0.6 m up, knees bent.
 fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
+    let file = launcher::user_or_asset(&args.robot)?;
+    // An MJCF file says how high its robot stands.
+    let described = if file.extension().is_some_and(|extension| extension == "xml") {
+        RobotCfg { mjcf: Some(MjcfFile::new(file)), ..Default::default() }
+    } else {
+        let init_pose = Pose::translation(0.0, 0.0, 0.6);
+        RobotCfg { urdf: UrdfCfg::single(file), init_pose, ..Default::default() }
+    };
     let pose = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
     Ok(RobotCfg {
         uid: "robot".into(),
-        urdf: UrdfCfg::single(launcher::user_or_asset(&args.robot)?),
         fix_base: false,
-        init_pose: Pose::translation(0.0, 0.0, 0.6),
         init_qpos: pose.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
         drive: DriveCfg { stiffness: args.stiffness.into(), damping: args.damping.into(), ..Default::default() },
         payload: vec![("base".into(), args.payload)],
-        ..Default::default()
+        ..described
     })
 }
 

@@ -163,20 +163,21 @@ pub(crate) fn document(
             Purpose::Run { .. } => Purpose::Run { friction_tendons: data.cfg().drive.model == DriveModel::Implicit },
             export => export.clone(),
         };
-        let layout = robot::add(
-            data.description(),
-            &robot::RobotCfg {
-                uid: data.uid(),
-                contact: scene::robot_contact(index, data.cfg().self_collision),
-                fix_base: data.cfg().fix_base,
-                base_pose: data.cfg().init_pose,
-                plans: data.plans(),
-                hulls: data.hulls(),
-                purpose,
-            },
-            &mut mjcf,
-            &mut diagnostics,
-        )?;
+        let robot_cfg = robot::RobotCfg {
+            uid: data.uid(),
+            contact: scene::robot_contact(index, data.cfg().self_collision),
+            fix_base: data.cfg().fix_base,
+            base_pose: data.cfg().init_pose,
+            plans: data.plans(),
+            hulls: data.hulls(),
+            purpose,
+        };
+        let layout = match data.file() {
+            None => robot::add(data.description(), &robot_cfg, &mut mjcf, &mut diagnostics)?,
+            Some(file) => file
+                .add(data.description(), &robot_cfg, data.cfg().self_collision, &mut mjcf, &mut diagnostics)
+                .map_err(|error| data.file_error(error.into()))?,
+        };
         if data.cfg().self_collision {
             mjcf.excludes.extend(layout.base_pairs.iter().cloned());
         }
@@ -245,7 +246,7 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
         .iter()
         .enumerate()
         .map(|(index, terrain)| mj::Asset { name: scene::terrain_file(index), bytes: terrain.file() })
-        .chain(contents.parts.iter().flat_map(|part| part.files().iter().cloned()))
+        .chain(contents.files().cloned())
         .collect();
     let mut compiled = mj::compile(&text.xml, &files).map_err(|error| match error {
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),

@@ -2,7 +2,9 @@
 
 use crate::description::JointKind;
 use crate::error::{Error, Result};
+use crate::mj::Asset;
 use crate::mjcf::robot::RobotLayout;
+use crate::mjcf::robot_file::RobotFile;
 use crate::objects::mjcf_part::MjcfData;
 use crate::objects::object_group::GroupData;
 use crate::objects::rigid_object::RigidObjectData;
@@ -55,7 +57,7 @@ impl Contents {
     /// then bodies and sites of parts (`uid/body`).
     pub(crate) fn body_names(&self) -> Arc<[String]> {
         let links = self.robots.iter().flat_map(|r| {
-            let links = r.description().links.iter();
+            let links = r.description().named_links().iter();
             links.map(|l| format!("{}/{}", r.uid(), l.name))
         });
         let frames = self.parts.iter().flat_map(|p| p.frames().iter().map(|frame| frame.name.clone()));
@@ -103,9 +105,11 @@ impl Contents {
         let mut carriers = Vec::new();
         for robot in &self.robots {
             let (description, first) = (robot.description(), carriers.len());
-            carriers.extend((0..description.links.len()).map(|mut link| {
+            carriers.extend((0..description.named_links().len()).map(|mut link| {
+                // Behind a frame between joints a body begins.
                 while let Some(joint) = description.links[link].parent_joint.map(|id| description.joint(id))
                     && joint.kind == JointKind::Fixed
+                    && !description.link(joint.parent).between_joints
                 {
                     link = joint.parent.0;
                 }
@@ -121,15 +125,22 @@ impl Contents {
         carriers.into()
     }
 
-    /// MuJoCo's own sensors of all parts, where their values are among all values.
+    /// MuJoCo's own sensors of all robots from MJCF files, then of all parts, where their values are among all values.
     pub(crate) fn engine_sensors(&self) -> Arc<[EngineSensor]> {
         let mut first = 0;
         let mut sensors = Vec::new();
-        for part in &self.parts {
-            sensors.extend(part.sensors().iter().map(|s| EngineSensor { first: first + s.first, ..s.clone() }));
-            first += part.sensors().iter().map(|s| s.width).sum::<usize>();
+        let of_robots = self.robots.iter().filter_map(|robot| robot.file()).map(RobotFile::sensors);
+        for of_file in of_robots.chain(self.parts.iter().map(|part| part.sensors())) {
+            sensors.extend(of_file.iter().map(|s| EngineSensor { first: first + s.first, ..s.clone() }));
+            first += of_file.iter().map(|s| s.width).sum::<usize>();
         }
         sensors.into()
+    }
+
+    /// Files that MuJoCo reads beside the document, of robots from MJCF files and of parts.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Asset> {
+        let of_robots = self.robots.iter().filter_map(|robot| robot.file()).flat_map(RobotFile::files);
+        of_robots.chain(self.parts.iter().flat_map(|part| part.files()))
     }
 
     /// Names of the movable joints of all robots, then of the joints of parts that have one degree of freedom, `uid/joint`.

@@ -1,7 +1,7 @@
 //! `RobotDescription`: the merged robot as the files describe it, unrepaired, before MuJoCo sees it.
 //!
-//! Made by `urdf::merge`, read by `dynamics`, `mjcf::robot` and `drive`. Names are unique, order is the order of the
-//! merged URDF files, every element knows its [`Source`].
+//! Made by `urdf::merge` and `mjcf::robot_file`, read by `dynamics`, `kinematics`, `mjcf::robot` and `drive`. Names are
+//! unique, order is the order of the files, every element knows its [`Source`].
 
 use crate::source::Source;
 use nalgebra::{Matrix3, Unit, Vector3};
@@ -21,7 +21,8 @@ pub struct JointId(pub usize);
 pub struct RobotDescription {
     /// Name of the robot.
     pub name: String,
-    /// All links; `links[root.0]` is the only one without a parent joint.
+    /// All links; `links[root.0]` is the only one without a parent joint. Those that are [`between_joints`](Link::between_joints)
+    /// stand behind all others.
     pub links: Vec<Link>,
     /// All joints, fixed ones included, in the order of the merged files.
     pub joints: Vec<Joint>,
@@ -48,6 +49,9 @@ pub struct Link {
     pub parent_joint: Option<JointId>,
     /// Joints whose parent this link is, in file order.
     pub child_joints: Vec<JointId>,
+    /// It is no body but a frame between two joints of one, as MJCF has them: without mass, shape or place of its own in
+    /// MuJoCo, and no user is told of it.
+    pub between_joints: bool,
 }
 
 /// Mass properties of a link as the file gives them.
@@ -161,6 +165,39 @@ pub struct Joint {
     pub friction: Option<f64>,
     /// Coupling to another joint.
     pub mimic: Option<Mimic>,
+    /// What the file says beyond URDF; `None` from a URDF.
+    pub defaults: Option<JointDefaults>,
+}
+
+/// What an MJCF file says of a joint beyond what a URDF can say: it holds where the configuration says nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointDefaults {
+    /// Rotor inertia \[kg m² or kg\].
+    pub armature: f64,
+    /// Position in which the file starts \[rad or m\].
+    pub position: f64,
+    /// How it is driven.
+    pub drive: FileDrive,
+}
+
+/// How a file drives a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FileDrive {
+    /// The file has no actuators at all.
+    Unsaid,
+    /// The file has actuators, and none of them acts on the joint.
+    Passive,
+    /// By an effort: the gains are not the file's.
+    Effort,
+    /// By actuators that follow positions or velocities.
+    Servo {
+        /// Stiffness \[N m/rad or N/m\].
+        stiffness: f64,
+        /// Damping \[N m s/rad or N s/m\].
+        damping: f64,
+    },
+    /// A coupling that no mimic says decides where it is: nothing may drive it.
+    Coupled,
 }
 
 /// Joint types of URDF.
@@ -228,9 +265,15 @@ pub struct Mimic {
 }
 
 impl RobotDescription {
-    /// The link called `name`.
+    /// The links that a user knows, indexed by [`LinkId`]: all but the frames between joints of one body.
+    pub fn named_links(&self) -> &[Link] {
+        let named = self.links.iter().position(|link| link.between_joints).unwrap_or(self.links.len());
+        &self.links[..named]
+    }
+
+    /// The link called `name`, of those that a user knows.
     pub fn link_id(&self, name: &str) -> Option<LinkId> {
-        self.links.iter().position(|l| l.name == name).map(LinkId)
+        self.named_links().iter().position(|l| l.name == name).map(LinkId)
     }
 
     /// The joint called `name`, fixed ones included.

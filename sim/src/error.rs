@@ -6,6 +6,7 @@ use crate::kinematics::KinematicsError;
 use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
+use crate::mjcf::robot_file::RobotFileError;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
@@ -109,6 +110,17 @@ pub enum Error {
         /// What is wrong.
         #[source]
         error: Box<CompileError>,
+    },
+    /// An MJCF file is no robot.
+    #[error("robot {robot:?}: {file}: {error}")]
+    RobotFile {
+        /// The robot.
+        robot: String,
+        /// The file.
+        file: String,
+        /// What is wrong.
+        #[source]
+        error: Box<RobotFileError>,
     },
     /// Something of an MJCF file cannot be in a scene.
     #[error("part {part:?}: {file}: {error}")]
@@ -329,7 +341,8 @@ pub enum Error {
     /// A joint has no drive to change.
     #[error(
         "{argument}: joint {joint:?} of robot {robot:?} has no drive in the model, since the robot was added with the drive \
-         type none; add it with another one, and call set_drive_type where joints shall be passive"
+         type none, or its file says that nothing drives the joint; add it with another one, and call set_drive_type where \
+         joints shall be passive"
     )]
     NotDriven {
         /// The method.

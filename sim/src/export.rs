@@ -7,9 +7,9 @@ use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::error::{Error, Result};
 use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
+use crate::mjcf::part::MjcfPart;
 use crate::mjcf::robot::{MeshKey, Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
-use crate::objects::mjcf_part::MjcfData;
 use crate::objects::robot::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::source::Source;
@@ -43,7 +43,7 @@ pub(crate) fn dump(
         let path = dir.join(world::terrain_file(index));
         std::fs::write(&path, terrain.file()).map_err(at(&path))?;
     }
-    for file in contents.parts.iter().flat_map(|part| part.files()) {
+    for file in contents.files() {
         let path = dir.join(&file.name);
         std::fs::write(&path, &file.bytes).map_err(at(&path))?;
     }
@@ -55,7 +55,7 @@ pub(crate) fn dump(
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
         prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
-        let reduced = reduced(contents, target, file);
+        let reduced = reduced(&mjcf, target, file);
         mjcf.comments.extend(reduced.iter().map(|diagnostic| diagnostic.message.clone()));
         left_out.extend(reduced);
         write_file(&dir.join(file), &write::write(&mjcf, target).xml)?;
@@ -65,11 +65,11 @@ pub(crate) fn dump(
     Ok(left_out)
 }
 
-/// What of the parts is not in a file for a line of MuJoCo that does not know it.
-fn reduced(contents: &Contents, target: Target, file: &str) -> Vec<Diagnostic> {
+/// What of robots and parts that are MJCF files is not in a file for a line of MuJoCo that does not know it.
+fn reduced(mjcf: &Mjcf, target: Target, file: &str) -> Vec<Diagnostic> {
     let version = if target == Target::V2 { "2.2.2" } else { "4.x" };
-    let of_part = |part: &Arc<MjcfData>| {
-        let lines = part.document().lines(target);
+    let of_part = |part: &Arc<MjcfPart>| {
+        let lines = part.lines(target);
         let message = |left_out| {
             let uid = part.uid();
             format!("part {uid:?}: {left_out}: MuJoCo {version} does not know it, and it is left out of {file}")
@@ -77,7 +77,7 @@ fn reduced(contents: &Contents, target: Target, file: &str) -> Vec<Diagnostic> {
         let say = |left_out| Diagnostic::new(DiagnosticKind::ExportReduced, lines.source.clone(), message(left_out));
         lines.left_out.iter().map(say).collect::<Vec<_>>()
     };
-    contents.parts.iter().flat_map(of_part).collect()
+    mjcf.parts.iter().flat_map(of_part).collect()
 }
 
 fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {

@@ -1,6 +1,7 @@
 //! How types of this crate stand in configuration files where a derive would not read well.
 
 use crate::drive::PerJoint;
+use crate::objects::robot_file::MjcfFile;
 use crate::urdf::UrdfCfg;
 use scene::file_format::pairs;
 use serde::de::value::MapAccessDeserializer;
@@ -49,6 +50,33 @@ impl<'de> Deserialize<'de> for PerJoint {
 
         deserializer.deserialize_any(NumberOrTable)
     }
+}
+
+/// The MJCF of a robot: the path of the file, or the table of [`MjcfFile`].
+pub(crate) fn mjcf_file<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<MjcfFile>, D::Error> {
+    struct FileOrTable;
+
+    impl<'de> Visitor<'de> for FileOrTable {
+        type Value = Option<MjcfFile>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("the path of an MJCF file, or a table with `path` or `text`")
+        }
+
+        fn visit_str<E: Error>(self, path: &str) -> Result<Self::Value, E> {
+            Ok(Some(MjcfFile::new(path)))
+        }
+
+        fn visit_unit<E: Error>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            MjcfFile::deserialize(MapAccessDeserializer::new(map)).map(Some)
+        }
+    }
+
+    deserializer.deserialize_any(FileOrTable)
 }
 
 /// The URDF of a robot: the path of its only file, or the table of [`UrdfCfg`].

@@ -54,6 +54,7 @@ pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::object_group::{GroupId, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
+pub use objects::robot_file::MjcfFile;
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
 pub use objects::weld::{Weld, WeldCfg, WeldId, WeldMut};

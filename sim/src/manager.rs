@@ -127,6 +127,8 @@ impl SimulationManager {
     /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
     /// error the simulation is as it was. What exists already keeps its state.
     ///
+    /// It is made of URDF files ([`RobotCfg::urdf`]), or is an MJCF file ([`RobotCfg::mjcf`]).
+    ///
     /// # Errors
     /// Anything wrong with the files, names, drives or meshes of the robot.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
@@ -140,7 +142,8 @@ impl SimulationManager {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }
         let mut diagnostics = Vec::new();
-        let robot = RobotData::load(cfg, role, &self.cfg, self.contents.next_mask_id(), &mut diagnostics)?;
+        let so_far = (self.contents.robots.len(), self.simulation.batch.model());
+        let robot = RobotData::load(cfg, role, &self.cfg, so_far, self.contents.next_mask_id(), &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.robots.push(Arc::new(robot));
         self.replace_contents(contents, diagnostics)?;

@@ -68,6 +68,11 @@ const TABLE: &[Run] = &[
         "--headless --num-envs 1 --steps 400 --reset-every 0 --payload 5 --out {out}/anymal_sensors \
          --robot {robots}/anymal_c_simple_description/urdf/anymal.urdf",
     ),
+    run_of(
+        "add_sensors_on_robot",
+        &[0],
+        "--headless --num-envs 1 --steps 400 --reset-every 0 --out {out}/mjcf_sensors --robot quadruped/quadruped.xml",
+    ),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --payload=-1"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --robot sr5/SR5.urdf"),
     run_of("run_ray_caster", &[0], "--headless --steps 300 --out {out}/ray_caster --report {out}/ray_caster.json"),

@@ -15,6 +15,13 @@ pub enum PerJoint {
     By(Vec<(String, f64)>),
 }
 
+/// Nothing is said: every joint keeps the default.
+impl Default for PerJoint {
+    fn default() -> Self {
+        Self::By(Vec::new())
+    }
+}
+
 impl From<f64> for PerJoint {
     fn from(value: f64) -> Self {
         Self::All(value)
@@ -40,21 +47,23 @@ pub struct DriveCfg {
     /// the same gains in their place.
     #[serde(with = "scene::file_format::pairs")]
     pub actuators: Vec<(String, ActuatorModel)>,
-    /// Stiffness \[N m/rad or N/m\] (drive type `force`).
+    /// Stiffness \[N m/rad or N/m\] (drive type `force`). Where unset, that of the position actuators in the file of an
+    /// [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.
     pub stiffness: PerJoint,
-    /// Damping \[N m s/rad or N s/m\] (drive type `force`).
+    /// Damping \[N m s/rad or N s/m\] (drive type `force`). Where unset, as for the stiffness, or else 10³.
     pub damping: PerJoint,
-    /// Largest effort \[N m or N\]; where unset, the URDF's.
+    /// Largest effort \[N m or N\]; where unset, the file's.
     pub max_effort: Option<PerJoint>,
     /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; of the drive laws, only that of [`DcMotor`] knows
     /// it.
     ///
     /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,
-    /// Dry friction \[N m or N\]; where unset, the URDF's. Joints that have some can be told another while they run:
+    /// Dry friction \[N m or N\]; where unset, the file's. Joints that have some can be told another while they run:
     /// [`RobotMut::set_friction`](crate::RobotMut::set_friction).
     pub friction: Option<PerJoint>,
-    /// Rotor inertia \[kg m² or kg\]; while they run, [`RobotMut::set_armature`](crate::RobotMut::set_armature).
+    /// Rotor inertia \[kg m² or kg\]; where unset, that of an MJCF file, or else 0. While they run:
+    /// [`RobotMut::set_armature`](crate::RobotMut::set_armature).
     pub armature: PerJoint,
 }
 
@@ -64,36 +73,36 @@ impl Default for DriveCfg {
             drive_type: DriveType::Force,
             model: DriveModel::Implicit,
             actuators: Vec::new(),
-            stiffness: PerJoint::All(DEFAULT_STIFFNESS),
-            damping: PerJoint::All(DEFAULT_DAMPING),
+            stiffness: PerJoint::default(),
+            damping: PerJoint::default(),
             max_effort: None,
             max_velocity: None,
             friction: None,
-            armature: PerJoint::All(0.0),
+            armature: PerJoint::default(),
         }
     }
 }
 
-/// EmbodiChain's default stiffness: what a joint keeps that no pattern matches.
-const DEFAULT_STIFFNESS: f64 = 1e4;
+/// EmbodiChain's default stiffness: what a joint has that neither a pattern nor its file says anything of.
+pub(super) const DEFAULT_STIFFNESS: f64 = 1e4;
 /// EmbodiChain's default damping.
-const DEFAULT_DAMPING: f64 = 1e3;
+pub(super) const DEFAULT_DAMPING: f64 = 1e3;
 
-/// Drive properties of one joint.
+/// Drive properties of one joint, as far as the configuration says them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGains {
-    /// Stiffness.
-    pub stiffness: f64,
-    /// Damping.
-    pub damping: f64,
+    /// Stiffness, if the configuration sets one.
+    pub stiffness: Option<f64>,
+    /// Damping, if the configuration sets one.
+    pub damping: Option<f64>,
     /// Largest effort, if the configuration sets one.
     pub max_effort: Option<f64>,
     /// Largest speed, if the configuration sets one.
     pub max_velocity: Option<f64>,
     /// Dry friction, if the configuration sets one.
     pub friction: Option<f64>,
-    /// Rotor inertia.
-    pub armature: f64,
+    /// Rotor inertia, if the configuration sets one.
+    pub armature: Option<f64>,
     /// Explicit actuator model, if the configuration names one.
     pub actuator: Option<ActuatorModel>,
 }
@@ -159,12 +168,12 @@ pub fn resolve(
     let armature = each("armature", &cfg.armature)?;
     Ok((0..joints.len())
         .map(|i| JointGains {
-            stiffness: stiffness[i].unwrap_or(DEFAULT_STIFFNESS),
-            damping: damping[i].unwrap_or(DEFAULT_DAMPING),
+            stiffness: stiffness[i],
+            damping: damping[i],
             max_effort: max_effort[i],
             max_velocity: max_velocity[i],
             friction: friction[i],
-            armature: armature[i].unwrap_or(0.0),
+            armature: armature[i],
             actuator: actuators[i],
         })
         .collect())

@@ -1,11 +1,11 @@
 //! What every joint of a robot will do: limits, drive, friction, start position, resolved from description and
 //! configuration. The stage between `RobotDescription` and MJCF.
 
-use super::cfg::{DriveCfg, DriveCfgError, resolve};
+use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, JointGains, resolve};
 use super::models::ActuatorModel;
 use super::table::{Gains, Setting};
 use super::{ActuatorSpec, DriveType};
-use crate::description::{Joint, JointId, JointKind, RobotDescription};
+use crate::description::{FileDrive, Joint, JointId, JointKind, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::pattern::{self, PatternError};
@@ -101,16 +101,15 @@ pub fn plan(
             let effort = joint.limit.as_ref().and_then(|l| l.effort).filter(|&e| e > 0.0);
             let velocity = joint.limit.as_ref().and_then(|l| l.velocity).filter(|&v| v > 0.0);
             let limit = own_limit(joint);
-            let (drive_type, stiffness, damping) = (drive.drive_type, gains.stiffness, gains.damping);
             JointPlan {
                 joint: id,
                 actuator: None,
                 model: gains.actuator,
-                setting: Setting { drive_type, stiffness, damping, inertia: None },
+                setting: setting(joint, drive.drive_type, gains),
                 max_effort: gains.max_effort.or(effort).unwrap_or(f64::INFINITY),
                 max_velocity: gains.max_velocity.or(velocity).unwrap_or(f64::INFINITY),
                 friction: gains.friction.or(joint.friction).unwrap_or(0.0),
-                armature: gains.armature,
+                armature: gains.armature.or(joint.defaults.map(|file| file.armature)).unwrap_or(0.0),
                 damping: joint.damping.unwrap_or(0.0),
                 limit,
                 usable: limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
@@ -145,6 +144,28 @@ pub fn plan(
         })?;
     }
     Ok((plans, diagnostics))
+}
+
+/// What is asked of a joint's drive: by the configuration, or else by its file, or else EmbodiChain's numbers. A joint that
+/// its file leaves passive is driven where the configuration names it, and one that a coupling moves never is.
+fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting {
+    let of_file = joint.defaults.map_or(FileDrive::Unsaid, |file| file.drive);
+    let (stiffness, damping) = match of_file {
+        FileDrive::Servo { stiffness, damping } if drive_type == DriveType::Force => (Some(stiffness), Some(damping)),
+        _ => (None, None),
+    };
+    let named = gains.stiffness.is_some() || gains.damping.is_some() || gains.actuator.is_some();
+    let driven = match of_file {
+        FileDrive::Coupled => false,
+        FileDrive::Passive => named,
+        FileDrive::Unsaid | FileDrive::Effort | FileDrive::Servo { .. } => true,
+    };
+    Setting {
+        drive_type: if driven { drive_type } else { DriveType::None },
+        stiffness: gains.stiffness.or(stiffness).unwrap_or(DEFAULT_STIFFNESS),
+        damping: gains.damping.or(damping).unwrap_or(DEFAULT_DAMPING),
+        inertia: None,
+    }
 }
 
 /// Position limits; a continuous joint has none, whatever the file says. A single missing end is 0, URDF's default; with
@@ -197,7 +218,7 @@ fn set_initial_positions(
 ) -> Result<(), PlanError> {
     for (plan, value) in plans.iter_mut().zip(initial) {
         let joint = description.joint(plan.joint);
-        let wanted = value.unwrap_or(0.0);
+        let wanted = value.or(joint.defaults.map(|file| file.position)).unwrap_or(0.0);
         if !wanted.is_finite() {
             return Err(PlanError::InitialValue { joint: joint.name.clone(), value: wanted });
         }

@@ -75,6 +75,7 @@ impl Builder {
             damping: None,
             friction: None,
             mimic: None,
+            defaults: None,
         });
         self.0.links[parent.0].child_joints.push(joint);
         self.0.links.push(link(format!("link{}", child.0), inertial, Some(joint)));
@@ -92,6 +93,7 @@ fn link(name: String, inertial: Option<Inertial>, parent_joint: Option<JointId>)
         collisions: Vec::new(),
         parent_joint,
         child_joints: Vec::new(),
+        between_joints: false,
     }
 }
 

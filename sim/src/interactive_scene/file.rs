@@ -178,6 +178,9 @@ impl<'a> Reader<'a> {
             EntityCfg::Robot(robot) => {
                 robot.uid = uid;
                 self.place_urdf(&mut robot.urdf);
+                if let Some(file) = &mut robot.mjcf {
+                    file.place_beside(|path| self.beside(path));
+                }
             }
             EntityCfg::Articulation(articulation) => {
                 articulation.uid = uid;

@@ -1,12 +1,14 @@
 //! From a robot description to the MJCF that MuJoCo compiles.
 //!
-//! [`document`] mirrors MJCF as plain data, [`robot`] and [`scene`] fill it, [`part`] adds files that are MJCF already,
+//! [`document`] mirrors MJCF as plain data, [`robot`] and [`scene`] fill it, [`part`] adds files that are MJCF already, and
+//! [`robot_file`] those that are robots;
 //! [`write`](mod@write) turns it into text for one of the two MuJoCo lines and remembers which line came from which element
 //! of the user's file.
 
 pub mod document;
 pub mod part;
 pub mod robot;
+pub mod robot_file;
 pub mod scene;
 pub mod write;
 

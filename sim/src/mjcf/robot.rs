@@ -221,13 +221,8 @@ impl Emitter<'_, '_> {
         format!("{}/{name}", self.cfg.uid)
     }
 
-    /// The name of a joint that the file does not have: `own`, with primes where a joint of the file is called that.
     fn unused(&self, own: &str) -> String {
-        let mut own = own.to_owned();
-        while self.description.joint_id(&own).is_some() {
-            own.push('\'');
-        }
-        self.name(&own)
+        unused_joint(self.description, self.cfg.uid, own)
     }
 
     /// Links depth first from the root, a body for each that moves.
@@ -492,28 +487,7 @@ impl Emitter<'_, '_> {
                     source: joint.mimic.as_ref().map(|m| m.source.clone()),
                 });
             }
-            if let Some(actuator) = plan.actuator {
-                // Without stiffness the control is a velocity, without both an effort.
-                let gain = [actuator.kp, actuator.kd, 1.0].into_iter().find(|&g| g > 0.0).unwrap_or(1.0);
-                let positions = actuator.kp > 0.0 && plan.usable.iter().all(|end| end.is_finite());
-                self.mjcf.actuators.push(Actuator {
-                    name: name.clone(),
-                    joint: name.clone(),
-                    gain,
-                    kp: actuator.kp,
-                    kd: actuator.kd,
-                    force_limit: Some(plan.max_effort.max(SMALLEST_EFFORT)).filter(|limit| limit.is_finite()),
-                    ctrl_range: positions.then_some(plan.usable).map(open_range),
-                    source: Some(joint.source.clone()),
-                });
-                if plan.friction > 0.0 && self.friction_is_tendon() {
-                    self.mjcf.friction_tendons.push(FrictionTendon {
-                        name: format!("{name}/friction"),
-                        joint: name,
-                        frictionloss: plan.friction,
-                    });
-                }
-            }
+            add_drive(self.mjcf, self.cfg.uid, joint, plan, self.friction_is_tendon());
         }
     }
 
@@ -527,6 +501,47 @@ impl Emitter<'_, '_> {
             .filter(|&b| bodies[b].parent == base)
             .map(|b| (bodies[base].name.clone(), bodies[b].name.clone()))
             .collect()
+    }
+}
+
+/// The full name of a joint that the files do not have: `own`, with primes where a joint of them is called that.
+pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str) -> String {
+    let mut own = own.to_owned();
+    while description.joint_id(&own).is_some() {
+        own.push('\'');
+    }
+    format!("{uid}/{own}")
+}
+
+/// Adds the actuator of a joint that is driven, and its dry friction where that is a tendon.
+pub(super) fn add_drive(
+    mjcf: &mut Mjcf,
+    uid: &str,
+    joint: &crate::description::Joint,
+    plan: &JointPlan,
+    friction_is_tendon: bool,
+) {
+    let Some(actuator) = plan.actuator else { return };
+    let name = format!("{uid}/{}", joint.name);
+    // Without stiffness the control is a velocity, without both an effort.
+    let gain = [actuator.kp, actuator.kd, 1.0].into_iter().find(|&g| g > 0.0).unwrap_or(1.0);
+    let positions = actuator.kp > 0.0 && plan.usable.iter().all(|end| end.is_finite());
+    mjcf.actuators.push(Actuator {
+        name: name.clone(),
+        joint: name.clone(),
+        gain,
+        kp: actuator.kp,
+        kd: actuator.kd,
+        force_limit: Some(plan.max_effort.max(SMALLEST_EFFORT)).filter(|limit| limit.is_finite()),
+        ctrl_range: positions.then_some(plan.usable).map(open_range),
+        source: Some(joint.source.clone()),
+    });
+    if plan.friction > 0.0 && friction_is_tendon {
+        mjcf.friction_tendons.push(FrictionTendon {
+            name: format!("{name}/friction"),
+            joint: name,
+            frictionloss: plan.friction,
+        });
     }
 }
 

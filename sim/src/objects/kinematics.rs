@@ -89,12 +89,13 @@ impl Robot<'_> {
         let columns: Vec<usize> = (0..self.dof()).collect();
         let rows = self.part_rows("compute_link_fk", qpos.into(), &columns, env_ids)?;
         let description = self.description();
-        let mut poses = Array3::zeros((rows.envs().len(), description.links.len(), 7));
+        let links = description.named_links().len();
+        let mut poses = Array3::zeros((rows.envs().len(), links, 7));
         let mut positions = vec![0.0; self.dof()];
         for (i, (env, row)) in rows.iter().enumerate() {
             put(&columns, row, &mut positions);
             let standing = |link| self.simulation.batch.read(env, |env| self.link_in(env, link));
-            for (link, pose) in link_poses(description, &positions, standing).iter().enumerate() {
+            for (link, pose) in link_poses(description, &positions, standing).iter().take(links).enumerate() {
                 for (k, value) in to_row(pose).into_iter().enumerate() {
                     poses[(i, link, k)] = value;
                 }

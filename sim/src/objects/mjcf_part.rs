@@ -6,8 +6,8 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
-use crate::mj::{self, LoadError, Model, words};
-use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, compare};
+use crate::mj::{self, CompileError, LoadError, Model, words};
+use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
 use crate::objects::robot::check_pose;
 use crate::objects::rows::{Rows, Table, check_distinct};
 use crate::pattern;
@@ -119,26 +119,20 @@ impl MjcfData {
     ) -> Result<Self> {
         check_pose("init_pose", &cfg.init_pose)?;
         let file = cfg.path.display().to_string();
-        let text = match &cfg.text {
-            Some(text) => text.clone(),
-            None => {
-                std::fs::read_to_string(&cfg.path).map_err(|error| Error::File { path: cfg.path.clone(), error })?
-            }
-        };
-        let compiled = if cfg.text.is_some() { mj::compile(&text, &[]) } else { mj::compile_file(&cfg.path) };
-        let model = compiled.map(mj::Compiled::into_model).map_err(|error| match error {
-            LoadError::Version(error) => Error::MujocoVersion(error),
-            LoadError::Compile(error) => {
-                Error::MjcfFile { part: cfg.uid.clone(), file: file.clone(), error: Box::new(error) }
-            }
+        let (text, model) = read(&cfg.path, cfg.text.as_deref(), |error| Error::MjcfFile {
+            part: cfg.uid.clone(),
+            file: file.clone(),
+            error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
-        let stem = format!("part{index}_");
-        let source = Source::new(&cfg.path, 1);
-        let (document, files) = PartDocument::new(&model, &names, &cfg.uid, &cfg.init_pose, &stem, &source)
+        let (stem, source) = (format!("part{index}_"), Source::new(&cfg.path, 1));
+        let of = PartOf { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
+        let document = PartDocument::new(&of, sensors_left_out(&model, &names), &source);
+        let (document, files) = document
+            .and_then(|document| Ok((document, of.files()?)))
             .map_err(|error| Error::MjcfPart { part: cfg.uid.clone(), file, error: Box::new(error) })?;
         let left_out = document.sensors_left_out();
-        diagnostics.extend(compare(&cfg.uid, &text, &cfg.path, &model, scene, left_out));
+        diagnostics.extend(compare(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
         let frames = frames(&cfg.uid, &model, &names, diagnostics);
         let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
@@ -213,6 +207,27 @@ impl MjcfData {
     }
 }
 
+/// The text of a file, or the text itself, and what MuJoCo makes of it; `refused` is the error that its refusal is.
+pub(crate) fn read(
+    path: &Path,
+    text: Option<&str>,
+    refused: impl FnOnce(CompileError) -> Error,
+) -> Result<(String, Model)> {
+    let (text, compiled) = match text {
+        Some(text) => (text.to_string(), mj::compile(text, &[])),
+        None => {
+            let read = std::fs::read_to_string(path);
+            let text = read.map_err(|error| Error::File { path: path.to_path_buf(), error })?;
+            (text, mj::compile_file(path))
+        }
+    };
+    let compiled = compiled.map_err(|error| match error {
+        LoadError::Version(error) => Error::MujocoVersion(error),
+        LoadError::Compile(error) => refused(error),
+    })?;
+    Ok((text, compiled.into_model()))
+}
+
 /// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.
 fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<Frame> {
     // Frame k is body k + 1. A body that is welded to another moves with it; what never moves stands for itself.
@@ -249,7 +264,7 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
 }
 
 /// MuJoCo's own sensors of a file, those of `kept`.
-fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: &[usize]) -> Vec<EngineSensor> {
+pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: &[usize]) -> Vec<EngineSensor> {
     let mut next = 0;
     kept.iter()
         .filter_map(|&s| {

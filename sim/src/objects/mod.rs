@@ -13,6 +13,7 @@ pub mod rigid_object;
 mod rigid_object_properties;
 pub mod robot;
 mod robot_drives;
+pub mod robot_file;
 mod robot_joints;
 mod robot_limits;
 mod robot_state;

@@ -11,7 +11,9 @@ use crate::manager::EnvId;
 use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
+use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
+use crate::objects::robot_file::MjcfFile;
 use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
@@ -35,6 +37,44 @@ pub struct RobotCfg {
     /// The URDF files.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
+    /// The MJCF file, for a robot that is described by one: then there are no URDF files.
+    ///
+    /// MuJoCo itself compiles the file, and what it made of it is in the scene: geoms with their materials and contact
+    /// settings, sites, joints with anchors, references, springs and limits, equalities, tendons, sensors. The robot is the
+    /// only body in the file's world and what hangs on it.
+    ///
+    /// - **Links** are its bodies, then its named sites. Where hinges or slides hold the root body in the world, the root link
+    ///   is the file's `world`. **Joints** are its hinges and slides. What has no name is called by its kind and its number in
+    ///   MuJoCo's order: `joint3`.
+    /// - **Drives** take the place of its actuators. Where [`drive`](Self::drive) says nothing of a joint, position and velocity
+    ///   actuators of the file give stiffness and damping, force ranges (and control ranges of motors) the largest effort, and
+    ///   joints that no actuator of the file acts on stay passive. In a file without any actuator all joints are driven, as in
+    ///   a URDF.
+    /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive.
+    /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
+    /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits;
+    ///   pairs of geoms hold where [`self_collision`](Self::self_collision) is on.
+    /// - What stands in the file's world (a floor, lights) is no part of the robot, nor are settings for the whole model and
+    ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
+    ///
+    /// ```
+    /// use sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
+    /// use sim::objects::robot_file::MjcfFile;
+    ///
+    /// let arm = r#"<mujoco><worldbody><body name="base"><geom size="0.1"/>
+    ///     <body name="arm" pos="0 0 0.1"><joint name="elbow" axis="0 1 0" range="-90 90" limited="true"/>
+    ///       <geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" mass="1"/><site name="tip" pos="0.3 0 0"/></body>
+    ///   </body></worldbody>
+    ///   <actuator><position joint="elbow" kp="200"/></actuator></mujoco>"#;
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+    /// let robot = sim.add_robot(RobotCfg { mjcf: Some(MjcfFile::text(arm)), ..Default::default() })?;
+    /// let robot = sim.robot(robot);
+    /// assert_eq!((robot.joint_names(), robot.link_names()), (&["elbow".into()][..], vec!["base", "arm", "tip"]));
+    /// assert_eq!(robot.get_stiffness()[(0, 0)], 200.0);
+    /// # Ok::<(), sim::Error>(())
+    /// ```
+    #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
+    pub mjcf: Option<MjcfFile>,
     /// Named groups of joints: patterns that each match whole joint names.
     #[serde(with = "scene::file_format::pairs")]
     pub control_parts: Vec<(String, Vec<String>)>,
@@ -42,10 +82,11 @@ pub struct RobotCfg {
     pub drive: DriveCfg,
     /// Whether the root link stands fixed in the environment.
     pub fix_base: bool,
-    /// Pose of the root link in the environment.
+    /// Pose of the root link in the environment; of an MJCF file the pose of the file's world, in which the root link stands
+    /// as the file says.
     #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Start positions by joint pattern or control part \[rad or m\]; 0 where none matches.
+    /// Start positions by joint pattern or control part \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
     #[serde(with = "scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
@@ -66,6 +107,7 @@ impl Default for RobotCfg {
         Self {
             uid: "robot".into(),
             urdf: UrdfCfg::default(),
+            mjcf: None,
             control_parts: Vec::new(),
             drive: DriveCfg::default(),
             fix_base: true,
@@ -92,6 +134,8 @@ pub struct RobotData {
     joint_names: Vec<String>,
     parts: BTreeMap<String, Vec<usize>>,
     hulls: BTreeMap<MeshKey, TriMesh>,
+    /// The MJCF file that it is; `None` where it is made of URDF files.
+    file: Option<RobotFile>,
     first_mask_id: i32,
     role: Role,
 }
@@ -106,11 +150,13 @@ pub(crate) enum Role {
 }
 
 impl RobotData {
-    /// Reads the files, resolves names, drives and meshes.
+    /// Reads the files, resolves names, drives and meshes of robot number `index` of a simulation, whose model is `scene` so
+    /// far.
     pub(crate) fn load(
         cfg: RobotCfg,
         role: Role,
         manager: &SimulationManagerCfg,
+        (index, scene): (usize, &mj::Model),
         first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
@@ -122,9 +168,7 @@ impl RobotData {
         for component in &cfg.urdf.components {
             check_pose("component transform", &component.transform)?;
         }
-        let assembly = assemble(&cfg.urdf)?;
-        let mut found = assembly.diagnostics;
-        let mut description = assembly.description;
+        let (file, mut description, mut found) = described(&cfg, index, scene)?;
         load_up(&mut description, &cfg)?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
@@ -150,7 +194,7 @@ impl RobotData {
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
-        Ok(Self { cfg, description, plans, joint_names, parts, hulls, first_mask_id, role })
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls, file, first_mask_id, role })
     }
 
     /// Name of the robot.
@@ -186,7 +230,7 @@ impl RobotData {
         &self.plans
     }
 
-    /// Names of the movable joints in the order of the merged URDF.
+    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
     }
@@ -196,9 +240,49 @@ impl RobotData {
         self.first_mask_id + link as i32
     }
 
+    /// The MJCF file that it is; `None` where it is made of URDF files.
+    pub fn file(&self) -> Option<&RobotFile> {
+        self.file.as_ref()
+    }
+
+    /// Something of its MJCF file is wrong.
+    pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
+        file_error(&self.cfg, error)
+    }
+
+    /// Pose of the root link at the start.
+    pub(crate) fn root_pose(&self) -> Pose {
+        self.file.as_ref().map_or(self.cfg.init_pose, |file| self.cfg.init_pose * file.root_pose())
+    }
+
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
         &self.hulls
     }
+}
+
+fn file_error(cfg: &RobotCfg, error: RobotFileError) -> Error {
+    let path = cfg.mjcf.as_ref().map(|file| file.path.display().to_string());
+    Error::RobotFile { robot: cfg.uid.clone(), file: path.unwrap_or_default(), error: Box::new(error) }
+}
+
+/// The robot as its files describe it, without payloads, and what is odd in them.
+fn described(
+    cfg: &RobotCfg,
+    index: usize,
+    scene: &mj::Model,
+) -> Result<(Option<RobotFile>, RobotDescription, Vec<Diagnostic>)> {
+    let Some(file) = &cfg.mjcf else {
+        let assembly = assemble(&cfg.urdf)?;
+        return Ok((None, assembly.description, assembly.diagnostics));
+    };
+    if !cfg.urdf.components.is_empty() {
+        let expected = "a robot is one MJCF file, or made of URDF files; leave out mjcf or the components of urdf";
+        return Err(Error::Config { field: "mjcf", value: format!("{:?}", file.path), expected });
+    }
+    let mut found = Vec::new();
+    let loading = Loading { uid: &cfg.uid, index, fix_base: cfg.fix_base, scene };
+    let (file, description) = RobotFile::load(file, &loading, |error| file_error(cfg, error), &mut found)?;
+    Ok((Some(file), description, found))
 }
 
 /// The joints with the gains of those drives that are evaluated at the start of a step, and of no others; the damping is the
@@ -224,7 +308,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         let expected = "a payload must be a finite mass >= 0 kg";
         return Err(Error::Config { field: "payload", value: mass.to_string(), expected });
     }
-    let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+    let names: Vec<&str> = description.named_links().iter().map(|link| link.name.as_str()).collect();
     let payloads = pattern::assign(&cfg.payload, &BTreeMap::new(), &names, "link")
         .map_err(|error| Error::Payload { robot: cfg.uid.clone(), error: Box::new(error) })?;
     for (link, payload) in description.links.iter_mut().zip(payloads) {
@@ -337,14 +421,15 @@ impl<'a> Robot<'a> {
         self.data.plans.len()
     }
 
-    /// Names of the movable joints in the order of the merged URDF.
+    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
     pub fn joint_names(&self) -> &'a [String] {
         &self.data.joint_names
     }
 
-    /// Names of all links, fused ones included, in the order of the merged URDF.
+    /// Names of all links, fused ones included, in the order of the merged URDF; of an MJCF file its bodies, then its named
+    /// sites.
     pub fn link_names(&self) -> Vec<&'a str> {
-        self.data.description.links.iter().map(|l| l.name.as_str()).collect()
+        self.data.description.named_links().iter().map(|l| l.name.as_str()).collect()
     }
 
     /// Names of the control parts.
@@ -438,7 +523,7 @@ impl<'a> Robot<'a> {
 
     /// Pose of the root link at the start: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
     pub fn get_default_root_pose(&self) -> Array2<f64> {
-        let row = to_row(&self.data.cfg.init_pose);
+        let row = to_row(&self.data.root_pose());
         Array2::from_shape_fn((self.simulation.batch.num_envs(), 7), |(_, k)| row[k])
     }
 

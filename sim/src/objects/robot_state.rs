@@ -97,7 +97,7 @@ impl Robot<'_> {
     /// Pose, velocity and angular velocity of the root link at the start, as [`get_root_state`](Self::get_root_state) has
     /// them, shape (N, 13): the pose of the configuration, at rest.
     pub fn get_default_root_state(&self) -> Array2<f64> {
-        let pose = to_row(&self.data.cfg().init_pose);
+        let pose = to_row(&self.data.root_pose());
         let n = self.simulation.batch.num_envs();
         Array2::from_shape_fn((n, 13), |(_, k)| pose.get(k).copied().unwrap_or(0.0))
     }

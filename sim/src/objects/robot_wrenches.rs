@@ -138,7 +138,7 @@ impl RobotMut<'_> {
 
     /// The links that are meant, each once, in the order given; all of them where `None`.
     fn links(&self, argument: &'static str, link_ids: Option<&[LinkId]>) -> Result<Vec<usize>> {
-        let known = &self.data.description().links;
+        let known = self.data.description().named_links();
         let count = known.len();
         let exists =
             |index| if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "link", index, count }) };

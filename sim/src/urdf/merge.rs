@@ -92,6 +92,7 @@ fn link(name: String, source: Source, component: String) -> Link {
         collisions: Vec::new(),
         parent_joint: None,
         child_joints: Vec::new(),
+        between_joints: false,
     }
 }
 
@@ -204,6 +205,7 @@ impl Merge<'_> {
             damping: None,
             friction: None,
             mimic: None,
+            defaults: None,
         });
     }
 
@@ -241,6 +243,7 @@ impl Merge<'_> {
                     multiplier: model.multiplier.unwrap_or(1.0),
                     offset: model.offset.unwrap_or(0.0),
                 }),
+                defaults: None,
             });
         }
     }

@@ -5,9 +5,12 @@ use super::{PartError, Writing, row, row_of, some};
 use crate::mj::words;
 
 impl Writing<'_> {
-    /// Actuators without and with an activation.
+    /// Actuators without and with an activation; a robot has drives in their place.
     pub(super) fn actuators(&self) -> Result<[Vec<String>; 2], PartError> {
         let mut lists = [Vec::new(), Vec::new()];
+        if self.rig.is_some() {
+            return Ok(lists);
+        }
         for actuator in 0..self.model.nactuator() {
             let with_state = usize::from(!self.model.actuator_activation(actuator).is_empty());
             lists[with_state].push(self.actuator(actuator)?);

@@ -1,7 +1,7 @@
 //! Bodies with what is in them: mass, joints, geoms, sites, cameras, lights.
 
 use super::super::write::{Element, number};
-use super::{PartError, Writing, row, row_of, singles, some};
+use super::{Base, PartError, Passive, Writing, row, row_of, singles, some};
 use crate::mj::{LightType, Target, words};
 use scene::Pose;
 use scene::pose::{from_row, to_row};
@@ -54,12 +54,16 @@ impl Writing<'_> {
         };
         let mut tree = Tree { lines: Vec::new(), depth: 0 };
         tree.push(&pose(Element::new("body").attr("name", self.uid), &to_row(self.pose)).open());
-        tree.depth += 1;
-        self.cameras_and_lights(0, &contents, &mut tree)?;
-        tree.depth -= 1;
+        if self.rig.is_none() {
+            tree.depth += 1;
+            self.cameras_and_lights(0, &contents, &mut tree)?;
+            tree.depth -= 1;
+        }
         tree.push("</body>");
-        // In the world itself: 2.2.2 finds the contacts of planes in other bodies twice.
-        self.shapes(0, &contents, &mut tree)?;
+        if self.rig.is_none() {
+            // In the world itself: 2.2.2 finds the contacts of planes in other bodies twice.
+            self.shapes(0, &contents, &mut tree)?;
+        }
         let mut stack: Vec<Visit> = children[0].iter().rev().map(|&b| Visit::Enter(b)).collect();
         while let Some(visit) = stack.pop() {
             match visit {
@@ -97,7 +101,15 @@ impl Writing<'_> {
 
     fn content(&self, body: usize, contents: &Contents, tree: &mut Tree) -> Result<(), PartError> {
         let m = self.model;
-        if body > 0 && (m.body_mass()[body] > 0.0 || row(m.body_inertia(), 3, body).iter().any(|x| *x > 0.0)) {
+        if let Some(own) = self.rig.and_then(|rig| rig.inertials.get(&body)) {
+            let axes = own.axes.quaternion();
+            let element = Element::new("inertial")
+                .numbers("pos", own.com.as_slice())
+                .numbers("quat", &[axes.w, axes.i, axes.j, axes.k])
+                .attr("mass", number(own.mass))
+                .numbers("diaginertia", own.moments.as_slice());
+            tree.push(&element.leaf());
+        } else if body > 0 && (m.body_mass()[body] > 0.0 || row(m.body_inertia(), 3, body).iter().any(|x| *x > 0.0)) {
             let element = Element::new("inertial")
                 .numbers("pos", row(m.body_ipos(), 3, body))
                 .numbers("quat", row(m.body_iquat(), 4, body))
@@ -105,8 +117,16 @@ impl Writing<'_> {
                 .numbers("diaginertia", row(m.body_inertia(), 3, body));
             tree.push(&element.leaf());
         }
+        let base = self.rig.map(|rig| &rig.base);
+        if let Some(Base::Free { name, .. }) =
+            base.filter(|base| matches!(base, Base::Free { body: b, .. } if *b == body))
+        {
+            tree.push(&Element::new("joint").attr("name", name).attr("type", "free").leaf());
+        }
         for &joint in &contents.joints[body] {
-            tree.push(&self.joint(joint)?.leaf());
+            if base != Some(&Base::Fixed(joint)) {
+                tree.push(&self.joint(joint)?.leaf());
+            }
         }
         self.shapes(body, contents, tree)?;
         self.cameras_and_lights(body, contents, tree)
@@ -163,12 +183,18 @@ impl Writing<'_> {
         {
             element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
         }
+        let of_file = Passive {
+            damping: m.dof_damping()[dof],
+            armature: m.dof_armature()[dof],
+            frictionloss: m.dof_frictionloss()[dof],
+        };
+        let Passive { damping, armature, frictionloss } = self.rig.map_or(of_file, |rig| rig.joints[joint]);
         Ok(element
             .attr("margin", number(m.jnt_margin()[joint]))
             .attr("stiffness", number(m.jnt_stiffness()[joint]))
-            .attr("damping", number(m.dof_damping()[dof]))
-            .attr("armature", number(m.dof_armature()[dof]))
-            .attr("frictionloss", number(m.dof_frictionloss()[dof]))
+            .attr("damping", number(damping))
+            .attr("armature", number(armature))
+            .attr("frictionloss", number(frictionloss))
             .numbers("solreflimit", row_of(m.jnt_solref(), m.njnt(), joint))
             .numbers("solimplimit", row_of(m.jnt_solimp(), m.njnt(), joint))
             .numbers("solreffriction", row_of(m.dof_solref(), m.nv(), dof))
@@ -194,9 +220,14 @@ impl Writing<'_> {
                 _ => element,
             };
         }
+        let of_file = [m.geom_contype()[geom], m.geom_conaffinity()[geom]];
+        let [contype, conaffinity] = match self.rig {
+            Some(rig) if of_file != [0, 0] => rig.contact,
+            _ => of_file,
+        };
         element = pose(element, &place)
-            .attr("contype", m.geom_contype()[geom])
-            .attr("conaffinity", m.geom_conaffinity()[geom])
+            .attr("contype", contype)
+            .attr("conaffinity", conaffinity)
             .attr("condim", m.geom_condim()[geom])
             .attr("priority", m.geom_priority()[geom])
             .attr("group", m.geom_group()[geom])

@@ -27,7 +27,8 @@ impl Writing<'_> {
         let exclude = |[first, second]: [usize; 2]| {
             Element::new("exclude").attr("body1", body(first)).attr("body2", body(second)).leaf()
         };
-        (0..m.npair()).map(pair).chain(m.excluded_bodies().map(exclude)).collect()
+        let is_kept = |p: &usize| self.rig.is_none_or(|rig| !rig.pairs.contains(p));
+        (0..m.npair()).filter(is_kept).map(pair).chain(m.excluded_bodies().map(exclude)).collect()
     }
 
     pub(super) fn equalities(&self) -> Result<Vec<String>, PartError> {

@@ -10,10 +10,13 @@ mod assets;
 mod bodies;
 mod constraints;
 mod names;
+mod rig;
 mod sensors;
 mod settings;
 
 pub use names::PartNames;
+pub use rig::{Base, Passive, Rig};
+pub(crate) use sensors::left_out as sensors_left_out;
 pub(crate) use settings::compare;
 
 use crate::mj::{Asset, Model, Target};
@@ -25,6 +28,7 @@ use std::fmt;
 /// Lines of a part for both lines of MuJoCo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfPart {
+    uid: String,
     v2: PartLines,
     v4: PartLines,
     /// Sensors of the file that are in neither, by their numbers.
@@ -86,14 +90,31 @@ pub struct PartError {
     pub what: String,
 }
 
+/// A file, and how it becomes a part.
+#[derive(Clone, Copy, Debug)]
+pub struct PartOf<'a> {
+    /// What MuJoCo made of it.
+    pub model: &'a Model,
+    /// Names of everything in it.
+    pub names: &'a PartNames,
+    /// Name of the part.
+    pub uid: &'a str,
+    /// Pose of its world in the scene's.
+    pub pose: &'a Pose,
+    /// Beginning of the names of its files.
+    pub stem: &'a str,
+    /// What differs from the file, in a part that is a robot.
+    pub rig: Option<&'a Rig>,
+}
+
 /// A file that is being written as a part.
 struct Writing<'a> {
     model: &'a Model,
     names: &'a PartNames,
     uid: &'a str,
     pose: &'a Pose,
-    /// Beginning of the names of its files.
     stem: &'a str,
+    rig: Option<&'a Rig>,
     /// The line of MuJoCo that is to read it, which need not be the one that compiled the file.
     target: Target,
     sensors_left_out: &'a [(usize, LeftOut)],
@@ -101,37 +122,20 @@ struct Writing<'a> {
 }
 
 impl MjcfPart {
-    /// The part called `uid` that stands at `pose`. Names of its files begin with `stem`.
+    /// The part that a file becomes, without the sensors `sensors_left_out`.
     ///
     /// # Errors
     /// Something of the model is not written back.
-    pub fn new(
-        model: &Model,
-        names: &PartNames,
-        uid: &str,
-        pose: &Pose,
-        stem: &str,
-        source: &Source,
-    ) -> Result<(Self, Vec<Asset>), PartError> {
-        if let Some(beyond) = model.beyond() {
-            let name = names.of(beyond.element, beyond.index);
-            return Err(PartError { element: beyond.element, name, what: beyond.what.into() });
-        }
-        let sensors_left_out = sensors::left_out(model, names);
-        let sensors = &sensors_left_out[..];
-        let of = |target| Writing {
-            model,
-            names,
-            uid,
-            pose,
-            stem,
-            target,
-            sensors_left_out: sensors,
-            left_out: RefCell::default(),
-        };
-        let (v2, v4) = (of(Target::V2).lines(source)?, of(Target::V4).lines(source)?);
-        let files = of(Target::V2).files()?;
-        Ok((Self { v2, v4, sensors_left_out }, files))
+    pub fn new(of: &PartOf<'_>, sensors_left_out: Vec<(usize, LeftOut)>, source: &Source) -> Result<Self, PartError> {
+        of.check()?;
+        let lines = |target| of.writing(target, &sensors_left_out).lines(source);
+        let (v2, v4) = (lines(Target::V2)?, lines(Target::V4)?);
+        Ok(Self { uid: of.uid.into(), v2, v4, sensors_left_out })
+    }
+
+    /// Name of the part.
+    pub fn uid(&self) -> &str {
+        &self.uid
     }
 
     /// Sensors of the file that a scene has without them, by their numbers.
@@ -145,6 +149,35 @@ impl MjcfPart {
             Target::V2 => &self.v2,
             Target::V4 => &self.v4,
         }
+    }
+}
+
+impl<'a> PartOf<'a> {
+    /// Checks that the model has nothing that nobody writes back.
+    ///
+    /// # Errors
+    /// It has.
+    pub fn check(&self) -> Result<(), PartError> {
+        match self.model.beyond() {
+            None => Ok(()),
+            Some(beyond) => {
+                let name = self.names.of(beyond.element, beyond.index);
+                Err(PartError { element: beyond.element, name, what: beyond.what.into() })
+            }
+        }
+    }
+
+    /// The files that the lines of the part name.
+    ///
+    /// # Errors
+    /// A texture cannot be written.
+    pub fn files(&self) -> Result<Vec<Asset>, PartError> {
+        self.writing(Target::V2, &[]).files()
+    }
+
+    fn writing(&self, target: Target, sensors_left_out: &'a [(usize, LeftOut)]) -> Writing<'a> {
+        let Self { model, names, uid, pose, stem, rig } = *self;
+        Writing { model, names, uid, pose, stem, rig, target, sensors_left_out, left_out: RefCell::default() }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::mj::words::{self, SensorObjects};
 const NEWER: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_potential", "e_kinetic"];
 
 /// The sensors of a file that a part cannot have, by their numbers.
-pub(super) fn left_out(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
+pub(crate) fn left_out(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
     let reason = |s: usize| {
         let what = obstacle(model, s)?;
         Some((s, LeftOut { element: "sensor", name: names.of("sensor", s), what }))

@@ -59,9 +59,10 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
     }
 }
 
-/// Says what of a file is not taken over: settings, for the scene's hold for all of its parts, and sensors.
+/// Says what of a file is not taken over: settings, for the scene's hold for all of its parts, and sensors. Says it of
+/// `owner`, such as `part "arm"`.
 pub(crate) fn compare(
-    uid: &str,
+    owner: &str,
     text: &str,
     file: &Path,
     model: &Model,
@@ -75,7 +76,7 @@ pub(crate) fn compare(
     let sensors: Vec<&Stated> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
     for (index, left_out) in sensors_left_out {
         let at = sensors.get(*index).filter(|_| sensors.len() == model.nsensor()).map(|s| s.source.clone());
-        let message = format!("part {uid:?}: {left_out}: it is left out, the rest of the file is not");
+        let message = format!("{owner}: {left_out}: it is left out, the rest of the file is not");
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
     }
     for difference in model.option_differences(scene) {
@@ -86,7 +87,7 @@ pub(crate) fn compare(
             DiagnosticKind::SettingIgnored,
             at.map(|s| s.source.clone()),
             format!(
-                "part {uid:?}: option {} is {}{default}; the scene's {} holds",
+                "{owner}: option {} is {}{default}; the scene's {} holds",
                 difference.name, difference.here, difference.there
             ),
         ));
@@ -99,7 +100,7 @@ pub(crate) fn compare(
     for (element, why) in left_out {
         let at = found.iter().find(|s| s.element == element);
         if let Some(stated) = at {
-            let message = format!("part {uid:?}: <{element}> is left out: {why}");
+            let message = format!("{owner}: <{element}> is left out: {why}");
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, stated.source.clone(), message));
         }
     }
@@ -112,7 +113,7 @@ pub(crate) fn compare(
     ];
     for (element, count, why) in counts {
         if count > 0 {
-            let message = format!("part {uid:?}: {count} {element}(s) are left out: {why}");
+            let message = format!("{owner}: {count} {element}(s) are left out: {why}");
             let at = found.iter().find(|s| s.element == element).map(|s| s.source.clone());
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
         }

@@ -1,0 +1,268 @@
+//! MJCF files as robots: MuJoCo compiles the file, what it made of it is described ([`RobotDescription`]), and written into
+//! the scene as MJCF parts are ([`super::part`]), with drives in the place of its actuators.
+//!
+//! Why a part and not bodies of our own: docs/decisions/0012.
+
+mod couplings;
+mod drives;
+mod error;
+mod places;
+mod tree;
+mod world;
+
+pub use error::RobotFileError;
+
+use super::document::{Inertial, Integrator, Mjcf};
+use super::part::{Base, LeftOut, MjcfPart, PartError, PartNames, PartOf, Passive, Rig, compare};
+use super::robot::{DampedJoint, GeomOwner, LinkFrame, Purpose, RobotCfg, RobotLayout, add_drive, unused_joint};
+use crate::body_inertia::{RigidBody, fuse};
+use crate::description::{JointId, LinkId, RobotDescription};
+use crate::diagnostic::Diagnostic;
+use crate::error::Result;
+use crate::mj::{Asset, Model, words};
+use crate::mjcf::document::GeomRole;
+use crate::objects::mjcf_part::{engine_sensors, read};
+use crate::objects::robot_file::MjcfFile;
+use crate::source::Source;
+use places::Places;
+use scene::Pose;
+use sensors::EngineSensor;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tree::{Described, Describing, Root};
+
+/// An MJCF file that is a robot, as MuJoCo compiled it alone.
+#[derive(Debug)]
+pub struct RobotFile {
+    source: Source,
+    model: Model,
+    names: PartNames,
+    root: Root,
+    /// Body of the file and place in it of each link that a user knows.
+    links: Vec<(usize, Pose)>,
+    /// The joint of the description that each joint of the file is.
+    joints: Vec<Option<JointId>>,
+    /// Beginning of the names of its files.
+    stem: String,
+    files: Vec<Asset>,
+    sensors: Vec<EngineSensor>,
+    sensors_left_out: Vec<(usize, LeftOut)>,
+}
+
+/// What a file is loaded for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Loading<'a> {
+    /// Name of the robot.
+    pub(crate) uid: &'a str,
+    /// Its number in the simulation.
+    pub(crate) index: usize,
+    /// Whether its base stands fixed.
+    pub(crate) fix_base: bool,
+    /// The scene so far.
+    pub(crate) scene: &'a Model,
+}
+
+impl RobotFile {
+    /// Reads and compiles a file, and describes the robot in it; `wrong` is the error that something of it is.
+    pub(crate) fn load(
+        file: &MjcfFile,
+        of: &Loading<'_>,
+        wrong: impl Fn(RobotFileError) -> crate::error::Error,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<(Self, RobotDescription)> {
+        let (text, model) = read(&file.path, file.text.as_deref(), |error| wrong(RobotFileError::Compile(error)))?;
+        let names = PartNames::of_model(&model);
+        let places = Places::of(&text, &file.path);
+        let owner = format!("robot {:?}", of.uid);
+        let root = tree::root(&model, &names, &places, of.fix_base).map_err(&wrong)?;
+        world::check(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
+        let acting = drives::of_joints(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
+        let couplings = couplings::of_joints(&owner, &model, &names, &places, diagnostics);
+        let describing = Describing {
+            uid: of.uid,
+            model: &model,
+            names: &names,
+            places: &places,
+            root,
+            acting: &acting,
+            couplings: &couplings,
+        };
+        let Described { description, links, joints } = describing.describe(diagnostics);
+        let stem = format!("robot{}_", of.index);
+        let pose = Pose::identity();
+        let part = PartOf { model: &model, names: &names, uid: of.uid, pose: &pose, stem: &stem, rig: None };
+        let files = part.check().and_then(|()| part.files()).map_err(|error| wrong(error.into()))?;
+        let sensors_left_out = world::sensors(&model, &names);
+        diagnostics.extend(compare(&owner, &text, &file.path, &model, of.scene, &sensors_left_out));
+        let is_kept = |s: &usize| sensors_left_out.iter().all(|(other, _)| other != s);
+        let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
+        let sensors = engine_sensors(of.uid, &model, &names, &kept);
+        let source = places.file();
+        let this = Self { source, model, names, root, links, joints, stem, files, sensors, sensors_left_out };
+        Ok((this, description))
+    }
+
+    /// What MuJoCo made of the file alone.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The files that its lines name.
+    pub(crate) fn files(&self) -> &[Asset] {
+        &self.files
+    }
+
+    /// MuJoCo's own sensors that the scene has; the first value is that among those of the robot.
+    pub(crate) fn sensors(&self) -> &[EngineSensor] {
+        &self.sensors
+    }
+
+    /// Pose of the root link in the file's world.
+    pub(crate) fn root_pose(&self) -> Pose {
+        if self.root.is_world { Pose::identity() } else { tree::body_pose(&self.model, self.root.body) }
+    }
+
+    /// Adds the robot to `mjcf`; the base pose is that of the file's world.
+    ///
+    /// # Errors
+    /// Something of the file is not written back.
+    pub(crate) fn add(
+        &self,
+        description: &RobotDescription,
+        cfg: &RobotCfg<'_>,
+        self_collision: bool,
+        mjcf: &mut Mjcf,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<RobotLayout, PartError> {
+        let rows = matches!(cfg.purpose, Purpose::Run { friction_tendons: true });
+        let (joints, damped) = self.passive(cfg, rows, mjcf);
+        let contact = match cfg.contact {
+            GeomRole::Collision { contype, conaffinity, .. } => [contype, conaffinity],
+            GeomRole::Visual => [0, 0],
+        };
+        let base = match (self.root.free_joint, cfg.fix_base) {
+            (Some(joint), true) => Base::Fixed(joint),
+            (None, false) => Base::Free { body: self.root.body, name: unused_joint(description, cfg.uid, "base") },
+            _ => Base::AsFile,
+        };
+        let free_joint = match &base {
+            Base::Free { name, .. } => Some(name.clone()),
+            Base::Fixed(_) => None,
+            Base::AsFile => self.root.free_joint.map(|joint| self.full(cfg, &self.names.joints[joint])),
+        };
+        let inertials = self.loaded_bodies(description, cfg.fix_base, diagnostics);
+        let rig = Rig { joints, base, contact, pairs: world::pairs(&self.model, self_collision), inertials };
+        let (model, names) = (&self.model, &self.names);
+        let part = PartOf { model, names, uid: cfg.uid, pose: &cfg.base_pose, stem: &self.stem, rig: Some(&rig) };
+        mjcf.parts.push(Arc::new(MjcfPart::new(&part, self.sensors_left_out.clone(), &self.source)?));
+        for plan in cfg.plans {
+            add_drive(mjcf, cfg.uid, description.joint(plan.joint), plan, rows);
+        }
+        let links =
+            self.links.iter().map(|&(body, body_from_link)| LinkFrame { body: self.body(cfg, body), body_from_link });
+        let of_body = |body: usize| self.links.iter().position(|(other, _)| *other == body).map(LinkId);
+        let geoms = (0..model.ngeom()).filter_map(|geom| {
+            let body = usize::try_from(model.geom_bodyid()[geom]).ok().filter(|body| *body > 0)?;
+            Some(GeomOwner { geom: self.full(cfg, &names.geoms[geom]), link: of_body(body)?, visual: None })
+        });
+        Ok(RobotLayout {
+            links: links.collect(),
+            free_joint,
+            base_pairs: self.base_pairs(cfg),
+            geoms: geoms.collect(),
+            damped,
+        })
+    }
+
+    fn full(&self, cfg: &RobotCfg<'_>, name: &str) -> String {
+        format!("{}/{name}", cfg.uid)
+    }
+
+    /// Name in the document of a body of the file.
+    fn body(&self, cfg: &RobotCfg<'_>, body: usize) -> String {
+        if body == 0 { cfg.uid.into() } else { self.full(cfg, &self.names.bodies[body]) }
+    }
+
+    /// Passive properties of all joints, and those whose damping is integrated with the drives.
+    fn passive(&self, cfg: &RobotCfg<'_>, rows: bool, mjcf: &Mjcf) -> (Vec<Passive>, Vec<DampedJoint>) {
+        let m = &self.model;
+        let mut damped = Vec::new();
+        let of_joint = |joint: usize| {
+            let dof = m.jnt_dofadr()[joint] as usize;
+            let mut passive = Passive {
+                damping: m.dof_damping()[dof],
+                armature: m.dof_armature()[dof],
+                frictionloss: m.dof_frictionloss()[dof],
+            };
+            if let Some(plan) = self.joints[joint].and_then(|id| cfg.plans.iter().find(|plan| plan.joint == id)) {
+                let tendon = rows && plan.actuator.is_some();
+                let frictionloss = if tendon { 0.0 } else { plan.friction };
+                passive = Passive { damping: plan.damping, armature: plan.armature, frictionloss };
+            }
+            passive
+        };
+        let mut joints: Vec<Passive> = (0..m.njnt()).map(of_joint).collect();
+        // As for robots from URDF files, where `mjcf::robot` says why.
+        if rows && mjcf.option.integrator != Integrator::Rk4 {
+            for (joint, passive) in joints.iter_mut().enumerate() {
+                let is_written = !(cfg.fix_base && self.root.free_joint == Some(joint));
+                let damping = std::mem::take(&mut passive.damping);
+                if damping > 0.0 && is_written {
+                    let armature = passive.armature;
+                    passive.armature += mjcf.option.timestep * damping;
+                    let dofs = if words::joint(m.jnt_type()[joint]) == Some("free") { 6 } else { 1 };
+                    let joint = self.full(cfg, &self.names.joints[joint]);
+                    damped.push(DampedJoint { joint, dofs, damping, armature });
+                }
+            }
+        }
+        (joints, damped)
+    }
+
+    /// Mass properties of the bodies whose links carry something besides what the file says.
+    fn loaded_bodies(
+        &self,
+        description: &RobotDescription,
+        fix_base: bool,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> BTreeMap<usize, Inertial> {
+        let mut loaded = BTreeMap::new();
+        for (body, &still) in self.still_bodies(fix_base).iter().enumerate().skip(1) {
+            let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
+            let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
+            let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
+            if links.iter().map(mass).sum::<f64>() == self.model.body_mass()[body] {
+                continue;
+            }
+            let rigid = RigidBody { links, moves: !still };
+            if let Some(fused) = fuse(description, &rigid, diagnostics) {
+                let (mass, com) = (fused.inertia.mass, fused.inertia.com);
+                let (moments, axes) = fused.inertia.principal();
+                loaded.insert(body, Inertial { mass, com, axes, moments, source: fused.source });
+            }
+        }
+        loaded
+    }
+
+    /// Which bodies never move.
+    fn still_bodies(&self, fix_base: bool) -> Vec<bool> {
+        let m = &self.model;
+        let root = if self.root.free_joint.is_some() { self.root.body } else { 0 };
+        (0..m.nbody()).map(|body| body == 0 || fix_base && m.body_weldid()[body] as usize == root).collect()
+    }
+
+    /// Bodies that never move with those that are joined to them: MuJoCo does not exclude their contacts. Without those that
+    /// the file excludes itself.
+    fn base_pairs(&self, cfg: &RobotCfg<'_>) -> Vec<(String, String)> {
+        let still = self.still_bodies(cfg.fix_base);
+        let parent = |body: usize| self.model.body_parentid()[body] as usize;
+        (1..still.len())
+            .filter(|&body| parent(body) > 0 && still[parent(body)] && !still[body])
+            .filter(|&body| {
+                let pair = [body, parent(body)];
+                self.model.excluded_bodies().all(|[a, b]| [a, b] != pair && [b, a] != pair)
+            })
+            .map(|body| (self.body(cfg, parent(body)), self.body(cfg, body)))
+            .collect()
+    }
+}

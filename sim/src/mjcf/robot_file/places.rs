@@ -1,0 +1,88 @@
+//! Lines of the named elements of a file and of the files it includes.
+
+use crate::source::Source;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Most files that are looked at: MuJoCo refuses a file that is included twice.
+const MOST_FILES: usize = 100;
+
+/// Where the named elements of a file are.
+pub(super) struct Places {
+    file: Source,
+    /// By kind and name.
+    named: HashMap<(String, String), Source>,
+}
+
+impl Places {
+    /// Looks through `text`, which is `file` or is called so. What MuJoCo read and this does not find is at its first line.
+    pub(super) fn of(text: &str, file: &Path) -> Self {
+        let mut places = Self { file: Source::new(file, 1), named: HashMap::new() };
+        places.add(text, file, file.parent().unwrap_or(Path::new("")), &mut 0);
+        places
+    }
+
+    fn add(&mut self, text: &str, file: &Path, folder: &Path, files: &mut usize) {
+        *files += 1;
+        let Ok(document) = roxmltree::Document::parse(text) else { return };
+        let shared = Arc::new(file.to_path_buf());
+        for node in document.descendants().filter(roxmltree::Node::is_element) {
+            let tag = node.tag_name().name();
+            if tag == "include"
+                && let Some(path) = node.attribute("file").map(|name| folder.join(name))
+                && *files < MOST_FILES
+                && let Ok(text) = std::fs::read_to_string(&path)
+            {
+                self.add(&text, &path, folder, files);
+            }
+            let Some(name) = node.attribute("name") else { continue };
+            let section = node.parent().map_or("", |parent| parent.tag_name().name());
+            // In these sections the kind is the section's, in bodies the element's.
+            let kind = match section {
+                "actuator" | "equality" | "tendon" => section,
+                _ if tag == "freejoint" => "joint",
+                _ => tag,
+            };
+            let line = document.text_pos_at(node.range().start).row;
+            let key = (kind.to_string(), name.to_string());
+            self.named.entry(key).or_insert_with(|| Source { file: Arc::clone(&shared), line });
+        }
+    }
+
+    /// Where the `kind` called `name` is; the file where it has no name there.
+    pub(super) fn get(&self, kind: &str, name: &str) -> Source {
+        self.named.get(&(kind.to_string(), name.to_string())).unwrap_or(&self.file).clone()
+    }
+
+    /// The first line of the file.
+    pub(super) fn file(&self) -> Source {
+        self.file.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_are_found_by_kind_and_name_in_included_files_too() {
+        let dir = tempfile::tempdir().unwrap();
+        let part = dir.path().join("part.xml");
+        std::fs::write(&part, "<mujocoinclude>\n\n<body name='b'/></mujocoinclude>").unwrap();
+        let file = dir.path().join("whole.xml");
+        let text = "<mujoco><worldbody>\n<body name='a'><freejoint name='f'/>\n<joint name='a'/></body>\n\
+                    <include file='part.xml'/></worldbody>\n<actuator><motor name='a'/></actuator></mujoco>";
+        let places = Places::of(text, &file);
+        for (kind, name, expected) in [
+            ("body", "a", Source::new(&file, 2)),
+            ("joint", "f", Source::new(&file, 2)),
+            ("joint", "a", Source::new(&file, 3)),
+            ("body", "b", Source::new(&part, 3)),
+            ("actuator", "a", Source::new(&file, 5)),
+            ("joint", "none", Source::new(&file, 1)),
+        ] {
+            assert_eq!(places.get(kind, name), expected, "{kind} {name}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Equalities of joints: those that are mimics, and those that only hold.
+
+use super::{empty, robot};
+use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::prelude::*;
+
+/// A drive, a finger on either side, and a third joint; `%` are the equalities.
+const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="palm"><geom size="0.03" mass="1"/>
+    <body name="crank"><joint name="crank" axis="0 0 1" range="-1 1" ref="0.1"/><geom size="0.02" pos="0.05 0 0" mass="0.2"/></body>
+    <body name="left" pos="0 0.1 0"><joint name="left" axis="0 0 1" range="-2 2" ref="-0.2"/>
+      <geom size="0.01" pos="0.05 0 0" mass="0.05"/></body>
+    <body name="right" pos="0 -0.1 0"><joint name="right" type="slide" axis="1 0 0" range="-0.3 0.3"/>
+      <geom size="0.01" mass="0.05"/></body>
+    <body name="other" pos="0 -0.2 0"><joint name="other" axis="0 0 1" range="-1 1" damping="0.1"/>
+      <geom size="0.01" pos="0.05 0 0" mass="0.05"/></body>
+  </body></worldbody><equality>%</equality></mujoco>"#;
+
+const LINES: &str = r#"<joint joint1="left" joint2="crank" polycoef="0.05 -1.5 0 0 0" solref="0.004 1"/>
+    <joint joint1="right" joint2="left" polycoef="0 0.1 0 0 0" solref="0.004 1"/>"#;
+
+/// `left - ref = 0.05 - 1.5 (crank - ref)`: what MuJoCo's equation says; `right` follows `left`, and so the crank.
+fn implied(crank: f64) -> (f64, f64) {
+    let left = -0.2 + 0.05 - 1.5 * (crank - 0.1);
+    (left, 0.1 * (left + 0.2))
+}
+
+#[test]
+fn lines_are_mimics_and_are_followed() {
+    let mut sim = empty(1);
+    let id = sim.add_robot(robot("hand", &HAND.replace('%', LINES))).unwrap();
+    let crank = sim.robot(id).joint_id("crank").unwrap();
+    let columns = ["crank", "left", "right", "other"].map(|name| sim.robot(id).joint_id(name).unwrap());
+    assert_eq!(columns.map(|c| sim.robot(id).is_mimic(c)), [false, true, true, false]);
+    let drivers = sim.robot(id).mimic_drivers();
+    let (left, right) = implied(0.0);
+    assert_eq!((drivers[1].0, drivers[2].0), (crank, crank));
+    for (found, expected) in [(drivers[1].1, -1.5), (drivers[1].2, left), (drivers[2].1, -0.15), (drivers[2].2, right)]
+    {
+        assert!((found - expected).abs() < 1e-15, "{drivers:?}");
+    }
+    // The start is the file's where nobody follows; followers start where they belong.
+    let (left, right) = implied(0.1);
+    let start = sim.robot(id).get_default_qpos();
+    assert!((start - array![[0.1, left, right, 0.0]]).iter().all(|d| d.abs() < 1e-15));
+    for target in [0.6, -0.7] {
+        sim.robot_mut(id).set_qpos(&array![[target]], Some(&[crank]), None).unwrap();
+        sim.update(500);
+        let qpos = sim.robot(id).get_qpos();
+        let (left, right) = implied(qpos[(0, 0)]);
+        assert!((qpos[(0, 0)] - target).abs() < 1e-3, "{qpos}");
+        // MuJoCo's couplings give way a little; light fingers that nothing holds hardly.
+        assert!((qpos[(0, 1)] - left).abs() < 1e-3 && (qpos[(0, 2)] - right).abs() < 1e-3, "{qpos}: {left} {right}");
+        let targets = sim.robot(id).get_target_qpos();
+        assert!((targets[(0, 1)] - implied(target).0).abs() < 1e-12, "{targets}");
+    }
+    // Forward kinematics follow too.
+    let fk = sim.robot(id).compute_fk(&array![[0.3, 9.0, 9.0, 0.0]], "right", None).unwrap();
+    assert!((fk[(0, 0)] - implied(0.3).1).abs() < 1e-12, "{fk}");
+}
+
+/// A parabola, a joint that is held where it is, and a circle of lines: nothing is driven against them.
+#[test]
+fn other_equalities_hold_and_nothing_drives_against_them() {
+    let circle = format!("{LINES}<joint joint1=\"crank\" joint2=\"right\" polycoef=\"0 1 0 0 0\"/>");
+    for (equalities, qpos) in [
+        (r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#, Some(-0.2 + 0.5 * 0.4 + 0.8 * 0.16)),
+        (r#"<joint joint1="left" polycoef="0.3 0 0 0 0"/>"#, Some(0.1)),
+        (circle.as_str(), None),
+    ] {
+        let mut sim = empty(1);
+        let id = sim.add_robot(robot("hand", &HAND.replace('%', equalities))).unwrap();
+        let said: Vec<String> = sim.diagnostics().iter().map(ToString::to_string).collect();
+        assert_eq!(said.iter().filter(|d| d.contains("no mimic says it")).count(), 1, "{said:?}");
+        let Some(expected) = qpos else {
+            assert!(said.iter().any(|d| d.contains("joint \"crank\" has no drive")), "{said:?}");
+            continue;
+        };
+        assert_eq!(sim.robot(id).get_stiffness().row(0).to_vec(), [1e4, 0.0, 1e4, 1e4]);
+        sim.robot_mut(id).set_qpos(&array![[0.5, 0.0, 0.0, 0.0]], None, None).unwrap();
+        sim.update(1000);
+        let left = sim.robot(id).get_qpos()[(0, 1)];
+        assert!((left - expected).abs() < 1e-3, "{left} is not {expected}");
+        let error = sim.robot_mut(id).set_stiffness(&Array2::from_elem((1, 4), 1.0), None, None).unwrap_err();
+        assert!(matches!(&error, Error::NotDriven { joint, .. } if joint == "left"), "{error}");
+    }
+}
