@@ -1,7 +1,7 @@
 //! Where frames are, in the world and seen from another frame.
 
 use crate::error::SensorError;
-use crate::frames::{pose, put};
+use crate::frames::{check_offset, pose, put};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{at_least_one, matching};
@@ -88,8 +88,8 @@ impl SensorCfg for FrameTransformerCfg {
 
     /// # Errors
     ///
-    /// There is no such body, no target at all, a pattern that matches nothing, an offset that is not finite, two frames of one name, and what
-    /// is wrong with the sampling.
+    /// There is no such body, no target at all, a pattern that matches nothing, an offset that is no pose, two frames of one
+    /// name, and what is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
         at_least_one(self.targets.len(), ("frame transformer", "targets", "target"), &context.bodies)?;
@@ -109,13 +109,10 @@ impl SensorCfg for FrameTransformerCfg {
                 targets.push((body, target.offset));
             }
         }
-        for offset in self.targets.iter().map(|t| &t.offset).chain([&self.source_offset]) {
-            let mut numbers = offset.translation.vector.iter().chain(offset.rotation.coords.iter());
-            if let Some(&value) = numbers.find(|x| !x.is_finite()) {
-                let expected = "every number must be finite";
-                return Err(SensorError::OutOfRange { field: "an offset".into(), value, expected });
-            }
-        }
+        check_offset("source_offset", &self.source_offset)?;
+        self.targets
+            .iter()
+            .try_for_each(|t| check_offset(&format!("the offset of target {:?}", t.bodies), &t.offset))?;
         let m = targets.len();
         let channels = [
             Channel::new("source_pos_w", 3),

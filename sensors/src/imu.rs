@@ -1,7 +1,7 @@
 //! Inertial measurement units.
 
 use crate::error::SensorError;
-use crate::frames::{pose, put, vector};
+use crate::frames::{check_offset, pose, put, vector};
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
@@ -84,14 +84,13 @@ impl SensorCfg for ImuCfg {
 
     /// # Errors
     ///
-    /// There is no such body, an offset or a bias that is not finite, and what is wrong with the sampling.
+    /// There is no such body, an offset that is no pose, a bias that is not finite, and what is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<Imu, SensorError> {
         let body = context.body(&self.body)?;
         let gravity_bias = self.gravity_bias.unwrap_or(-context.gravity);
-        let numbers =
-            self.offset.translation.vector.iter().chain(self.offset.rotation.coords.iter()).chain(&gravity_bias);
-        if let Some(&value) = numbers.into_iter().find(|x| !x.is_finite()) {
-            let field = "offset or gravity_bias".into();
+        check_offset("offset", &self.offset)?;
+        if let Some(&value) = gravity_bias.iter().find(|x| !x.is_finite()) {
+            let field = "gravity_bias".into();
             return Err(SensorError::OutOfRange { field, value, expected: "every number must be finite" });
         }
         let channels = [

@@ -246,6 +246,15 @@ pub enum Error {
         #[source]
         error: Box<Error>,
     },
+    /// A pair that a scene file keeps apart is none.
+    #[error("{at}: pair that never collides: {error}")]
+    Exclusion {
+        /// Where it is declared.
+        at: Source,
+        /// What is wrong.
+        #[source]
+        error: Box<Error>,
+    },
     /// A scene file is wrong.
     #[error("{at}: {reason}")]
     SceneFile {

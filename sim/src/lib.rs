@@ -44,7 +44,7 @@ pub use diagnostic::{Diagnostic, DiagnosticKind};
 pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveModel, DriveType, IdealPd, PerJoint};
 pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
-pub use interactive_scene::{EntityCfg, EntityTypes, InteractiveScene, SceneCfg};
+pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
 pub use mjcf::document::{Cone, Integrator};

@@ -4,15 +4,15 @@
 use sensors::camera::{CameraCfg, Extrinsics, Placement};
 use sensors::ray::pattern::Grid;
 use sensors::{
-    ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
-    Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
+    ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
+    RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
 };
 use sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 
 /// A pendulum with sensors of its own.
-const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint axis="0 1 0"/>
+const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0"/>
     <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0"/><site name="tip" pos="0.4 0 0"/></body></worldbody>
-  <sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
+  <actuator><motor joint="hinge"/></actuator><sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
 
 /// Four environments with a box that lies and a ball that stands a little off the ground.
 fn world(threads: usize) -> SimulationManager {
@@ -59,6 +59,8 @@ fn updates_allocate_nothing() {
         let frames = vec!["m/tip".into()];
         let wrench = JointWrenchCfg { links: vec!["m/rod".into()], frames, sampling: sampling(), debug_vis: true };
         sim.add_sensor("wrench", wrench).unwrap();
+        sim.add_sensor("joints", JointStateCfg { joints: None, sampling: sampling() }).unwrap();
+        sim.add_sensor("actuators", ActuatorStateCfg { actuators: None, sampling: sampling() }).unwrap();
         let targets = vec![TargetFrameCfg::of(".*")];
         let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("m/tip", targets) };
         sim.add_sensor("frames", frames).unwrap();

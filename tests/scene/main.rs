@@ -4,6 +4,7 @@
 mod file_errors;
 mod kinds;
 mod look_up;
+mod parts;
 mod quadruped;
 mod round_trip;
 mod terrain;

@@ -6,8 +6,11 @@ mod contact_pairs;
 mod debug_vis;
 mod every_kind;
 mod frames;
+mod history;
 mod imu;
+mod refused;
 mod same_bits;
+mod ticks;
 mod worlds;
 mod wrench;
 

@@ -1,12 +1,16 @@
-//! What a scene can hold: robots, articulations, rigid objects, terrain, MJCF files, and sensors of any crate.
+//! What a scene can hold: robots, articulations, rigid objects and groups of them, terrain, MJCF files, welds, and sensors
+//! of any crate.
 
 use crate::error::{Error, Result};
 use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
 use crate::objects::articulation::{ArticulationCfg, ArticulationId};
 use crate::objects::mjcf_part::MjcfCfg;
+use crate::objects::object_group::{GroupId, RigidObjectGroupCfg};
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
+use crate::objects::weld::{WeldCfg, WeldId};
+use crate::pattern::in_every_env;
 use crate::sensor_list::SensorId;
 use sensors::{Sensor, SensorCfg};
 use std::any::Any;
@@ -22,10 +26,14 @@ pub enum EntityCfg {
     Articulation(Box<ArticulationCfg>),
     /// A rigid object. Its uid is the name of the entity.
     RigidObject(Box<RigidObjectCfg>),
+    /// Several rigid objects. Its uid is the name of the entity; each of them is called by it, a point and its own.
+    Group(Box<RigidObjectGroupCfg>),
     /// A terrain. Its uid is the name of the entity.
     Terrain(Box<TerrainCfg>),
     /// An MJCF file. Its uid is the name of the entity.
     Mjcf(Box<MjcfCfg>),
+    /// A weld, which holds nothing until it is attached. Its uid is the name of the entity.
+    Weld(Box<WeldCfg>),
     /// A sensor of any kind.
     Sensor(Box<dyn SensorEntity>),
 }
@@ -48,6 +56,12 @@ impl From<RigidObjectCfg> for EntityCfg {
     }
 }
 
+impl From<RigidObjectGroupCfg> for EntityCfg {
+    fn from(cfg: RigidObjectGroupCfg) -> Self {
+        Self::Group(Box::new(cfg))
+    }
+}
+
 impl From<TerrainCfg> for EntityCfg {
     fn from(cfg: TerrainCfg) -> Self {
         Self::Terrain(Box::new(cfg))
@@ -58,6 +72,34 @@ impl From<MjcfCfg> for EntityCfg {
     fn from(cfg: MjcfCfg) -> Self {
         Self::Mjcf(Box::new(cfg))
     }
+}
+
+impl From<WeldCfg> for EntityCfg {
+    fn from(cfg: WeldCfg) -> Self {
+        Self::Weld(Box::new(cfg))
+    }
+}
+
+impl EntityCfg {
+    /// When it is built: what there is, then what holds that together, then what looks at it.
+    pub(super) fn turn(&self) -> Turn {
+        match self {
+            Self::Weld(_) => Turn::Weld,
+            Self::Sensor(_) => Turn::Sensor,
+            _ => Turn::Thing,
+        }
+    }
+}
+
+/// The turns in which a scene is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// Robots, objects, terrain, MJCF files.
+    Thing,
+    /// What needs two of them.
+    Weld,
+    /// What looks at any of them.
+    Sensor,
 }
 
 impl<C: SensorEntity> From<C> for EntityCfg {
@@ -141,8 +183,10 @@ pub(super) enum Handle {
     Robot(RobotId),
     Articulation(ArticulationId),
     RigidObject(ObjectId),
+    Group(GroupId),
     Terrain(TerrainId),
     Mjcf(MjcfId),
+    Weld(WeldId),
     Sensor(SensorHandle),
 }
 
@@ -157,10 +201,17 @@ impl Handle {
             EntityCfg::RigidObject(cfg) => {
                 sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::RigidObject)
             }
+            EntityCfg::Group(cfg) => {
+                sim.add_rigid_object_group(RigidObjectGroupCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Group)
+            }
             EntityCfg::Terrain(cfg) => {
                 sim.add_terrain(TerrainCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Terrain)
             }
             EntityCfg::Mjcf(cfg) => sim.add_mjcf(MjcfCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Mjcf),
+            EntityCfg::Weld(cfg) => {
+                let [first, second] = [&cfg.first, &cfg.second].map(|name| in_every_env(name).into());
+                sim.add_weld(WeldCfg { uid: uid.into(), first, second }).map(Self::Weld)
+            }
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
         }
     }
@@ -171,8 +222,10 @@ impl Handle {
             Self::Robot(_) => "robot".into(),
             Self::Articulation(_) => "articulation".into(),
             Self::RigidObject(_) => "rigid object".into(),
+            Self::Group(_) => "group of rigid objects".into(),
             Self::Terrain(_) => "terrain".into(),
             Self::Mjcf(_) => "MJCF part".into(),
+            Self::Weld(_) => "weld".into(),
             Self::Sensor(handle) => format!("sensor of type {}", handle.type_name),
         };
         Error::EntityType { name: name.into(), found, wanted }

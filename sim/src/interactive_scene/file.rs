@@ -3,7 +3,7 @@
 use super::entity::EntityCfg;
 use super::types::EntityTypes;
 use super::value::{Value, ValueError};
-use super::{SceneCfg, in_every_env};
+use super::{ExclusionCfg, SceneCfg, in_every_env};
 use crate::error::{Error, Result};
 use crate::objects::shape::ObjectShape;
 use crate::pattern::closest;
@@ -17,7 +17,10 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// What a file may hold at its top.
-const SECTIONS: [&str; 2] = ["simulation", "entities"];
+const SECTIONS: [&str; 3] = ["simulation", "entities", EXCLUSIONS];
+
+/// Key of the pairs that never collide.
+const EXCLUSIONS: &str = "exclude_collisions";
 
 /// Makes a set of defaults.
 type Preset = fn() -> SimulationManagerCfg;
@@ -86,6 +89,10 @@ impl SceneCfg {
             }
         }
         scene.insert("entities".into(), entities.into());
+        if !self.exclusions.is_empty() {
+            let pair = |exclusion: &ExclusionCfg| toml::Value::from(exclusion.between.to_vec());
+            scene.insert(EXCLUSIONS.into(), self.exclusions.iter().map(pair).collect::<Vec<_>>().into());
+        }
         toml::to_string(&scene).map_err(|e| fail("the scene", e.to_string()))
     }
 }
@@ -118,6 +125,7 @@ impl<'a> Reader<'a> {
                         scene.entities.push((name.into_inner().into_owned(), entity));
                     }
                 }
+                EXCLUSIONS => scene.exclusions = self.exclusions(value)?,
                 other => {
                     let known = closest(other, SECTIONS).join("`, `");
                     return Err(self.at(key.span(), format!("unknown key `{other}`, expected one of `{known}`")));
@@ -149,6 +157,21 @@ impl<'a> Reader<'a> {
         }
         let value = Spanned::new(span.clone(), DeValue::Table(merged));
         SimulationManagerCfg::deserialize(Value(value)).map_err(|e| self.wrong(e, span))
+    }
+
+    /// Pairs of names, each with its place.
+    fn exclusions(&self, value: Spanned<DeValue<'a>>) -> Result<Vec<ExclusionCfg>> {
+        let span = value.span();
+        let DeValue::Array(pairs) = value.into_inner() else {
+            return Err(self.at(span, format!("`{EXCLUSIONS}` is a list of pairs: [[\"ball\", \"table\"], ...]")));
+        };
+        let read = |pair: Spanned<DeValue<'a>>| {
+            let at = pair.span();
+            let source = Source::new(self.file, self.line(at.clone()));
+            let between = <[String; 2]>::deserialize(Value(pair)).map_err(|e| self.wrong(e, at))?;
+            Ok(ExclusionCfg { between, at: Some(source) })
+        };
+        pairs.into_iter().map(read).collect()
     }
 
     /// One entity: its kind reads what is left of the table without `type`.
@@ -188,16 +211,26 @@ impl<'a> Reader<'a> {
             }
             EntityCfg::RigidObject(object) => {
                 object.uid = uid;
-                if let ObjectShape::Mesh { path, .. } = &mut object.shape {
-                    *path = self.beside(path);
-                }
+                self.place_shape(&mut object.shape);
+            }
+            EntityCfg::Group(group) => {
+                group.uid = uid;
+                group.objects.iter_mut().for_each(|object| self.place_shape(&mut object.shape));
             }
             EntityCfg::Terrain(terrain) => terrain.uid = uid,
             EntityCfg::Mjcf(part) => {
                 part.uid = uid;
                 part.place_beside(|path| self.beside(path));
             }
+            EntityCfg::Weld(weld) => weld.uid = uid,
             EntityCfg::Sensor(_) => {}
+        }
+    }
+
+    /// Makes the path of a mesh relative to the file.
+    fn place_shape(&self, shape: &mut ObjectShape) {
+        if let ObjectShape::Mesh { path, .. } = shape {
+            *path = self.beside(path);
         }
     }
 

@@ -4,27 +4,23 @@
 //! everything else is done with the handles of the [`SimulationManager`] inside it.
 
 mod entity;
+mod exclusion;
 mod file;
+mod look_up;
 mod types;
 mod value;
 
 pub use entity::{EntityCfg, SensorEntity, SensorHandle};
+pub use exclusion::ExclusionCfg;
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
-use crate::objects::articulation::{Articulation, ArticulationId, ArticulationMut};
-use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
-use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
-use crate::objects::robot::{Robot, RobotMut};
-use crate::objects::terrain::Terrain;
-use crate::pattern::{closest, in_every_env};
-use crate::sensor_list::SensorId;
+use crate::manager::{EnvId, SimulationManager};
+use crate::pattern::in_every_env;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::source::Source;
-use entity::{Handle, short_name};
+use entity::{Handle, Turn};
 use ndarray::Array2;
-use sensors::Sensor;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -55,8 +51,8 @@ use std::path::Path;
 /// bodies = ["{ENV_REGEX_NS}/cube"]
 /// ```
 ///
-/// Groups of objects, welds and pairs that never collide are no entities: add them to the simulation of the scene that runs
-/// ([`add_weld`](SimulationManager::add_weld), [`exclude_collision`](SimulationManager::exclude_collision)).
+/// Pairs that never collide have no name: [`exclude_collision`](Self::exclude_collision), and in files, above all tables,
+/// `exclude_collisions = [["cube", "table"]]`.
 #[derive(Clone, Debug, Default)]
 pub struct SceneCfg {
     /// The simulation itself: number of environments, time step, ground, lights.
@@ -64,6 +60,8 @@ pub struct SceneCfg {
     /// Names and what they are. `{ENV}/` or `{ENV_REGEX_NS}/` before a name changes nothing: every entity is in every
     /// environment.
     pub entities: Vec<(String, EntityCfg)>,
+    /// Pairs that never collide.
+    pub exclusions: Vec<ExclusionCfg>,
     /// Where entities were declared, by name: errors say it. A scene of Rust needs none.
     pub sources: BTreeMap<String, Source>,
 }
@@ -76,10 +74,19 @@ impl SceneCfg {
 
     /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), an
     /// [`ArticulationCfg`](crate::ArticulationCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), a
-    /// [`TerrainCfg`](crate::TerrainCfg), or the configuration of any sensor.
+    /// [`RigidObjectGroupCfg`](crate::RigidObjectGroupCfg), a [`TerrainCfg`](crate::TerrainCfg), an
+    /// [`MjcfCfg`](crate::MjcfCfg), a [`WeldCfg`](crate::WeldCfg), or the configuration of any sensor.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
         self.entities.push((name.into(), cfg.into()));
+        self
+    }
+
+    /// The scene in which two things pass through each other: names as in
+    /// [`SimulationManager::exclude_collision`], with or without `{ENV}/` before them.
+    #[must_use]
+    pub fn exclude_collision(mut self, one: impl Into<String>, other: impl Into<String>) -> Self {
+        self.exclusions.push(ExclusionCfg { between: [one.into(), other.into()], at: None });
         self
     }
 
@@ -97,12 +104,12 @@ pub struct InteractiveScene {
 }
 
 impl InteractiveScene {
-    /// Builds everything that `cfg` declares. Robots, objects and terrain come first, so that sensors may be declared before
-    /// what they look at; within both, the order is that of the declaration.
+    /// Builds everything that `cfg` declares. Robots, objects and terrain come first, then pairs that never collide, welds, and
+    /// sensors, so that these may be declared before what they are about; within each, the order is that of the declaration.
     ///
     /// # Errors
-    /// Two entities of one name, what is wrong with the simulation, and what is wrong with an entity: in
-    /// [`Error::Entity`] where it is known where it was declared.
+    /// Two entities of one name, what is wrong with the simulation, and what is wrong with an entity or a pair: in
+    /// [`Error::Entity`] or [`Error::Exclusion`] where it is known where it was declared.
     pub fn new(cfg: SceneCfg) -> Result<Self> {
         let mut taken: Vec<&str> = Vec::new();
         for name in cfg.keys() {
@@ -113,9 +120,12 @@ impl InteractiveScene {
         }
         let mut sim = SimulationManager::new(cfg.simulation.clone())?;
         let mut handles: Vec<Option<Handle>> = cfg.entities.iter().map(|_| None).collect();
-        for sensors in [false, true] {
+        for turn in [Turn::Thing, Turn::Weld, Turn::Sensor] {
+            if turn == Turn::Weld {
+                cfg.exclusions.iter().try_for_each(|exclusion| exclusion.add_to(&mut sim))?;
+            }
             for ((name, entity), handle) in cfg.entities.iter().zip(&mut handles) {
-                if matches!(entity, EntityCfg::Sensor(_)) == sensors {
+                if entity.turn() == turn {
                     let name = in_every_env(name);
                     *handle =
                         Some(Handle::add(&mut sim, name, entity).map_err(|error| match cfg.sources.get(name) {
@@ -152,187 +162,6 @@ impl InteractiveScene {
     /// The simulation, to change. What is added to it here has no name in the scene.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.sim
-    }
-
-    fn find(&self, name: &str) -> Result<&Handle> {
-        let name = in_every_env(name);
-        let found = self.entities.iter().find(|(known, _)| known == name);
-        found.map(|(_, handle)| handle).ok_or_else(|| Error::UnknownName {
-            what: "entity of the scene called",
-            name: name.into(),
-            candidates: closest(name, self.keys()).into_iter().map(String::from).collect(),
-        })
-    }
-
-    /// The handle of a robot.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no robot.
-    pub fn robot_id(&self, name: &str) -> Result<RobotId> {
-        match self.find(name)? {
-            Handle::Robot(id) => Ok(*id),
-            other => Err(other.is_no(name, "robot".into())),
-        }
-    }
-
-    /// A robot, to read.
-    ///
-    /// # Errors
-    /// As [`robot_id`](Self::robot_id).
-    pub fn robot(&self, name: &str) -> Result<Robot<'_>> {
-        Ok(self.sim.robot(self.robot_id(name)?))
-    }
-
-    /// A robot, to command and to write. What is written acts at once: there is no `write_data_to_sim` to forget.
-    ///
-    /// # Errors
-    /// As [`robot_id`](Self::robot_id).
-    pub fn robot_mut(&mut self, name: &str) -> Result<RobotMut<'_>> {
-        let id = self.robot_id(name)?;
-        Ok(self.sim.robot_mut(id))
-    }
-
-    /// The handle of an articulation that is no robot.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no such articulation.
-    pub fn articulation_id(&self, name: &str) -> Result<ArticulationId> {
-        match self.find(name)? {
-            Handle::Articulation(id) => Ok(*id),
-            other => Err(other.is_no(name, "articulation".into())),
-        }
-    }
-
-    /// An articulation, to read.
-    ///
-    /// # Errors
-    /// As [`articulation_id`](Self::articulation_id).
-    pub fn articulation(&self, name: &str) -> Result<Articulation<'_>> {
-        Ok(self.sim.articulation(self.articulation_id(name)?))
-    }
-
-    /// An articulation, to write.
-    ///
-    /// # Errors
-    /// As [`articulation_id`](Self::articulation_id).
-    pub fn articulation_mut(&mut self, name: &str) -> Result<ArticulationMut<'_>> {
-        let id = self.articulation_id(name)?;
-        Ok(self.sim.articulation_mut(id))
-    }
-
-    /// The handle of a rigid object.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no rigid object.
-    pub fn rigid_object_id(&self, name: &str) -> Result<ObjectId> {
-        match self.find(name)? {
-            Handle::RigidObject(id) => Ok(*id),
-            other => Err(other.is_no(name, "rigid object".into())),
-        }
-    }
-
-    /// A rigid object, to read.
-    ///
-    /// # Errors
-    /// As [`rigid_object_id`](Self::rigid_object_id).
-    pub fn rigid_object(&self, name: &str) -> Result<RigidObject<'_>> {
-        Ok(self.sim.rigid_object(self.rigid_object_id(name)?))
-    }
-
-    /// A rigid object, to write.
-    ///
-    /// # Errors
-    /// As [`rigid_object_id`](Self::rigid_object_id).
-    pub fn rigid_object_mut(&mut self, name: &str) -> Result<RigidObjectMut<'_>> {
-        let id = self.rigid_object_id(name)?;
-        Ok(self.sim.rigid_object_mut(id))
-    }
-
-    /// The handle of a terrain.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no terrain.
-    pub fn terrain_id(&self, name: &str) -> Result<TerrainId> {
-        match self.find(name)? {
-            Handle::Terrain(id) => Ok(*id),
-            other => Err(other.is_no(name, "terrain".into())),
-        }
-    }
-
-    /// A terrain.
-    ///
-    /// # Errors
-    /// As [`terrain_id`](Self::terrain_id).
-    pub fn terrain(&self, name: &str) -> Result<&Terrain> {
-        Ok(self.sim.terrain(self.terrain_id(name)?))
-    }
-
-    /// The handle of an MJCF file that is a part of the scene.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no MJCF file.
-    pub fn mjcf_id(&self, name: &str) -> Result<MjcfId> {
-        match self.find(name)? {
-            Handle::Mjcf(id) => Ok(*id),
-            other => Err(other.is_no(name, "MJCF part".into())),
-        }
-    }
-
-    /// An MJCF file that is a part of the scene, to read.
-    ///
-    /// # Errors
-    /// As [`mjcf_id`](Self::mjcf_id).
-    pub fn mjcf_part(&self, name: &str) -> Result<MjcfPart<'_>> {
-        Ok(self.sim.mjcf_part(self.mjcf_id(name)?))
-    }
-
-    /// An MJCF file that is a part of the scene, to command and to write.
-    ///
-    /// # Errors
-    /// As [`mjcf_id`](Self::mjcf_id).
-    pub fn mjcf_part_mut(&mut self, name: &str) -> Result<MjcfPartMut<'_>> {
-        let id = self.mjcf_id(name)?;
-        Ok(self.sim.mjcf_part_mut(id))
-    }
-
-    /// The handle of a sensor of type `S`, such as `Camera`.
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no such sensor.
-    pub fn sensor_id<S: Sensor>(&self, name: &str) -> Result<SensorId<S>> {
-        let handle = self.find(name)?;
-        let id = if let Handle::Sensor(sensor) = handle { sensor.get() } else { None };
-        id.ok_or_else(|| handle.is_no(name, format!("sensor of type {}", short_name::<S>())))
-    }
-
-    /// A sensor of type `S`, to read.
-    ///
-    /// # Errors
-    /// As [`sensor_id`](Self::sensor_id), and where it failed in an earlier step.
-    pub fn sensor<S: Sensor>(&self, name: &str) -> Result<&S> {
-        self.sim.sensor(self.sensor_id(name)?)
-    }
-
-    /// A sensor of type `S`, to change.
-    ///
-    /// # Errors
-    /// As [`sensor`](Self::sensor).
-    pub fn sensor_mut<S: Sensor>(&mut self, name: &str) -> Result<&mut S> {
-        let id = self.sensor_id(name)?;
-        self.sim.sensor_mut(id)
-    }
-
-    /// Shows the markers of a sensor from now on, or does not, whatever kind of sensor it is: see
-    /// [`SimulationManager::set_debug_vis`].
-    ///
-    /// # Errors
-    /// There is no such entity, or it is no sensor.
-    pub fn set_debug_vis(&mut self, name: &str, shown: bool) -> Result<()> {
-        let index = match self.find(name)? {
-            Handle::Sensor(sensor) => sensor.index(),
-            other => return Err(other.is_no(name, "sensor".into())),
-        };
-        self.sim.sensors.set_debug_vis(index, shown)
     }
 
     /// Number of environments.

@@ -4,9 +4,11 @@ use super::entity::{EntityCfg, SensorEntity};
 use super::value::{Value, ValueError};
 use crate::objects::articulation::ArticulationCfg;
 use crate::objects::mjcf_part::MjcfCfg;
+use crate::objects::object_group::RigidObjectGroupCfg;
 use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
+use crate::objects::weld::WeldCfg;
 use sensors::{
     ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
     MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
@@ -40,14 +42,16 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, articulations, rigid objects, terrain, MJCF files and the built-in sensors.
+    /// Robots, articulations, rigid objects and groups of them, terrain, MJCF files, welds and the built-in sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
             .with::<ArticulationCfg>("articulation")
             .with::<RigidObjectCfg>("rigid_object")
+            .with::<RigidObjectGroupCfg>("rigid_object_group")
             .with::<TerrainCfg>("terrain")
             .with::<MjcfCfg>("mjcf")
+            .with::<WeldCfg>("weld")
             .with_sensor::<CameraCfg>("camera")
             .with_sensor::<RayCasterCfg>("ray_caster")
             .with_sensor::<RayCasterCameraCfg>("ray_caster_camera")
@@ -129,6 +133,14 @@ impl Kind for RigidObjectCfg {
     }
 }
 
+impl Kind for RigidObjectGroupCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Group(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
 impl Kind for TerrainCfg {
     type Cfg = Self;
 
@@ -142,6 +154,14 @@ impl Kind for MjcfCfg {
 
     fn of(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Mjcf(cfg) = entity { Some(cfg) } else { None }
+    }
+}
+
+impl Kind for WeldCfg {
+    type Cfg = Self;
+
+    fn of(entity: &EntityCfg) -> Option<&Self> {
+        if let EntityCfg::Weld(cfg) = entity { Some(cfg) } else { None }
     }
 }
 

@@ -11,7 +11,7 @@ impl fmt::Display for RayCaster {
         writeln!(f, "Ray-caster @ {name:?}:")?;
         writeln!(f, "\tpattern              : {pattern}")?;
         writeln!(f, "\talignment            : {}", alignment.name())?;
-        writeln!(f, "\tupdate period (steps): {}", self.schedule().period_steps())?;
+        writeln!(f, "\tupdate period (s)    : {}", self.sampler().period())?;
         writeln!(f, "\tnumber of targets    : {} ({} of them fixed)", targets.len(), targets.fixed_count())?;
         writeln!(f, "\tnumber of sensors    : {sensors}")?;
         writeln!(f, "\tnumber of rays/sensor: {rays}")?;

@@ -1,7 +1,7 @@
 //! What rays hit.
 
 use crate::error::SensorError;
-use crate::select::matching;
+use crate::select::{at_least_one, matching};
 use crate::sensor::SensorContext;
 use scene::RenderScene;
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,7 @@ impl HitTargets {
     ///
     /// # Errors
     ///
-    /// A pattern that is no regular expression or matches nothing.
+    /// A pattern that is no regular expression or matches nothing, or no pattern at all.
     pub(crate) fn select(
         &self,
         scene: &RenderScene,
@@ -75,6 +75,7 @@ fn names(
     let mut names: Vec<String> = can_be_hit.map(|i| i.name.to_string()).filter(|n| !n.is_empty()).collect();
     names.sort();
     names.dedup();
+    at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &names)?;
     let mut named = vec![false; names.len()];
     for pattern in patterns {
         matching(pattern, &names, "thing to hit")?.into_iter().for_each(|index| named[index] = true);

@@ -1,0 +1,166 @@
+//! Groups, welds and pairs that never collide: from Rust, from files, the same from both.
+
+use kinetoscope::ndarray::{Array3, Axis};
+use kinetoscope::prelude::*;
+
+/// A ball above a block on the ground, two cubes in the air, of which a weld that stands before them may hold the first to the
+/// world.
+const TEXT: &str = r#"
+exclude_collisions = [
+    ["{ENV}/ball", "block"],
+]
+
+[simulation]
+num_envs = 2
+physics_dt = 2e-3
+
+[entities.nail]
+type = "weld"
+first = "{ENV_REGEX_NS}/cubes.red"
+second = "world"
+
+[entities.touch]
+type = "contact_sensor"
+bodies = ["ball"]
+filters = ["block"]
+
+[entities.block]
+type = "rigid_object"
+shape.box.size = [0.4, 0.4, 0.4]
+init_pose.pos = [0, 0, 0.2]
+
+[entities.ball]
+type = "rigid_object"
+shape.sphere.radius = 0.1
+init_pose.pos = [0, 0, 0.52]
+
+[entities.cubes]
+type = "rigid_object_group"
+objects = [
+    { uid = "red", shape.box.size = [0.1, 0.1, 0.1], init_pose.pos = [2, 0, 1] },
+    { uid = "blue", shape.box.size = [0.1, 0.1, 0.1], init_pose.pos = [3, 0, 1] },
+]
+"#;
+
+fn declared() -> SceneCfg {
+    let object = |uid: &str, shape, [x, y, z]: [f64; 3]| {
+        let init_pose = Pose::translation(x, y, z);
+        RigidObjectCfg { uid: uid.into(), shape, init_pose, ..Default::default() }
+    };
+    let cube = |uid, x| object(uid, ObjectShape::cube(0.1), [x, 0.0, 1.0]);
+    let touch = ContactSensorCfg { filters: vec!["block".into()], ..ContactSensorCfg::of("ball") };
+    SceneCfg::new(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() })
+        .with("nail", WeldCfg { first: "cubes.red".into(), second: "world".into(), ..Default::default() })
+        .with("touch", touch)
+        .with("block", object("block", ObjectShape::cube(0.4), [0.0, 0.0, 0.2]))
+        .with("ball", object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 0.52]))
+        .with("cubes", RigidObjectGroupCfg { objects: vec![cube("red", 2.0), cube("blue", 3.0)], ..Default::default() })
+        .exclude_collision("ball", "block")
+}
+
+fn read(text: &str) -> SceneCfg {
+    SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap()
+}
+
+/// Heights of ball and block, poses of the cubes, and whether the ball was felt on the block, after a second with the nail in
+/// the second environment.
+fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
+    let mut scene = InteractiveScene::new(cfg).unwrap();
+    assert_eq!(scene.keys().collect::<Vec<_>>(), ["nail", "touch", "block", "ball", "cubes"]);
+    assert_eq!(scene.weld("nail").unwrap().is_attached().to_vec(), [false, false]);
+    scene.weld_mut("nail").unwrap().attach(Some(&[EnvId(1)])).unwrap();
+    scene.update_for(1.0).unwrap();
+    let height = |name: &str| scene.rigid_object(name).unwrap().get_pose()[(1, 2)];
+    let felt = scene.sensor::<ContactSensor>("touch").unwrap().force_matrix_w();
+    (
+        [height("ball"), height("block")],
+        scene.rigid_object_group("cubes").unwrap().get_pose(),
+        felt.iter().any(|f| *f != 0.0),
+    )
+}
+
+/// What is excluded falls through to the ground, what is welded hangs, what is not has landed; the controls are the scene
+/// without the pair and the first environment.
+#[test]
+fn they_do_what_they_say() {
+    let ([ball, block], cubes, felt) = run(read(TEXT));
+    assert!((ball - 0.1).abs() < 1e-3 && (block - 0.2).abs() < 1e-3 && !felt, "{ball} {block} {felt}");
+    // A weld against the world gives way by 1e-4 of the acceleration of its load; a fall of a metre takes 0.45 s.
+    assert!((cubes[(1, 0, 2)] - 1.0).abs() < 1e-4, "{cubes}");
+    for (env, object) in [(0, 0), (0, 1), (1, 1)] {
+        assert!((cubes[(env, object, 2)] - 0.05).abs() < 1e-3, "{cubes}");
+    }
+    let without = SceneCfg { exclusions: Vec::new(), ..read(TEXT) };
+    let ([ball, _], _, felt) = run(without);
+    assert!((ball - 0.5).abs() < 1e-3 && felt, "{ball} {felt}");
+}
+
+#[test]
+fn a_file_and_rust_give_the_same_bits() {
+    let expected = run(declared());
+    assert_eq!(run(read(TEXT)), expected);
+    let types = EntityTypes::default();
+    let written = declared().to_toml(&types).unwrap();
+    assert_eq!(run(SceneCfg::from_toml(&written, "elsewhere/scene.toml", &types).unwrap()), expected, "{written}");
+}
+
+#[test]
+fn they_are_found_by_name_and_kind() {
+    let mut scene = InteractiveScene::new(declared()).unwrap();
+    let group = scene.rigid_object_group_id("{ENV}/cubes").unwrap();
+    assert_eq!(scene.sim().rigid_object_group(group).names(), ["cubes.red", "cubes.blue"]);
+    let mut poses = scene.rigid_object_group("cubes").unwrap().get_pose();
+    poses.index_axis_mut(Axis(2), 0).fill(7.0);
+    scene.rigid_object_group_mut("cubes").unwrap().write_pose(&poses, None).unwrap();
+    assert_eq!(scene.rigid_object_group("cubes").unwrap().get_pose(), poses);
+    for (error, expected) in [
+        (scene.weld("cubes").unwrap_err(), "\"cubes\" is a group of rigid objects, not a weld"),
+        (scene.rigid_object_group("nail").unwrap_err(), "\"nail\" is a weld, not a group of rigid objects"),
+        (scene.rigid_object("cubes").unwrap_err(), "\"cubes\" is a group of rigid objects, not a rigid object"),
+    ] {
+        assert_eq!(error.to_string(), expected);
+    }
+    assert!(matches!(scene.weld_mut("nale"), Err(Error::UnknownName { candidates, .. }) if candidates[0] == "nail"));
+}
+
+/// Meshes of the objects of a group lie beside the file, as those of single objects do.
+#[test]
+fn paths_of_a_group_are_relative_to_the_file() {
+    let cfg = read(
+        "[entities.g]\ntype = \"rigid_object_group\"\nobjects = [{ uid = \"cup\", shape.mesh.path = \"cup.stl\" }]",
+    );
+    let [(_, EntityCfg::Group(group))] = cfg.entities.as_slice() else { panic!("{cfg:?}") };
+    let ObjectShape::Mesh { path, .. } = &group.objects[0].shape else { panic!("{group:?}") };
+    assert_eq!(path, std::path::Path::new("dir/cup.stl"));
+}
+
+#[test]
+fn mistakes_are_named_with_their_line() {
+    // Found when the file is read.
+    for (text, line, parts) in [
+        ("exclude_collisions = 3", 1, &["list of pairs"][..]),
+        ("exclude_collisions = [\n[\"a\", \"b\"],\n[\"a\"]]", 3, &["array of length 2"]),
+        ("exclude_collisions = [[\"a\", 3]]", 1, &["integer `3`", "string"]),
+        ("exclude_collision = []", 1, &["`exclude_collision`", "`exclude_collisions`"]),
+        ("[entities.w]\ntype = \"weld\"\nfrist = \"a\"", 3, &["frist", "`first`", "`second`"]),
+        ("[entities.w]\ntype = \"weld\"\nuid = \"a\"", 3, &["\"w\"", "uid"]),
+        ("[entities.g]\ntype = \"rigid_object_group\"\nobjects = [\n{ uid = \"a\", mas = 1 }]", 4, &["mas", "`mass`"]),
+    ] {
+        let message = SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap_err().to_string();
+        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{text}\n{message}");
+    }
+    // Found when the scene is built.
+    for (text, line, parts) in [
+        (TEXT.replace("\"block\"],", "\"blok\"],"), 3, &["\"blok\"", "\"block\""][..]),
+        (TEXT.replace("\"block\"],", "\"ball\"],"), 3, &["exclude_collision", "different"]),
+        (TEXT.replace("cubes.red", "cubes.rod"), 10, &["\"nail\"", "\"cubes.red\""]),
+        (TEXT.replace("\"world\"", "\"cubes.red\""), 10, &["\"nail\"", "different"]),
+        (TEXT.replace("\"blue\"", "\"red\""), 30, &["\"cubes\"", "cubes.red"]),
+        ("[entities.g]\ntype = \"rigid_object_group\"".into(), 1, &["\"g\"", "at least 1 object"]),
+    ] {
+        let message = InteractiveScene::new(read(&text)).unwrap_err().to_string();
+        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{text}\n{message}");
+    }
+}
