@@ -187,7 +187,9 @@ impl Camera {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
-        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads);
+        let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads);
+        rasterizer.set_renderer(cfg.renderer);
+        rasterizer.share_assets(&context.ray_assets);
         Self {
             lens,
             scene,
