@@ -5,7 +5,8 @@ use super::determinism::bits;
 use super::scenes::{Random, figure, random};
 use crate::lanes::levels;
 use crate::visibility::{RenderError, View};
-use scene::{Light, LightKind, PoseF32, RenderScene};
+use scene::shape::{Plane, Sphere};
+use scene::{Hemisphere, Instance, Light, LightKind, Material, PoseF32, RenderScene};
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
@@ -169,6 +170,40 @@ fn every_instruction_set_casts_the_same_rays() {
         let all: Vec<_> = all.collect();
         assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{renderer:?}");
     }
+}
+
+/// Smoothing makes few paths look more like many, where light is hard to find: below a glowing panel that paths meet by
+/// chance.
+#[test]
+fn smoothing_takes_noise_away_and_keeps_the_picture() {
+    let matt = |red: f32| Material { specular: 0.0, ..Material::from_rgba([red, 0.7, 0.7, 1.0]) };
+    let panel = Material { emission: 6.0, ..matt(0.7) };
+    let mut scene = RenderScene::new(vec![
+        Instance::new(Plane::INFINITE, matt(0.7), 1),
+        Instance::new(Sphere { radius: 0.3 }, matt(0.2), 2),
+        Instance::new(Plane { half: [0.5; 2] }, panel, 3),
+    ])
+    .unwrap();
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.02; 3], ground: [0.02; 3] };
+    let down = PoseF32 { rotation: [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]], translation: [0., 0., 1.5] };
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0., 0., 0.3]), down];
+    let view = View::look_at([96, 72], 0.7, [2.2, -1.4, 1.0], [0., 0., 0.2], [0., 0., 1.]).unwrap();
+    let paths = |samples, denoise, seed| {
+        let renderer = Renderer::RayTraced { samples, max_bounces: 1, denoise, seed };
+        draw(renderer, EXACT, &scene, &poses, &view).color.unwrap()
+    };
+    let many = paths(256, false, 9);
+    let error = |a: &[u8]| {
+        let square: f64 = a.iter().zip(&many).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
+        (square / a.len() as f64).sqrt()
+    };
+    let (rough, smooth, more) = (error(&paths(4, false, 1)), error(&paths(4, true, 1)), error(&paths(16, false, 1)));
+    println!("off by {rough} of 255 with 4 paths, {smooth} smoothed, {more} with 16 paths");
+    assert!(smooth < 0.6 * rough, "{smooth} of {rough}");
+    // A control of the measure: noise falls as paths are added.
+    assert!(more < 0.75 * rough, "{more} of {rough}");
 }
 
 #[test]
