@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release --example create_sensor -- --headless --num-envs 4 --steps 2004 --out pictures
 //! cargo run --release --example create_sensor -- --headless --steps 1 --attach-sensor --out pictures
+//! cargo run --release --example create_sensor -- --headless --steps 1 --renderer rt --out pictures
 //! ```
 
 mod launcher;
@@ -13,7 +14,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use launcher::arm::ArmWithHand;
 use launcher::panel::{Views, grid, tile};
-use launcher::{Launcher, Progress, Renderer, picture};
+use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -43,9 +44,11 @@ struct Args {
     /// Also write depth, mask and normals as .npy, shape (N, H, W, ...)
     #[arg(long)]
     raw: bool,
-    /// Ray tracing (not offered yet; the rasterizer draws)
+    /// Ray tracing, as --renderer rt
     #[arg(long, alias = "enable_rt")]
     enable_rt: bool,
+    #[command(flatten)]
+    paths: PathFlags,
 }
 
 /// The tutorial sets targets at multiples of these steps.
@@ -57,9 +60,14 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    if args.enable_rt || matches!(args.launcher.renderer, Renderer::Rt | Renderer::FastRt | Renderer::Hybrid) {
-        return Err("there is no ray tracer yet: leave out --enable-rt and use --renderer raster".into());
-    }
+    let renderer = match (args.enable_rt, args.launcher.renderer) {
+        (true, Renderer::Raster | Renderer::Hybrid) => {
+            return Err("--enable-rt asks for a ray tracer: use it with --renderer rt or fast-rt, or without".into());
+        }
+        (true, Renderer::Auto) => Renderer::Rt,
+        (_, renderer) => renderer,
+    };
+    let renderer = renderer.of_cameras(args.paths)?;
     println!("Creating simulation...");
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
@@ -79,7 +87,7 @@ fn run(args: &Args) -> launcher::Result {
         rgba: [0.85, 0.2, 0.15, 1.0],
         ..Default::default()
     })?;
-    let camera = sim.add_sensor("camera", camera_cfg(args, &sim, robot))?;
+    let camera = sim.add_sensor("camera", CameraCfg { renderer, ..camera_cfg(args, &sim, robot) })?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
@@ -120,7 +128,7 @@ fn run(args: &Args) -> launcher::Result {
     let images_per_second = album.images as f64 / album.drawing.as_secs_f64().max(1e-9);
     print_table(&album, &sim);
     println!(
-        "\n{} images of {} x {} (color, depth, mask, normals): {images_per_second:.0} per second on {} threads",
+        "\n{} images of {} x {} (color, depth, mask, normals): {images_per_second:.3} per second on {} threads",
         album.images,
         args.width,
         args.height,
@@ -141,6 +149,7 @@ fn run(args: &Args) -> launcher::Result {
             "id": id.id, "object": id.object, "link": id.link, "class": id.class,
         })).collect::<Vec<_>>(),
         "images": album.files,
+        "renderer": renderer,
         "images_per_second": images_per_second,
         "env_steps_per_second": rate,
         "warnings": sim.warning_counts(),

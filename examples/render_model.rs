@@ -13,7 +13,7 @@ use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
-use launcher::picture;
+use launcher::{PathFlags, Renderer, picture};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,6 +53,11 @@ struct Args {
     /// Samples per pixel of the color: 1 or 4
     #[arg(long, default_value_t = 4)]
     msaa: u8,
+    /// How the image is drawn
+    #[arg(long, value_enum, default_value_t = Renderer::Auto)]
+    renderer: Renderer,
+    #[command(flatten)]
+    paths: PathFlags,
     /// Geom groups that are drawn, as in MuJoCo's viewers
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
     groups: Vec<u8>,
@@ -92,6 +97,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
+    let renderer = args.renderer.of_cameras(args.paths)?;
     let still = load(args)?;
     for left_out in still.visible().left_out() {
         eprintln!("warning: {left_out}");
@@ -109,6 +115,7 @@ fn run(args: &Args) -> launcher::Result {
         None => std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get),
     };
     let mut rasterizer = ParallelRasterizer::new(cfg, threads);
+    rasterizer.set_renderer(renderer);
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
     let seconds = Duration::try_from_secs_f64(args.bench.unwrap_or(0.0)).map_err(|e| format!("--bench: {e}"))?;
@@ -139,13 +146,14 @@ fn run(args: &Args) -> launcher::Result {
             "id": id.id, "object": id.object, "link": id.link, "class": id.class, "body": id.body, "geoms": id.geoms,
         })).collect::<Vec<_>>(),
         "triangles": still.visible().scene().triangle_count(),
+        "renderer": renderer,
         "images_per_second": rate,
         "threads": threads,
     });
     let path = args.out.join("meta.json");
     std::fs::write(&path, serde_json::to_string_pretty(&meta)? + "\n")
         .map_err(|e| format!("{}: {e}", path.display()))?;
-    println!("{images} images, {rate:.1} per second; written to {}", args.out.display());
+    println!("{images} images, {rate:.3} per second; written to {}", args.out.display());
     Ok(())
 }
 

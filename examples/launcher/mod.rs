@@ -78,12 +78,49 @@ pub(crate) enum Renderer {
     Auto,
     /// Rasterizer
     Raster,
-    /// Rasterizer with traced shadows
+    /// Rasterizer with shadows by rays
     Hybrid,
-    /// Ray tracer, few samples
+    /// What is seen by rays, light and shadows as the rasterizer has them
     FastRt,
-    /// Ray tracer
+    /// Path tracing
     Rt,
+}
+
+/// Flags of path tracing, for examples that draw with it.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct PathFlags {
+    /// Ray tracing: paths per pixel
+    #[arg(long, alias = "rt_samples", value_name = "PATHS", default_value_t = 64)]
+    pub(crate) rt_samples: u32,
+    /// Ray tracing: surfaces that light goes over after the one that is seen, at most
+    #[arg(long, alias = "rt_bounces", value_name = "BOUNCES", default_value_t = 4)]
+    pub(crate) rt_bounces: u32,
+    /// Ray tracing: leave the noise as it is
+    #[arg(long, alias = "rt_noisy")]
+    pub(crate) rt_noisy: bool,
+}
+
+impl Renderer {
+    /// What cameras call it.
+    ///
+    /// # Errors
+    /// Numbers of paths or bounces that are not possible.
+    pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::sensors::camera::Renderer> {
+        use kinetoscope::sensors::camera::Renderer as Known;
+        let renderer = match self {
+            Self::Auto | Self::Raster => Known::Raster,
+            Self::Hybrid => Known::Hybrid,
+            Self::FastRt => Known::FastRayTraced,
+            Self::Rt => Known::RayTraced {
+                samples: flags.rt_samples,
+                max_bounces: flags.rt_bounces,
+                denoise: !flags.rt_noisy,
+                seed: 0,
+            },
+        };
+        renderer.validate()?;
+        Ok(renderer)
+    }
 }
 
 impl Launcher {

@@ -14,7 +14,7 @@ pub enum LightKind {
         /// How fast the light falls off from the axis: cos(angle) to this power.
         exponent: f32,
     },
-    /// The same in all directions; casts no shadow.
+    /// The same in all directions; the rasterizer draws no shadow of it.
     Point,
 }
 
@@ -35,6 +35,9 @@ pub struct Light {
     pub specular: [f32; 3],
     /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Not for directional lights.
     pub attenuation: [f32; 3],
+    /// How large it is, for soft shadows in ray-traced pictures: the radius of its disc \[m\]; of a directional lamp, at a
+    /// distance of 1 m (the tangent of its angular radius). 0 is a point, whose shadows are sharp.
+    pub radius: f32,
     /// Whether things in the light cast a shadow.
     pub cast_shadow: bool,
     /// Whether it is on.
@@ -52,6 +55,7 @@ impl Default for Light {
             diffuse: [0.7; 3],
             specular: [0.3; 3],
             attenuation: [1., 0., 0.],
+            radius: 0.0,
             cast_shadow: true,
             active: true,
         }

@@ -35,28 +35,22 @@ impl Threads for ScopedThreads {
     }
 }
 
-/// The threads that some sensors have in common; clones are the same threads.
-#[derive(Clone, Debug)]
-pub struct Crew(Arc<dyn Threads>);
-
-/// [`ScopedThreads`].
-impl Default for Crew {
-    fn default() -> Self {
-        Self::new(Arc::new(ScopedThreads))
-    }
-}
+/// The threads that some sensors have in common; clones are the same threads. By default [`ScopedThreads`].
+#[derive(Clone, Debug, Default)]
+pub struct Crew(Option<Arc<dyn Threads>>);
 
 impl Crew {
     /// Work is done on `threads`.
     pub fn new(threads: Arc<dyn Threads>) -> Self {
-        Self(threads)
+        Self(Some(threads))
     }
 
     /// Calls `work` at up to `desks` desks at the same time: see [`Threads::run`].
     pub(crate) fn run(&self, desks: usize, work: impl Fn(usize) + Sync) {
-        match desks {
-            0 | 1 => work(0),
-            _ => self.0.run(desks, &work),
+        match &self.0 {
+            _ if desks < 2 => work(0),
+            Some(threads) => threads.run(desks, &work),
+            None => ScopedThreads.run(desks, &work),
         }
     }
 

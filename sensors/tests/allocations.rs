@@ -3,7 +3,7 @@
 use scene::mesh::TriMesh;
 use scene::shape::{Capsule, Mesh, Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
+use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
 use sensors::visibility::View;
 use sensors::{Crew, ScopedThreads, Threads};
 use std::sync::Arc;
@@ -61,6 +61,22 @@ fn frames_allocate_nothing_and_scratch_memory_is_three_pictures_at_most() {
                 "{size:?}, {samples} samples, shadows {shadows}: {scratch} > 3 x {picture}"
             );
         }
+    }
+}
+
+#[test]
+fn pictures_by_rays_allocate_nothing() {
+    let (scene, poses) = scene();
+    let view = view([96, 64]);
+    let paths = Renderer::RayTraced { samples: 2, max_bounces: 2, denoise: true, seed: 0 };
+    for renderer in [Renderer::Hybrid, Renderer::FastRayTraced, paths] {
+        let mut frame = Frame::new(view.width, view.height, FOUR);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.renderer = renderer;
+        let mut draw = || rasterizer.render(&scene, &poses, &view, &mut frame).expect("a good frame");
+        draw();
+        let allocations = allocation_counter::measure(|| (0..2).for_each(|_| draw())).count_total;
+        assert_eq!(allocations, 0, "{renderer:?}");
     }
 }
 

@@ -8,4 +8,5 @@ mod objects;
 mod overview;
 mod placement;
 mod rays;
+mod renderers;
 mod schedule;

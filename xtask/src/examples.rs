@@ -56,7 +56,14 @@ const TABLE: &[Run] = &[
     ),
     run_of("create_sensor", &[2], "--headless --steps 1 --attach-sensor --attach-link no_such_link --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --width 0 --out {out}/none"),
-    run_of("create_sensor", &[2], "--headless --steps 1 --enable-rt --out {out}/none"),
+    run_of(
+        "create_sensor",
+        &[0],
+        "--headless --steps 1 --enable-rt --rt-samples 4 --rt-bounces 2 --width 160 --height 120 --out {out}/paths",
+    ),
+    run_of("create_sensor", &[0], "--headless --steps 1 --renderer hybrid --width 160 --height 120 --out {out}/hybrid"),
+    run_of("create_sensor", &[2], "--headless --steps 1 --renderer rt --rt-samples 0 --out {out}/none"),
+    run_of("create_sensor", &[2], "--headless --steps 1 --renderer raster --enable-rt --out {out}/none"),
     run_of(
         "add_sensors_on_robot",
         &[0],

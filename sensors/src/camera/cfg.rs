@@ -5,6 +5,7 @@ use super::error::CameraError;
 use super::extrinsics::Extrinsics;
 use super::intrinsics::Intrinsics;
 use super::rasterizer::RasterCfg;
+use super::renderer::Renderer;
 use super::sensor::{Camera, Lens};
 use crate::error::SensorError;
 use crate::schedule::Schedule;
@@ -71,6 +72,8 @@ pub struct CameraCfg {
     pub channels: Channels,
     /// What depth and distance say where nothing is hit.
     pub depth_miss: DepthMiss,
+    /// Which renderer draws pictures.
+    pub renderer: Renderer,
     /// How pictures are drawn.
     pub raster: RasterCfg,
     /// The environments that it looks into, in this order; `None` is all of them.
@@ -98,6 +101,7 @@ impl Default for CameraCfg {
             round_period: false,
             channels: Channels { color: true, ..Channels::default() },
             depth_miss: DepthMiss::Inf,
+            renderer: Renderer::default(),
             raster: RasterCfg::of_cameras(),
             env_ids: None,
             lazy: true,
@@ -132,6 +136,7 @@ impl SensorCfg for CameraCfg {
         if !matches!(self.raster.samples, 1 | 4) {
             return Err(CameraError::View(RenderError::Samples { samples: self.raster.samples }).into());
         }
+        self.renderer.validate().map_err(CameraError::View)?;
         let lens = Lens::new(self)?;
         let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;

@@ -4,6 +4,7 @@ pub mod cfg;
 pub mod channel;
 pub mod colormap;
 pub mod error;
+mod exposure;
 pub mod extrinsics;
 pub(crate) mod frustum;
 pub mod intrinsics;
@@ -11,6 +12,7 @@ pub(crate) mod mounts;
 pub mod parallel;
 pub mod point_cloud;
 pub mod rasterizer;
+pub mod renderer;
 pub mod sensor;
 
 #[cfg(test)]
@@ -24,4 +26,5 @@ pub use intrinsics::{Intrinsics, PixelIntrinsics};
 pub use parallel::ParallelRasterizer;
 pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
+pub use renderer::Renderer;
 pub use sensor::Camera;

@@ -1,8 +1,11 @@
 //! Draws many frames on several threads.
 
 use super::channel::FrameMut;
+use super::exposure::expose;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
+use super::renderer::Renderer;
 use crate::crew::Crew;
+use crate::ray::RayAssets;
 use crate::resolve::plan::{Plan, estimate};
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
@@ -53,6 +56,20 @@ impl ParallelRasterizer {
         }
     }
 
+    /// Which renderer draws frames.
+    pub fn set_renderer(&mut self, renderer: Renderer) {
+        for rasterizer in &mut self.rasterizers {
+            rasterizer.renderer = renderer;
+        }
+    }
+
+    /// Takes trees over meshes from there, and keeps new ones there.
+    pub(crate) fn share_assets(&mut self, assets: &RayAssets) {
+        for rasterizer in &mut self.rasterizers {
+            rasterizer.assets = assets.clone();
+        }
+    }
+
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
         let own: usize = self.rasterizers.iter().map(Rasterizer::scratch_bytes).sum();
@@ -66,11 +83,18 @@ impl ParallelRasterizer {
     /// Of the first shot that cannot be drawn, with its index; the others are drawn nevertheless.
     pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
         let Self { rasterizers, plans, crew } = self;
-        let Some(cfg) = rasterizers.first().map(|r| r.cfg) else { return Ok(()) };
+        let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
         let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
+        let cost = cost.saturating_mul(renderer.slowness());
         let threads = rasterizers.len().min(cost / (WORTH_A_THREAD / 2)).max(1);
         let rasterizers = &mut rasterizers[..threads];
         let failure = Failure::default();
+        if renderer.follows_paths() {
+            for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
+                failure.note(index, expose(crew, rasterizers, shot, frame));
+            }
+            return failure.first();
+        }
         let count = jobs.len();
         let together = match threads {
             1 => 0,
@@ -90,7 +114,7 @@ impl ParallelRasterizer {
                 failure.note(first + index, result);
             });
         }
-        failure.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+        failure.first()
     }
 }
 
@@ -99,6 +123,10 @@ impl ParallelRasterizer {
 struct Failure(Mutex<Option<(usize, RenderError)>>);
 
 impl Failure {
+    fn first(self) -> Result<(), (usize, RenderError)> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+
     fn note(&self, index: usize, result: Result<(), RenderError>) {
         if let Err(error) = result {
             let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -119,7 +147,7 @@ fn draw_together(
 ) {
     let parts = (PARTS * rasterizers.len()).div_ceil(jobs.len());
     crew.share(rasterizers, plans.iter_mut().zip(&*jobs).enumerate(), |rasterizer, (index, (plan, (shot, frame)))| {
-        note(index, plan.prepare(rasterizer.cfg, shot, frame));
+        note(index, plan.prepare(rasterizer.style(), shot, frame));
     });
     if plans.iter().any(Plan::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);

@@ -1,9 +1,14 @@
 //! Draws frames.
 
 use super::channel::{Frame, FrameMut};
+use super::exposure::expose;
+use super::renderer::Renderer;
+use crate::crew::Crew;
 use crate::lanes::Level;
+use crate::ray::RayAssets;
 use crate::resolve::band::Brush;
-use crate::resolve::plan::Plan;
+use crate::resolve::path::film::Film;
+use crate::resolve::plan::{Plan, Style};
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::{RenderError, View};
 use scene::{Light, PoseF32, RenderScene};
@@ -79,9 +84,14 @@ pub struct Shot<'a> {
 pub struct Rasterizer {
     /// How frames are drawn.
     pub cfg: RasterCfg,
+    /// Which renderer draws them.
+    pub renderer: Renderer,
+    pub(super) assets: RayAssets,
     pub(super) level: Level,
-    plan: Plan,
+    pub(super) plan: Plan,
     pub(super) brush: Brush,
+    /// Of pictures by path tracing.
+    pub(super) film: Film,
 }
 
 impl Default for Rasterizer {
@@ -97,7 +107,20 @@ impl Rasterizer {
     }
 
     pub(crate) fn with_level(cfg: RasterCfg, level: Level) -> Self {
-        Self { cfg, level, plan: Plan::default(), brush: Brush::default() }
+        Self {
+            cfg,
+            renderer: Renderer::default(),
+            assets: RayAssets::default(),
+            level,
+            plan: Plan::default(),
+            brush: Brush::default(),
+            film: Film::default(),
+        }
+    }
+
+    /// How shots are drawn.
+    pub(super) fn style(&self) -> Style<'_> {
+        Style { cfg: self.cfg, renderer: self.renderer, assets: &self.assets }
     }
 
     /// The instruction set in use.
@@ -107,7 +130,7 @@ impl Rasterizer {
 
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
-        self.plan.bytes() + self.brush.bytes()
+        self.plan.bytes() + self.brush.bytes() + self.film.bytes()
     }
 
     /// Draws the channels that `frame` has.
@@ -131,8 +154,11 @@ impl Rasterizer {
     ///
     /// A view, a pose or a buffer that is no good; nothing is drawn then.
     pub fn render_shot(&mut self, shot: &Shot<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
-        let Self { cfg, level, plan, brush } = self;
-        plan.prepare(*cfg, shot, frame)?;
+        if self.renderer.follows_paths() {
+            return expose(&Crew::default(), std::slice::from_mut(self), shot, frame);
+        }
+        let Self { cfg, renderer, assets, level, plan, brush, .. } = self;
+        plan.prepare(Style { cfg: *cfg, renderer: *renderer, assets }, shot, frame)?;
         for band in plan.shadow_bands() {
             brush.shadow(*level, shot.scene, band);
         }

@@ -190,7 +190,9 @@ impl Camera {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
-        let rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
+        let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
+        rasterizer.set_renderer(cfg.renderer);
+        rasterizer.share_assets(&context.ray_assets);
         let canvas = Some(Canvas::new(pictures, rows));
         Self {
             lens,

@@ -13,7 +13,7 @@ pub struct RayAssets(Arc<Mutex<Assets>>);
 
 impl RayAssets {
     /// Does something with the assets; one after the other.
-    pub(super) fn with<R>(&self, f: impl FnOnce(&mut Assets) -> R) -> R {
+    pub(crate) fn with<R>(&self, f: impl FnOnce(&mut Assets) -> R) -> R {
         f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -29,7 +29,7 @@ pub(crate) struct Assets {
 }
 
 impl Assets {
-    pub(super) fn mesh(&mut self, mesh: &Arc<RenderMesh>) -> Arc<MeshTree> {
+    pub(crate) fn mesh(&mut self, mesh: &Arc<RenderMesh>) -> Arc<MeshTree> {
         find(&mut self.meshes, mesh, || MeshTree::new(mesh))
     }
 

@@ -10,14 +10,14 @@
 //! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
 
 mod assets;
-mod bvh;
+pub(crate) mod bvh;
 pub mod camera;
 pub mod caster;
 mod error;
-mod packet;
+pub(crate) mod packet;
 pub mod pattern;
-mod shape;
-mod triangle;
+pub(crate) mod shape;
+pub(crate) mod triangle;
 pub(crate) mod vector;
 mod world;
 

@@ -23,7 +23,7 @@ impl Packet {
     /// The first rays of a list that hit things up to `max_distance`. A ray with a number that is not finite is none; its lane
     /// and those at the end look like one of the others.
     #[inline(always)]
-    pub(super) fn of(rays: &[Ray], max_distance: f64) -> Self {
+    pub(crate) fn of(rays: &[Ray], max_distance: f64) -> Self {
         let like = rays.iter().find(|ray| ray.is_finite()).copied();
         let like = like.unwrap_or(Ray { origin: [0.0; 3], direction: [0.0; 3] });
         let mut packet = Self { origin: [[0.0; WIDTH]; 3], direction: [[0.0; WIDTH]; 3], limit: [-1.0; WIDTH] };

@@ -8,10 +8,12 @@ use super::tone::encode;
 use crate::camera::channel::{FrameMut, PixelGroup, Stage};
 use crate::camera::rasterizer::Shot;
 use crate::lanes::{LANES, Level, Simd, at_level, first, load, splat_i};
+use crate::ray::bvh::Stack;
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{BLOCK, Tile};
-use crate::visibility::raster::{Layer, Painter};
+use crate::visibility::raster::{Item, Layer, Painter};
 use scene::RenderScene;
+use std::cell::RefCell;
 use std::ops::Range;
 
 /// What a thread needs to draw; keeps its memory.
@@ -21,6 +23,9 @@ pub(crate) struct Brush {
     layer: Tile,
     veiled: Tile,
     painter: Painter,
+    /// Of rays that are cast for a picture, and of those that are cast while it is shaded.
+    stack: Stack,
+    shade_stack: RefCell<Stack>,
     colors: Vec<Colors>,
     edges: Edges,
 }
@@ -33,6 +38,13 @@ impl Brush {
             + size_of::<Painter>()
             + self.colors.capacity() * size_of::<Colors>()
             + self.edges.bytes()
+            + self.stack.bytes()
+            + self.shade_stack.borrow().bytes()
+    }
+
+    /// Scratch memory of rays.
+    pub(crate) fn stack(&mut self) -> &mut Stack {
+        &mut self.stack
     }
 
     /// Draws a part of a shadow map.
@@ -79,19 +91,26 @@ impl Brush {
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, veiled, painter, colors, edges } = self;
+        let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges } = self;
         let list = &plan.list;
+        let mut draw = |tile: &mut Tile, item: &Item| {
+            if plan.renderer.sees_by_rays() {
+                plan.tracer.draw(s, stack, tile, projection, (&list.placed, shot.scene.first_ids()), item);
+            } else {
+                painter.draw(s, tile, projection, shot.scene, &list.placed, item);
+            }
+        };
         for item in &list.opaque {
-            painter.draw(s, tile, projection, shot.scene, &list.placed, item);
+            draw(tile, item);
         }
         tile.settle();
         let wants_detail = frame.wants(Stage::Detail);
-        let context = plan.context(shot, projection, wants_detail);
+        let context = plan.context(shot, projection, shade_stack, wants_detail);
         let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
         if veils {
             veiled.copy(tile);
             for (_, item) in list.blended.iter().filter(|(layer, _)| *layer == Layer::Veil) {
-                painter.draw(s, veiled, projection, shot.scene, &list.placed, item);
+                draw(veiled, item);
             }
         }
         let size = [projection.width, projection.height];
@@ -136,7 +155,7 @@ impl Brush {
         for items in list.blended.chunk_by(|(_, a), (_, b)| a.instance == b.instance) {
             layer.behind(tile);
             for (_, item) in items {
-                painter.draw(s, layer, projection, shot.scene, &list.placed, item);
+                draw(layer, item);
             }
             let Some((_, item)) = items.first() else { continue };
             let alpha = shot.scene.instances()[item.instance as usize].material.rgba[3];

@@ -2,6 +2,7 @@
 
 use super::shade::{Lighting, shade, sky};
 use super::shadow::ShadowMap;
+use super::shadow_rays::ShadowRays;
 use super::surface::{Source, surface};
 use crate::camera::channel::PixelGroup;
 use crate::lanes::{
@@ -21,6 +22,8 @@ pub(crate) struct Context<'a> {
     pub(crate) placed: &'a [Placed],
     pub(crate) lighting: &'a Lighting,
     pub(crate) shadows: &'a [ShadowMap],
+    /// Instead of maps.
+    pub(crate) shadow_rays: Option<ShadowRays<'a>>,
     /// Width of a pixel at depth 1.
     pub(crate) pixel: f32,
     /// Whether channels of [`Stage::Detail`](crate::camera::channel::Stage::Detail) are wanted.
@@ -137,7 +140,8 @@ fn resolve_lanes<S: Simd>(
             }
         }
         if colors.is_some() {
-            let Context { scene, lighting, shadows, pixel, .. } = *context;
+            let Context { scene, lighting, pixel, .. } = *context;
+            let shadows = (context.shadows, context.shadow_rays);
             let distance = at.depth * length;
             let seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, pixel, here);
             color = V3::select(here, seen, color);

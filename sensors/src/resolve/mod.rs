@@ -5,9 +5,11 @@
 pub(crate) mod band;
 pub(crate) mod group;
 pub(crate) mod multisample;
+pub(crate) mod path;
 pub(crate) mod plan;
 pub(crate) mod shade;
 pub(crate) mod shadow;
+pub(crate) mod shadow_rays;
 pub(crate) mod surface;
 pub(crate) mod texture;
 pub(crate) mod tone;

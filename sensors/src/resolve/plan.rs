@@ -3,13 +3,18 @@
 use super::group::Context;
 use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
-use crate::camera::RasterCfg;
+use super::shadow_rays::ShadowRays;
 use crate::camera::channel::{FrameMut, Stage};
 use crate::camera::rasterizer::Shot;
+use crate::camera::{RasterCfg, Renderer};
+use crate::ray::RayAssets;
+use crate::ray::bvh::Stack;
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
-use crate::visibility::raster::{DrawList, Layer, level};
+use crate::visibility::raster::{DrawList, Layer, Parts, level};
+use crate::visibility::trace::Tracer;
 use crate::visibility::{Projection, RenderError, View};
 use scene::{Instance, PoseF32};
+use std::cell::RefCell;
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
 pub(crate) const BAND: usize = 128 * 1024;
@@ -28,15 +33,35 @@ pub(crate) struct Plan {
     pub(crate) planes: usize,
     /// The picture, while there is one.
     pub(crate) projection: Option<Projection>,
+    /// What rays meet, where some are cast.
+    pub(crate) tracer: Tracer,
+    pub(crate) renderer: Renderer,
+    /// Whether shadows are cast by rays.
+    shadow_rays: bool,
+}
+
+/// How shots are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Style<'a> {
+    pub(crate) cfg: RasterCfg,
+    pub(crate) renderer: Renderer,
+    /// Where trees over meshes are kept.
+    pub(crate) assets: &'a RayAssets,
 }
 
 impl Plan {
     pub(crate) fn bytes(&self) -> usize {
-        self.list.bytes() + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
+        self.list.bytes() + self.tracer.bytes() + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
     }
 
     /// Checks a shot and finds what is drawn where. Shadows are not drawn yet, see [`Plan::shadow_bands`].
-    pub(crate) fn prepare(&mut self, cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> Result<(), RenderError> {
+    pub(crate) fn prepare(
+        &mut self,
+        style: Style<'_>,
+        shot: &Shot<'_>,
+        frame: &FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let Style { cfg, renderer, assets } = style;
         self.projection = None;
         self.maps = 0;
         let Shot { scene, poses, view, .. } = *shot;
@@ -44,6 +69,7 @@ impl Plan {
         if !matches!(cfg.samples, 1 | 4) {
             return Err(RenderError::Samples { samples: cfg.samples });
         }
+        renderer.validate()?;
         if poses.len() != scene.instances().len() {
             return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
         }
@@ -53,11 +79,26 @@ impl Plan {
         frame.validate(view.width * view.height)?;
         let projection = Projection::from(view);
         let wants_color = frame.wants(Stage::Color);
-        if wants_color {
-            self.light(cfg, shot);
+        self.shadow_rays = wants_color && cfg.shadows && renderer == Renderer::Hybrid;
+        if wants_color && !renderer.follows_paths() {
+            self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
         }
-        self.planes = if wants_color && cfg.samples == 4 { SAMPLES.len() } else { 1 };
-        self.list.build(&projection, scene, poses, cfg.lod, |instance| Layer::of(instance, cfg.groups));
+        let multisampled = wants_color && cfg.samples == 4 && !renderer.follows_paths();
+        self.planes = if multisampled { SAMPLES.len() } else { 1 };
+        let parts = match renderer {
+            Renderer::Raster if cfg.lod => Parts::Levels,
+            Renderer::Raster | Renderer::Hybrid => Parts::Clusters,
+            Renderer::FastRayTraced | Renderer::RayTraced { .. } => Parts::Whole,
+        };
+        let keep = |instance: &Instance| Layer::of(instance, cfg.groups);
+        self.list.build(&projection, scene, poses, parts, keep);
+        if renderer.sees_by_rays() || self.shadow_rays {
+            self.tracer.find_bodies(scene, assets, keep);
+        }
+        if self.shadow_rays || wants_color && renderer.follows_paths() {
+            self.tracer.place(scene, poses);
+        }
+        self.renderer = renderer;
         self.projection = Some(projection);
         Ok(())
     }
@@ -111,8 +152,15 @@ impl Plan {
     }
 
     /// What all pixels need; `detail` says whether channels of that stage are wanted.
-    pub(crate) fn context<'a>(&'a self, shot: &Shot<'a>, projection: &'a Projection, detail: bool) -> Context<'a> {
+    pub(crate) fn context<'a>(
+        &'a self,
+        shot: &Shot<'a>,
+        projection: &'a Projection,
+        stack: &'a RefCell<Stack>,
+        detail: bool,
+    ) -> Context<'a> {
         Context {
+            shadow_rays: self.shadow_rays.then_some(ShadowRays { tracer: &self.tracer, stack }),
             projection,
             scene: shot.scene,
             poses: shot.poses,

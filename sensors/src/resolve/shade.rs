@@ -1,6 +1,7 @@
 //! How much light of which colour a surface sends to the camera.
 
 use super::shadow::ShadowMap;
+use super::shadow_rays::ShadowRays;
 use super::surface::{Source, Surface};
 use super::{texture, tone};
 use crate::lanes::{F, M, Simd, V3, abs, max, min, root, select, splat};
@@ -36,7 +37,7 @@ pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
 }
 
 /// The cosine of an angle in degrees, by its series: `cos()` is not the same on every machine.
-fn cos_deg(deg: f32) -> f32 {
+pub(crate) fn cos_deg(deg: f32) -> f32 {
     let x = f64::from(deg.clamp(0.0, 180.0)) * (std::f64::consts::PI / 180.0);
     let (mut sum, mut term) = (1.0f64, 1.0f64);
     for k in 1..16 {
@@ -194,7 +195,7 @@ pub(crate) fn shade<S: Simd>(
     s: S,
     scene: &RenderScene,
     lighting: &Lighting,
-    shadows: &[ShadowMap],
+    (shadows, shadow_rays): (&[ShadowMap], Option<ShadowRays<'_>>),
     source: &Source<'_>,
     at: &Surface<S>,
     view: V3<S>,
@@ -236,6 +237,13 @@ pub(crate) fn shade<S: Simd>(
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
                 lit = lit * map.light(s, at.position, at.normal, source.placed.error, matters);
+            }
+        }
+        if let Some(rays) = shadow_rays.filter(|_| light.cast_shadow) {
+            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+            if matters.any_true() {
+                let from = (at.position, at.normal, at.depth);
+                lit = lit * rays.light(s, light, lamp.along.map(|x| -x), from, matters);
             }
         }
         for (k, diffuse) in diffuse.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use crate::lanes::{F, Level};
 use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{AREA, BLOCK, Tile};
-use crate::visibility::raster::{DrawList, Layer, Painter};
+use crate::visibility::raster::{DrawList, Layer, Painter, Parts};
 use scene::{Instance, Light, LightKind, PoseF32, RenderScene};
 
 /// Depths from a lamp.
@@ -122,7 +122,8 @@ impl ShadowMap {
         self.texel = 1.0 / projection.fx;
         self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
-        self.list.build(&projection, scene, poses, cfg.lod, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
+        self.list.build(&projection, scene, poses, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
         // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
         self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));

@@ -3,6 +3,7 @@
 pub(crate) mod primitive;
 mod projection;
 pub mod raster;
+pub(crate) mod trace;
 pub mod view;
 
 pub(crate) use projection::Projection;
@@ -77,6 +78,22 @@ pub enum RenderError {
     /// The eye is where the target is.
     #[error("the eye and the target of a view are the same point, or not finite")]
     LookAt,
+    /// Paths per pixel that a ray tracer cannot have.
+    #[error("{samples} paths per pixel; 1 to {limit} are possible")]
+    Paths {
+        /// The number.
+        samples: u32,
+        /// The most that is possible.
+        limit: u32,
+    },
+    /// Bounces that a ray tracer cannot have.
+    #[error("{max_bounces} bounces; 0 to {limit} are possible")]
+    Bounces {
+        /// The number.
+        max_bounces: u32,
+        /// The most that is possible.
+        limit: u32,
+    },
     /// A number of samples that is not offered.
     #[error("{samples} samples per pixel; 1 and 4 are possible")]
     Samples {

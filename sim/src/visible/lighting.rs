@@ -25,6 +25,7 @@ pub(super) fn light(model: &Model, scene: &mut RenderScene) {
                 diffuse: linear(light.diffuse),
                 specular: linear(light.specular),
                 attenuation: light.attenuation,
+                radius: 0.0,
                 cast_shadow: light.cast_shadow,
                 // An image around everything is no lamp.
                 active: light.active && light.kind != LightType::Image,

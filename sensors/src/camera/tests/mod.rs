@@ -14,4 +14,5 @@ mod sensor;
 mod sensor_mistakes;
 mod sensor_values;
 mod stage;
+mod traced;
 mod watertight;

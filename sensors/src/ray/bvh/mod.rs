@@ -46,6 +46,12 @@ struct Node {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stack(Vec<Entry>);
 
+impl Stack {
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<Entry>()
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     /// The ray is not in it before.

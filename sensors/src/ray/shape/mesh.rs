@@ -9,8 +9,8 @@ use crate::ray::packet::{Packet, WIDTH};
 use crate::ray::triangle::{Shear, ShearPacket, Triangle, normal};
 use crate::ray::vector::{V3, to_f64};
 use crate::ray::{Assets, Ray};
-use scene::RenderMesh;
 use columns::Columns;
+use scene::RenderMesh;
 use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
@@ -28,6 +28,8 @@ pub(crate) struct Mesh {
 pub(crate) struct MeshTree {
     bvh: Bvh,
     triangles: Vec<Triangle>,
+    /// Which triangle of the mesh each of them is.
+    numbers: Vec<u32>,
     bounds: [V3; 2],
     /// Along each axis, made when the first steep rays come; none for some meshes.
     columns: [OnceLock<Option<Columns>>; 3],
@@ -37,11 +39,16 @@ impl MeshTree {
     pub(crate) fn new(mesh: &RenderMesh) -> Self {
         let corners = |t: &[u32; 3]| t.map(|i| mesh.positions()[i as usize]);
         let whole = |t: &Triangle| t.iter().flatten().all(|x| x.is_finite()) && normal(t).is_some();
-        Self::of_triangles(mesh.triangles().iter().map(corners).filter(whole).collect())
+        Self::of_numbered((0..).zip(mesh.triangles().iter().map(corners)).filter(|(_, t)| whole(t)).unzip())
     }
 
     /// Of triangles that have an area.
+    #[cfg(test)]
     pub(crate) fn of_triangles(triangles: Vec<Triangle>) -> Self {
+        Self::of_numbered((0..).zip(triangles).unzip())
+    }
+
+    fn of_numbered((numbers, triangles): (Vec<u32>, Vec<Triangle>)) -> Self {
         let bounds = |t: &Triangle| {
             let of = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|k| pick(pick(t[0][k], t[1][k]), t[2][k]));
             [of(f32::min), of(f32::max)]
@@ -49,12 +56,13 @@ impl MeshTree {
         let boxes: Vec<_> = triangles.iter().map(bounds).collect();
         let (bvh, order) = Bvh::build(&boxes);
         let triangles: Vec<Triangle> = order.iter().map(|&i| triangles[i as usize]).collect();
+        let numbers = order.iter().map(|&i| numbers[i as usize]).collect();
         let first = boxes.first().map_or([[0.0; 3]; 2], |b| b.map(to_f64));
         let bounds = boxes.iter().fold(first, |all, b| {
             let (lo, hi) = (to_f64(b[0]), to_f64(b[1]));
             [[0, 1, 2].map(|k| all[0][k].min(lo[k])), [0, 1, 2].map(|k| all[1][k].max(hi[k]))]
         });
-        Self { bvh, triangles, bounds, columns: Default::default() }
+        Self { bvh, triangles, numbers, bounds, columns: Default::default() }
     }
 }
 
@@ -85,9 +93,45 @@ impl MeshTree {
         self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds, axes)).as_ref()
     }
 
-    /// The nearest triangle up to `limit`, or one that was found before.
+    /// The number that a triangle, given by its place in the tree, has in the mesh.
     #[inline(always)]
-    fn nearest(&self, ray: &Ray, limit: f64, found: Option<(f64, usize)>, stack: &mut Stack) -> Option<(f64, usize)> {
+    pub(crate) fn number(&self, index: usize) -> u32 {
+        self.numbers[index]
+    }
+
+    /// Unit normal of a triangle, given by its place in the tree: counter-clockwise corners seen from its tip.
+    #[inline(always)]
+    pub(crate) fn normal(&self, index: usize) -> Option<V3> {
+        normal(&self.triangles[index])
+    }
+
+    /// Smallest and largest coordinates.
+    pub(crate) fn bounds(&self) -> [V3; 2] {
+        self.bounds
+    }
+
+    /// Whether some triangle is met at a distance from 0 to `limit`.
+    #[inline(always)]
+    pub(crate) fn blocks(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> bool {
+        let shear = Shear::new(ray);
+        let mut blocked = false;
+        self.bvh.walk(ray, limit, stack, |leaf, limit| {
+            blocked |= self.triangles[leaf].iter().any(|t| shear.distance(t).is_some_and(|t| t >= 0.0 && t <= limit));
+            // Nothing is nearer than this: the walk ends.
+            if blocked { -1.0 } else { limit }
+        });
+        blocked
+    }
+
+    /// The nearest triangle up to `limit`, or one that was found before: how far away, and its place in the tree.
+    #[inline(always)]
+    pub(crate) fn nearest(
+        &self,
+        ray: &Ray,
+        limit: f64,
+        found: Option<(f64, usize)>,
+        stack: &mut Stack,
+    ) -> Option<(f64, usize)> {
         let shear = Shear::new(ray);
         let mut best = found;
         self.bvh.walk(ray, limit, stack, |leaf, mut limit| {
@@ -103,6 +147,58 @@ impl MeshTree {
             limit
         });
         best
+    }
+
+    /// [`nearest`](Self::nearest) for every ray of a packet, up to its limit, to the bit; `shear` is that of the rays, if they
+    /// have one. One walk for all of them where they run side by side. Only lanes with a ray are written.
+    #[inline(always)]
+    pub(crate) fn nearest_of_packet<S: Simd>(
+        &self,
+        s: S,
+        packet: &Packet,
+        shear: Option<&ShearPacket<S>>,
+        stack: &mut Stack,
+        found: &mut [Option<(f64, usize)>; WIDTH],
+    ) {
+        let beam = shear.and_then(
+            #[inline(always)]
+            |shear| Some((shear, Beam::around(s, packet, shear, &self.bvh)?)),
+        );
+        let narrow = beam.filter(|(_, beam)| beam.share() * self.triangles.len() as f64 <= BUDGET as f64);
+        let Some((shear, beam)) = narrow else {
+            for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                found[k] = self.nearest(&packet.ray(k), packet.limit(k), None, stack);
+            }
+            return;
+        };
+        let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
+        // Of the best triangle, as a number that has all of them; +inf where there is none.
+        let mut best = D::splat(s, f64::INFINITY);
+        let walked = self.bvh.walk_beam(
+            &beam,
+            limit,
+            BUDGET,
+            stack,
+            #[inline(always)]
+            |leaf| {
+                let mut nearer = 0;
+                for (index, triangle) in leaf.clone().zip(&self.triangles[leaf]) {
+                    let Some((t, inside)) = shear.distances(triangle) else { continue };
+                    let index = D::splat(s, index as f64);
+                    let better = inside & zero.le(t) & t.le(limit) & (t.lt(limit) | index.lt(best));
+                    (limit, best) = (better.select(t, limit), better.select(index, best));
+                    nearer |= better.to_bitmask();
+                }
+                if nearer != 0 { Some(limit) } else { None }
+            },
+        );
+        let (limit, best) = (limit.array(), best.array());
+        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+            found[k] = (best[k] < f64::INFINITY).then(|| (limit[k], best[k] as usize));
+            if walked == Walked::Part {
+                found[k] = self.nearest(&packet.ray(k), limit[k], found[k], stack);
+            }
+        }
     }
 
     #[inline(always)]
@@ -130,40 +226,10 @@ impl RayShape for Mesh {
         {
             return;
         }
-        let Some(beam) = Beam::around(s, packet, &shear, &tree.bvh) else {
-            return touch_each(self, packet, stack, touches);
-        };
-        if beam.share() * tree.triangles.len() as f64 > BUDGET as f64 {
-            return touch_each(self, packet, stack, touches);
-        }
-        let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
-        // Of the best triangle, as a number that has all of them; +inf where there is none.
-        let mut best = D::splat(s, f64::INFINITY);
-        let walked = tree.bvh.walk_beam(
-            &beam,
-            limit,
-            BUDGET,
-            stack,
-            #[inline(always)]
-            |leaf| {
-                let mut nearer = 0;
-                for (index, triangle) in leaf.clone().zip(&tree.triangles[leaf]) {
-                    let Some((t, inside)) = shear.distances(triangle) else { continue };
-                    let index = D::splat(s, index as f64);
-                    let better = inside & zero.le(t) & t.le(limit) & (t.lt(limit) | index.lt(best));
-                    (limit, best) = (better.select(t, limit), better.select(index, best));
-                    nearer |= better.to_bitmask();
-                }
-                if nearer != 0 { Some(limit) } else { None }
-            },
-        );
-        let (limit, best) = (limit.array(), best.array());
+        let mut found = [None; WIDTH];
+        tree.nearest_of_packet(s, packet, Some(&shear), stack, &mut found);
         for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-            let mut found = (best[k] < f64::INFINITY).then(|| (limit[k], best[k] as usize));
-            if walked == Walked::Part {
-                found = tree.nearest(&packet.ray(k), limit[k], found, stack);
-            }
-            touches[k] = found.and_then(|found| tree.touch(found));
+            touches[k] = found[k].and_then(|found| tree.touch(found));
         }
     }
 

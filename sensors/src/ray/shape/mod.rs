@@ -85,7 +85,6 @@ macro_rules! ray_shapes {
             }
 
             /// The nearest surface at a distance from 0 to `limit`, both included.
-            #[cfg(test)]
             pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
                 match self { $(Self::$Name(shape) => shape.touch(ray, limit, stack),)* }
             }

@@ -71,6 +71,17 @@ impl Layer {
     }
 }
 
+/// In which parts instances are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Parts {
+    /// Meshes by cluster, each as coarse as it may be.
+    Levels,
+    /// Meshes by cluster, as they are.
+    Clusters,
+    /// Each in one piece.
+    Whole,
+}
+
 /// Everything that may be seen in a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DrawList {
@@ -90,13 +101,13 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
-    /// Finds what may be seen, and with `lod` how coarse each mesh may be. `keep` tells instances apart.
+    /// Finds what may be seen. `keep` tells instances apart.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,
         scene: &RenderScene,
         poses: &[PoseF32],
-        lod: bool,
+        parts: Parts,
         keep: impl Fn(&Instance) -> Layer,
     ) {
         self.error = 0.0;
@@ -106,7 +117,8 @@ impl DrawList {
         // Room for all of it: what is seen changes from frame to frame, and memory must not grow with it.
         let (mut opaque, mut blended) = (0, 0);
         for instance in scene.instances() {
-            let items = instance.mesh().map_or(1, |mesh| mesh.clusters().len());
+            let mesh = instance.mesh().filter(|_| parts != Parts::Whole);
+            let items = mesh.map_or(1, |mesh| mesh.clusters().len());
             match keep(instance) {
                 Layer::Hidden => {}
                 Layer::Opaque => opaque += items,
@@ -139,11 +151,15 @@ impl DrawList {
                 Layer::Opaque => self.opaque.push(item),
                 _ => self.blended.push((layer, item)),
             };
-            let Some(mesh) = instance.mesh() else {
+            let Some(mesh) = instance.mesh().filter(|_| parts != Parts::Whole) else {
                 push(whole);
                 continue;
             };
-            let level = if lod { detail::level(projection, instance, &placed.camera_from_instance) } else { 0 };
+            let level = if parts == Parts::Levels {
+                detail::level(projection, instance, &placed.camera_from_instance)
+            } else {
+                0
+            };
             let error = mesh.level_error(usize::from(level));
             self.placed[index] = Placed { level, error, ..placed };
             self.error = self.error.max(error);

@@ -15,7 +15,7 @@ use crate::lanes::{COLUMN, F, LANES, M, ROW, Simd, U};
 use crate::lanes::{load, load_u, select, select_u, splat, splat_u, store, store_u};
 use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
-pub(crate) use draw_list::{DrawList, Item, Layer, Placed};
+pub(crate) use draw_list::{DrawList, Item, Layer, Parts, Placed};
 use scene::{RenderScene, Shape};
 use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 

@@ -1,0 +1,89 @@
+//! Which renderer draws pictures.
+
+use crate::visibility::RenderError;
+use serde::{Deserialize, Serialize};
+
+/// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Renderer {
+    /// The rasterizer.
+    #[default]
+    Raster,
+    /// What is seen is found by rays: one through each sample, against every triangle and the exact shapes. Light, shadows
+    /// and transparency are the rasterizer's. Meshes are never drawn coarser
+    /// ([`RasterCfg::lod`](super::RasterCfg::lod) is for shadow maps only).
+    FastRayTraced,
+    /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too. Meshes
+    /// are never drawn coarser.
+    Hybrid,
+    /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
+    /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
+    ///
+    /// - **Lamps** are as bright as the rasterizer draws them: a white matt surface that faces a lamp of colour L has the
+    ///   radiance L. A lamp with a [`radius`](scene::Light::radius) is a disc that faces what it lights. Ambient light of lamps
+    ///   and of the headlight reaches everything, as in the rasterizer.
+    /// - **The dome** is [`RenderScene::ambient`](scene::RenderScene::ambient): its sky's radiance from above the horizon, its
+    ///   ground's from below. Where nothing is in the way a surface gets what the rasterizer gives it. Cameras and mirrors see
+    ///   [`RenderScene::sky`](scene::RenderScene::sky) there instead.
+    /// - **Emission** of a material lights other things.
+    /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
+    ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
+    ///   1). The layer mirrors a lamp's `specular` colour and everything else's only colour. `reflectance` of the light is
+    ///   mirrored perfectly. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight.
+    ///
+    /// The tone curve and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
+    /// any number of threads.
+    RayTraced {
+        /// Paths per pixel; 1 to 65536. A power of two spreads them best.
+        samples: u32,
+        /// Surfaces that light goes over after the one that is seen, at most; 0 is light from lamps and the dome alone. At
+        /// most 64.
+        max_bounces: u32,
+        /// Whether noise is smoothed where colour, normals and depth of the surface are alike.
+        denoise: bool,
+        /// Another seed has other noise.
+        seed: u32,
+    },
+}
+
+impl Renderer {
+    /// A picture to look at: 64 paths of up to 4 bounces, smoothed.
+    pub const RAY_TRACED: Self = Self::RayTraced { samples: 64, max_bounces: 4, denoise: true, seed: 0 };
+    /// The most paths per pixel.
+    pub const MAX_SAMPLES: u32 = 1 << 16;
+    /// The most bounces.
+    pub const MAX_BOUNCES: u32 = 64;
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Paths`], [`RenderError::Bounces`].
+    pub fn validate(self) -> Result<(), RenderError> {
+        let Self::RayTraced { samples, max_bounces, .. } = self else { return Ok(()) };
+        if !(1..=Self::MAX_SAMPLES).contains(&samples) {
+            return Err(RenderError::Paths { samples, limit: Self::MAX_SAMPLES });
+        }
+        if max_bounces > Self::MAX_BOUNCES {
+            return Err(RenderError::Bounces { max_bounces, limit: Self::MAX_BOUNCES });
+        }
+        Ok(())
+    }
+
+    /// Whether what is seen at a pixel is found by rays.
+    pub(crate) fn sees_by_rays(self) -> bool {
+        matches!(self, Self::FastRayTraced | Self::RayTraced { .. })
+    }
+
+    /// Whether colours come from paths.
+    pub(crate) fn follows_paths(self) -> bool {
+        matches!(self, Self::RayTraced { .. })
+    }
+
+    /// How much longer a pixel takes than the rasterizer's, about.
+    pub(crate) fn slowness(self) -> usize {
+        if self == Self::Raster { 1 } else { 20 }
+    }
+}

@@ -1,0 +1,224 @@
+//! Pictures by rays against the rasterizer's.
+
+use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
+use super::determinism::bits;
+use super::scenes::{Random, figure, random};
+use crate::lanes::levels;
+use crate::visibility::{RenderError, View};
+use scene::shape::{Plane, Sphere};
+use scene::{Hemisphere, Instance, Light, LightKind, Material, PoseF32, RenderScene};
+
+const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
+
+/// Every level of detail as it is, for all renderers.
+const EXACT: RasterCfg = RasterCfg { samples: 4, shadows: true, shadow_size: 0, groups: u32::MAX, lod: false };
+
+fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
+    let mut rasterizer = Rasterizer::new(cfg);
+    rasterizer.renderer = renderer;
+    let mut frame = Frame::new(view.width, view.height, Channels::ALL);
+    rasterizer.render(scene, poses, view, &mut frame).unwrap();
+    frame
+}
+
+/// Compares all channels but the colour where no silhouette is: where all eight neighbours show the same thing at about the
+/// same depth, in both pictures. How many pixels were compared, and how many of them differ.
+///
+/// Depth and distance may differ by 1e-4 of themselves: of surfaces seen at a slant of up to 1 : 100, rounding of rays in
+/// single precision makes 1e-5. Normals by 0.5 degrees: a pixel's centre on an edge between two triangles may belong to
+/// either, which is what the few pixels that differ are.
+fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
+    let (depth, mask) = (a.depth.as_ref().unwrap(), a.mask.as_ref().unwrap());
+    let height = mask.len() / width;
+    let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| y * width + x));
+    let (mut compared, mut different) = (0, 0);
+    let near = |a: f32, b: f32, part: f32| a == b || (a - b).abs() <= part * a.abs();
+    for k in inner {
+        let around = (0..9).map(|n| k + (n / 3) * width + n % 3 - width - 1);
+        let other = (b.depth.as_ref().unwrap(), b.mask.as_ref().unwrap());
+        let whole = |(depth, mask): (&Vec<f32>, &Vec<i32>)| {
+            around.clone().all(|n| mask[n] == mask[k] && near(depth[k], depth[n], 0.1))
+        };
+        if !(whole((depth, mask)) && whole(other)) {
+            continue;
+        }
+        compared += 1;
+        let vector = |f: &Option<Vec<f32>>| {
+            let f = f.as_ref().unwrap();
+            nalgebra::Vector3::new(f[3 * k], f[3 * k + 1], f[3 * k + 2])
+        };
+        let same_normal = |a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| {
+            let (a, b) = (vector(a), vector(b));
+            a == b || a.dot(&b) >= 0.5f32.to_radians().cos()
+        };
+        let same = mask[k] == other.1[k]
+            && near(depth[k], other.0[k], 1e-4)
+            && near(a.distance.as_ref().unwrap()[k], b.distance.as_ref().unwrap()[k], 1e-4)
+            && same_normal(&a.normal, &b.normal)
+            && same_normal(&a.shading_normal, &b.shading_normal)
+            && (vector(&a.position) - vector(&b.position)).norm() <= 1e-4 * depth[k].min(1e9);
+        different += usize::from(!same);
+    }
+    (compared, different)
+}
+
+#[test]
+fn rays_see_what_the_rasterizer_draws() {
+    let mut numbers = Random(11);
+    let (mut compared, mut different) = (0, 0);
+    for seed in 0..40 {
+        let r = &mut numbers;
+        let (scene, poses) = random(r, 1.2);
+        let camera = r.pose(if seed % 4 == 0 { 0.5 } else { 3.0 });
+        let target = r.vector(-0.5, 0.5).map(|x| x as f32);
+        let view = View::look_at([101, 75], 1.0, camera.translation, target, [0., 0., 1.]).unwrap();
+        let (near, far) = [(0.01, 100.0), (1e-4, 1e5), (1.0, 4.0), (0.3, 2.0)][seed % 4];
+        let view = View { near, far, cx: r.within(20., 80.) as f32, fy: r.within(40., 120.) as f32, ..view };
+        let raster = draw(Renderer::Raster, EXACT, &scene, &poses, &view);
+        let traced = draw(Renderer::FastRayTraced, EXACT, &scene, &poses, &view);
+        let (all, other) = compare(&raster, &traced, view.width);
+        (compared, different) = (compared + all, different + other);
+        // Colours come from the same shading: they differ where samples on edges do.
+        let [a, b] = [&raster, &traced].map(|f| f.color.as_ref().unwrap());
+        let pixels = a.chunks(4).zip(b.chunks(4));
+        let far_apart = pixels.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 3)).count();
+        assert!(far_apart * 50 < 101 * 75, "scene {seed}: {far_apart} pixels look different");
+    }
+    println!("{different} of {compared} pixels differ");
+    assert!(compared > 40 * 101 * 75 / 2, "{compared}");
+    // Centres on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
+    assert!(different * 1000 <= compared, "{different} of {compared}");
+    // A control: a picture from a millimetre beside is not the same.
+    let (scene, poses) = random(&mut Random(5), 1.2);
+    let view = View::look_at([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3], [0., 0., 1.]).unwrap();
+    let mut beside = view;
+    beside.world_from_camera.translation[2] += 1e-3;
+    let a = draw(Renderer::Raster, EXACT, &scene, &poses, &view);
+    let b = draw(Renderer::FastRayTraced, EXACT, &scene, &poses, &beside);
+    let (all, other) = compare(&a, &b, 101);
+    assert!(other * 2 > all, "{other} of {all}");
+}
+
+#[test]
+fn path_tracing_changes_no_channel_but_the_colour() {
+    let (scene, poses) = figure();
+    let view = View::look_at([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
+    let [traced, paths, hybrid, raster] = [Renderer::FastRayTraced, FEW_PATHS, Renderer::Hybrid, Renderer::Raster]
+        .map(|renderer| draw(renderer, EXACT, &scene, &poses, &view));
+    let without = |frame: &Frame| bits(&Frame { color: None, ..frame.clone() });
+    assert!(without(&traced) == without(&paths) && without(&raster) == without(&hybrid));
+    assert!(traced.color != paths.color && raster.color != hybrid.color);
+    let (all, other) = compare(&raster, &paths, 97);
+    assert!(all > 97 * 83 / 2 && other * 1000 <= all, "{other} of {all}");
+}
+
+/// A scene with all kinds of lamps and things that are not quite opaque.
+fn rich(seed: u64, size: [usize; 2]) -> (RenderScene, Vec<PoseF32>, View) {
+    let (scene, poses) = random(&mut Random(seed), 1.0);
+    let mut instances = scene.instances().to_vec();
+    (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
+    instances[3].material.reflectance = 0.5;
+    let mut scene = RenderScene::new(instances).unwrap();
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 10.0 };
+    let spot = Light { kind: spot, position: [2., 1., 3.], direction: [-2., -1., -3.], ..Light::default() };
+    scene.lights.push(Light { radius: 0.1, ..spot });
+    scene.lights.push(Light { kind: LightKind::Point, position: [0., -2., 1.], ..Light::default() });
+    scene.haze = Some(scene::Haze { color: None, start: 2.0, end: 8.0 });
+    let view = View::look_at(size, 0.9, [2.5, -1.5, 1.5], [0., 0., -0.1], [0., 0., 1.]).unwrap();
+    (scene, poses, view)
+}
+
+#[test]
+fn every_renderer_draws_the_same_bits_with_any_number_of_threads() {
+    let shots: Vec<_> = [[61, 47], [8, 8], [33, 70]].into_iter().zip(1..).map(|(s, k)| rich(k, s)).collect();
+    for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS] {
+        let cfg = RasterCfg::default();
+        let alone: Vec<_> = shots.iter().map(|(s, p, v)| bits(&draw(renderer, cfg, s, p, v))).collect();
+        for threads in [1, 2, 3] {
+            let mut parallel = ParallelRasterizer::new(cfg, threads);
+            parallel.set_renderer(renderer);
+            for count in [1, 3] {
+                let new = |(_, _, v): &(_, _, View)| Frame::new(v.width, v.height, Channels::ALL);
+                let mut frames: Vec<_> = shots[..count].iter().map(new).collect();
+                let shots = shots.iter().map(|(scene, poses, view)| Shot { scene, poses, view, lights: None });
+                let mut jobs: Vec<_> = shots.zip(&mut frames).map(|(shot, frame)| (shot, frame.as_mut())).collect();
+                parallel.render(&mut jobs).unwrap();
+                for (k, frame) in frames.iter().enumerate() {
+                    assert!(bits(frame) == alone[k], "{renderer:?}: shot {k} of {count}, {threads} threads");
+                }
+            }
+        }
+    }
+    // A control: another seed has other noise.
+    let (scene, poses, view) = &shots[0];
+    let other = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 4 };
+    let [a, b] = [FEW_PATHS, other].map(|r| draw(r, RasterCfg::default(), scene, poses, view).color);
+    assert!(a != b);
+}
+
+#[test]
+fn every_instruction_set_casts_the_same_rays() {
+    let (scene, poses, view) = rich(2, [61, 47]);
+    for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS] {
+        let all = levels().into_iter().map(|level| {
+            let mut rasterizer = Rasterizer::with_level(RasterCfg::default(), level);
+            rasterizer.renderer = renderer;
+            let mut frame = Frame::new(view.width, view.height, Channels::ALL);
+            rasterizer.render(&scene, &poses, &view, &mut frame).unwrap();
+            bits(&frame)
+        });
+        let all: Vec<_> = all.collect();
+        assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{renderer:?}");
+    }
+}
+
+/// Smoothing makes few paths look more like many, where light is hard to find: below a glowing panel that paths meet by
+/// chance.
+#[test]
+fn smoothing_takes_noise_away_and_keeps_the_picture() {
+    let matt = |red: f32| Material { specular: 0.0, ..Material::from_rgba([red, 0.7, 0.7, 1.0]) };
+    let panel = Material { emission: 6.0, ..matt(0.7) };
+    let mut scene = RenderScene::new(vec![
+        Instance::new(Plane::INFINITE, matt(0.7), 1),
+        Instance::new(Sphere { radius: 0.3 }, matt(0.2), 2),
+        Instance::new(Plane { half: [0.5; 2] }, panel, 3),
+    ])
+    .unwrap();
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.02; 3], ground: [0.02; 3] };
+    let down = PoseF32 { rotation: [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]], translation: [0., 0., 1.5] };
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0., 0., 0.3]), down];
+    let view = View::look_at([96, 72], 0.7, [2.2, -1.4, 1.0], [0., 0., 0.2], [0., 0., 1.]).unwrap();
+    let paths = |samples, denoise, seed| {
+        let renderer = Renderer::RayTraced { samples, max_bounces: 1, denoise, seed };
+        draw(renderer, EXACT, &scene, &poses, &view).color.unwrap()
+    };
+    let many = paths(256, false, 9);
+    let error = |a: &[u8]| {
+        let square: f64 = a.iter().zip(&many).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
+        (square / a.len() as f64).sqrt()
+    };
+    let (rough, smooth, more) = (error(&paths(4, false, 1)), error(&paths(4, true, 1)), error(&paths(16, false, 1)));
+    println!("off by {rough} of 255 with 4 paths, {smooth} smoothed, {more} with 16 paths");
+    assert!(smooth < 0.6 * rough, "{smooth} of {rough}");
+    // A control of the measure: noise falls as paths are added.
+    assert!(more < 0.75 * rough, "{more} of {rough}");
+}
+
+#[test]
+fn numbers_that_no_path_has_are_refused() {
+    let (scene, poses) = figure();
+    let view = View::look_at([8, 8], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
+    let mut rasterizer = Rasterizer::default();
+    let mut error = |samples, max_bounces| {
+        rasterizer.renderer = Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
+        let mut frame = Frame::new(8, 8, Channels::ALL);
+        rasterizer.render(&scene, &poses, &view, &mut frame).unwrap_err()
+    };
+    let limit = Renderer::MAX_SAMPLES;
+    assert_eq!(error(0, 1), RenderError::Paths { samples: 0, limit });
+    assert_eq!(error(1 << 17, 1), RenderError::Paths { samples: 1 << 17, limit });
+    assert_eq!(error(1, 65), RenderError::Bounces { max_bounces: 65, limit: 64 });
+    assert_eq!(error(0, 1).to_string(), "0 paths per pixel; 1 to 65536 are possible");
+}

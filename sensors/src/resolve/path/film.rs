@@ -1,0 +1,104 @@
+//! The colours of a picture while its paths are followed: one row of memory per row of pixels, so that threads share it.
+
+use super::smooth::Guide;
+use super::{Found, Lamps, Paths};
+use crate::lanes::{LANES, Level, Simd, at_level, load};
+use crate::ray::bvh::Stack;
+use crate::resolve::tone::encode;
+
+/// A picture in linear light; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Film {
+    pub(crate) width: usize,
+    pub(crate) lamps: Lamps,
+    /// Radiance; with smoothing that of a white surface, until it is encoded.
+    pub(crate) pixels: Vec<Pixel>,
+    /// The pixels of the next pass of smoothing.
+    pub(crate) next: Vec<Pixel>,
+    pub(crate) guides: Vec<Guide>,
+}
+
+/// A pixel of a film.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    pub(crate) color: [f32; 3],
+    /// Variance of its brightness.
+    pub(crate) variance: f32,
+}
+
+/// Rows of a film, in the hands of a thread.
+#[derive(Debug)]
+pub(crate) struct Rows<'a> {
+    /// The first row.
+    pub(crate) first: usize,
+    pub(crate) pixels: &'a mut [Pixel],
+    pub(crate) guides: &'a mut [Guide],
+}
+
+impl Film {
+    pub(crate) fn bytes(&self) -> usize {
+        (self.pixels.capacity() + self.next.capacity()) * size_of::<Pixel>()
+            + self.guides.capacity() * size_of::<Guide>()
+            + self.lamps.bytes()
+    }
+
+    /// Memory for a picture.
+    pub(crate) fn resize(&mut self, [width, height]: [usize; 2], smooth: bool) {
+        self.width = width;
+        let count = width * height;
+        self.pixels.resize(count, Pixel::default());
+        self.guides.resize(count, Guide::default());
+        self.next.resize(if smooth { count } else { 0 }, Pixel::default());
+    }
+
+    /// The film in parts of some rows, and its lamps.
+    pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
+        let size = (self.width * rows).max(1);
+        let parts = self.pixels.chunks_mut(size).zip(self.guides.chunks_mut(size)).enumerate();
+        (&self.lamps, parts.map(move |(k, (pixels, guides))| Rows { first: k * rows, pixels, guides }))
+    }
+}
+
+impl Rows<'_> {
+    /// Follows the paths of all pixels. With `smooth` the colour of surfaces is divided out.
+    pub(crate) fn expose(&mut self, paths: &Paths<'_>, smooth: bool, stack: &mut Stack) {
+        let width = paths.projection.width;
+        for (k, (pixel, guide)) in self.pixels.iter_mut().zip(&mut *self.guides).enumerate() {
+            let found @ Found { color, variance, albedo, .. } = paths.pixel([k % width, self.first + k / width], stack);
+            *guide = Guide::new(&found);
+            let by = if smooth { guide.albedo } else { [1.0; 3] };
+            let mean = super::brightness(by.map(f64::from));
+            *pixel = Pixel {
+                color: [0, 1, 2].map(|c| color[c] as f32 / by[c]),
+                variance: (variance / (mean * mean)) as f32,
+            };
+            debug_assert!(albedo.iter().all(|x| x.is_finite()));
+        }
+    }
+}
+
+/// Colours for the screen, of as many pixels as there are; with `smooth` the colour of surfaces is multiplied again.
+pub(crate) fn develop(level: Level, pixels: &[Pixel], guides: &[Guide], smooth: bool, out: &mut [u8]) {
+    at_level!(level, s => develop_lanes(s, pixels, guides, smooth, out));
+}
+
+fn develop_lanes<S: Simd>(s: S, pixels: &[Pixel], guides: &[Guide], smooth: bool, out: &mut [u8]) {
+    let groups = pixels.chunks(LANES).zip(guides.chunks(LANES)).zip(out.chunks_mut(4 * LANES));
+    for ((pixels, guides), out) in groups {
+        for c in 0..3 {
+            let mut linear = [0.0f32; LANES];
+            for (to, (pixel, guide)) in linear.iter_mut().zip(pixels.iter().zip(guides)) {
+                *to = pixel.color[c] * if smooth { guide.albedo[c] } else { 1.0 };
+            }
+            let mut bytes = [0i32; LANES];
+            // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.
+            s.vectorize(
+                #[inline(always)]
+                || bytes = encode(s, load(s, &linear)).to_int().array(),
+            );
+            for (to, byte) in out.chunks_exact_mut(4).zip(bytes) {
+                (to[c], to[3]) = (byte as u8, 255);
+            }
+        }
+    }
+}

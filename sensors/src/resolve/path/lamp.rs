@@ -1,0 +1,121 @@
+//! Lamps, as paths see them.
+
+use super::lobe::{Basis, on_disc};
+use crate::ray::vector::{V3, along, dot, scale, sub, unit};
+use crate::resolve::shade::cos_deg;
+use scene::{Light, LightKind};
+
+/// A lamp of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lamp {
+    kind: LightKind,
+    position: V3,
+    /// Unit vector along which it shines.
+    along: V3,
+    cutoff_cos: f64,
+    exponent: u32,
+    attenuation: V3,
+    radius: f64,
+    pub(super) ambient: V3,
+    pub(super) diffuse: V3,
+    pub(super) specular: V3,
+    pub(super) cast_shadow: bool,
+}
+
+/// Light from a lamp at a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Incoming {
+    /// Unit vector to where it comes from.
+    pub(super) direction: V3,
+    /// How far that is \[m\].
+    pub(super) distance: f64,
+    /// How much of it arrives.
+    pub(super) strength: f64,
+}
+
+impl Lamp {
+    pub(super) fn new(light: &Light) -> Self {
+        let wide = |v: [f32; 3]| v.map(f64::from);
+        let (cutoff_cos, exponent) = match light.kind {
+            LightKind::Spot { cutoff_deg, exponent } => {
+                (f64::from(cos_deg(cutoff_deg)), exponent.clamp(0.0, 128.0) as u32)
+            }
+            LightKind::Directional | LightKind::Point => (-2.0, 0),
+        };
+        Self {
+            kind: light.kind,
+            position: wide(light.position),
+            along: unit(wide(light.direction)).unwrap_or([0.0, 0.0, -1.0]),
+            cutoff_cos,
+            exponent,
+            attenuation: wide(light.attenuation),
+            radius: f64::from(light.radius.max(0.0)),
+            ambient: wide(light.ambient),
+            diffuse: wide(light.diffuse),
+            specular: wide(light.specular),
+            cast_shadow: light.cast_shadow,
+        }
+    }
+
+    /// A lamp at a camera.
+    pub(super) fn of_camera(headlight: &scene::Headlight, position: V3) -> Self {
+        let light = Light {
+            kind: LightKind::Point,
+            ambient: headlight.ambient,
+            diffuse: headlight.diffuse,
+            specular: headlight.specular,
+            ..Light::default()
+        };
+        Self { position, ..Self::new(&light) }
+    }
+
+    /// Light at `point` from the point of the lamp's disc that two numbers in 0..1 choose; `None` where none arrives.
+    pub(super) fn at(&self, point: V3, choice: [f64; 2]) -> Option<Incoming> {
+        if self.kind == LightKind::Directional {
+            let toward = scale(self.along, -1.0);
+            let direction = self.spread(toward, toward, choice)?;
+            return Some(Incoming { direction: unit(direction)?, distance: f64::INFINITY, strength: 1.0 });
+        }
+        let to = sub(self.position, point);
+        let distance = dot(to, to).sqrt();
+        let toward = unit(to)?;
+        let [constant, linear, quadratic] = self.attenuation;
+        let mut strength = 1.0 / (constant + distance * (linear + distance * quadratic)).max(1e-6);
+        if matches!(self.kind, LightKind::Spot { .. }) {
+            let cos = -dot(toward, self.along);
+            if cos < self.cutoff_cos {
+                return None;
+            }
+            strength *= power(cos.max(0.0), self.exponent);
+        }
+        let to = self.spread(to, toward, choice)?;
+        Some(Incoming { direction: unit(to)?, distance: dot(to, to).sqrt(), strength })
+    }
+
+    /// From the middle of the disc to a point of it.
+    fn spread(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
+        if self.radius == 0.0 {
+            return Some(to);
+        }
+        let [x, y] = on_disc(choice);
+        let on = Basis::of(normal).to_world([self.radius * x, self.radius * y, 0.0]);
+        Some(along(to, 1.0, on))
+    }
+
+    pub(super) fn has_size(&self) -> bool {
+        self.radius > 0.0
+    }
+}
+
+/// x to an integer power, by squaring.
+pub(super) fn power(x: f64, mut exponent: u32) -> f64 {
+    let (mut result, mut square) = (1.0, x);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result *= square;
+        }
+        square *= square;
+        exponent >>= 1;
+    }
+    result
+}

@@ -1,0 +1,285 @@
+//! Colours by path tracing: light is followed backward from the camera.
+//!
+//! At every surface all lamps are asked for their light (one shadow ray each), and one direction is chosen by the surface's
+//! own law; what is met there sends its emission, what is not met the dome's light. So lamps are met by shadow rays only, the
+//! dome and emitting surfaces by paths only: nothing counts twice. Later bounces end by Russian roulette. Source: Kajiya, The
+//! rendering equation, 1986; the conventions of light are those of [`Renderer`](crate::camera::Renderer).
+
+pub(crate) mod film;
+mod lamp;
+mod lobe;
+mod point;
+pub(crate) mod smooth;
+mod sobol;
+mod texel;
+
+#[cfg(test)]
+mod tests;
+
+use crate::ray::Ray;
+use crate::ray::bvh::Stack;
+use crate::ray::vector::{V3, along, dot, scale, to_f64};
+use crate::resolve::tone;
+use crate::visibility::Projection;
+use crate::visibility::trace::Tracer;
+use lamp::Lamp;
+use lobe::Basis;
+use point::Point;
+use scene::{Light, PoseF32, RenderScene};
+use sobol::{Sample, Sequence};
+use std::f64::consts::PI;
+
+/// Lamps that are asked, at most.
+const MAX_LAMPS: usize = crate::resolve::shade::MAX_LIGHTS;
+/// Paths begin this part of their coordinates above a surface.
+const ABOVE: f64 = 1e-7;
+/// Bounces after which paths may end by chance.
+const SURE: u32 = 2;
+/// Surfaces that are not opaque that a path goes through, at most.
+const MAX_PASSES: u32 = 64;
+/// Pairs of numbers: in the pixel, and at each surface where to go on, which lobe and whether at all, whether through.
+const IN_PIXEL: u32 = 0;
+const ONWARD: u32 = 1;
+const CHANCE: u32 = 2;
+const THROUGH: u32 = 3;
+/// Pairs of each surface: those, and one for each lamp.
+const PAIRS: u32 = 4 + MAX_LAMPS as u32;
+
+/// What the paths of a picture have in common.
+#[derive(Clone, Debug)]
+pub(crate) struct Paths<'a> {
+    pub(crate) scene: &'a RenderScene,
+    pub(crate) poses: &'a [PoseF32],
+    pub(crate) tracer: &'a Tracer,
+    pub(crate) projection: &'a Projection,
+    pub(crate) samples: u32,
+    pub(crate) max_bounces: u32,
+    pub(crate) seed: u32,
+    pub(crate) lamps: &'a Lamps,
+}
+
+/// The light of a frame; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lamps {
+    lamps: Vec<Lamp>,
+    /// Radiance of the dome from above and below the horizon.
+    dome: [V3; 2],
+    /// What cameras and mirrors see there: straight up, at the horizon, straight down.
+    sky: [V3; 3],
+    haze: Option<(Option<V3>, f64, f64)>,
+}
+
+impl Lamps {
+    /// Prepares the light. `shadows` is whether lamps cast any, `eye` where the camera is.
+    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadows: bool, eye: [f32; 3]) {
+        let linear = |c: [f32; 3]| to_f64(tone::decode(c));
+        let Self { lamps, dome, sky, haze } = self;
+        *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
+        *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
+        *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
+        lamps.clear();
+        lamps.extend(lights.iter().filter(|l| l.active).map(Lamp::new));
+        if scene.headlight.active {
+            lamps.insert(0, Lamp::of_camera(&scene.headlight, to_f64(eye)));
+        }
+        lamps.truncate(MAX_LAMPS);
+        for lamp in lamps {
+            lamp.cast_shadow &= shadows;
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.lamps.capacity() * size_of::<Lamp>()
+    }
+
+    /// The sky as cameras see it.
+    fn sky(&self, direction: V3) -> V3 {
+        let k = direction[2].abs().min(1.0).sqrt();
+        let [zenith, horizon, nadir] = self.sky;
+        let to = if direction[2] > 0.0 { zenith } else { nadir };
+        [0, 1, 2].map(|c| horizon[c] + k * (to[c] - horizon[c]))
+    }
+}
+
+/// What a pixel's paths found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Found {
+    /// Mean radiance, linear.
+    pub(crate) color: V3,
+    /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
+    pub(crate) variance: f64,
+    /// Means over what is seen: colour of the surface (1 for mirrors and sky), normal, distance (0 for the sky).
+    pub(crate) albedo: V3,
+    pub(crate) normal: V3,
+    pub(crate) distance: f64,
+}
+
+/// What a camera ray met first.
+#[derive(Clone, Copy, Debug)]
+struct First {
+    albedo: V3,
+    normal: V3,
+    distance: f64,
+}
+
+impl Paths<'_> {
+    /// Follows the paths of a pixel.
+    pub(crate) fn pixel(&self, at: [usize; 2], stack: &mut Stack) -> Found {
+        let sequence = Sequence::new(at, self.seed);
+        let n = f64::from(self.samples);
+        let mut out = Found::default();
+        let mut squares = 0.0;
+        for index in 0..self.samples {
+            let sample = sequence.sample(index);
+            let [dx, dy] = sample.pair(IN_PIXEL);
+            let (color, first) = self.radiance(sample, [at[0] as f64 + dx, at[1] as f64 + dy], stack);
+            let bright = brightness(color);
+            squares += bright * bright / n;
+            out.color = along(out.color, 1.0 / n, color);
+            out.albedo = along(out.albedo, 1.0 / n, first.albedo);
+            out.normal = along(out.normal, 1.0 / n, first.normal);
+            out.distance += first.distance / n;
+        }
+        let bright = brightness(out.color);
+        out.variance = (squares - bright * bright).max(0.0) / (n - 1.0).max(1.0);
+        out
+    }
+
+    /// The light that comes to a point of the picture, and what is seen there.
+    fn radiance(&self, sample: Sample, [u, v]: [f64; 2], stack: &mut Stack) -> (V3, First) {
+        let view = self.projection;
+        let wide = f64::from;
+        let c = [(u - wide(view.cx)) / wide(view.fx), (v - wide(view.cy)) / wide(view.fy), 1.0];
+        let d = view.world_from_camera.rotation.map(|r| dot(to_f64(r), c));
+        let length = dot(d, d).sqrt();
+        let direction = scale(d, 1.0 / length);
+        let (near, far) = (wide(view.near) * length, wide(view.far) * length);
+        let mut ray = Ray { origin: along(to_f64(view.world_from_camera.translation), near, direction), direction };
+        let mut limit = far - near;
+        // How wide a pixel is at the end of the path so far, and how much wider it gets by the metre.
+        let (mut width, mut spread) = (wide(view.near) / wide(view.fx), 1.0 / (wide(view.fx) * length));
+        let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
+        let (mut light, mut kept) = ([0.0; 3], [1.0; 3]);
+        let (mut bounce, mut passes, mut travelled) = (0, 0, near);
+        // Whether it goes on as the camera's ray went.
+        let mut clear = true;
+        loop {
+            let hit = self.tracer.nearest(&ray, limit, stack);
+            let met = hit.and_then(|hit| {
+                let footprint = width + spread * hit.distance;
+                Some((hit.distance, Point::new(self.scene, self.poses, &ray, &hit, footprint)?))
+            });
+            let Some((distance, point)) = met else {
+                let below = usize::from(ray.direction[2] <= 0.0);
+                let beyond = if clear { self.lamps.sky(ray.direction) } else { self.lamps.dome[below] };
+                light = add(light, times(kept, beyond));
+                break;
+            };
+            let dims = 1 + bounce * PAIRS;
+            travelled += distance;
+            width += spread * distance;
+            limit -= distance;
+            if point.alpha < 1.0 {
+                let chance = sample.pair(dims + THROUGH + 1_000_000 * passes)[0];
+                if !point.front || chance >= point.alpha {
+                    passes += 1;
+                    if passes > MAX_PASSES {
+                        break;
+                    }
+                    ray.origin = above(&point, -1.0);
+                    continue;
+                }
+            }
+            let o = scale(ray.direction, -1.0);
+            if bounce == 0 {
+                let matt = 1.0 - point.lobe.mirror;
+                first = First {
+                    albedo: point.lobe.albedo.map(|x| matt * x + point.lobe.mirror),
+                    normal: point.normal,
+                    distance: travelled,
+                };
+                if let Some((color, start, end)) = self.lamps.haze {
+                    let k = ((travelled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
+                    let k = k * k * (3.0 - 2.0 * k);
+                    let flat = [ray.direction[0], ray.direction[1], ray.direction[2].max(0.0)];
+                    light = along(light, k, color.unwrap_or_else(|| self.lamps.sky(flat)));
+                    kept = scale(kept, 1.0 - k);
+                }
+            }
+            light = add(light, times(kept, scale(point.emission, 1.0 - point.lobe.mirror)));
+            if bounce > self.max_bounces {
+                break;
+            }
+            light = add(light, times(kept, self.lit(&point, o, sample, dims, stack)));
+            let basis = Basis::of(point.normal);
+            let [lobe, chance] = sample.pair(dims + CHANCE);
+            let Some(next) = point.lobe.choose(basis.to_local(o), lobe, sample.pair(dims + ONWARD)) else { break };
+            let onward = basis.to_world(next.direction);
+            // Below the surface itself, though not below its smooth normal.
+            if dot(onward, point.flat) <= 0.0 {
+                break;
+            }
+            kept = times(kept, next.weight);
+            if bounce >= SURE {
+                let most = kept.iter().fold(0.0f64, |m, &x| m.max(x)).min(1.0);
+                if chance >= most {
+                    break;
+                }
+                kept = scale(kept, 1.0 / most);
+            }
+            if !next.mirrored {
+                (clear, spread) = (false, spread.max(0.1));
+            }
+            bounce += 1;
+            ray = Ray { origin: above(&point, 1.0), direction: onward };
+            limit = f64::INFINITY;
+        }
+        (light, first)
+    }
+
+    /// What a point sends to `o` of the lamps' light.
+    fn lit(&self, point: &Point, o: V3, sample: Sample, dims: u32, stack: &mut Stack) -> V3 {
+        let basis = Basis::of(point.normal);
+        let local = basis.to_local(o);
+        let matt = 1.0 - point.lobe.mirror;
+        let mut out = [0.0; 3];
+        for (lamp, k) in self.lamps.lamps.iter().zip(4..) {
+            let choice = if lamp.has_size() { sample.pair(dims + k) } else { [0.0; 2] };
+            let Some(light) = lamp.at(point.position, choice) else { continue };
+            out = along(out, light.strength * matt, times(point.lobe.albedo, lamp.ambient));
+            let scatter = point.lobe.scatter(local, basis.to_local(light.direction));
+            let sent = [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer * lamp.specular[c]));
+            if sent.iter().all(|&x| x <= 0.0) {
+                continue;
+            }
+            let passes = if lamp.cast_shadow {
+                let origin = above(&Point { position: point.lifted, ..*point }, 1.0);
+                let ray = Ray { origin, direction: light.direction };
+                self.tracer.passes(&ray, light.distance, stack)
+            } else {
+                1.0
+            };
+            out = along(out, light.strength * passes, sent);
+        }
+        out
+    }
+}
+
+/// Just above a surface, or below it.
+fn above(point: &Point, side: f64) -> V3 {
+    let far = point.position.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+    along(point.position, side * ABOVE * far, point.flat)
+}
+
+fn times(a: V3, b: V3) -> V3 {
+    [0, 1, 2].map(|k| a[k] * b[k])
+}
+
+fn add(a: V3, b: V3) -> V3 {
+    [0, 1, 2].map(|k| a[k] + b[k])
+}
+
+/// How bright a colour is. Source: ITU-R BT.709.
+fn brightness([r, g, b]: V3) -> f64 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}

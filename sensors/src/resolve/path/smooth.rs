@@ -1,0 +1,110 @@
+//! Smooths noise: a few passes of a small filter with holes, each twice as wide as the one before, that does not blend across
+//! edges of normals, of depth or of light brighter than its own noise.
+//!
+//! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
+//! weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with polynomials
+//! in place of exponentials, which differ from machine to machine.
+
+use super::film::Pixel;
+use super::{Found, brightness};
+
+/// Passes: the last one reaches 2 * 2^4 pixels.
+pub(crate) const PASSES: u32 = 5;
+/// Weights of a pixel and of those one and two steps away: a cubic B-spline's.
+const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
+/// Surfaces may bend off the plane of a pixel by this part of their distance, per pixel.
+const BEND: f32 = 2e-3;
+/// Light may differ by so many standard deviations of its noise.
+const NOISE: f32 = 4.0;
+
+/// What a pixel shows, apart from light.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Guide {
+    /// Never 0.
+    pub(crate) albedo: [f32; 3],
+    pub(crate) normal: [f32; 3],
+    /// 0 for the sky.
+    pub(crate) distance: f32,
+}
+
+impl Guide {
+    pub(super) fn new(found: &Found) -> Self {
+        Self {
+            albedo: found.albedo.map(|x| (x as f32).max(0.02)),
+            normal: found.normal.map(|x| x as f32),
+            distance: found.distance as f32,
+        }
+    }
+}
+
+/// One pass over some rows, of which the first is `first`; `pass` counts from 0.
+pub(crate) fn pass([width, first]: [usize; 2], pass: u32, from: &[Pixel], guides: &[Guide], to: &mut [Pixel]) {
+    let step = 1isize << pass;
+    let height = from.len() / width.max(1);
+    for (k, to) in to.iter_mut().enumerate() {
+        let (x, y) = ((k % width) as isize, (first + k / width) as isize);
+        let at = y as usize * width + x as usize;
+        let (center, guide) = (from[at], guides[at]);
+        let mut sum = Pixel::default();
+        let mut whole = 0.0;
+        let bright = light(&center);
+        let noise = NOISE * around(from, [width, height], [x, y]).sqrt() + 1e-4;
+        for j in -2isize..=2 {
+            for i in -2isize..=2 {
+                let (px, py) = (x + i * step, y + j * step);
+                if px < 0 || py < 0 || px >= width as isize || py >= height as isize {
+                    continue;
+                }
+                let other = py as usize * width + px as usize;
+                let (pixel, beside) = (from[other], guides[other]);
+                let reach = step as f32 * (i.unsigned_abs().max(j.unsigned_abs()) as f32);
+                let apart = (light(&pixel) - bright) / noise;
+                // It is itself, even where its mean normal is almost none.
+                let surface = if i == 0 && j == 0 { 1.0 } else { alike(&guide, &beside, reach) };
+                let weight = SPLINE[i.unsigned_abs()]
+                    * SPLINE[j.unsigned_abs()]
+                    * surface
+                    * (1.0 / (1.0 + apart * apart * apart * apart));
+                whole += weight;
+                for c in 0..3 {
+                    sum.color[c] += weight * pixel.color[c];
+                }
+                sum.variance += weight * weight * pixel.variance;
+            }
+        }
+        // Its own weight is not 0.
+        *to = Pixel { color: sum.color.map(|x| x / whole), variance: sum.variance / (whole * whole) };
+    }
+}
+
+fn light(pixel: &Pixel) -> f32 {
+    brightness(pixel.color.map(f64::from)) as f32
+}
+
+/// The mean variance of a pixel and its neighbours: that of one is itself noise.
+fn around(from: &[Pixel], [width, height]: [usize; 2], [x, y]: [isize; 2]) -> f32 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for j in -1..=1 {
+        for i in -1..=1 {
+            let (px, py) = (x + i, y + j);
+            if px >= 0 && py >= 0 && px < width as isize && py < height as isize {
+                sum += from[py as usize * width + px as usize].variance;
+                count += 1.0;
+            }
+        }
+    }
+    sum / count
+}
+
+/// How much two pixels show the same surface, 0..=1, if they are `reach` pixels apart.
+fn alike(a: &Guide, b: &Guide, reach: f32) -> f32 {
+    if (a.distance == 0.0) != (b.distance == 0.0) {
+        return 0.0;
+    }
+    let cosine = a.normal.iter().zip(b.normal).map(|(x, y)| x * y).sum::<f32>().max(0.0);
+    // To the 64th power; the sky has no normal.
+    let facing = if a.distance == 0.0 { 1.0 } else { (0..6).fold(cosine, |x, _| x * x) };
+    let depth = (a.distance - b.distance).abs() / (BEND * 8.0 * a.distance.max(1e-6) * reach.max(1.0));
+    let near = (1.0 - depth * depth).max(0.0);
+    facing * near * near
+}

@@ -1,0 +1,133 @@
+//! Numbers that fill a square evenly: Sobol's first two dimensions with Owen's scrambling, another one for each pixel and
+//! each pair of dimensions.
+//!
+//! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for stochastic
+//! transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
+
+/// The sequence of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sequence {
+    seed: u32,
+}
+
+/// One sample of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    seed: u32,
+    index: u32,
+}
+
+/// Mixes bits so that all depend on all. Source: Wellons, hash-prospector, "lowbias32".
+fn mix(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x21f0_aaad);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0xd35a_2d97);
+    x ^ (x >> 15)
+}
+
+fn combine(seed: u32, x: u32) -> u32 {
+    mix(seed ^ mix(x.wrapping_add(0x9e37_79b9)))
+}
+
+/// Each bit is flipped or not by what is above it.
+fn scramble(x: u32, seed: u32) -> u32 {
+    let mut x = x.reverse_bits();
+    x = x.wrapping_add(seed);
+    x ^= x.wrapping_mul(0x6c50_b47c);
+    x ^= x.wrapping_mul(0xb82f_1e52);
+    x ^= x.wrapping_mul(0xc7af_e638);
+    x ^= x.wrapping_mul(0x8d22_f6e6);
+    x.reverse_bits()
+}
+
+/// The second dimension; the first are the reversed bits.
+fn second(mut index: u32) -> u32 {
+    let (mut out, mut direction) = (0, 1u32 << 31);
+    while index != 0 {
+        if index & 1 == 1 {
+            out ^= direction;
+        }
+        index >>= 1;
+        direction ^= direction >> 1;
+    }
+    out
+}
+
+impl Sequence {
+    /// Of a pixel, in pictures of a seed.
+    pub(super) fn new([x, y]: [usize; 2], seed: u32) -> Self {
+        Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
+    }
+
+    pub(super) fn sample(self, index: u32) -> Sample {
+        Sample { seed: self.seed, index }
+    }
+}
+
+impl Sample {
+    /// Two numbers in 0..1. The first 2^k samples have one in each of 2^k boxes of the square, of any proportions; pairs do
+    /// not depend on each other.
+    pub(super) fn pair(self, dimension: u32) -> [f64; 2] {
+        let seed = combine(self.seed, dimension);
+        let index = scramble(self.index, seed);
+        let unit = |x: u32| f64::from(x) / 4_294_967_296.0;
+        [
+            unit(scramble(index.reverse_bits(), mix(seed ^ 0x68bc_21eb))),
+            unit(scramble(second(index), mix(seed ^ 0x02e5_be93))),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A net: one sample in every box of the same area, however it is cut in halves.
+    #[test]
+    fn the_first_samples_fill_every_box_once() {
+        for (pixel, dimension) in [([0, 0], 0), ([3, 7], 1), ([639, 479], 12)] {
+            for k in [1u32, 4, 8] {
+                let count = 1usize << k;
+                let all: Vec<_> =
+                    (0..count).map(|i| Sequence::new(pixel, 5).sample(i as u32).pair(dimension)).collect();
+                for wide in 0..=k {
+                    let (columns, rows) = (1usize << wide, 1usize << (k - wide));
+                    let mut seen = vec![0; count];
+                    for [x, y] in &all {
+                        seen[(y * rows as f64) as usize * columns + (x * columns as f64) as usize] += 1;
+                    }
+                    assert!(seen.iter().all(|&n| n == 1), "{count} samples in {columns} x {rows} boxes");
+                }
+            }
+        }
+        // A control: numbers of a generator do not.
+        let mut state = 1u32;
+        let mut seen = [0; 256];
+        for _ in 0..256 {
+            state = mix(state);
+            seen[(state >> 24) as usize] += 1;
+        }
+        assert!(seen.iter().any(|&n| n != 1));
+    }
+
+    /// Means over pixels are those of even numbers: sums of n numbers in 0..1 have a standard deviation of sqrt(n / 12).
+    #[test]
+    fn pixels_dimensions_and_seeds_do_not_depend_on_each_other() {
+        let n = 4096usize;
+        let five = 5.0 / (12.0 * n as f64).sqrt();
+        let pick = |k: usize, dimension, seed| Sequence::new([k % 64, k / 64], seed).sample(0).pair(dimension);
+        let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
+        assert!((mean(&|k| pick(k, 3, 0)[0]) - 0.5).abs() < five);
+        assert!((mean(&|k| pick(k, 3, 0)[1]) - 0.5).abs() < five);
+        // Products of two that do not depend on each other: mean 1/4, variance 7/144.
+        let five = 5.0 * (7.0 / 144.0 / n as f64).sqrt();
+        for (a, b) in [((3, 0), (4, 0)), ((3, 0), (3, 1))] {
+            let product = mean(&|k| pick(k, a.0, a.1)[0] * pick(k, b.0, b.1)[0]);
+            assert!((product - 0.25).abs() < five, "{product}");
+        }
+        assert!((mean(&|k| pick(k, 3, 0)[0] * pick(k + 1, 3, 0)[0]) - 0.25).abs() < five);
+        // A control: one that depends on itself has a third.
+        assert!((mean(&|k| pick(k, 3, 0)[0].powi(2)) - 0.25).abs() > five);
+    }
+}

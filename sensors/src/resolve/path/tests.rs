@@ -1,0 +1,286 @@
+//! Light against closed forms.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use super::*;
+use crate::ray::RayAssets;
+use crate::visibility::View;
+use crate::visibility::raster::Layer;
+use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
+use scene::{Headlight, Hemisphere, Instance, LightKind, Material, Shape, Sky};
+
+/// A scene without any light of its own.
+fn dark(instances: Vec<Instance>) -> RenderScene {
+    let mut scene = RenderScene::new(instances).unwrap();
+    scene.lights.clear();
+    scene.headlight = Headlight { active: false, ..Headlight::default() };
+    scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+    scene.sky = Sky::uniform([0.0; 3]);
+    scene
+}
+
+/// A matt colour, the same in all channels, given in linear light, and what it is after sRGB.
+fn matt(linear: f32) -> Material {
+    let srgb = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    Material { specular: 0.0, ..Material::from_rgba([srgb, srgb, srgb, 1.0]) }
+}
+
+/// The colour that a material really has: sRGB and back rounds.
+fn albedo(linear: f32) -> f64 {
+    f64::from(scene::material::decode_srgb(matt(linear).rgba[0]))
+}
+
+/// A pixel of a millionth of a radian: the light of one ray.
+fn looking(eye: [f32; 3], target: [f32; 3]) -> View {
+    View { fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, ..View::look_at([1, 1], 0.5, eye, target, [0., 0., 1.]).unwrap() }
+}
+
+/// What a pixel shows in several pictures of different seeds: the mean, and the standard deviation of it.
+fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_bounces: u32) -> (f64, f64) {
+    let mut tracer = Tracer::default();
+    tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
+    tracer.place(scene, poses);
+    let mut lamps = Lamps::default();
+    lamps.prepare(scene, &scene.lights, true, view.world_from_camera.translation);
+    let projection = &Projection::from(view);
+    let count = 16u32;
+    let mut stack = Stack::default();
+    let all: Vec<f64> = (0..count)
+        .map(|seed| {
+            let paths = Paths { scene, poses, tracer: &tracer, projection, samples, max_bounces, seed, lamps: &lamps };
+            paths.pixel([0, 0], &mut stack).color[1]
+        })
+        .collect();
+    let n = f64::from(count);
+    let mean = all.iter().sum::<f64>() / n;
+    let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Five standard deviations, and rounding: colours and lamps are single precision.
+fn agrees((mean, deviation): (f64, f64), expected: f64) -> bool {
+    (mean - expected).abs() <= 5.0 * deviation + 1e-6 * expected.abs().max(1e-3)
+}
+
+fn every_convex_shape() -> Vec<Shape> {
+    vec![
+        Sphere { radius: 0.3 }.into(),
+        Capsule { radius: 0.15, half_length: 0.3 }.into(),
+        Ellipsoid { radii: [0.4, 0.2, 0.1] }.into(),
+        Cylinder { radius: 0.2, half_length: 0.25 }.into(),
+        Box { half: [0.2, 0.3, 0.1] }.into(),
+    ]
+}
+
+/// White furnace: what is convex and has the albedo a sends a times the light that is everywhere. To the last digits, for
+/// every path does.
+#[test]
+fn matt_things_in_a_furnace_are_as_bright_as_their_albedo() {
+    for shape in every_convex_shape() {
+        for a in [1.0, 0.5, 0.18] {
+            let mut scene = dark(vec![Instance::new(shape.clone(), matt(a), 1)]);
+            scene.ambient = Hemisphere { sky: [0.8; 3], ground: [0.8; 3] };
+            for (k, eye) in [[2.0, 0.3, 0.2], [0.1, 0.2, 3.0], [-1.0, -1.0, -1.0]].into_iter().enumerate() {
+                let view = looking(eye, [0.02, 0.01, 0.03]);
+                let (mean, deviation) = seen(&scene, &[PoseF32::IDENTITY], &view, 4, 3);
+                let expected = 0.8f32 as f64 * albedo(a);
+                assert!((mean - expected).abs() < 1e-6, "{} from {k}: {mean}, not {expected}", shape.name());
+                assert!(deviation < 1e-12);
+            }
+        }
+    }
+    // A control: a camera inside, where no light is.
+    let mut scene = dark(vec![Instance::new(Sphere { radius: 0.3 }, matt(1.0), 1)]);
+    scene.ambient = Hemisphere { sky: [0.8; 3], ground: [0.8; 3] };
+    let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &looking([0.0; 3], [1.0, 0.2, 0.1]), 4, 3);
+    assert_eq!(mean, 0.0);
+}
+
+/// Shiny things in a furnace take a part of the light, and give none.
+#[test]
+fn shiny_things_in_a_furnace_are_not_brighter_than_it() {
+    for (specular, shininess) in [(1.0, 1.0), (1.0, 0.1), (0.5, 0.5), (1.0, 0.0)] {
+        let material = Material { specular, shininess, ..matt(1.0) };
+        let mut scene = dark(vec![Instance::new(Sphere { radius: 1.0 }, material, 1)]);
+        scene.ambient = Hemisphere { sky: [1.0; 3], ground: [1.0; 3] };
+        for beside in [0.0, 0.6, 0.95] {
+            let view = looking([3.0, beside, 0.0], [0.0, beside, 0.0]);
+            let (mean, deviation) = seen(&scene, &[PoseF32::IDENTITY], &view, 256, 3);
+            assert!(mean <= 1.0 + 5.0 * deviation && mean > 0.7, "{specular} {shininess} {beside}: {mean}");
+        }
+    }
+}
+
+/// Inside of a ball that glows, light is the same at every point: after n bounces it is e (1 + a + ... + a^n).
+#[test]
+fn every_bounce_in_a_glowing_ball_adds_its_part() {
+    for a in [0.5f32, 0.8] {
+        let material = Material { emission: 0.25, ..matt(a) };
+        let scene = dark(vec![Instance::new(Sphere { radius: 1.0 }, material, 1)]);
+        let view = looking([0.2, -0.1, 0.3], [1.0, 0.5, -0.2]);
+        let a = albedo(a);
+        let sum = |bounces: u32| 0.25 * a * (0..=bounces + 1).map(|k| a.powi(k as i32)).sum::<f64>();
+        for bounces in [0, 1, 2, 5, 10] {
+            let light = seen(&scene, &[PoseF32::IDENTITY], &view, 256, bounces);
+            assert!(agrees(light, sum(bounces)), "{bounces} bounces: {light:?}, not {}", sum(bounces));
+        }
+        // Controls: another number of bounces would be found out, and so would a bounce too many.
+        let light = seen(&scene, &[PoseF32::IDENTITY], &view, 256, 2);
+        assert!(!agrees(light, sum(1)) && !agrees(light, sum(3)));
+        // All of them: e / (1 - a).
+        let light = seen(&scene, &[PoseF32::IDENTITY], &view, 256, 64);
+        assert!(agrees(light, 0.25 * a / (1.0 - a)), "{light:?}");
+    }
+}
+
+fn lamp(kind: LightKind, position: [f32; 3], direction: [f32; 3]) -> Light {
+    Light { kind, position, direction, attenuation: [0., 0., 1.], diffuse: [0.9; 3], ..Light::default() }
+}
+
+/// What a matt floor sends of a lamp's light: albedo, colour, cosine, and 1 / r² where it is near.
+#[test]
+fn lamps_light_a_floor_by_cosine_and_distance() {
+    let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1)]);
+    let view = looking([3.0, 1.0, 2.0], [0.2, -0.1, 0.0]);
+    let at = [0.2, -0.1, 0.0];
+    let place = [0.9f32, 0.4, 1.5];
+    let to = [0, 1, 2].map(|k| f64::from(place[k]) - f64::from(at[k] as f32));
+    let square = dot(to, to);
+    let (colour, a) = (f64::from(0.9f32), albedo(0.6));
+    let down = [-0.7, -0.5, -1.5];
+    let spot = LightKind::Spot { cutoff_deg: 30.0, exponent: 3.0 };
+    let axis = crate::ray::vector::unit(down.map(f64::from)).unwrap();
+    let inside = -dot(axis, to) / square.sqrt();
+    let cases = [
+        (lamp(LightKind::Directional, place, down), -axis[2]),
+        (lamp(LightKind::Point, place, down), to[2] / square.powf(1.5)),
+        (lamp(spot, place, down), to[2] / square.powf(1.5) * inside.powi(3)),
+        // Looks the other way.
+        (lamp(spot, place, [0.7, 0.5, -1.5]), 0.0),
+    ];
+    for (light, part) in cases {
+        scene.lights = vec![light];
+        let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &view, 4, 3);
+        let expected = a * colour * part;
+        // The pixel is a few micrometres wide, lamps are single precision.
+        assert!((mean - expected).abs() < 1e-5 * expected.max(1e-3), "{light:?}: {mean}, not {expected}");
+    }
+}
+
+/// A rectangle above the middle of which a point lies, `a` by `b` half sides in units of the height: its form factor.
+/// Source: Howell, A catalog of radiation heat transfer configuration factors, B-3.
+fn form_factor(a: f64, b: f64) -> f64 {
+    let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+    4.0 / (2.0 * PI) * (a / p * (b / p).atan() + b / q * (a / q).atan())
+}
+
+#[test]
+fn a_glowing_rectangle_lights_a_floor_by_its_form_factor() {
+    let emitter = Material { emission: 2.0, ..matt(0.5) };
+    let half = [0.6f32, 0.4];
+    let scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.7), 1), Instance::new(Plane { half }, emitter, 2)]);
+    // Face down, 0.8 m up.
+    let rotation = [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
+    let poses = [PoseF32::IDENTITY, PoseF32 { rotation, translation: [0., 0., 0.8] }];
+    let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
+    let factor = form_factor(f64::from(half[0]) / 0.8, f64::from(half[1]) / 0.8);
+    let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
+    let light = seen(&scene, &poses, &view, 1024, 0);
+    assert!(agrees(light, expected), "{light:?}, not {expected}");
+    assert!(light.1 < 0.01 * expected && !agrees(light, 1.1 * expected), "it can tell a tenth");
+    // From behind the rectangle is not there.
+    let behind = [PoseF32::IDENTITY, PoseF32::from_translation([0., 0., 0.8])];
+    assert_eq!(seen(&scene, &behind, &view, 64, 0).0, 0.0);
+}
+
+/// A lamp of a size through the edge of a box: what is lit is the part of the lamp's disc that is seen.
+#[test]
+fn lamps_of_a_size_cast_soft_shadows() {
+    let mut scene = dark(vec![
+        Instance::new(Plane::INFINITE, matt(0.6), 1),
+        Instance::new(Box { half: [1.0, 2.0, 0.1] }, matt(0.6), 2),
+    ]);
+    // The box covers x < 0 at heights from 0.9 to 1.1; the lamp is 2 m up.
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
+    let radius = 0.2f64;
+    let light =
+        |radius| Light { attenuation: [1., 0., 0.], radius, ..lamp(LightKind::Point, [0., 0., 2.], [0., 0., -1.]) };
+    let at = |x: f32, radius: f32| {
+        let mut scene = scene.clone();
+        scene.lights = vec![light(radius)];
+        seen(&scene, &poses, &looking([2.5, 0.3, 0.6], [x, 0.0, 0.0]), 1024, 0)
+    };
+    let open = |x: f64| albedo(0.6) * f64::from(0.9f32) * 2.0 / (4.0 + x * x).sqrt();
+    // Below the edge of the box's lower side (0, 0.9) a ray to the height 2 goes through x' with (x' - x) 0.9 / 2 = -x,
+    // and below that of its upper side (0, 1.1) with 1.1. The disc is nearly level: its tilt is x / 2, seen from x; what is
+    // lit is what lies beyond the larger of both.
+    let cut = |x: f64| (x - x * 2.0 / 0.9).max(x - x * 2.0 / 1.1);
+    let part = |c: f64| {
+        let c = (c / radius).clamp(-1.0, 1.0);
+        (c.acos() - c * (1.0 - c * c).sqrt()) / PI
+    };
+    let mut last = -1.0;
+    for x in [-0.5f32, -0.12, -0.06, 0.0, 0.06, 0.12, 0.5] {
+        let (mean, deviation) = at(x, radius as f32);
+        let expected = open(x.into()) * part(cut(x.into()));
+        // The tilt of the disc moves its points by up to r (1 - cos) sideways and r sin in height: both below 1 %.
+        assert!((mean - expected).abs() < 5.0 * deviation + 0.015 * open(x.into()), "{x}: {mean}, not {expected}");
+        assert!(mean > last - 1e-3, "{x}");
+        last = mean;
+        // A control: points cast sharp shadows.
+        let (sharp, _) = at(x, 0.0);
+        let lit = if x < 0.0 { 0.0 } else { open(x.into()) };
+        assert!(x == 0.0 || (sharp - lit).abs() < 1e-5, "{x}: {sharp}, not {lit}");
+    }
+    scene.lights = vec![Light { cast_shadow: false, ..light(0.0) }];
+    let view = looking([2.5, 0.3, 0.6], [-0.5, 0.0, 0.0]);
+    assert!((seen(&scene, &poses, &view, 4, 0).0 - open(-0.5)).abs() < 1e-5, "this one casts none");
+}
+
+/// A ball of alpha 0.3 between the floor and a lamp lets 0.7 of the light past, once; seen from above it takes 0.3 of the
+/// picture.
+#[test]
+fn what_is_not_opaque_takes_its_alpha_once() {
+    let mut glass = matt(0.0);
+    glass.rgba[3] = 0.3;
+    let mut scene =
+        dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1), Instance::new(Sphere { radius: 0.2 }, glass, 2)]);
+    scene.lights = vec![lamp(LightKind::Directional, [0.; 3], [0., 0., -1.])];
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, 1.0])];
+    let (lit, part) = (albedo(0.6) * f64::from(0.9f32), 1.0 - f64::from(0.3f32));
+    let beside = looking([1.0, 0.0, 0.5], [0.0; 3]);
+    let (mean, _) = seen(&scene, &poses, &beside, 4, 0);
+    assert!((mean - part * lit).abs() < 1e-5, "{mean}");
+    // Through the ball at a point that is lit past it.
+    let through = looking([-0.5, 0.0, 1.5], [0.5, 0.0, 0.5]);
+    let light = seen(&scene, &poses, &through, 1024, 0);
+    assert!(agrees(light, part * lit), "{light:?}");
+    assert!(!agrees(light, lit) && !agrees(light, part * part * lit));
+}
+
+#[test]
+fn mirrors_show_what_is_there() {
+    let mirror = Material { reflectance: 1.0, ..matt(0.3) };
+    let glow = Material { emission: 1.0, ..matt(0.4) };
+    let mut scene =
+        dark(vec![Instance::new(Plane::INFINITE, mirror, 1), Instance::new(Sphere { radius: 0.3 }, glow, 2)]);
+    scene.sky = Sky { zenith: [0.2; 3], horizon: [0.9; 3], nadir: [0.0; 3] };
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
+    let (mean, _) = seen(&scene, &poses, &looking([1.0, 0.0, 1.0], [0.0; 3]), 4, 2);
+    assert!((mean - albedo(0.4)).abs() < 1e-6, "the ball: {mean}");
+    // Past the ball: the sky 45 degrees up.
+    let (mean, _) = seen(&scene, &poses, &looking([1.0, 2.0, 1.0], [0.0, 2.0, 0.0]), 4, 2);
+    let linear = |x: f32| f64::from(scene::material::decode_srgb(x));
+    let expected = linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9));
+    assert!((mean - expected).abs() < 1e-5, "the sky: {mean}, not {expected}");
+}
+
+/// The lamp on the camera, and light from everywhere, are as bright as the rasterizer draws them.
+#[test]
+fn the_headlight_and_ambient_light_are_those_of_the_rasterizer() {
+    let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1)]);
+    scene.headlight = Headlight { ambient: [0.1; 3], diffuse: [0.4; 3], specular: [0.0; 3], active: true };
+    scene.ambient = Hemisphere { sky: [0.3; 3], ground: [0.1; 3] };
+    let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &looking([3.0, 0.0, 4.0], [0.0; 3]), 4, 2);
+    let expected = albedo(0.6) * (0.8 * f64::from(0.4f32) + f64::from(0.1f32) + f64::from(0.3f32));
+    assert!((mean - expected).abs() < 1e-5, "{mean}, not {expected}");
+}

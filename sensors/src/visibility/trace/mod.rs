@@ -1,0 +1,359 @@
+//! Visibility by rays: what a ray from anywhere meets, and a visibility buffer filled by the rays of its samples.
+//!
+//! Two levels. Below, one tree for each mesh, in the mesh's own frame: built once, shared by all environments, the one that
+//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame ([`tree`]). Shapes with
+//! a closed form are met exactly; height fields as the triangles that the rasterizer draws. Everything is in double
+//! precision.
+//!
+//! The rays of a picture need no upper tree: an instance is met only within the rectangle of the picture that it covers,
+//! where its rays are cast in packets of eight, the nearest instances first. What is written is the rasterizer's own
+//! visibility buffer, so every channel comes from the same code.
+
+mod tree;
+
+use super::Projection;
+use super::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
+use super::raster::{Item, Layer, Placed};
+use crate::lanes::Simd;
+use crate::ray::bvh::Stack;
+use crate::ray::packet::{Packet, WIDTH};
+use crate::ray::shape::Solid;
+use crate::ray::shape::mesh::MeshTree;
+use crate::ray::triangle::ShearPacket;
+use crate::ray::vector::{V3, along, dot, scale};
+use crate::ray::{Ray, RayAssets};
+use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
+use std::sync::Arc;
+use tree::Tree;
+
+/// What rays meet of an instance, in its own frame.
+#[derive(Clone, Debug)]
+enum Body {
+    /// Triangles, and the mesh that they are of.
+    Mesh(Arc<RenderMesh>, Arc<MeshTree>),
+    /// A closed form.
+    Closed(Solid),
+}
+
+/// A body in the world.
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    instance: u32,
+    world_from_instance: PoseF64,
+    /// Opacity.
+    alpha: f64,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hit {
+    /// How far away \[m\].
+    pub(crate) distance: f64,
+    pub(crate) instance: u32,
+    /// The triangle of the instance's mesh; 0 for a closed form.
+    pub(crate) triangle: u32,
+    /// Unit normal out of the body, world frame.
+    pub(crate) normal: V3,
+}
+
+/// What rays meet in a frame; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tracer {
+    /// One for each instance; `None` where it is not seen.
+    bodies: Vec<Option<Body>>,
+    things: Vec<Thing>,
+    /// Things without an end.
+    endless: Vec<u32>,
+    tree: Tree,
+}
+
+impl Body {
+    fn of(instance: &Instance, known: Option<Self>, assets: &RayAssets) -> Self {
+        let mesh = match &instance.shape {
+            Shape::Mesh(shape) => &shape.mesh,
+            Shape::HeightField(shape) => shape.mesh(),
+            shape => return Self::Closed(assets.with(|assets| Solid::of(shape, assets))),
+        };
+        match known {
+            Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
+            _ => Self::Mesh(Arc::clone(mesh), assets.with(|assets| assets.mesh(mesh))),
+        }
+    }
+
+    /// Smallest and largest coordinates; `None` for a shape without an end.
+    fn bounds(&self) -> Option<[V3; 2]> {
+        match self {
+            Self::Mesh(_, tree) => Some(tree.bounds()),
+            Self::Closed(solid) => solid.bounds(),
+        }
+    }
+}
+
+/// The pose in double precision.
+fn wide(pose: &PoseF32) -> PoseF64 {
+    PoseF64 { rotation: pose.rotation.map(|r| r.map(f64::from)), translation: pose.translation.map(f64::from) }
+}
+
+impl Tracer {
+    pub(crate) fn bytes(&self) -> usize {
+        self.bodies.capacity() * size_of::<Option<Body>>()
+            + self.things.capacity() * size_of::<Thing>()
+            + self.endless.capacity() * size_of::<u32>()
+            + self.tree.bytes()
+    }
+
+    /// Finds the trees of everything that `keep` does not hide; those that nobody has yet are built.
+    pub(crate) fn find_bodies(&mut self, scene: &RenderScene, assets: &RayAssets, keep: impl Fn(&Instance) -> Layer) {
+        let instances = scene.instances();
+        self.bodies.resize_with(instances.len(), || None);
+        for (body, instance) in self.bodies.iter_mut().zip(instances) {
+            *body = match keep(instance) {
+                Layer::Hidden => None,
+                _ => Some(Body::of(instance, body.take(), assets)),
+            };
+        }
+    }
+
+    /// Puts everything where it is, for rays that go anywhere. Its bodies were found before.
+    pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32]) {
+        let Self { bodies, things, endless, tree } = self;
+        things.clear();
+        endless.clear();
+        tree.clear();
+        for (k, body) in bodies.iter().enumerate() {
+            let Some(body) = body else { continue };
+            let world_from_instance = wide(&poses[k]);
+            let thing = things.len() as u32;
+            let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
+            things.push(Thing { instance: k as u32, world_from_instance, alpha });
+            match body.bounds() {
+                Some(bounds) => tree.add(thing, &world_from_instance, bounds),
+                None => endless.push(thing),
+            }
+        }
+        tree.build();
+    }
+
+    /// The nearest surface at a distance from 0 to `limit` \[m\].
+    pub(crate) fn nearest(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Hit> {
+        let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
+        let mut meet = |thing: u32, limit: f64| {
+            let Some(found) = self.meet(thing, ray, limit, stack) else { return limit };
+            // Of two that are as near, the first in the scene counts.
+            if best.is_none_or(|b| found.distance < b.distance || found.distance == b.distance && thing < b.thing) {
+                best = Some(found);
+            }
+            limit.min(found.distance)
+        };
+        for &thing in &self.endless {
+            limit = meet(thing, limit);
+        }
+        self.tree.visit(ray, limit, meet);
+        self.hit(best?)
+    }
+
+    /// The part of the light that gets along a ray from distance 0 to `limit` \[m\]: nothing past something opaque, and past
+    /// the front of other things what they let through.
+    pub(crate) fn passes(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> f64 {
+        let mut left = 1.0;
+        let mut meet = |thing: u32, limit: f64| {
+            let Thing { instance, world_from_instance, alpha } = &self.things[thing as usize];
+            if *alpha < 1.0 {
+                let front = self.meet(thing, ray, limit, stack).and_then(|found| self.hit(found));
+                if front.is_some_and(|hit| dot(hit.normal, ray.direction) < 0.0) {
+                    left *= 1.0 - alpha;
+                }
+                return limit;
+            }
+            let local = seen_from(ray, world_from_instance);
+            let blocked = match &self.bodies[*instance as usize] {
+                Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
+                Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
+                None => false,
+            };
+            if !blocked {
+                return limit;
+            }
+            left = 0.0;
+            // Nothing is nearer than this: the visit ends.
+            -1.0
+        };
+        let mut limit = limit;
+        for &thing in &self.endless {
+            limit = meet(thing, limit);
+        }
+        self.tree.visit(ray, limit, meet);
+        left
+    }
+
+    /// Where a ray meets a thing.
+    #[inline(always)]
+    fn meet(&self, thing: u32, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Found> {
+        let Thing { instance, world_from_instance, .. } = &self.things[thing as usize];
+        let local = seen_from(ray, world_from_instance);
+        match self.bodies[*instance as usize].as_ref()? {
+            Body::Mesh(_, tree) => {
+                let (distance, index) = tree.nearest(&local, limit, None, stack)?;
+                Some(Found { thing, distance, index, normal: [0.0; 3] })
+            }
+            Body::Closed(solid) => {
+                let touch = solid.touch(&local, limit, stack)?;
+                // These bodies are convex, about their origin: outward is where the surface is. A plane's points are level
+                // with it.
+                let inward = dot(touch.normal, local.at(touch.t)) < 0.0 && !matches!(solid, Solid::Plane(_));
+                let normal = scale(touch.normal, if inward { -1.0 } else { 1.0 });
+                Some(Found { thing, distance: touch.t, index: 0, normal })
+            }
+        }
+    }
+
+    fn hit(&self, found: Found) -> Option<Hit> {
+        let Thing { instance, world_from_instance, .. } = &self.things[found.thing as usize];
+        let (triangle, normal) = match self.bodies[*instance as usize].as_ref()? {
+            Body::Mesh(_, tree) => (tree.number(found.index), tree.normal(found.index)?),
+            Body::Closed(_) => (0, found.normal),
+        };
+        let normal = world_from_instance.rotate(normal);
+        Some(Hit { distance: found.distance, instance: *instance, triangle, normal })
+    }
+
+    /// Casts the rays of all samples where an instance may be seen, into a visibility buffer. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn draw<S: Simd>(
+        &self,
+        s: S,
+        stack: &mut Stack,
+        tile: &mut Tile,
+        projection: &Projection,
+        (placed, first_ids): (&[Placed], &[u32]),
+        item: &Item,
+    ) {
+        let Some(area) = tile.overlap(item.rect) else { return };
+        let index = item.instance as usize;
+        let Some(body) = &self.bodies[index] else { return };
+        let lens = Lens::new(projection, &placed[index]);
+        s.vectorize(
+            #[inline(always)]
+            || {
+                for by in area[1]..=area[3] {
+                    for bx in area[0]..=area[2] {
+                        let block = tile.block(bx, by);
+                        if tile.hidden(block, item.nearness) {
+                            continue;
+                        }
+                        tile.open(block);
+                        let mut drawn = false;
+                        for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                            let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
+                            let samples = tile.samples(block, plane);
+                            for row in 0..BLOCK {
+                                let corner = [(bx * BLOCK) as f64 + dx, (by * BLOCK + row) as f64 + dy];
+                                let at = samples + row * BLOCK..samples + (row + 1) * BLOCK;
+                                let (near, ids) = (&mut tile.nearness[at.clone()], &mut tile.id[at]);
+                                drawn |= lens.row(s, body, corner, stack, near, ids, first_ids[index]);
+                            }
+                        }
+                        if drawn {
+                            tile.touch(block);
+                        }
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// Where a ray meets a thing, as far as it must be known to compare.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    thing: u32,
+    distance: f64,
+    /// Place of a triangle in its tree.
+    index: usize,
+    /// Of a closed form, out of it, in its own frame.
+    normal: V3,
+}
+
+/// The ray in the frame that a pose maps from.
+#[inline(always)]
+fn seen_from(ray: &Ray, pose: &PoseF64) -> Ray {
+    Ray { origin: pose.apply_inverse(ray.origin), direction: pose.rotate_inverse(ray.direction) }
+}
+
+/// A camera's rays in the frame of an instance.
+struct Lens {
+    rotation: [V3; 3],
+    origin: V3,
+    c: [f64; 2],
+    f: [f64; 2],
+    near: f64,
+}
+
+impl Lens {
+    fn new(projection: &Projection, placed: &Placed) -> Self {
+        let pose = wide(&placed.local.instance_from_camera);
+        Self {
+            rotation: pose.rotation,
+            origin: pose.translation,
+            c: [projection.cx, projection.cy].map(f64::from),
+            f: [projection.fx, projection.fy].map(f64::from),
+            near: f64::from(projection.near),
+        }
+    }
+
+    /// Casts the rays of eight samples beside each other, the first of them at (u, v), and keeps what is nearer than what is
+    /// there. Whether there is any.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
+    fn row<S: Simd>(
+        &self,
+        s: S,
+        body: &Body,
+        [u, v]: [f64; 2],
+        stack: &mut Stack,
+        nearness: &mut [f32],
+        ids: &mut [u32],
+        first_id: u32,
+    ) -> bool {
+        // Distances along a ray for a metre of depth.
+        let mut length = [1.0; WIDTH];
+        let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];
+        for (k, (ray, length)) in rays.iter_mut().zip(&mut length).enumerate() {
+            let c = [(u + k as f64 - self.c[0]) / self.f[0], (v - self.c[1]) / self.f[1], 1.0];
+            let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2]);
+            *length = dot(d, d).sqrt();
+            // Nothing before the near plane counts: rays begin there.
+            *ray = Ray { origin: along(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
+        }
+        let mut packet = Packet::of(&rays, f64::INFINITY);
+        for k in 0..WIDTH {
+            // What is there is known to single precision.
+            packet.shorten(k, (1.000_001 / f64::from(nearness[k]) - self.near) * length[k]);
+        }
+        let mut found = [None; WIDTH];
+        match body {
+            Body::Mesh(_, tree) => {
+                tree.nearest_of_packet(s, &packet, ShearPacket::new(s, &packet).as_ref(), stack, &mut found);
+                for (_, index) in found.iter_mut().flatten() {
+                    *index = tree.number(*index) as usize;
+                }
+            }
+            Body::Closed(solid) => {
+                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                    found[k] = solid.touch(&rays[k], packet.limit(k), stack).map(|touch| (touch.t, 0));
+                }
+            }
+        }
+        let mut drawn = false;
+        for k in 0..WIDTH {
+            let Some((t, number)) = found[k] else { continue };
+            let q = (1.0 / (self.near + t / length[k])) as f32;
+            if q > nearness[k] {
+                (nearness[k], ids[k]) = (q, first_id + number as u32);
+                drawn = true;
+            }
+        }
+        debug_assert!(first_id != NOTHING);
+        drawn
+    }
+}

@@ -1,0 +1,104 @@
+//! Every renderer sees the scene of the example `create_sensor` as the rasterizer does.
+
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
+use std::f64::consts::FRAC_PI_2;
+
+const SIZE: [usize; 2] = [320, 240];
+
+/// The arm, the hand and the cube, and a camera for each renderer at one of the two places of the example.
+fn cameras(attached: bool) -> (SimulationManager, Vec<(Renderer, SensorId<Camera>)>) {
+    let mut sim =
+        SimulationManager::new(SimulationManagerCfg { physics_dt: 0.01, threads: Some(2), ..Default::default() })
+            .unwrap();
+    let hand = ComponentCfg {
+        transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
+        ..ComponentCfg::new("hand", assets::path("revo1_left/revo1_left.urdf").unwrap())
+    };
+    let arm = ComponentCfg::new("arm", assets::path("sr5/SR5.urdf").unwrap());
+    let urdf = UrdfCfg { components: vec![arm, hand], ..Default::default() };
+    sim.add_robot(RobotCfg { uid: "sr5".into(), urdf, ..Default::default() }).unwrap();
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(0.05),
+        init_pose: Pose::translation(1.2, -0.2, 0.1),
+        ..Default::default()
+    })
+    .unwrap();
+    let free = Extrinsics {
+        placement: Placement::Pose { pos: [1.2, -0.2, 1.5], rotation: from_wxyz([0.0, 0.0, 1.0, 0.0]) },
+        ..Default::default()
+    };
+    // From beside, so that all of the arm is seen.
+    let beside = Extrinsics {
+        placement: Placement::LookAt { eye: [1.6, -1.2, 1.0], target: [0.2, 0.0, 0.4], up: [0.0, 0.0, 1.0] },
+        ..Default::default()
+    };
+    let few = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: true, seed: 0 };
+    let all = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced, few];
+    let cameras = all.into_iter().enumerate().map(|(k, renderer)| {
+        let cfg = CameraCfg {
+            width: SIZE[0],
+            height: SIZE[1],
+            intrinsics: Intrinsics::Pixels { fx: 300.0, fy: 300.0, cx: 160.0, cy: 120.0 },
+            near: 0.01,
+            far: 10.0,
+            extrinsics: if attached { beside.clone() } else { free.clone() },
+            channels: Channels::ALL,
+            renderer,
+            raster: RasterCfg { lod: false, ..RasterCfg::of_cameras() },
+            ..Default::default()
+        };
+        (renderer, sim.add_sensor(format!("camera_{k}"), cfg).unwrap())
+    });
+    let cameras = cameras.collect();
+    sim.update(1);
+    (sim, cameras)
+}
+
+#[test]
+fn masks_depths_and_normals_are_the_rasterizers_off_silhouettes() {
+    for beside in [false, true] {
+        let (sim, cameras) = cameras(beside);
+        let raster = sim.sensor(cameras[0].1).unwrap();
+        let (mask, depth) = (raster.mask().unwrap(), raster.depth().unwrap());
+        let normal = raster.normal().unwrap();
+        for (renderer, camera) in &cameras[1..] {
+            let other = sim.sensor(*camera).unwrap();
+            let (mask_2, depth_2) = (other.mask().unwrap(), other.depth().unwrap());
+            let normal_2 = other.normal().unwrap();
+            let (mut compared, mut different) = (0, 0);
+            for y in 1..SIZE[1] - 1 {
+                for x in 1..SIZE[0] - 1 {
+                    let d = depth[(0, y, x)];
+                    let same_around = (0..9).all(|n| {
+                        let at = (0, y + n / 3 - 1, x + n % 3 - 1);
+                        let near = |other: f32| other == d || (other - d).abs() < 0.1 * d;
+                        let id = mask[(0, y, x)];
+                        mask[at] == id && mask_2[at] == id && near(depth[at]) && near(depth_2[at])
+                    });
+                    if !same_around {
+                        continue;
+                    }
+                    compared += 1;
+                    let other = depth_2[(0, y, x)];
+                    let close = other == d || (other - d).abs() <= 1e-4 * d;
+                    let cosine: f32 = (0..3).map(|k| normal[(0, y, x, k)] * normal_2[(0, y, x, k)]).sum();
+                    let nothing = d == f32::INFINITY;
+                    different += usize::from(!close || !(nothing || cosine >= 0.5f32.to_radians().cos()));
+                }
+            }
+            println!("{renderer:?}: {different} of {compared} pixels differ");
+            assert!(compared > SIZE[0] * SIZE[1] * 8 / 10, "{renderer:?}: {compared}");
+            // Centres of pixels on edges between triangles may belong to either of them.
+            assert!(different * 1000 <= compared, "{renderer:?}: {different} of {compared}");
+            let (a, b) = (raster.color().unwrap(), sim.sensor(*camera).unwrap().color().unwrap());
+            assert!(a != b || *renderer == Renderer::FastRayTraced, "{renderer:?} is another renderer");
+            // And about as bright: the same lamps, the same light from all around.
+            let mean = |c: &kinetoscope::ndarray::ArrayView4<'_, u8>| c.iter().map(|&x| f64::from(x)).sum::<f64>();
+            let ratio = mean(&b) / mean(&a);
+            assert!((0.8..1.25).contains(&ratio), "{renderer:?}: {ratio}");
+        }
+        assert!(mask.iter().any(|&id| id != 0));
+    }
+}
