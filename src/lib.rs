@@ -26,10 +26,10 @@ pub mod prelude {
     pub use sim::{
         ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
         Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, GroundCfg, GroupId,
-        IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId, MjcfCfg,
-        MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties, Property, Randomization,
-        RandomizationError, Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg,
-        SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
-        TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
+        IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg, LinkId, MaskId,
+        MeshCollision, MjcfCfg, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape, PerJoint, Posture, Properties,
+        Property, Randomization, RandomizationError, Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId,
+        Rollout, SceneCfg, SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot,
+        SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
     };
 }

@@ -3,10 +3,10 @@
 use super::order::neighbours_together;
 use crate::crew::{Crew, Work};
 use crate::ray::world::FixedWorld;
-use crate::ray::{Ray, RayHit, RayTargets, RayWorld};
+use crate::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
 use ndarray::Array2;
-use scene::PoseF64;
+use scene::{OwnScene, PoseF64};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -65,6 +65,8 @@ pub(crate) struct Scan<R: Rays> {
 #[derive(Debug)]
 struct Round<R: Rays> {
     targets: Arc<RayTargets>,
+    /// Where trees over meshes are, for targets of environments that look otherwise.
+    assets: RayAssets,
     rays: R,
     /// The order in which they are cast.
     order: Option<Vec<u32>>,
@@ -81,12 +83,22 @@ struct Round<R: Rays> {
 #[derive(Clone, Debug)]
 struct Task<V> {
     max_distance: f64,
+    /// What rays hit in each environment; mostly one and the same.
+    looks: Vec<Look>,
     /// What does not move, in each environment; mostly one and the same.
     fixed: Vec<Arc<FixedWorld>>,
     /// Environments and their views.
     views: Vec<(usize, V)>,
     /// Where the targets are that may move, view after view.
     poses: Vec<PoseF64>,
+}
+
+/// What rays hit in an environment.
+#[derive(Clone, Debug)]
+struct Look {
+    /// What it was made of.
+    scene: OwnScene,
+    targets: Arc<RayTargets>,
 }
 
 #[derive(Clone, Debug)]
@@ -103,8 +115,11 @@ impl<R: Rays> Scan<R> {
         let desk = || Desk { world: RayWorld::new(&targets), rays: Vec::with_capacity(PART.min(count)) };
         let nothing = Arc::new(FixedWorld::default());
         let of_view = || (0..count).step_by(PART).map(|first| vec![RayHit::MISS; PART.min(count - first)]);
-        let task = Task { max_distance, fixed: vec![nothing; n], views: Vec::with_capacity(n), poses: Vec::new() };
+        let look = Look { scene: OwnScene::default(), targets: Arc::clone(&targets) };
+        let (looks, fixed, views) = (vec![look; n], vec![nothing; n], Vec::with_capacity(n));
+        let task = Task { max_distance, looks, fixed, views, poses: Vec::new() };
         let round = Round {
+            assets: context.ray_assets.clone(),
             task: RwLock::new(task),
             next: AtomicUsize::new(0),
             desks: (0..context.threads.max(1)).map(|_| Mutex::new(desk())).collect(),
@@ -125,17 +140,28 @@ impl<R: Rays> Scan<R> {
         &self.round.rays
     }
 
-    /// Looks where things are that do not move, in an environment where somebody may have moved them.
-    pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>) {
-        let (targets, poses) = (&self.round.targets, row(poses, env));
-        let mut task = write(&self.round.task);
-        let is_here = |fixed: &Arc<FixedWorld>| fixed.is_at(targets, poses);
-        if is_here(&task.fixed[env]) {
+    /// Looks where things are that do not move, in an environment where somebody may have moved them or changed how they
+    /// look; `scene` is the environment's own.
+    pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>, scene: &OwnScene) {
+        let (round, poses) = (&self.round, row(poses, env));
+        let mut task = write(&round.task);
+        let other = task.looks[env].scene != *scene;
+        if other {
+            let own = |scene: &_| Arc::new(RayTargets::new(scene, round.targets.instances(), &round.assets));
+            let targets = scene.0.as_deref().map_or_else(|| Arc::clone(&round.targets), own);
+            task.looks[env] = Look { scene: scene.clone(), targets };
+        }
+        let targets = Arc::clone(&task.looks[env].targets);
+        let is_here = |fixed: &Arc<FixedWorld>| fixed.is_at(&targets, poses);
+        if !other && is_here(&task.fixed[env]) {
             return;
         }
-        // They are at the same places in most environments.
-        let known = task.fixed.first().filter(|first| is_here(first)).map(Arc::clone);
-        task.fixed[env] = known.unwrap_or_else(|| Arc::new(FixedWorld::new(targets, poses)));
+        // They are the same things at the same places in most environments.
+        let known = task.fixed.first().filter(|first| {
+            let alike = env > 0 && Arc::ptr_eq(&task.looks[0].targets, &targets);
+            alike && is_here(first)
+        });
+        task.fixed[env] = known.map_or_else(|| Arc::new(FixedWorld::new(&targets, poses)), Arc::clone);
     }
 
     /// Casts the rays of the environments `envs`, with the view that `view` gives for each; `poses` are those of the
@@ -196,7 +222,8 @@ impl<R: Rays> Work for Round<R> {
             let (at, first) = (part / per_view, part % per_view * PART);
             let (env, view) = &task.views[at];
             if placed != at {
-                world.place_with(&task.fixed[*env], &task.poses[at * moving..(at + 1) * moving]);
+                let moving = &task.poses[at * moving..(at + 1) * moving];
+                world.place_with(&task.looks[*env].targets, &task.fixed[*env], moving);
                 placed = at;
             }
             let mut hits = lock(&self.parts[part]);
@@ -214,8 +241,9 @@ impl<R: Rays> Work for Round<R> {
 /// A scan of its own: clones cast at the same time.
 impl<R: Rays> Clone for Scan<R> {
     fn clone(&self) -> Self {
-        let Round { targets, rays, order, task, desks, parts, .. } = &*self.round;
+        let Round { targets, assets, rays, order, task, desks, parts, .. } = &*self.round;
         let round = Round {
+            assets: assets.clone(),
             targets: Arc::clone(targets),
             rays: rays.clone(),
             order: order.clone(),
