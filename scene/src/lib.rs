@@ -27,4 +27,4 @@ pub use pose_f64::PoseF64;
 pub use random::Random;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
 pub use shape::{RenderMesh, Shape};
-pub use state::{SceneState, VisibleState};
+pub use state::{OwnScene, SceneState, VisibleState};

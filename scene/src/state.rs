@@ -6,8 +6,9 @@
 //! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
 //! and velocities are those of t_(k+1). Both times are given.
 
-use crate::{Light, PoseF32, PoseF64};
+use crate::{Light, PoseF32, PoseF64, RenderScene};
 use ndarray::{Array, Array2, Array3, Axis, RemoveAxis};
+use std::sync::Arc;
 
 /// State of all environments after a physics step (or after a reset).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,15 +62,34 @@ pub struct SceneState {
     pub sensordata: Option<Array2<f64>>,
     /// Where things are that can be seen.
     pub visible: Option<VisibleState>,
-    /// World from instance, in the order of [`RenderScene::instances`](crate::RenderScene::instances), in double precision
+    /// World from instance, in the order of [`RenderScene::instances`], in double precision
     /// (what ray casters work with), shape \[num_envs, instances\].
     pub instance_poses: Option<Array2<PoseF64>>,
+    /// What can be seen where sizes or colours are the environment's own, shape \[num_envs\]; empty where all environments
+    /// look alike.
+    pub own_scenes: Vec<OwnScene>,
 }
 
-/// Where everything of a [`RenderScene`](crate::RenderScene) is in all environments.
+/// What can be seen in one environment instead of the scene of all: the same instances in the same order and of the same
+/// kinds, with sizes or colours of their own; nothing where it looks as all do. Two are equal where they are the same in
+/// memory.
+#[derive(Clone, Debug, Default)]
+pub struct OwnScene(pub Option<Arc<RenderScene>>);
+
+impl PartialEq for OwnScene {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (None, None) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+/// Where everything of a [`RenderScene`] is in all environments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisibleState {
-    /// World from instance, in the order of [`RenderScene::instances`](crate::RenderScene::instances), shape
+    /// World from instance, in the order of [`RenderScene::instances`], shape
     /// \[num_envs, instances\]. Single precision: what the renderer works with.
     pub instance_poses: Array2<PoseF32>,
     /// The scene's lamps where they are now, shape \[num_envs, lamps\].
@@ -114,6 +134,12 @@ impl SceneState {
         self.step.len()
     }
 
+    /// What can be seen in environment `env`, where that is the environment's own.
+    pub fn own_scene(&self, env: usize) -> &OwnScene {
+        static AS_ALL: OwnScene = OwnScene(None);
+        self.own_scenes.get(env).unwrap_or(&AS_ALL)
+    }
+
     /// Takes over from `other` the environments where `chosen` is true: steps, times, and the fields that this state has.
     /// `false`, and nothing is taken over, where `other` is not of the same scene: it lacks a field of this one, or has
     /// another number of anything. Allocates only where the list of contacts has no room for those of before and those of after
@@ -144,6 +170,13 @@ impl SceneState {
         }
         if let (Some(to), Some(from)) = (&mut self.contacts, &other.contacts) {
             to.take_over(from, chosen);
+        }
+        let sees = self.visible.is_some() || self.instance_poses.is_some();
+        if sees && !(self.own_scenes.is_empty() && other.own_scenes.is_empty()) {
+            self.own_scenes.resize(chosen.len(), OwnScene::default());
+            for env in envs() {
+                self.own_scenes[env].clone_from(other.own_scene(env));
+            }
         }
         true
     }
@@ -321,6 +354,7 @@ mod tests {
                 lights: Array2::from_shape_fn((3, 1), |(env, _)| lamp(env)),
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
+            own_scenes: Vec::new(),
         }
     }
 
@@ -347,6 +381,30 @@ mod tests {
         // The control: nobody is chosen.
         assert!(kept.take_over(&state(400.0, [1, 1, 1]), &[false; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
+    }
+
+    #[test]
+    fn own_scenes_come_and_go_with_their_environment() {
+        let own = || OwnScene(Some(Arc::new(RenderScene::empty())));
+        let (red, large) = (own(), own());
+        assert!(red != large && red == red.clone(), "the same in memory, or not");
+        let with = |scenes: [&OwnScene; 3]| SceneState {
+            own_scenes: scenes.map(OwnScene::clone).into(),
+            ..state(200.0, [1, 1, 1])
+        };
+        let nothing = OwnScene::default();
+        let mut kept = state(100.0, [1, 1, 1]);
+        assert_eq!(kept.own_scene(2), &nothing);
+        assert!(kept.take_over(&with([&red, &large, &nothing]), &[true, false, true]));
+        assert_eq!(kept.own_scenes, [red.clone(), nothing.clone(), nothing.clone()]);
+        assert!(kept.take_over(&with([&nothing, &large, &red]), &[false, true, true]));
+        assert_eq!(kept.own_scenes, [red.clone(), large, red]);
+        // Back to what all look like.
+        assert!(kept.take_over(&state(300.0, [1, 1, 1]), &[true; 3]));
+        assert!((0..3).all(|env| kept.own_scene(env) == &nothing));
+        // Nobody looks: nothing is kept.
+        let mut blind = SceneState::new(3);
+        assert!(blind.take_over(&with([&nothing, &own(), &nothing]), &[true; 3]) && blind.own_scenes.is_empty());
     }
 
     #[test]

@@ -280,6 +280,7 @@ impl Requires {
             sensordata: part(has(Self::SENSORDATA), &state.sensordata),
             visible: part(has(Self::VISIBLE), &state.visible),
             instance_poses: part(has(Self::INSTANCES), &state.instance_poses),
+            own_scenes: if has(Self::VISIBLE) || has(Self::INSTANCES) { state.own_scenes.clone() } else { Vec::new() },
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::batch::Batch;
 use crate::capture::Plan;
 use crate::contents::{Contents, GROUND_MASK_ID};
+use crate::description::Geometry;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::table::{Drive, DriveTable, Gains, Realization};
 use crate::drive::{DriveModel, implicit};
@@ -20,7 +21,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
-use ::scene::Pose;
+use ::scene::{OwnScene, Pose};
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
@@ -48,6 +49,10 @@ pub(crate) struct Simulation {
     pub(crate) maker: Option<Maker>,
     /// What each environment has for itself.
     pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
+    /// What each environment looks like, where its sizes or colours are its own; empty where nobody's are, or nobody looks.
+    pub(crate) own_scenes: Vec<OwnScene>,
+    /// Whether each geom only has a pose, for a mesh that is drawn in its place.
+    pub(crate) proxies: Vec<bool>,
     /// Pairs of bodies that are excluded from contact because they overlap at the start.
     pub(crate) excluded: Vec<(String, String)>,
 }
@@ -84,6 +89,13 @@ pub(crate) struct FreeIndex {
     pub joint: Option<(usize, usize)>,
     /// Its number among the bodies that are moved by hand.
     pub mocap: Option<usize>,
+}
+
+impl FreeIndex {
+    /// Whether it neither moves nor is moved by hand.
+    pub(crate) fn stands(&self) -> bool {
+        self.joint.is_none() && self.mocap.is_none()
+    }
 }
 
 /// Where one joint's numbers are.
@@ -170,6 +182,7 @@ pub(crate) fn document(
             base_pose: data.cfg().init_pose,
             plans: data.plans(),
             hulls: data.hulls(),
+            room_for_friction: data.cfg().drive.friction.is_some(),
             purpose,
         };
         let layout = match data.file() {
@@ -234,6 +247,7 @@ struct Built {
     start: Arc<Start>,
     xml: String,
     diagnostics: Vec<Diagnostic>,
+    proxies: Vec<bool>,
 }
 
 fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, String)]) -> Result<Built> {
@@ -261,7 +275,26 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     let identities = identify(&model, contents, &robots, &objects, &parts);
     let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml: text.xml, diagnostics })
+    let (proxies, xml) = (find_proxies(&model, contents, &robots), text.xml);
+    Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml, diagnostics, proxies })
+}
+
+/// Geoms that meshes are drawn in the place of.
+fn find_proxies(model: &mj::Model, contents: &Contents, robots: &[RobotIndex]) -> Vec<bool> {
+    let mut proxies = vec![false; model.ngeom()];
+    for (data, index) in contents.robots.iter().zip(robots) {
+        for geom in &index.geoms {
+            let visuals = &data.description().links[geom.link].visuals;
+            let visual = geom.visual.and_then(|visual| visuals.get(visual));
+            proxies[geom.geom] = visual.is_some_and(|visual| matches!(visual.geometry, Geometry::Mesh { .. }));
+        }
+    }
+    for object in &contents.objects {
+        if let Some(geom) = model.id(ObjectKind::Geom, &format!("{}/visual", object.uid())) {
+            proxies[geom] = true;
+        }
+    }
+    proxies
 }
 
 /// Threads for those who do not say how many.
@@ -476,12 +509,11 @@ fn set_up_drives(
     compiled.make_effort_sources(&effort_sources);
     compiled.prepare_for_stepping(!row_drives.is_empty());
     let model = compiled.into_model();
-    // Friction rows come in the order of degrees of freedom, one for each with friction.
-    let with_friction: Vec<usize> =
-        model.dof_frictionloss().iter().enumerate().filter(|(_, f)| **f > 0.0).map(|(dof, _)| dof).collect();
     for (dof, index) in row_drives {
-        let row = with_friction.binary_search(&dof).map_err(|_| missing("friction row", &format!("{dof}")))?;
-        table.drives[index].realization = Realization::Row { row };
+        if model.dof_frictionloss()[dof] <= 0.0 {
+            return Err(missing("friction row", &format!("{dof}")));
+        }
+        table.drives[index].realization = Realization::Row;
     }
     Ok((model, table, indices, start))
 }
@@ -514,6 +546,8 @@ impl Built {
             tables: OnceLock::new(),
             maker: None,
             own_values: vec![None; cfg.num_envs],
+            own_scenes: Vec::new(),
+            proxies: self.proxies,
             excluded,
         };
         simulation.reset(&vec![true; cfg.num_envs]);
@@ -559,6 +593,7 @@ impl Simulation {
         let visible =
             Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements).with_own_headlight());
         self.visible = Some(Arc::clone(&visible));
+        self.look_anew(&(0..cfg.num_envs).collect::<Vec<_>>());
         visible
     }
 

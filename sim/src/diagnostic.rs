@@ -49,6 +49,8 @@ pub enum DiagnosticKind {
     /// The surface of an object's mesh is open, encloses nothing, or is inside out in a part: it weighs and turns as its convex
     /// hull.
     OpenMesh,
+    /// The convex pieces of an object's mesh are farther above its surface than they should be.
+    CoarsePieces,
     /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
     ExportReduced,
 }
@@ -77,6 +79,7 @@ impl DiagnosticKind {
             Self::ColorClamped => "color-clamped",
             Self::SettingIgnored => "setting-ignored",
             Self::OpenMesh => "open-mesh",
+            Self::CoarsePieces => "coarse-pieces",
             Self::ExportReduced => "export-reduced",
         }
     }

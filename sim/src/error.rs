@@ -7,6 +7,7 @@ use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::mjcf::robot_file::RobotFileError;
+use crate::named::Named;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
@@ -46,19 +47,19 @@ pub enum Error {
         error: Box<scene::mesh::MeshError>,
     },
     /// A drive property or a start position is wrong.
-    #[error("robot {robot:?}: {error}")]
+    #[error("{robot}: {error}")]
     Plan {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// What is wrong.
         #[source]
         error: Box<PlanError>,
     },
     /// A control part's patterns are wrong.
-    #[error("robot {robot:?}, control part {part:?}: {error}")]
+    #[error("{robot}, control part {part:?}: {error}")]
     ControlPart {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The part.
         part: String,
         /// What is wrong.
@@ -66,19 +67,19 @@ pub enum Error {
         error: Box<PatternError>,
     },
     /// The patterns of a payload are wrong.
-    #[error("robot {robot:?}, payload: {error}")]
+    #[error("{robot}, payload: {error}")]
     Payload {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// What is wrong.
         #[source]
         error: Box<PatternError>,
     },
     /// Kinematics of a robot cannot be computed.
-    #[error("robot {robot:?}: {error}")]
+    #[error("{robot}: {error}")]
     Kinematics {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// What is wrong.
         #[source]
         error: Box<KinematicsError>,
@@ -87,10 +88,10 @@ pub enum Error {
     #[error(transparent)]
     Terrain(#[from] scene::terrain::TerrainError),
     /// Two control parts have the same name.
-    #[error("robot {robot:?}: control part {part:?} is given twice; join its patterns in one list")]
+    #[error("{robot}: control part {part:?} is given twice; join its patterns in one list")]
     ControlPartRepeated {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The part.
         part: String,
     },
@@ -163,12 +164,12 @@ pub enum Error {
     },
     /// The combination of integrator and drives does not work.
     #[error(
-        "robot {robot:?}: implicit drives need the integrator Euler{also}, not {integrator}; change the integrator or \
+        "{robot}: implicit drives need the integrator Euler{also}, not {integrator}; change the integrator or \
          use DriveModel::Actuator"
     )]
     Integrator {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// MuJoCo's word for the integrator.
         integrator: &'static str,
         /// Further integrators that this MuJoCo offers.
@@ -349,47 +350,47 @@ pub enum Error {
     },
     /// A joint has no drive to change.
     #[error(
-        "{argument}: joint {joint:?} of robot {robot:?} has no drive in the model, since the robot was added with the drive \
-         type none, or its file says that nothing drives the joint; add it with another one, and call set_drive_type where \
-         joints shall be passive"
+        "{argument}: joint {joint:?} of {robot} has no drive in the model, since it was added with the drive type none, or \
+         its file says that nothing drives the joint; add it with another one, and call set_drive_type where joints shall be \
+         passive"
     )]
     NotDriven {
         /// The method.
         argument: &'static str,
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The joint.
         joint: String,
     },
     /// The gains of a drive are in MuJoCo's model.
     #[error(
-        "{argument}: joint {joint:?} of robot {robot:?} is driven by DriveModel::Actuator, whose gains and limits are in the \
+        "{argument}: joint {joint:?} of {robot} is driven by DriveModel::Actuator, whose gains and limits are in the \
          model that all environments share; use DriveModel::Implicit or an explicit actuator model to change them"
     )]
     GainsInModel {
         /// The method.
         argument: &'static str,
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The joint.
         joint: String,
     },
     /// A joint's drive delays nothing.
     #[error(
-        "set_delay: joint {joint:?} of robot {robot:?} is not driven by the actuator model delayed_pd; name it for this joint \
+        "set_delay: joint {joint:?} of {robot} is not driven by the actuator model delayed_pd; name it for this joint \
          in drive.actuators"
     )]
     NoDelay {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The joint.
         joint: String,
     },
     /// Patterns of names of a robot match nothing, or are none.
-    #[error("robot {robot:?}: {error}")]
+    #[error("{robot}: {error}")]
     RobotNames {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// What is wrong.
         #[source]
         error: Box<PatternError>,

@@ -26,6 +26,7 @@ pub mod kinematics;
 mod manager;
 pub mod mj;
 pub mod mjcf;
+mod named;
 pub mod objects;
 pub mod randomization;
 pub mod rollout;
@@ -48,8 +49,10 @@ pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveSce
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
 pub use mjcf::document::{Cone, Integrator};
+pub use named::Named;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
+pub use objects::mesh_collision::MeshCollision;
 pub use objects::mjcf_part::{ActuatorIndex, MjcfCfg, MjcfPart, MjcfPartMut};
 pub use objects::object_group::{GroupId, RigidObjectGroup, RigidObjectGroupCfg, RigidObjectGroupMut};
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};

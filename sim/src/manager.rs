@@ -16,7 +16,7 @@ use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
-use ::scene::Marker;
+use ::scene::{Marker, OwnScene};
 use ndarray::Array2;
 use sensors::ray::RayAssets;
 use sensors::{Crew, Requires, Sensor, SensorCfg, SensorContext};
@@ -333,6 +333,12 @@ impl SimulationManager {
         let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);
         self.diagnostics.extend(self.visuals.take_diagnostics());
         visible
+    }
+
+    /// What an environment looks like, where its sizes or colours are its own.
+    pub(crate) fn own_scene(&self, env: EnvId) -> &OwnScene {
+        static AS_ALL: OwnScene = OwnScene(None);
+        self.simulation.own_scenes.get(env.0).unwrap_or(&AS_ALL)
     }
 
     /// What each number of the mask channel of cameras stands for, the same in every environment. Numbers stay when more

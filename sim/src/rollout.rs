@@ -13,7 +13,7 @@ use crate::manager::{EnvId, SimulationManager, env_list};
 use crate::mj::{self, ObjectKind};
 use crate::snapshot::{Entry, Snapshot};
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What came of a [rollout](SimulationManager::rollout). Row k is the k-th environment that was asked for.
 #[derive(Clone, Debug)]
@@ -102,7 +102,7 @@ fn roll(
         EnvStatus::Running => None,
         EnvStatus::Diverged { step, reason } => Some(format!("step {step}: {reason}")),
     };
-    (Entry { env: row.env, state: env.remember() }, reason)
+    (Entry { env: row.env, state: env.remember(), own: Arc::default() }, reason)
 }
 
 impl SimulationManager {
@@ -200,7 +200,8 @@ impl SimulationManager {
         })?;
         let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
         for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
-            entries.push(entry);
+            let own = self.simulation.own_properties(entry.env, self.draws[entry.env]);
+            entries.push(Entry { own, ..entry });
             diverged.extend(reason.map(|reason| (k, reason)));
         }
         Ok(Rollout { states, end: Snapshot::new(&self.simulation, entries), diverged })

@@ -20,6 +20,7 @@ fn configurations_are_checked() {
     assert!(error(missing).to_string().contains("nowhere/cabinet.urdf"));
     let init_qpos = vec![("drawer".to_string(), 0.1)];
     let text = error(ArticulationCfg { init_qpos, ..named("b") }).to_string();
+    assert!(text.starts_with("articulation \"b\": "), "{text}");
     assert!(text.contains("init_qpos") && text.contains("drawer_slide"), "{text}");
     let drive = Some(DriveCfg { stiffness: (-1.0).into(), ..Default::default() });
     let text = error(ArticulationCfg { drive, ..named("b") }).to_string();
@@ -48,7 +49,12 @@ fn what_is_written_is_checked() {
     assert!(matches!(cabinet.write_qpos(&array![[0.1, 0.2]], None, None), Err(Error::Shape { .. })));
     let pose = array![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]];
     assert!(matches!(cabinet.write_root_pose(&pose, None), Err(Error::FixedBody(uid)) if uid == "cabinet"));
-    assert!(matches!(cabinet.set_stiffness(&array![[1.0]], None, None), Err(Error::NotDriven { .. })));
+    let undriven = cabinet.set_stiffness(&array![[1.0]], None, None);
+    assert!(matches!(&undriven, Err(Error::NotDriven { robot, .. }) if *robot == "cabinet"), "{undriven:?}");
+    let text = undriven.unwrap_err().to_string();
+    assert!(text.contains("articulation \"cabinet\"") && !text.contains("robot"), "{text}");
+    let names = cabinet.read().find_joints(&["nothing"]).unwrap_err().to_string();
+    assert!(names.starts_with("articulation \"cabinet\": "), "{names}");
     assert!(cabinet.read().link_pose("door").unwrap_err().to_string().contains("drawer"));
 }
 

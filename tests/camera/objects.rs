@@ -117,7 +117,8 @@ fn static_objects_stand_and_wrong_numbers_are_errors() {
     assert!((sim.rigid_object(ball).get_pose()[(0, 2)] - 0.56).abs() < 1e-3, "the ball lies on the shelf");
     assert_eq!(sim.rigid_object(shelf).get_pose()[(0, 2)], 0.5);
     let there = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]];
-    let error = sim.rigid_object_mut(shelf).write_pose(&there, None).unwrap_err().to_string();
+    let still = array![[0.0; 6]];
+    let error = sim.rigid_object_mut(shelf).write_velocity(&still, None).unwrap_err().to_string();
     assert!(error.contains("shelf") && error.contains("Dynamic"), "{error}");
     for bad in [array![[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]], array![[f64::NAN, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]]] {
         assert!(sim.rigid_object_mut(ball).write_pose(&bad, None).is_err());

@@ -530,8 +530,8 @@ fn wrong_names_ranges_and_widths_are_refused() {
     for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
         assert!(matches!(fault(&mut sim, mass("cube", Draw::Set(range))), RandomizationError::Range { .. }));
     }
-    // A joint that nominally has no damping, and the free joint of an object, are none to draw for.
-    let none = Randomization::new().with(Property::DryFriction, "machine/hinge", Draw::Set([1.0, 1.0]));
+    // A joint whose implicit drive takes the place of its friction, and the free joint of an object, are none to draw for.
+    let none = Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", Draw::Set([1.0, 1.0]));
     assert!(matches!(fault(&mut sim, none), RandomizationError::Pattern { property: "dry_friction", .. }));
     let width = sim.randomize_with(ALL, |_, _, p| p.set(Property::Gravity, "gravity", &[0.0]));
     assert!(matches!(width, Err(Error::Randomization(RandomizationError::Width { expected: 3, found: 1, .. }))));

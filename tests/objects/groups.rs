@@ -64,8 +64,8 @@ fn groups_and_poses_that_cannot_be() {
     let good =
         Array3::from_shape_fn((2, 3, 7), |(_, _, c)| if c == 3 { 1.0 } else { 0.5 * f64::from(u8::from(c < 3)) });
     let mut group = sim.rigid_object_group_mut(id);
-    assert!(matches!(group.write_pose(&good, None), Err(Error::FixedBody(uid)) if uid == "mixed.blue"));
-    assert!(group.read().get_pose().iter().all(|x| *x != 0.5), "none of them was moved");
+    group.write_pose(&good, None).unwrap();
+    assert_eq!(group.read().get_pose(), good, "the one that stands, too");
     let id = sim.add_rigid_object_group(blocks()).unwrap();
     assert!(matches!(sim.add_rigid_object_group(blocks()), Err(Error::DuplicateUid(uid)) if uid == "blocks"));
     let mut group = sim.rigid_object_group_mut(id);
@@ -84,4 +84,58 @@ fn groups_and_poses_that_cannot_be() {
     assert_eq!(group.read().get_pose(), before);
     group.write_pose(&good, None).unwrap();
     assert!(group.read().get_pose().index_axis(Axis(2), 0).iter().all(|x| *x == 0.5));
+}
+
+/// What flies without gravity goes on by v t and turns by w t; what is read is what was written, in world axes.
+#[test]
+fn velocities_are_those_of_the_objects() {
+    let mut sim = super::weightless(2);
+    let id = sim.add_rigid_object_group(blocks()).unwrap();
+    // The cubes lie turned, so that world axes are not theirs.
+    let turned = Array3::from_shape_fn((1, 3, 7), |(_, k, c)| [0.0, k as f64, 5.0, 0.6, 0.8, 0.0, 0.0][c]);
+    sim.rigid_object_group_mut(id).write_pose(&turned, None).unwrap();
+    // A cube has the same moment about every axis: it spins on as it is.
+    let velocities = Array3::from_shape_fn((2, 3, 6), |(e, k, c)| {
+        let linear = 0.1 * (e + 1) as f64 * (k as f64 - 1.0);
+        [linear, -linear, 0.2, 0.0, 0.3 * e as f64, 0.5 * k as f64][c]
+    });
+    sim.rigid_object_group_mut(id).write_velocity(&velocities, None).unwrap();
+    let near = |a: &Array3<f64>, b: &Array3<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+    assert!(near(&sim.rigid_object_group(id).get_velocity(), &velocities));
+    for (k, object) in names(&sim, id).into_iter().enumerate() {
+        assert_eq!(
+            sim.rigid_object(object).get_velocity(),
+            sim.rigid_object_group(id).get_velocity().index_axis(Axis(1), k)
+        );
+    }
+    let before = sim.rigid_object_group(id).get_pose();
+    sim.update(200);
+    let after = sim.rigid_object_group(id).get_pose();
+    for ((e, k, c), velocity) in velocities.indexed_iter().filter(|((.., c), _)| *c < 3) {
+        let moved = after[(e, k, c)] - before[(e, k, c)];
+        assert!((moved - 0.2 * velocity).abs() < 1e-12, "environment {e}, object {k}: {moved}");
+    }
+    // One row for one environment; the other flies on.
+    let stop = Array3::zeros((1, 3, 6));
+    sim.rigid_object_group_mut(id).write_velocity(&stop, Some(&[EnvId(1)])).unwrap();
+    let velocity = sim.rigid_object_group(id).get_velocity();
+    assert!(velocity.index_axis(Axis(0), 1).iter().all(|v| *v == 0.0));
+    assert!((velocity[(0, 2, 0)] - 0.1).abs() < 1e-12);
+
+    let before = sim.rigid_object_group(id).get_velocity();
+    let mut group = sim.rigid_object_group_mut(id);
+    let shape = group.write_velocity(&Array3::zeros((2, 3, 7)), None);
+    assert!(matches!(shape, Err(Error::Shape { argument: "write_velocity", expected, .. }) if expected == [2, 3, 6]));
+    let mut nan = velocities.clone();
+    nan[(0, 1, 4)] = f64::NAN;
+    assert!(matches!(group.write_velocity(&nan, None), Err(Error::NotFinite { row: 0, column: 4, .. })));
+    let repeated = group.write_velocity(&velocities, Some(&[EnvId(0), EnvId(0)]));
+    assert!(matches!(repeated, Err(Error::Repeated { .. })));
+    assert_eq!(group.read().get_velocity(), before);
+    let mut mixed = blocks();
+    mixed.objects[1].body_type = BodyType::Kinematic;
+    let mixed = sim.add_rigid_object_group(RigidObjectGroupCfg { uid: "mixed".into(), ..mixed }).unwrap();
+    let refused = sim.rigid_object_group_mut(mixed).write_velocity(&velocities, None);
+    assert!(matches!(refused, Err(Error::NotDynamic { object, .. }) if object == "mixed.green"));
+    assert!(sim.rigid_object_group(mixed).get_velocity().iter().all(|v| *v == 0.0), "none of them was told");
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod apart;
+mod concave;
 mod groups;
 mod kinematic;
 mod masses;
@@ -9,6 +10,7 @@ mod meshes;
 mod properties;
 mod refused;
 mod restitution;
+mod standing;
 mod welds;
 
 use kinetoscope::prelude::*;

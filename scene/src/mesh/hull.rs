@@ -59,6 +59,16 @@ pub enum HullError {
         /// What is accepted.
         expected: &'static str,
     },
+    /// A field of the configuration of convex pieces is out of its range.
+    #[error("PiecesCfg::{field} is {value}; expected {expected}")]
+    InvalidPieces {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is accepted.
+        expected: &'static str,
+    },
     /// Fewer than four points.
     #[error("{found} points; a hull needs at least 4")]
     TooFewPoints {

@@ -12,7 +12,7 @@ use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hu
 /// Changes whenever the readers give other vertices for the same file.
 const READERS: u32 = 1;
 const MAGIC: &[u8; 12] = b"kshull\r\n\x00\x01\x00\x00";
-const KEY: usize = 32;
+pub(super) const KEY: usize = 32;
 const HEAD: usize = MAGIC.len() + KEY + 8;
 
 /// A folder of convex hulls. Whatever is wrong with the folder or a file in it costs time, never an error: the hull is
@@ -97,7 +97,7 @@ impl HullCache {
     }
 }
 
-fn key(bytes: &[u8], format: Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
+pub(super) fn key(bytes: &[u8], format: Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
     let HullCfg { max_vertices, tolerance, min_thickness } = *cfg;
     let MeshOptions { dae_up_axis } = *options;
     let mut hasher = Sha256::new();
@@ -114,7 +114,7 @@ fn key(bytes: &[u8], format: Format, options: &MeshOptions, scale: [f64; 3], cfg
 }
 
 /// Magic, key, counts, positions, triangles, and the SHA-256 of all that.
-fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
+pub(super) fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     out.extend(key);
     out.extend((hull.positions.len() as u32).to_le_bytes());
@@ -126,7 +126,7 @@ fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
     out
 }
 
-fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
+pub(super) fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
     let (content, sum) = bytes.split_at_checked(bytes.len().checked_sub(KEY)?)?;
     let (head, body) = content.split_at_checked(HEAD)?;
     let (magic, rest) = head.split_at(MAGIC.len());
@@ -145,7 +145,7 @@ fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
 }
 
 /// Writes beside the place and renames, so that no reader ever sees half a file.
-fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub(super) fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let dir = file.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(dir)?;
     let mut temporary = tempfile::NamedTempFile::new_in(dir)?;

@@ -15,7 +15,7 @@ use crate::sensor::{Requires, Sensor, SensorContext};
 use crate::visibility::{RenderError, View};
 use ndarray::{Array1, Array2, Array3, ArrayView1, Axis};
 use scene::pose::{from_row, to_row};
-use scene::{Light, Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
+use scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -71,6 +71,8 @@ struct Captures {
     poses: Array2<PoseF32>,
     /// Shape \[rows, lamps\].
     lights: Array2<Light>,
+    /// What there is instead of the scene of all, row by row.
+    scenes: Vec<OwnScene>,
     /// Where the parent was; the identity for a free camera, `None` before the first capture.
     world_from_parent: Vec<Option<Pose>>,
     stamps: Array1<f64>,
@@ -187,6 +189,7 @@ impl Camera {
         let captures = Captures {
             poses: Array2::from_elem((rows, scene.instances().len()), PoseF32::IDENTITY),
             lights: Array2::from_elem((rows, scene.lights.len()), Light::default()),
+            scenes: vec![OwnScene::default(); rows],
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
@@ -491,6 +494,7 @@ impl Camera {
             let to = &mut self.captures;
             to.poses.index_axis_mut(Axis(0), row).assign(&visible.instance_poses.index_axis(Axis(0), env));
             to.lights.index_axis_mut(Axis(0), row).assign(&visible.lights.index_axis(Axis(0), env));
+            to.scenes[row].clone_from(state.own_scene(env));
             let parent = self.parent.zip(state.body_poses.as_ref());
             let world_from_parent =
                 parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
@@ -535,7 +539,8 @@ impl Camera {
         for ((row, frame), view) in frames.zip(&desk.views) {
             let poses = row_of(&self.captures.poses, row);
             let lights = Some(row_of(&self.captures.lights, row));
-            jobs.push((Shot { scene: &self.scene, poses, view, lights }, frame));
+            let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
+            jobs.push((Shot { scene, poses, view, lights }, frame));
         }
         let result = desk.rasterizer.render(&mut jobs);
         let miss = match self.depth_miss {

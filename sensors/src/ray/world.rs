@@ -249,8 +249,12 @@ impl RayWorld {
         self.place_moving(targets.moving_poses(poses));
     }
 
-    /// The same, with what does not move already prepared, and the poses of what may move: [`RayTargets::moving_poses`].
-    pub(crate) fn place_with(&mut self, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
+    /// The same, of other targets, with what does not move already prepared, and the poses of what may move:
+    /// [`RayTargets::moving_poses`].
+    pub(crate) fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
+        if !Arc::ptr_eq(&self.targets, targets) {
+            self.targets = Arc::clone(targets);
+        }
         if !Arc::ptr_eq(&self.fixed, fixed) {
             self.fixed = Arc::clone(fixed);
         }

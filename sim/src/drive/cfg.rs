@@ -59,8 +59,8 @@ pub struct DriveCfg {
     ///
     /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,
-    /// Dry friction \[N m or N\]; where unset, the file's. Joints that have some can be told another while they run:
-    /// [`RobotMut::set_friction`](crate::RobotMut::set_friction).
+    /// Dry friction \[N m or N\]; where unset, the file's. Where anything is given, 0 too, driven joints of the robot can be told
+    /// another while they run: [`RobotMut::set_friction`](crate::RobotMut::set_friction).
     pub friction: Option<PerJoint>,
     /// Rotor inertia \[kg m² or kg\]; where unset, that of an MJCF file, or else 0. While they run:
     /// [`RobotMut::set_armature`](crate::RobotMut::set_armature).

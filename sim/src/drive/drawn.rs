@@ -107,6 +107,28 @@ impl DriveState {
         }
     }
 
+    /// As [`draw_gains`](Self::draw_gains), of one of them.
+    pub(crate) fn draw_gain(&mut self, drive: usize, kind: usize, value: f64) {
+        let mut values = Kind::ALL.map(|kind| kind.gain(&self.gains[drive]));
+        values[kind] = value;
+        self.draw_gains(drive, values);
+    }
+
+    /// The gains and the effort limit of a drive that are drawn, and not set to something else since.
+    pub(crate) fn drawn_values(&self, drive: usize) -> [Option<f64>; 3] {
+        Kind::ALL.map(|kind| self.drawn_gain(drive, kind).map(|drawn| drawn.value))
+    }
+
+    /// Gains and settings become what they would be if nothing had been drawn.
+    pub(crate) fn forget_drawn(&mut self) {
+        for drive in 0..self.table().drives.len() {
+            let (gains, setting) = self.without_drawn(drive);
+            self.gains.put(drive, gains);
+            self.settings.put(drive, setting);
+            self.drawn.put(drive, DrawnGains::default());
+        }
+    }
+
     /// Gains and setting of a drive as they would be if nothing had been drawn.
     pub(super) fn without_drawn(&self, drive: usize) -> (Gains, Setting) {
         let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);

@@ -64,8 +64,10 @@ pub(super) fn effort(row: usize, gains: &Gains, feedforward: f64, data: &mj::Dat
 /// The explicit half of the implicit damping: `-B v` (the armature holds the other half).
 pub(super) fn apply_damping(table: &DriveTable, coefficients: &[f64], data: &mut mj::Data) {
     for (&(dof, _), damping) in table.damped.iter().zip(coefficients) {
-        let v = data.qvel()[dof];
-        data.qfrc_applied_mut()[dof] -= damping * v;
+        if *damping != 0.0 {
+            let v = data.qvel()[dof];
+            data.qfrc_applied_mut()[dof] -= damping * v;
+        }
     }
 }
 

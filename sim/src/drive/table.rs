@@ -10,11 +10,8 @@ use std::sync::Arc;
 /// How one drive acts in MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Realization {
-    /// A friction row: its index among the friction rows (degrees of freedom first, in order).
-    Row {
-        /// Index among the friction rows.
-        row: usize,
-    },
+    /// The friction row of its degree of freedom: see [`DriveTable::rows`].
+    Row,
     /// MuJoCo's actuator.
     Actuator,
     /// MuJoCo's actuator as a plain source of effort, whose control an explicit model computes.
@@ -110,11 +107,19 @@ impl DriveTable {
         self.models.push(DriveActuator { drive, model, memory });
     }
 
+    /// The friction row of each drive that is one, in environments of `model`, counted among the rows of degrees of freedom;
+    /// 0 for others. MuJoCo makes a row for each degree of freedom with friction, in their order.
+    pub fn rows(&self, model: &mj::Model) -> Vec<usize> {
+        let before = |dof: usize| model.dof_frictionloss()[..dof].iter().filter(|friction| **friction > 0.0).count();
+        let row = |drive: &Drive| if drive.realization == Realization::Row { before(drive.dof) } else { 0 };
+        self.drives.iter().map(row).collect()
+    }
+
     /// The explicit model of a drive.
     pub fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
         match self.drives[drive].realization {
             Realization::Explicit { model } => Some(&self.models[model]),
-            Realization::Row { .. } | Realization::Actuator => None,
+            Realization::Row | Realization::Actuator => None,
         }
     }
 }
@@ -194,6 +199,8 @@ pub struct DriveState {
     pub applied: Shared<f64>,
     /// What explicit models keep from step to step.
     pub memory: Box<[f64]>,
+    /// The friction row of each drive that is one, which the dry friction of other joints moves; 0 for others.
+    rows: Shared<usize>,
     /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
     /// the model holds the other half of it: they change together.
     damping: Shared<f64>,
@@ -217,6 +224,7 @@ impl DriveState {
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
             memory: table.models.iter().flat_map(|drive| drive.model.law().memory()).collect(),
+            rows: Shared(table.rows(model).into()),
             damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
         };
@@ -315,6 +323,11 @@ impl DriveState {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
     }
 
+    /// Takes the friction rows of a model, as [`DriveTable::rows`] gives them.
+    pub(crate) fn set_rows(&mut self, rows: &[usize]) {
+        rows.iter().enumerate().for_each(|(index, row)| self.rows.put(index, *row));
+    }
+
     /// What [`restoring`](Self::set_numbers) a state brings back: ten numbers of each drive (gains and limits, what they
     /// were made of, range; without what is drawn), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
     /// explicit models keep.
@@ -372,7 +385,7 @@ impl DriveState {
         for (i, drive) in table.drives.iter().enumerate() {
             let target = self.target(i);
             match drive.realization {
-                Realization::Row { row } => implicit::apply(drive, row, &self.gains[i], &target, data),
+                Realization::Row => implicit::apply(drive, self.rows[i], &self.gains[i], &target, data),
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
                 Realization::Explicit { model } => {
                     let DriveActuator { model, memory, .. } = &table.models[model];
@@ -397,7 +410,7 @@ impl DriveState {
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
-            Realization::Row { row } => implicit::effort(row, &self.gains[i], self.feedforward[i], data),
+            Realization::Row => implicit::effort(self.rows[i], &self.gains[i], self.feedforward[i], data),
             Realization::Actuator | Realization::Explicit { .. } => data.actuator_force()[drive.ctrl],
         }));
     }

@@ -88,6 +88,9 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
         return;
     }
     let wants = |field| requires.contains(field);
+    if (wants(Requires::VISIBLE) || wants(Requires::INSTANCES)) && state.own_scenes != simulation.own_scenes {
+        state.own_scenes.clone_from(&simulation.own_scenes);
+    }
     let bodies = simulation.plan.bodies();
     if let Some(contacts) = state.contacts.as_mut().filter(|_| wants(Requires::CONTACTS)) {
         contacts.list.clear();

@@ -187,7 +187,7 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
 fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
     let (_, mut diagnostics) =
-        planned.map_err(|error| Error::Plan { robot: description.name.clone(), error: Box::new(error) })?;
+        planned.map_err(|error| Error::Plan { robot: (&description.name).into(), error: Box::new(error) })?;
     // Where a simulation starts is no property of the files.
     diagnostics.retain(|d| d.kind != DiagnosticKind::InitialPositionClamped);
     Ok(diagnostics)

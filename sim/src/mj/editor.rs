@@ -71,10 +71,16 @@ edited_arrays! {
     pub body_mass_mut: f64;
     pub body_inertia_mut: f64;
     pub geom_friction_mut: f64;
+    pub geom_rgba_mut: f32;
+    pub body_pos_mut: f64;
+    pub body_quat_mut: f64;
     pub dof_damping_mut: f64;
     pub dof_armature_mut: f64;
     pub dof_frictionloss_mut: f64;
     pub tendon_frictionloss_mut: f64;
+    // What is around a shape follows from its size.
+    geom_size_mut: f64;
+    geom_rbound_mut: f64;
     // MuJoCo takes short cuts by these, to rows that then must be there: only what is right as a whole is written.
     body_ipos_mut: f64;
     body_sameframe_mut: u8;
@@ -164,12 +170,34 @@ impl Editor {
         Ok(())
     }
 
+    /// Gives a geom that is a ball, a capsule, an ellipsoid, a cylinder or a box other sizes \[m\], MuJoCo's three numbers;
+    /// [`set_constants`](Self::set_constants) is to follow, which on 4.x finds the boxes around it anew. Others stay as they
+    /// are. Mass and moments do not follow.
+    ///
+    /// Source of the bounding radius, which 2.2.2 leaves alone: the farthest point of each shape from its middle.
+    ///
+    /// # Panics
+    /// There is no such geom.
+    pub fn set_geom_size(&mut self, geom: usize, size: [f64; 3]) {
+        let [x, y, z] = size;
+        let radius = match self.base.geom_type()[geom] as u32 {
+            mj::mjGEOM_SPHERE => x,
+            mj::mjGEOM_CAPSULE => x + y,
+            mj::mjGEOM_ELLIPSOID => x.max(y).max(z),
+            mj::mjGEOM_CYLINDER => (x * x + y * y).sqrt(),
+            mj::mjGEOM_BOX => (x * x + y * y + z * z).sqrt(),
+            _ => return,
+        };
+        self.geom_size_mut()[3 * geom..3 * geom + 3].copy_from_slice(&size);
+        self.geom_rbound_mut()[geom] = radius;
+    }
+
     /// Sets gravity \[m/s²\].
     pub fn set_gravity(&mut self, gravity: [f64; 3]) {
         self.copy.header_mut().opt.gravity = gravity;
     }
 
-    /// `mj_setConst`: what follows from masses, inertias, centres of mass and armatures.
+    /// `mj_setConst`: what follows from masses, inertias, centres of mass and armatures, sizes and places.
     ///
     /// # Errors
     /// MuJoCo stopped.
@@ -368,6 +396,34 @@ mod tests {
         assert_eq!(editor.model(&model).own_arrays().count(), 0, "constants of an unchanged model are those it has");
         editor.load(&edited);
         assert_eq!(differences(&editor.model(&model), &edited), Vec::<String>::new());
+    }
+
+    /// One of each kind that has sizes, several of them in one body, which 4.x keeps boxes around.
+    fn shapes(sizes: [&str; 5], at: &str) -> Model {
+        let [ball, capsule, ellipsoid, cylinder, cuboid] = sizes;
+        compile(&format!(
+            r#"<mujoco><worldbody>
+            <body pos="0 0 1"><freejoint/><inertial pos="0.01 0 0.02" euler="10 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>
+              <geom size="{ball}"/><geom type="capsule" size="{capsule}" pos="1 0 0" euler="0 30 20"/>
+              <geom type="ellipsoid" size="{ellipsoid}" pos="2 0 0"/><geom type="cylinder" size="{cylinder}" pos="3 0 0"/></body>
+            <body pos="{at}"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="box" size="{cuboid}"/></body>
+            </worldbody></mujoco>"#
+        ))
+    }
+
+    #[test]
+    fn what_follows_from_sizes_and_places_is_what_compiling_gives() {
+        let model = shapes(["0.1", "0.1 0.2", "0.1 0.2 0.3", "0.1 0.2", "0.1 0.2 0.3"], "0 5 0");
+        let fresh = shapes(["0.11", "0.12 0.22", "0.13 0.35 0.32", "0.14 0.21", "0.2 0.1 0.35"], "0 4 1");
+        assert!(!differences(&model, &fresh).is_empty());
+        let mut editor = Editor::new(&model).expect("small");
+        let sizes = [[0.11, 0., 0.], [0.12, 0.22, 0.], [0.13, 0.35, 0.32], [0.14, 0.21, 0.], [0.2, 0.1, 0.35]];
+        sizes.into_iter().enumerate().for_each(|(geom, size)| editor.set_geom_size(geom, size));
+        editor.body_pos_mut()[6..9].copy_from_slice(&[0.0, 4.0, 1.0]);
+        let unfinished = differences(&editor.model(&model), &fresh);
+        assert_eq!(unfinished.is_empty(), !cfg!(mj4), "{unfinished:?}");
+        editor.set_constants().expect("fits");
+        assert_eq!(differences(&editor.model(&model), &fresh), Vec::<String>::new());
     }
 
     #[test]

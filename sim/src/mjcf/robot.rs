@@ -25,8 +25,9 @@ pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Purpose<'a> {
-    /// To be stepped by us: each visual becomes a proxy geom that only has a pose; where `friction_tendons`, dry friction
-    /// of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to us.
+    /// To be stepped by us: each visual that is a mesh becomes a proxy geom that only has a pose; where `friction_tendons`, dry
+    /// friction of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to
+    /// us.
     Run {
         /// Drives are friction rows.
         friction_tendons: bool,
@@ -87,6 +88,8 @@ pub struct RobotCfg<'a> {
     pub plans: &'a [JointPlan],
     /// Convex hulls of collision meshes.
     pub hulls: &'a BTreeMap<MeshKey, TriMesh>,
+    /// Driven joints have a tendon for dry friction, whether they have some or not.
+    pub room_for_friction: bool,
     /// What the document is for.
     pub purpose: Purpose<'a>,
 }
@@ -370,7 +373,8 @@ impl Emitter<'_, '_> {
         /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
         const PROXY: f64 = 1e-3;
         match (&self.cfg.purpose, geometry) {
-            (Purpose::Run { .. }, _) => vec![(Shape::Sphere(PROXY), rgba, None)],
+            (Purpose::Run { .. }, Geometry::Mesh { .. }) => vec![(Shape::Sphere(PROXY), rgba, None)],
+            (Purpose::Run { .. }, primitive) => vec![(primitive_shape(primitive), rgba, None)],
             (Purpose::Export(assets), Geometry::Mesh { path, scale, .. }) => {
                 let parts = assets.parts.get(&MeshKey::new(path, scale));
                 // A material of the URDF overrides those of the mesh file (as RViz does).
@@ -441,14 +445,12 @@ impl Emitter<'_, '_> {
         if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {
             return;
         }
-        for joint in joints {
-            let damping = std::mem::take(&mut joint.damping);
-            if damping > 0.0 {
-                let armature = joint.armature;
-                joint.armature += self.mjcf.option.timestep * damping;
-                let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
-                self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping, armature });
-            }
+        for joint in joints.iter_mut().filter(|joint| joint.kind != JointType::Free) {
+            // Those without damping as well: an environment may be told some while it runs.
+            let (damping, armature) = (std::mem::take(&mut joint.damping), joint.armature);
+            joint.armature += self.mjcf.option.timestep * damping;
+            let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
+            self.damped.push(DampedJoint { joint: joint.name.clone(), dofs, damping, armature });
         }
     }
 
@@ -487,7 +489,8 @@ impl Emitter<'_, '_> {
                     source: joint.mimic.as_ref().map(|m| m.source.clone()),
                 });
             }
-            add_drive(self.mjcf, self.cfg.uid, joint, plan, self.friction_is_tendon());
+            let tendon = self.friction_is_tendon() && (plan.friction > 0.0 || self.cfg.room_for_friction);
+            add_drive(self.mjcf, self.cfg.uid, joint, plan, tendon);
         }
     }
 
@@ -513,13 +516,13 @@ pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str)
     format!("{uid}/{own}")
 }
 
-/// Adds the actuator of a joint that is driven, and its dry friction where that is a tendon.
+/// Adds the actuator of a joint that is driven, and where wanted a tendon that holds its dry friction.
 pub(super) fn add_drive(
     mjcf: &mut Mjcf,
     uid: &str,
     joint: &crate::description::Joint,
     plan: &JointPlan,
-    friction_is_tendon: bool,
+    friction_tendon: bool,
 ) {
     let Some(actuator) = plan.actuator else { return };
     let name = format!("{uid}/{}", joint.name);
@@ -536,7 +539,7 @@ pub(super) fn add_drive(
         ctrl_range: positions.then_some(plan.usable).map(open_range),
         source: Some(joint.source.clone()),
     });
-    if plan.friction > 0.0 && friction_is_tendon {
+    if friction_tendon {
         mjcf.friction_tendons.push(FrictionTendon {
             name: format!("{name}/friction"),
             joint: name,

@@ -74,8 +74,8 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
     });
 }
 
-/// Adds a rigid object: a body called by its uid, with the geom `uid/shape`, the joint `uid/free`, and, where a file says
-/// what it looks like, geoms called `uid/visual`.
+/// Adds a rigid object: a body called by its uid, with the geom `uid/shape` (and `uid/shape1`... where it collides in pieces),
+/// the joint `uid/free`, and, where a file says what it looks like, geoms called `uid/visual`.
 pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Purpose<'_>) {
     let cfg = object.cfg();
     let MassProperties { mass, com, axes, moments } = *object.mass_properties();
@@ -89,11 +89,14 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
             cfg.uid, cfg.linear_damping, cfg.angular_damping
         ));
     }
-    let shape = format!("{}/shape", cfg.uid);
+    let mut shapes = vec![format!("{}/shape", cfg.uid)];
     if let Some(mesh) = object.mesh() {
-        let (vertices, triangles) = (mesh.hull.positions.clone(), mesh.hull.triangles.clone());
-        let content = MeshContent::Inline { vertices, triangles };
-        mjcf.meshes.push(MeshAsset { name: shape.clone(), content, visual: false, source: None });
+        shapes.extend((1..mesh.shapes.len()).map(|k| format!("{}/shape{k}", cfg.uid)));
+        for (name, mesh) in shapes.iter().zip(&mesh.shapes) {
+            let (vertices, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+            let content = MeshContent::Inline { vertices, triangles };
+            mjcf.meshes.push(MeshAsset { name: name.clone(), content, visual: false, source: None });
+        }
     }
     let visuals = visuals(object, purpose);
     let role = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: visuals.is_empty() };
@@ -102,7 +105,7 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
         impedance: restitution::IMPEDANCE,
         weight: restitution::WEIGHT,
     });
-    let collision = Geom {
+    let collision = |shape: String| Geom {
         name: Some(shape.clone()),
         shape: cfg.shape.to_mjcf(shape),
         pose: Pose::identity(),
@@ -120,7 +123,7 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
         inertial: moves.then_some(Inertial { mass, com, axes, moments, source: None }),
         joints: if moves { vec![free] } else { Vec::new() },
         mocap: cfg.body_type == BodyType::Kinematic,
-        geoms: std::iter::once(collision).chain(visuals).collect(),
+        geoms: shapes.into_iter().map(collision).chain(visuals).collect(),
         sites: Vec::new(),
         source: None,
     });

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::mj;
 use crate::objects::rows::{Rows, Table, distinct_envs};
+use crate::randomization::Property;
 use crate::sensor_list::SensorList;
 use ::scene::Pose;
 use ::scene::pose::{from_row, to_row};
@@ -59,12 +60,20 @@ enum Place {
     Joint(usize, usize),
     /// Its number among the bodies that are moved by hand.
     Mocap(usize),
+    /// The model of each environment.
+    Model,
 }
 
 /// Poses that were checked, with unit quaternions.
 pub(super) struct Poses {
     place: Place,
     rows: Vec<(usize, [f64; 7])>,
+}
+
+/// Velocities that were checked, of the six degrees of freedom from `dof` on.
+pub(super) struct Velocities {
+    dof: usize,
+    rows: Vec<(usize, [f64; 6])>,
 }
 
 /// One body in all environments, to write.
@@ -85,7 +94,7 @@ impl FreeBodyMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let poses = self.check_poses(argument, poses, env_ids)?;
-        self.put_poses(&poses);
+        self.put_poses(&poses)?;
         let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
@@ -114,9 +123,20 @@ impl FreeBodyMut<'_> {
         Ok(Poses { place, rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect() })
     }
 
-    /// Writes poses that were checked; sensors are to be told.
-    pub(super) fn put_poses(&mut self, poses: &Poses) {
+    /// Writes poses that were checked; sensors are to be told. Only MuJoCo itself may still refuse those of an object that
+    /// stands; then none of them is written.
+    pub(super) fn put_poses(&mut self, poses: &Poses) -> Result<()> {
         let (place, body) = (poses.place, self.index.body);
+        if matches!(place, Place::Model) {
+            let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
+            // Environments come in this order.
+            let mut rows = poses.rows.iter();
+            return self.simulation.change_properties(&envs, |_, properties| {
+                let Some((_, row)) = rows.next() else { return Ok(()) };
+                properties.set(Property::Position, self.owner, &row[..3])?;
+                properties.set(Property::Rotation, self.owner, &row[3..])
+            });
+        }
         for &(env, row) in &poses.rows {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| match place {
@@ -135,9 +155,11 @@ impl FreeBodyMut<'_> {
                         data.mocap_pos_mut()[3 * mocap..3 * mocap + 3].copy_from_slice(&row[..3]);
                         data.mocap_quat_mut()[4 * mocap..4 * mocap + 4].copy_from_slice(&row[3..]);
                     }
+                    Place::Model => {}
                 });
             });
         }
+        Ok(())
     }
 
     /// Writes velocities of the frame, then angular velocities, in world axes.
@@ -159,13 +181,33 @@ impl FreeBodyMut<'_> {
         env_ids: Option<&[EnvId]>,
         arm: impl Fn(&mj::Data) -> Vector3<f64>,
     ) -> Result<()> {
+        let velocities = self.check_velocities(argument, velocities, env_ids)?;
+        self.put_velocities(&velocities, arm);
+        let envs: Vec<usize> = velocities.rows.iter().map(|(env, _)| *env).collect();
+        self.sensors.refresh(&envs, self.simulation);
+        Ok(())
+    }
+
+    /// Velocities that can be written: everything is checked.
+    pub(super) fn check_velocities(
+        &self,
+        argument: &'static str,
+        velocities: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Velocities> {
         let dof = match self.place()? {
             Place::Joint(_, dof) => dof,
             Place::Mocap(_) => return Err(Error::NotDynamic { argument, object: self.owner.into() }),
+            Place::Model => return Err(Error::FixedBody(self.owner.into())),
         };
         let rows = self.check(argument, 6, "environments, vx vy vz wx wy wz", velocities, env_ids)?;
-        for (env, v) in rows.arrays::<6>() {
-            let body = self.index.body;
+        Ok(Velocities { dof, rows: rows.arrays::<6>().collect() })
+    }
+
+    /// Writes velocities that were checked, as [`write_velocities_of`](Self::write_velocities_of); sensors are to be told.
+    pub(super) fn put_velocities(&mut self, velocities: &Velocities, arm: impl Fn(&mj::Data) -> Vector3<f64>) {
+        let (dof, body) = (velocities.dof, self.index.body);
+        for &(env, v) in &velocities.rows {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| {
                     let rotation = body_pose(data, body).rotation;
@@ -176,14 +218,15 @@ impl FreeBodyMut<'_> {
                 });
             });
         }
-        self.sensors.refresh(rows.envs(), self.simulation);
-        Ok(())
     }
 
     fn place(&self) -> Result<Place> {
         let FreeIndex { joint, mocap, .. } = self.index;
         let joint = joint.map(|(qpos, dof)| Place::Joint(qpos, dof));
-        joint.or(mocap.map(Place::Mocap)).ok_or_else(|| Error::FixedBody(self.owner.into()))
+        // Of what is fixed only objects can be put elsewhere: a robot's base is where its description says.
+        let stands = self.simulation.objects.iter().any(|object| object.stands() && object.body == self.index.body);
+        let place = joint.or(mocap.map(Place::Mocap)).or(stands.then_some(Place::Model));
+        place.ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
     fn check<'v>(

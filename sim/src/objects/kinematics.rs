@@ -355,7 +355,7 @@ impl Robot<'_> {
     }
 
     fn kinematics_error(&self, error: KinematicsError) -> Error {
-        Error::Kinematics { robot: self.uid().into(), error: Box::new(error) }
+        Error::Kinematics { robot: self.data.named(), error: Box::new(error) }
     }
 
     /// Fills `positions` with where all joints are, and returns where the link `base` is, in an environment.

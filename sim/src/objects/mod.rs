@@ -5,6 +5,7 @@ pub mod articulation;
 pub(crate) mod free_body;
 pub mod kinematics;
 pub(crate) mod mass_properties;
+pub mod mesh_collision;
 pub mod mjcf_part;
 pub mod object_group;
 mod object_mesh;

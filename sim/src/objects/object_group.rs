@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager};
 use crate::objects::rigid_object::{RigidObjectCfg, RigidObjectData};
 use crate::sensor_list::SensorList;
+use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Axis, Ix3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -126,27 +127,63 @@ impl<'a> RigidObjectGroupMut<'a> {
     /// single row is for all of them).
     ///
     /// # Errors
-    /// One of the objects is static; wrong shape, unknown environment, or one that is named twice, a value that is not finite,
+    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite,
     /// a quaternion of length zero; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
-        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        let (rows, objects, numbers) = poses.dim();
-        if ![1, envs.len()].contains(&rows) || objects != self.data.objects.len() || numbers != 7 {
-            let (found, expected) = (poses.shape().to_vec(), vec![envs.len(), self.data.objects.len(), 7]);
-            let meaning = "environments, objects, x y z qw qx qy qz";
-            return Err(Error::Shape { argument, found, expected, meaning });
-        }
+        let envs = self.check_shape(argument, poses, (7, "environments, objects, x y z qw qx qy qz"), env_ids)?;
         let mut checked = Vec::new();
-        for k in 0..objects {
+        for k in 0..self.data.objects.len() {
             checked.push(self.body(k).check_poses(argument, poses.index_axis(Axis(1), k), env_ids)?);
         }
         for (k, poses) in checked.iter().enumerate() {
-            self.body(k).put_poses(poses);
+            self.body(k).put_poses(poses)?;
         }
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
+    }
+
+    /// Sets the velocities of the objects' frames and their angular velocities, in world axes: `[vx, vy, vz, wx, wy, wz]`
+    /// \[m/s, rad/s\], shape (environments, K, 6), as in [`write_pose`](Self::write_pose).
+    ///
+    /// # Errors
+    /// One of the objects is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not
+    /// finite; then nothing is written.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_velocity<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix3>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (argument, velocities): (_, ArrayView3<'_, f64>) = ("write_velocity", velocities.into());
+        let envs = self.check_shape(argument, velocities, (6, "environments, objects, vx vy vz wx wy wz"), env_ids)?;
+        let mut checked = Vec::new();
+        for k in 0..self.data.objects.len() {
+            checked.push(self.body(k).check_velocities(argument, velocities.index_axis(Axis(1), k), env_ids)?);
+        }
+        for (k, velocities) in checked.iter().enumerate() {
+            self.body(k).put_velocities(velocities, |_| Vector3::zeros());
+        }
+        self.sensors.refresh(&envs, self.simulation);
+        Ok(())
+    }
+
+    /// The environments that are meant, where the array has a place for `numbers` of every object.
+    fn check_shape(
+        &self,
+        argument: &'static str,
+        values: ArrayView3<'_, f64>,
+        (numbers, meaning): (usize, &'static str),
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Vec<usize>> {
+        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let (rows, objects, width) = values.dim();
+        if ![1, envs.len()].contains(&rows) || objects != self.data.objects.len() || width != numbers {
+            let (found, expected) = (values.shape().to_vec(), vec![envs.len(), self.data.objects.len(), numbers]);
+            return Err(Error::Shape { argument, found, expected, meaning });
+        }
+        Ok(envs)
     }
 
     fn body(&mut self, k: usize) -> FreeBodyMut<'_> {

@@ -1,5 +1,6 @@
 //! Meshes of rigid objects: what collides, what is seen, what is inside.
 
+use super::rigid_object::RigidObjectCfg;
 use super::shape::{ObjectShape, cone};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
@@ -11,8 +12,8 @@ use std::sync::Arc;
 /// The mesh of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectMesh {
-    /// What collides: convex.
-    pub(crate) hull: Arc<TriMesh>,
+    /// What collides: convex, one or several.
+    pub(crate) shapes: Vec<Arc<TriMesh>>,
     /// What is seen, where it is not the hull: the triangles of a file.
     pub(crate) seen: Option<Arc<TriMesh>>,
     /// What it would weigh with 1 kg/m³; `None` where the shape says it.
@@ -21,18 +22,21 @@ pub(crate) struct ObjectMesh {
 
 impl ObjectMesh {
     /// The mesh of a shape; `None` where MuJoCo has the shape.
-    pub(crate) fn of(uid: &str, shape: &ObjectShape, diagnostics: &mut Vec<Diagnostic>) -> Result<Option<Self>> {
-        let (path, scale, cfg) = match shape {
+    pub(crate) fn of(cfg: &RigidObjectCfg, diagnostics: &mut Vec<Diagnostic>) -> Result<Option<Self>> {
+        cfg.mesh_collision.check(cfg)?;
+        let (uid, collision) = (&cfg.uid, &cfg.mesh_collision);
+        let (path, scale, cfg) = match &cfg.shape {
             ObjectShape::Cone { radius, height } => {
-                let hull = Arc::new(cone(*radius, *height));
-                return Ok(Some(Self { hull, seen: None, inertia: None }));
+                let shapes = vec![Arc::new(cone(*radius, *height))];
+                return Ok(Some(Self { shapes, seen: None, inertia: None }));
             }
             ObjectShape::Mesh { path, scale, hull } => (path, *scale, hull),
             _ => return Ok(None),
         };
-        let failed = |error| Error::ObjectMesh { object: uid.into(), error: Box::new(error) };
+        let failed = |error| Error::ObjectMesh { object: uid.clone(), error: Box::new(error) };
         let seen = ::scene::mesh::load(path).map_err(failed)?.scaled(scale);
         let hull = HullCache::default_location().hull_of_file(path, scale, cfg).map_err(failed)?;
+        let shapes = collision.shapes((uid.as_str(), path.as_path()), &seen, scale, cfg, diagnostics)?;
         let solid = match seen.solid() {
             Some(solid) => Some(solid),
             None => {
@@ -50,7 +54,7 @@ impl ObjectMesh {
         };
         // Hulls are closed and have a volume: what is flat was made thicker.
         let inertia = Some(solid.map_or(RigidInertia::ZERO, |solid| inertia(&solid)));
-        Ok(Some(Self { hull: Arc::new(hull), seen: Some(Arc::new(seen)), inertia }))
+        Ok(Some(Self { shapes, seen: Some(Arc::new(seen)), inertia }))
     }
 }
 

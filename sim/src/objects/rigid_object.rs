@@ -1,6 +1,7 @@
 //! Rigid objects: props that robots see, push and hold.
 
 use super::mass_properties::MassProperties;
+use super::mesh_collision::MeshCollision;
 use super::object_mesh::ObjectMesh;
 use super::restitution;
 use super::shape::ObjectShape;
@@ -29,7 +30,8 @@ pub enum BodyType {
     /// a place and no velocity: it pushes what it is put into, which sinks in by 0.04 s times the speed, and does not drag
     /// along what lies on it. It does not collide with what is fixed or moved by hand, too.
     Kinematic,
-    /// Stands fixed in all environments in the same place, and is in the way of others.
+    /// Stands fixed, and is in the way of others. Where it stands is a [property](crate::randomization) of the environment:
+    /// one in which it stands elsewhere has it there after resets, too.
     Static,
 }
 
@@ -41,6 +43,8 @@ pub struct RigidObjectCfg {
     pub uid: String,
     /// Its shape.
     pub shape: ObjectShape,
+    /// What collides of a mesh file.
+    pub mesh_collision: MeshCollision,
     /// Whether it moves.
     pub body_type: BodyType,
     /// Mass \[kg\]; from `density` where `None`.
@@ -86,6 +90,7 @@ impl Default for RigidObjectCfg {
         Self {
             uid: "object".into(),
             shape: ObjectShape::cube(0.1),
+            mesh_collision: MeshCollision::Hull,
             body_type: BodyType::Dynamic,
             mass: None,
             density: 1000.0,
@@ -169,7 +174,7 @@ impl RigidObjectData {
             return fail("rgba", &cfg.rgba, "each component must be 0 to 1");
         }
         check_pose("init_pose", &cfg.init_pose)?;
-        let mesh = ObjectMesh::of(&cfg.uid, &cfg.shape, diagnostics)?;
+        let mesh = ObjectMesh::of(&cfg, diagnostics)?;
         let mass_properties = MassProperties::of(&cfg, mesh.as_ref());
         let MassProperties { mass, moments, .. } = mass_properties;
         if cfg.body_type == BodyType::Dynamic && !(mass.is_finite() && mass > 1e-12 && moments.min() > 1e-14) {
@@ -289,10 +294,13 @@ impl<'a> RigidObjectMut<'a> {
     /// Puts the object somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] for `env_ids` (all where `None`;
     /// a single row is for all of them). Quaternions are normalised; velocities, which are in world axes, stay. A forward
     /// pass follows, so that everything that is read afterwards belongs to the new state. A kinematic object stays there until
-    /// it is put elsewhere or reset.
+    /// it is put elsewhere or reset. A static one stays over resets, until it is put elsewhere or
+    /// [`reset_properties`](crate::SimulationManager::reset_properties) is called: its place is
+    /// [`Property::Position`](crate::Property) and `Rotation`, an environment where it differs gets a model of its own, and
+    /// what already touches it is pushed out as from anything else.
     ///
     /// # Errors
-    /// The object is static; wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
+    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
     /// quaternion of length zero; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
@@ -303,7 +311,7 @@ impl<'a> RigidObjectMut<'a> {
     /// [`write_pose`](Self::write_pose).
     ///
     /// # Errors
-    /// As [`write_pose`](Self::write_pose); a kinematic object has no velocity, either.
+    /// As [`write_pose`](Self::write_pose); static and kinematic objects have no velocity.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_velocity<'t>(
         &mut self,

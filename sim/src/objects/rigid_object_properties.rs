@@ -148,10 +148,11 @@ impl RigidObjectMut<'_> {
         let uid = self.data.uid();
         let columns = properties.iter().map(|property| property.width()).sum();
         let rows = self.rows(argument, meaning, columns, values, env_ids)?;
-        let given: Vec<(usize, Vec<f64>)> = rows.iter().map(|(env, row)| (env, row.to_vec())).collect();
-        self.simulation.change_properties(rows.envs(), |env, changed| {
-            let row = given.iter().find(|(of, _)| *of == env).map_or(&[][..], |(_, row)| row);
-            let mut rest = row;
+        // Environments come in this order.
+        let mut given = rows.iter();
+        self.simulation.change_properties(rows.envs(), |_, changed| {
+            let row = given.next().map_or_else(Vec::new, |(_, row)| row.to_vec());
+            let mut rest = &row[..];
             for &property in properties {
                 let (mine, others) = rest.split_at(property.width().min(rest.len()));
                 changed.set(property, uid, mine)?;

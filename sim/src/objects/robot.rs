@@ -12,6 +12,7 @@ use crate::mj;
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot::MeshKey;
 use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
+use crate::named::Named;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
 use crate::objects::robot_file::MjcfFile;
 use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
@@ -149,6 +150,17 @@ pub(crate) enum Role {
     Articulation(String),
 }
 
+impl Role {
+    /// How errors call it.
+    fn named(&self, uid: &str) -> Named {
+        let what = match self {
+            Self::Robot => "robot",
+            Self::Articulation(_) => "articulation",
+        };
+        Named { what, uid: uid.into() }
+    }
+}
+
 impl RobotData {
     /// Reads the files, resolves names, drives and meshes of robot number `index` of a simulation, whose model is `scene` so
     /// far.
@@ -174,18 +186,18 @@ impl RobotData {
         let mut parts = BTreeMap::new();
         for (part, patterns) in &cfg.control_parts {
             let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
-                robot: cfg.uid.clone(),
+                robot: role.named(&cfg.uid),
                 part: part.clone(),
                 error: Box::new(error),
             })?;
             if parts.insert(part.clone(), members).is_some() {
-                return Err(Error::ControlPartRepeated { robot: cfg.uid, part: part.clone() });
+                return Err(Error::ControlPartRepeated { robot: role.named(&cfg.uid), part: part.clone() });
             }
         }
-        let at_plan = |error| Error::Plan { robot: cfg.uid.clone(), error: Box::new(error) };
+        let at_plan = |error| Error::Plan { robot: role.named(&cfg.uid), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
-        check_integrator(&cfg, &plans, manager.integrator)?;
+        check_integrator(&cfg, &role, &plans, manager.integrator)?;
         found.append(&mut planned);
         let explicit = explicitly_driven(&plans, cfg.drive.model);
         if explicit.iter().any(|plan| plan.actuator.is_some()) {
@@ -213,6 +225,11 @@ impl RobotData {
             Role::Robot => "robot",
             Role::Articulation(class) => class,
         }
+    }
+
+    /// How errors call it.
+    pub(crate) fn named(&self) -> Named {
+        self.role.named(self.uid())
     }
 
     /// Whether it was added as a robot, and not as another articulation.
@@ -310,7 +327,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     }
     let names: Vec<&str> = description.named_links().iter().map(|link| link.name.as_str()).collect();
     let payloads = pattern::assign(&cfg.payload, &BTreeMap::new(), &names, "link")
-        .map_err(|error| Error::Payload { robot: cfg.uid.clone(), error: Box::new(error) })?;
+        .map_err(|error| Error::Payload { robot: (&cfg.uid).into(), error: Box::new(error) })?;
     for (link, payload) in description.links.iter_mut().zip(payloads) {
         let Some(payload) = payload.filter(|mass| *mass > 0.0) else { continue };
         match &mut link.inertial {
@@ -346,7 +363,7 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
 }
 
 /// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
-fn check_integrator(cfg: &RobotCfg, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
+fn check_integrator(cfg: &RobotCfg, role: &Role, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
@@ -356,7 +373,7 @@ fn check_integrator(cfg: &RobotCfg, plans: &[JointPlan], integrator: Integrator)
     let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
     if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
         let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
-        return Err(Error::Integrator { robot: cfg.uid.clone(), integrator: integrator.name(), also });
+        return Err(Error::Integrator { robot: role.named(&cfg.uid), integrator: integrator.name(), also });
     }
     Ok(())
 }

@@ -173,7 +173,7 @@ impl RobotMut<'_> {
         for &(column, joint, drive) in &drives {
             let Some(DriveActuator { model: ActuatorModel::DelayedPd(model), memory, .. }) = table.model_of(drive)
             else {
-                return Err(Error::NoDelay { robot: self.data.uid().into(), joint: name(joint) });
+                return Err(Error::NoDelay { robot: self.data.named(), joint: name(joint) });
             };
             for (row, (_, steps)) in write.rows.iter().enumerate() {
                 let (value, longest) = (steps[column], model.longest());
@@ -198,7 +198,7 @@ impl RobotMut<'_> {
     fn inertias_at_start(&self) -> Result<Vec<f64>> {
         let data = self.data;
         effective_inertias(data.description(), data.plans(), !data.cfg().fix_base)
-            .map_err(|error| Error::Plan { robot: data.uid().into(), error: Box::new(PlanError::Dynamics(error)) })
+            .map_err(|error| Error::Plan { robot: data.named(), error: Box::new(PlanError::Dynamics(error)) })
     }
 
     /// Changes drives by one number each, after everything was checked.
@@ -230,7 +230,7 @@ impl RobotMut<'_> {
         match drives.iter().find(|(_, _, drive)| native(*drive)) {
             Some(&(_, joint, _)) => {
                 let joint = self.data.joint_names()[joint].clone();
-                Err(Error::GainsInModel { argument, robot: self.data.uid().into(), joint })
+                Err(Error::GainsInModel { argument, robot: self.data.named(), joint })
             }
             None => Ok(drives),
         }
@@ -245,7 +245,7 @@ impl RobotMut<'_> {
             }
             let Some(drive) = self.simulation.robots[self.index].joints[joint].drive else {
                 let joint = self.data.joint_names()[joint].clone();
-                return Err(Error::NotDriven { argument, robot: self.data.uid().into(), joint });
+                return Err(Error::NotDriven { argument, robot: self.data.named(), joint });
             };
             drives.push((column, joint, drive));
         }

@@ -4,12 +4,12 @@
 //! They are in MuJoCo's model: an environment that gets others has these arrays for itself. They are among its
 //! [`properties`](crate::SimulationManager::properties), so that random draws and these setters work on the same numbers.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::manager::EnvId;
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
 use crate::objects::rows::Numbers;
 use crate::randomization::Property;
-use ndarray::{Array2, ArrayView1, ArrayView2, AsArray, Ix2};
+use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 
 impl Robot<'_> {
     /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints that have none.
@@ -39,15 +39,17 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the dry friction of joints \[N m or N\], above 0. Rows are for `env_ids` (all where `None`; a single row is for all
+    /// Sets the dry friction of joints \[N m or N\]. Rows are for `env_ids` (all where `None`; a single row is for all
     /// of them), columns for `joint_ids` (all where `None`). A forward pass follows.
     ///
     /// It is a property of the environment: it stays through a reset, and, unlike
-    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::snapshot) is restored;
+    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::snapshot) is restored (but with its properties);
     /// [`reset_properties`](crate::SimulationManager::reset_properties) gives back what the robot was added with.
     ///
-    /// Only joints that were added with some have a constraint for it ([`DriveCfg::friction`](crate::DriveCfg::friction), or
-    /// the file's `<dynamics friction="..">`): a little is enough. The others can be told 0, which they have: what
+    /// All joints that no implicit drive moves may have some, those of passive articulations too. An implicit drive takes the
+    /// place that MuJoCo has for it, so that a joint with one has dry friction only where the model has another place:
+    /// where [`DriveCfg::friction`](crate::DriveCfg::friction) is given for the robot, 0 will do, or the file's
+    /// `<dynamics friction="..">` is above 0. The others can be told 0, which they have: what
     /// [`get_friction`](Robot::get_friction) returns can be set.
     ///
     /// ```
@@ -68,8 +70,8 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or negative; 0 for a
-    /// joint with dry friction, or more than 0 for one that was added without. Then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or negative; more
+    /// than 0 for a joint whose model has no place for it. Then nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_friction<'t>(
         &mut self,
@@ -80,12 +82,13 @@ impl RobotMut<'_> {
         self.set_property("set_friction", Property::DryFriction, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets the viscous damping of joints themselves \[N m s/rad or N s/m\]; that of drives stays. Only joints that were added
-    /// with some can be told another (the file's `<dynamics damping="..">`), the others 0. Otherwise as
-    /// [`set_friction`](Self::set_friction): it is a property, which [snapshots](crate::snapshot) do not hold.
+    /// Sets the viscous damping of joints themselves \[N m s/rad or N s/m\]; that of drives stays. Joints that
+    /// were added without (the file's `<dynamics damping="..">`) may have some as well. Otherwise as
+    /// [`set_friction`](Self::set_friction): it is a property.
     ///
     /// # Errors
-    /// As [`set_friction`](Self::set_friction), but 0 is a damping for every joint.
+    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
+    /// nothing is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_joint_damping<'t>(
         &mut self,
@@ -98,7 +101,7 @@ impl RobotMut<'_> {
 
     /// Sets the rotor inertia of joints \[kg m² or kg\], also of joints that were added without
     /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). Otherwise as [`set_friction`](Self::set_friction): it is a
-    /// property, which [snapshots](crate::snapshot) do not hold. What was derived from it when the robot was added stays: gains
+    /// property. What was derived from it when the robot was added stays: gains
     /// of drive type `acceleration`, warnings of instability.
     ///
     /// # Errors
@@ -126,20 +129,10 @@ impl RobotMut<'_> {
         let write = self.checked_numbers(argument, Numbers::Gain, values, joint_ids, env_ids)?;
         let names: Vec<String> = write.joints.iter().map(|&joint| property_name(&self.read(), joint)).collect();
         let known = self.simulation.properties_named(property, &names);
-        if property == Property::DryFriction {
-            for (row, (_, frictions)) in write.rows.iter().enumerate() {
-                let wrong = |(friction, known): (&f64, &bool)| *known && *friction <= 0.0;
-                if let Some(column) = frictions.iter().zip(&known).position(wrong) {
-                    let of = format!("joint {:?}", self.data.joint_names()[write.joints[column]]);
-                    let expected = "above 0: it may be small".into();
-                    return Err(Error::OutOfRange { argument, row, column, of, value: frictions[column], expected });
-                }
-            }
-        }
-        let rows: Vec<(usize, ArrayView1<'_, f64>)> = write.rows.iter().collect();
-        self.simulation.change_properties(write.rows.envs(), |env, properties| {
-            // `rows` and the environments are the same list.
-            let Some((_, row)) = rows.iter().find(|(of, _)| *of == env) else { return Ok(()) };
+        // Environments come in this order.
+        let mut rows = write.rows.iter();
+        self.simulation.change_properties(write.rows.envs(), |_, properties| {
+            let Some((_, row)) = rows.next() else { return Ok(()) };
             // A joint without the property has 0 of it.
             let mut changes = names.iter().zip(&known).zip(row).filter(|((_, known), value)| **known || **value != 0.0);
             changes.try_for_each(|((name, _), value)| properties.set(property, name, &[*value]))

@@ -58,7 +58,7 @@ impl Robot<'_> {
     }
 
     fn name_error(&self, error: PatternError) -> Error {
-        Error::RobotNames { robot: self.uid().into(), error: Box::new(error) }
+        Error::RobotNames { robot: self.data.named(), error: Box::new(error) }
     }
 }
 

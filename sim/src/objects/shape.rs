@@ -48,8 +48,9 @@ pub enum ObjectShape {
     /// A mesh file: STL, OBJ, DAE or GLB.
     ///
     /// What is seen, by cameras and by ray casters, are the triangles of the file. What collides is their convex hull, as with
-    /// the links of a robot: MuJoCo's contacts are those of convex shapes, so that nothing lies in the hollow of a bowl that
-    /// is one mesh. A hollow thing is several objects that hold together, or a terrain.
+    /// the links of a robot, unless [`RigidObjectCfg::mesh_collision`](crate::RigidObjectCfg::mesh_collision) says that convex
+    /// pieces or the triangles do: MuJoCo's contacts are those of convex shapes, so that nothing lies in the hollow of a bowl
+    /// that is one hull.
     ///
     /// Mass and moments are those of what the triangles enclose, filled evenly. Where the surface is open, encloses nothing,
     /// or has numbers that no body has (a part beside the others is inside out), they are those of the hull, and a diagnostic

@@ -24,6 +24,8 @@ pub(crate) struct Made {
     gains: Vec<(usize, [f64; 3])>,
     /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
     damping: Vec<f64>,
+    /// As [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows) takes them, of the model.
+    rows: Vec<usize>,
 }
 
 impl Maker {
@@ -52,7 +54,8 @@ impl Maker {
             let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
             (drive, gains.map(|of| values(of)[element]))
         });
-        Ok(Made { model, gains: gains.collect(), damping })
+        let rows = drives.rows(model.as_ref().unwrap_or(env.data().model()));
+        Ok(Made { model, gains: gains.collect(), damping, rows })
     }
 
     /// Writes what differs from the nominal values; gives whether constants follow from it.
@@ -113,11 +116,28 @@ impl Maker {
                         None => {}
                     },
                     Property::Gravity => editor.set_gravity([value[0], value[1], value[2]]),
+                    Property::Size => editor.set_geom_size(place, [value[0], value[1], value[2]]),
+                    Property::Color => {
+                        let color = editor.geom_rgba_mut()[4 * place..4 * place + 4].iter_mut();
+                        color.zip(value).for_each(|(to, from)| *to = *from as f32);
+                    }
+                    Property::Position => editor.body_pos_mut()[3 * place..3 * place + 3].copy_from_slice(value),
+                    Property::Rotation => {
+                        let length = value.iter().map(|x| x * x).sum::<f64>().sqrt();
+                        let quat = editor.body_quat_mut()[4 * place..4 * place + 4].iter_mut();
+                        quat.zip(value).for_each(|(to, from)| *to = from / length);
+                    }
                     Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {}
                 }
                 constants |= matches!(
                     property,
-                    Property::Mass | Property::CenterOfMass | Property::Inertia | Property::Armature
+                    Property::Mass
+                        | Property::CenterOfMass
+                        | Property::Inertia
+                        | Property::Armature
+                        | Property::Size
+                        | Property::Position
+                        | Property::Rotation
                 );
             }
         }
@@ -132,6 +152,7 @@ impl Made {
             env.drives.draw_gains(drive, gains);
         }
         env.drives.set_damping(&self.damping);
+        env.drives.set_rows(&self.rows);
         if let Some(model) = self.model {
             env.set_model(model);
         }

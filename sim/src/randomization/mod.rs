@@ -1,4 +1,4 @@
-//! Properties of single environments: masses, friction, gravity, gains and more, drawn at random or set.
+//! Properties of single environments: masses, friction, gravity, gains, sizes, colours and more, drawn at random or set.
 //!
 //! The environments of a simulation share one compiled model. One that has properties of its own gets a shallow copy of the
 //! model's struct, in which only the arrays that differ are its own memory; what follows from masses (MuJoCo's
@@ -9,13 +9,16 @@
 //! processes, nor on what other environments do, nor on what else is random.
 //!
 //! Properties stay until they are drawn or set again: [`reset`](SimulationManager::reset) and
-//! [`restore`](SimulationManager::restore) leave them alone, gains of drives included, and when more is added to the scene they are carried over by
+//! [`restore`](SimulationManager::restore) leave them alone
+//! ([`restore_with_properties`](SimulationManager::restore_with_properties) does not), gains of drives included, and when more is added to the scene they are carried over by
 //! name. A gain that was drawn and is then set at run time is that of the drive's setting again; one that is set to its
-//! nominal value, too. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
+//! nominal value, too. Cameras, ray casters and overviews see the sizes, colours and places of each
+//! environment. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
 //! `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
 
 mod apply;
 mod error;
+mod named;
 mod properties;
 mod property;
 mod tables;
@@ -23,9 +26,11 @@ mod terms;
 
 pub(crate) use apply::Maker;
 pub use error::RandomizationError;
+pub(crate) use named::NamedValue;
 pub(crate) use properties::OwnValues;
 pub use properties::Properties;
 pub use property::Property;
+use tables::Beside;
 pub(crate) use tables::Tables;
 pub use terms::{Draw, Randomization, Term};
 
@@ -33,7 +38,7 @@ use crate::compile::Simulation;
 use crate::env::Env;
 use crate::error::Result;
 use crate::manager::{EnvId, SimulationManager, env_mask};
-use scene::Random;
+use scene::{OwnScene, Random};
 use std::sync::Arc;
 
 impl Simulation {
@@ -41,13 +46,20 @@ impl Simulation {
     pub(crate) fn tables(&self) -> &Arc<Tables> {
         self.tables.get_or_init(|| {
             let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
-            Arc::new(Tables::of(self.batch.model(), &drives))
+            let standing: Vec<usize> = self.objects.iter().filter(|object| object.stands()).map(|o| o.body).collect();
+            let beside = Beside { proxies: &self.proxies, standing: &standing };
+            Arc::new(Tables::of(self.batch.model(), &drives, beside))
         })
     }
 
     fn properties_of(&self, tables: &Arc<Tables>, index: usize, env: &Env) -> Properties {
         let own = self.own_values[index].as_deref().unwrap_or(&NOTHING);
         Properties::new(tables, own, &env.drives)
+    }
+
+    /// What an environment, `here`, has for itself, by name.
+    pub(crate) fn named_properties(&self, env: usize, here: &Env) -> Vec<NamedValue> {
+        self.tables().named(self.own_values[env].as_deref().unwrap_or(&NOTHING), &here.drives)
     }
 
     /// Reads a property of one number, no gain, of what is called `name` in every environment; nothing where it has none.
@@ -95,7 +107,28 @@ impl Simulation {
             self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
             self.batch.write(index, |env| made.give(env));
         }
+        self.look_anew(envs);
         Ok(())
+    }
+
+    /// Makes what environments look like, where their sizes or colours are their own and somebody looks.
+    pub(crate) fn look_anew(&mut self, envs: &[usize]) {
+        let Some(visible) = &self.visible else { return };
+        let owns =
+            |env: usize, property| self.own_values[env].as_ref().and_then(|own| own[property as usize].as_deref());
+        let looks_own = |env: &usize| owns(*env, Property::Size).or(owns(*env, Property::Color)).is_some();
+        if self.own_scenes.is_empty() && !envs.iter().any(looks_own) {
+            return;
+        }
+        let tables = self.tables();
+        let scene = |env: &usize| {
+            let [sizes, colors] = [Property::Size, Property::Color]
+                .map(|property| tables.get(property).changes(property.width(), owns(*env, property).unwrap_or(&[])));
+            (*env, if looks_own(env) { visible.own_scene(self.batch.model(), &sizes, &colors) } else { OwnScene(None) })
+        };
+        let scenes: Vec<(usize, OwnScene)> = envs.iter().map(scene).collect();
+        self.own_scenes.resize(self.own_values.len(), OwnScene(None));
+        scenes.into_iter().for_each(|(env, scene)| self.own_scenes[env] = scene);
     }
 
     /// Takes over, by name, what environments of `old` have for themselves.
@@ -201,7 +234,8 @@ impl SimulationManager {
     ) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         self.change(env_ids, change)?;
-        self.draws.iter_mut().zip(chosen).for_each(|(draws, chosen)| *draws += u64::from(chosen));
+        let counted = self.draws.iter_mut().zip(chosen);
+        counted.for_each(|(draws, chosen)| *draws = draws.wrapping_add(u64::from(chosen)));
         Ok(())
     }
 

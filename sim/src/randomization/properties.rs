@@ -112,11 +112,31 @@ impl Properties {
     /// Sets the value of one element, and with a mass the moments that go with it.
     pub(super) fn set_element(&mut self, property: Property, element: usize, value: &[f64]) {
         let width = property.width();
-        self.values[property as usize][element * width..(element + 1) * width].copy_from_slice(value);
+        let at = element * width..(element + 1) * width;
+        self.values[property as usize][at.clone()].copy_from_slice(value);
+        if property == Property::Size {
+            // Numbers that the shape does not have.
+            let nominal = &self.tables.get(property).nominal[at.clone()];
+            let numbers = self.values[property as usize][at].iter_mut().zip(nominal);
+            numbers.filter(|(_, nominal)| **nominal == 0.0).for_each(|(number, _)| *number = 0.0);
+        }
         if property == Property::Mass {
             let moments = self.proportional_moments(element);
             self.values[Property::Inertia as usize][3 * element..3 * element + 3].copy_from_slice(&moments);
         }
+    }
+
+    /// Everything nominal but gains.
+    pub(crate) fn become_nominal(&mut self) {
+        for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
+            self.values[property as usize].clone_from(&self.tables.get(property).nominal);
+        }
+    }
+
+    /// Sets the value of one element and nothing that goes with it.
+    pub(crate) fn put(&mut self, property: Property, element: usize, value: &[f64]) {
+        let width = property.width();
+        self.values[property as usize][element * width..(element + 1) * width].copy_from_slice(value);
     }
 
     /// Nominal moments of a body in the proportion of its mass to the nominal one. Bodies stand in the tables of masses and
@@ -137,7 +157,7 @@ impl Properties {
             for (name, (value, nominal)) in table.names.iter().zip(values) {
                 // What the compiler took is good.
                 if value != nominal
-                    && let Some(expected) = property.fault(value)
+                    && let Some(expected) = property.fault(value, nominal)
                 {
                     let (property, name, value) = (property.name(), name.clone(), value.to_vec());
                     return Err(RandomizationError::Value { env, property, name, value, expected });

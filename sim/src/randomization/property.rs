@@ -22,11 +22,12 @@ pub enum Property {
     TorsionalFriction,
     /// Rolling friction of shapes \[m\], 1 number.
     RollingFriction,
-    /// Viscous damping of a joint \[N m s/rad or N s/m\], 1 number; of joints that nominally have some.
+    /// Viscous damping of a joint \[N m s/rad or N s/m\], 1 number.
     JointDamping,
     /// Rotor inertia of a joint \[kg m² or kg\], 1 number.
     Armature,
-    /// Dry friction of a joint \[N m or N\], 1 number above 0; of joints that nominally have some.
+    /// Dry friction of a joint \[N m or N\], 1 number. A joint whose implicit drive takes the place of it has some only where
+    /// [`DriveCfg::friction`](crate::DriveCfg::friction) or its file said so: 0 there makes room for more.
     DryFriction,
     /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](sensors::Imu) still adds the nominal one, unless its
     /// `gravity_bias` says otherwise.
@@ -37,11 +38,27 @@ pub enum Property {
     DriveDamping,
     /// Largest effort of an implicit drive \[N m or N\], 1 number, which may be infinite.
     MaxEffort,
+    /// Sizes of a shape of a link or object \[m\], 3 numbers as MuJoCo has them: half lengths of a box, radii of an
+    /// ellipsoid; radius, half length of a cylinder and of the straight part of a capsule; radius of a ball. Numbers that a
+    /// shape does not have are 0 and stay 0. Cameras, ray casters and contacts have them alike. Of bodies with such shapes:
+    /// meshes, planes and terrain stay as they are, whatever they are part of. A body with several shapes has them scaled by
+    /// one factor where that is drawn, each about its own middle, which stays.
+    ///
+    /// Mass, centre of mass and moments stay: they are properties of their own.
+    Size,
+    /// Colour and opacity of what is seen of a link, an object or a terrain, 4 numbers from 0 to 1 for the screen (sRGB);
+    /// it multiplies a texture, and goes over what a material or a mesh file says, for all parts of a mesh. Nominally what
+    /// MuJoCo has: the grey 0.5 where a mesh file brings its own colours, which come back with it.
+    Color,
+    /// Where a static object stands in the environment \[m\], 3 numbers.
+    Position,
+    /// How a static object is turned: a quaternion w, x, y, z of length 1, 4 numbers. It is to be set, rather than drawn.
+    Rotation,
 }
 
 impl Property {
     /// All properties.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 17] = [
         Self::Mass,
         Self::CenterOfMass,
         Self::Inertia,
@@ -55,6 +72,10 @@ impl Property {
         Self::Stiffness,
         Self::DriveDamping,
         Self::MaxEffort,
+        Self::Size,
+        Self::Color,
+        Self::Position,
+        Self::Rotation,
     ];
 
     /// Name in configuration files and messages.
@@ -73,13 +94,18 @@ impl Property {
             Self::Stiffness => "stiffness",
             Self::DriveDamping => "drive_damping",
             Self::MaxEffort => "max_effort",
+            Self::Size => "size",
+            Self::Color => "color",
+            Self::Position => "position",
+            Self::Rotation => "rotation",
         }
     }
 
     /// How many numbers it is.
     pub fn width(self) -> usize {
         match self {
-            Self::CenterOfMass | Self::Inertia | Self::Gravity => 3,
+            Self::CenterOfMass | Self::Inertia | Self::Gravity | Self::Size | Self::Position => 3,
+            Self::Color | Self::Rotation => 4,
             _ => 1,
         }
     }
@@ -89,21 +115,30 @@ impl Property {
         match self {
             Self::Mass | Self::CenterOfMass | Self::Inertia => "body that moves and is called",
             Self::Friction | Self::TorsionalFriction | Self::RollingFriction => "body or ground that collides, called",
-            Self::JointDamping => "joint with damping called",
-            Self::Armature => "joint called",
-            Self::DryFriction => "joint with dry friction called",
+            Self::JointDamping | Self::Armature => "joint called",
+            Self::DryFriction => {
+                "joint that can have dry friction (a robot's drive.friction makes room for it, 0 will do) called"
+            }
             Self::Gravity => "gravity called",
             Self::Stiffness | Self::DriveDamping | Self::MaxEffort => "joint with an implicit drive called",
+            Self::Size => "body with a box, ball, capsule, cylinder or ellipsoid called",
+            Self::Color => "body or terrain called",
+            Self::Position | Self::Rotation => "static object called",
         }
     }
 
     /// Whether it is kept with the environment's drives, not with its model.
     pub(super) fn is_gain(self) -> bool {
-        matches!(self, Self::Stiffness | Self::DriveDamping | Self::MaxEffort)
+        self.gain().is_some()
     }
 
-    /// What a value must be, where this one is not.
-    pub(super) fn fault(self, values: &[f64]) -> Option<&'static str> {
+    /// Its number among proportional gain, derivative gain and effort limit.
+    pub(crate) fn gain(self) -> Option<usize> {
+        [Self::Stiffness, Self::DriveDamping, Self::MaxEffort].iter().position(|gain| *gain == self)
+    }
+
+    /// What a value must be, where this one is not; of a size, numbers that are nominally 0 are none.
+    pub(crate) fn fault(self, values: &[f64], nominal: &[f64]) -> Option<&'static str> {
         let all = |good: fn(f64) -> bool| values.iter().all(|&value| good(value));
         match self {
             Self::Mass => {
@@ -116,9 +151,21 @@ impl Property {
                 let good = all(|i| i.is_finite() && i >= 1e-15) && 2.0 * largest <= sum * (1.0 + 1e-6);
                 (!good).then_some("moments of inertia must be positive, and none larger than the sum of the others")
             }
-            Self::DryFriction => (!all(|f| f.is_finite() && f > 0.0))
-                .then_some("dry friction must be finite and above 0: it may be small"),
-            Self::CenterOfMass | Self::Gravity => (!all(f64::is_finite)).then_some("every number must be finite"),
+            Self::Size => {
+                let good = |(x, nominal): (&f64, &f64)| (1e-6..=1e6).contains(x) || (*nominal == 0.0 && *x == 0.0);
+                (!values.iter().zip(nominal).all(good)).then_some("every size must be 1e-6 to 1e6 metres")
+            }
+            Self::Color => {
+                (!all(|x| (0.0..=1.0).contains(&x))).then_some("each of red, green, blue and opacity must be 0 to 1")
+            }
+            Self::Rotation => {
+                let length = values.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let good = (length - 1.0).abs() <= 1e-6;
+                (!good).then_some("it must be a quaternion w, x, y, z of length 1")
+            }
+            Self::CenterOfMass | Self::Gravity | Self::Position => {
+                (!all(f64::is_finite)).then_some("every number must be finite")
+            }
             Self::MaxEffort => (!all(|x| x >= 0.0)).then_some("it must be a number >= 0; infinity is no limit"),
             _ => (!all(|x| x.is_finite() && x >= 0.0)).then_some("it must be a finite number >= 0"),
         }

@@ -3,6 +3,7 @@
 use super::Property;
 use crate::drive::table::{Drive, DriveTable, Realization};
 use crate::mj::{self, Model, ObjectKind};
+use std::collections::BTreeMap;
 
 /// All that has one property.
 #[derive(Clone, Debug, Default)]
@@ -15,6 +16,15 @@ pub(crate) struct Table {
     pub(super) nominal: Vec<f64>,
 }
 
+/// What the model alone does not say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Beside<'a> {
+    /// Whether each geom only has a pose, for something else that is drawn in its place.
+    pub(crate) proxies: &'a [bool],
+    /// Bodies that stand fixed and may do so elsewhere in each environment.
+    pub(crate) standing: &'a [usize],
+}
+
 /// The properties of a compiled scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Tables {
@@ -24,8 +34,19 @@ pub(crate) struct Tables {
 
 impl Tables {
     /// The properties of a model with its drives.
-    pub(crate) fn of(model: &Model, drives: &DriveTable) -> Self {
-        Self { tables: Property::ALL.map(|property| table(property, model, drives)) }
+    pub(crate) fn of(model: &Model, drives: &DriveTable, beside: Beside<'_>) -> Self {
+        Self { tables: Property::ALL.map(|property| table(property, model, drives, beside)) }
+    }
+
+    /// Where an element is in MuJoCo's arrays, or among the drives.
+    pub(crate) fn place(&self, property: Property, element: usize) -> usize {
+        self.get(property).places[element]
+    }
+
+    /// The nominal value of an element.
+    pub(crate) fn nominal(&self, property: Property, element: usize) -> &[f64] {
+        let width = property.width();
+        &self.get(property).nominal[element * width..(element + 1) * width]
     }
 
     pub(super) fn get(&self, property: Property) -> &Table {
@@ -34,6 +55,12 @@ impl Tables {
 }
 
 impl Table {
+    /// Where elements differ from the nominal values: the values, `width` numbers each, by place.
+    pub(super) fn changes<'v>(&self, width: usize, values: &'v [f64]) -> BTreeMap<usize, &'v [f64]> {
+        let elements = values.chunks(width).zip(self.nominal.chunks(width)).zip(&self.places);
+        elements.filter(|((value, nominal), _)| value != nominal).map(|((value, _), &place)| (place, value)).collect()
+    }
+
     fn push(&mut self, name: String, place: usize, values: &[f64]) {
         self.names.push(name);
         self.places.push(place);
@@ -41,7 +68,7 @@ impl Table {
     }
 }
 
-fn table(property: Property, model: &Model, drives: &DriveTable) -> Table {
+fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<'_>) -> Table {
     let mut table = Table::default();
     match property {
         Property::Mass => bodies(model, &mut table, |body| &model.body_mass()[body..=body]),
@@ -53,18 +80,17 @@ fn table(property: Property, model: &Model, drives: &DriveTable) -> Table {
         Property::JointDamping => joints(model, &mut table, |joint| {
             let dof = model.jnt_dofadr()[joint] as usize;
             let moved = drives.damped.iter().find(|(of, _)| *of == dof).map(|(_, damping)| *damping);
-            Some(moved.unwrap_or(model.dof_damping()[dof])).filter(|damping| *damping > 0.0)
+            Some(moved.unwrap_or(model.dof_damping()[dof]))
         }),
         Property::Armature => joints(model, &mut table, |joint| {
             let dof = model.jnt_dofadr()[joint] as usize;
             Some(user_armature(model, drives, dof))
         }),
         Property::DryFriction => joints(model, &mut table, |joint| {
-            let friction = match friction_place(model, drives, joint)? {
+            Some(match friction_place(model, drives, joint)? {
                 FrictionPlace::Joint => model.dof_frictionloss()[model.jnt_dofadr()[joint] as usize],
                 FrictionPlace::Tendon(tendon) => model.tendon_frictionloss()[tendon],
-            };
-            Some(friction).filter(|friction| *friction > 0.0)
+            })
         }),
         Property::Gravity => table.push("gravity".into(), 0, &model.gravity()),
         Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {
@@ -82,8 +108,54 @@ fn table(property: Property, model: &Model, drives: &DriveTable) -> Table {
                 }
             }
         }
+        Property::Size => {
+            for geom in (0..model.ngeom()).filter(|&geom| !beside.proxies[geom]) {
+                let (size, numbers) = (&model.geom_size()[3 * geom..3 * geom + 3], sizes(model.geom_type()[geom]));
+                let value = [0, 1, 2].map(|k| if k < numbers { size[k] } else { 0.0 });
+                if let Some(name) = geom_name(model, geom).filter(|_| numbers > 0) {
+                    table.push(name, geom, &value);
+                }
+            }
+        }
+        Property::Color => {
+            for geom in 0..model.ngeom() {
+                // The ground's colour is in its squares.
+                if let Some(name) = geom_name(model, geom).filter(|name| name != "ground") {
+                    table.push(name, geom, &crate::visible::color_of(model, geom).map(f64::from));
+                }
+            }
+        }
+        Property::Position => standing(model, &mut table, beside, |body| &model.body_pos()[3 * body..3 * body + 3]),
+        Property::Rotation => standing(model, &mut table, beside, |body| &model.body_quat()[4 * body..4 * body + 4]),
     }
     table
+}
+
+/// How many sizes a geom of a type has; 0 for one whose size is no property.
+fn sizes(kind: i32) -> usize {
+    match kind as u32 {
+        mj::mjGEOM_SPHERE => 1,
+        mj::mjGEOM_CAPSULE | mj::mjGEOM_CYLINDER => 2,
+        mj::mjGEOM_ELLIPSOID | mj::mjGEOM_BOX => 3,
+        _ => 0,
+    }
+}
+
+/// A geom is called as its body, or, in the world, as itself.
+fn geom_name(model: &Model, geom: usize) -> Option<String> {
+    match usize::try_from(model.geom_bodyid()[geom]) {
+        Ok(body) if body > 0 => model.name(ObjectKind::Body, body),
+        _ => model.name(ObjectKind::Geom, geom),
+    }
+}
+
+/// Bodies that stand where they are put.
+fn standing<'m>(model: &'m Model, table: &mut Table, beside: Beside<'_>, values: impl Fn(usize) -> &'m [f64]) {
+    for &body in beside.standing {
+        if let Some(name) = model.name(ObjectKind::Body, body) {
+            table.push(name, body, values(body));
+        }
+    }
 }
 
 /// Bodies that can move and have a mass.
@@ -104,11 +176,7 @@ fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
         if model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0 {
             continue;
         }
-        let name = match usize::try_from(model.geom_bodyid()[geom]) {
-            Ok(body) if body > 0 => model.name(ObjectKind::Body, body),
-            _ => model.name(ObjectKind::Geom, geom),
-        };
-        if let Some(name) = name {
+        if let Some(name) = geom_name(model, geom) {
             table.push(name, geom, &[model.geom_friction()[3 * geom + coefficient]]);
         }
     }
@@ -156,6 +224,6 @@ pub(super) fn friction_place(model: &Model, drives: &DriveTable, joint: usize) -
         return Some(FrictionPlace::Tendon(tendon));
     }
     let dof = model.jnt_dofadr()[joint] as usize;
-    let is_row = |drive: &Drive| drive.dof == dof && matches!(drive.realization, Realization::Row { .. });
+    let is_row = |drive: &Drive| drive.dof == dof && drive.realization == Realization::Row;
     (!drives.drives.iter().any(is_row)).then_some(FrictionPlace::Joint)
 }

@@ -5,16 +5,17 @@
 //! ```
 //!
 //! All numbers are little-endian. Magic, length and checksum stand in these places in every format, so that a damaged file
-//! is told from one of another version. The content of format 2: MuJoCo's version, the lines of the layout, the
-//! environments.
+//! is told from one of another version. The content of format 3: MuJoCo's version, the lines of the layout, the
+//! environments, each with its properties.
 
 use super::bytes::{Malformed, Reader, Writer};
 use super::layout::Layout;
-use super::{Entry, Snapshot, SnapshotError};
+use super::{Entry, OwnProperties, Snapshot, SnapshotError};
 use crate::drive::table::numbers_fault;
 use crate::env::{Divergence, EnvState, EnvStatus};
 use crate::error::{Error, Result};
 use crate::mj::{self, Buffers, EngineError, Inputs, Motion, Warning, Weld};
+use crate::randomization::{NamedValue, Property};
 use crate::wrenches::Wrenches;
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
@@ -23,7 +24,7 @@ use std::sync::Arc;
 
 /// As PNG's: a byte that is no text, a name, and ends of lines that programs which treat files as text change.
 const MAGIC: [u8; 8] = *b"\x89KTS\r\n\x1a\n";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const CHECKSUM: usize = 32;
 /// Magic, length, format.
 const HEADER: usize = 8 + 8 + 4;
@@ -145,6 +146,15 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
         out.u64(weld.equality as u64);
         out.numbers(&weld.pose);
     }
+    let OwnProperties { values, draws } = &*entry.own;
+    out.u64(*draws);
+    out.u64(values.len() as u64);
+    for NamedValue { property, name, nth, value } in values {
+        out.text(property.name());
+        out.text(name);
+        out.u32(*nth);
+        out.numbers(value);
+    }
     let Some(EnvStatus::Diverged { step, reason }) = diverged.as_deref() else { return out.u8(0) };
     match reason {
         Divergence::Warning(warning) => {
@@ -191,6 +201,13 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
     let wrenches = Wrenches::from_numbers(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
     // A number, and seven of a list with its length.
     let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
+    let draws = match reader.u64()? {
+        draws if draws <= MOST_STEPS => draws,
+        _ => return Err(Malformed("a count of draws is larger than any run's")),
+    };
+    // Two texts and a list with their lengths, and a number.
+    let own = (0..reader.count(8 + 8 + 4 + 8)?).map(|_| read_property(reader)).collect::<Result<Vec<_>, _>>()?;
+    let own = Arc::new(OwnProperties { values: own, draws });
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -211,7 +228,22 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
     };
     let inputs = Inputs::from_values(values, active);
     let state = EnvState { motion, inputs, drives, wrenches, welds, steps: done, diverged };
-    Ok(Entry { env, state })
+    Ok(Entry { env, state, own })
+}
+
+fn read_property(reader: &mut Reader<'_>) -> Result<NamedValue, Malformed> {
+    let word = reader.text()?;
+    let property = Property::ALL.into_iter().find(|property| property.name() == word);
+    let property = property.ok_or(Malformed("a property is unknown"))?;
+    let (name, nth, value) = (reader.text()?, reader.u32()?, reader.numbers()?);
+    if value.len() != property.width() {
+        return Err(Malformed("a property has not all its numbers"));
+    }
+    // Of sizes, zeros are told by the scene.
+    match property.fault(&value, &value) {
+        None => Ok(NamedValue { property, name, nth, value: value.into() }),
+        Some(_) => Err(Malformed("a property has a value that cannot be")),
+    }
 }
 
 fn read_weld(reader: &mut Reader<'_>) -> Result<Weld, Malformed> {
@@ -257,7 +289,18 @@ mod tests {
         let (mut env, layout) = env();
         env.write(|data| data.qvel_mut()[1] = 0.3);
         env.step(7);
-        let mut entries = vec![Entry { env: 3, state: env.remember() }, Entry { env: 0, state: env.remember() }];
+        let value = |property: Property, nth, value: &[f64]| {
+            let name = format!("größe/{nth}");
+            NamedValue { property, name, nth, value: value.into() }
+        };
+        let values = vec![
+            value(Property::Mass, 0, &[0.7]),
+            value(Property::Size, 2, &[0.1, 0.2, 0.0]),
+            value(Property::MaxEffort, 0, &[f64::INFINITY]),
+        ];
+        let own = [Arc::new(OwnProperties { values, draws: 5 }), Arc::default()];
+        let mut entries: Vec<Entry> =
+            own.into_iter().zip([3, 0]).map(|(own, at)| Entry { env: at, state: env.remember(), own }).collect();
         entries[1].state.diverged = Some(Box::new(EnvStatus::Diverged { step: 7, reason }));
         Snapshot { layout: Arc::new(layout), entries: entries.into() }
     }
@@ -318,8 +361,8 @@ mod tests {
     fn other_files_formats_and_engines_are_told_apart() {
         assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::Foreign { .. })));
         let snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
-        let other = decode(&snapshot.encode(1, &mj::version_string()));
-        assert!(matches!(other, Err(SnapshotError::Format { found: 1, supported: 2, .. })));
+        let other = decode(&snapshot.encode(2, &mj::version_string()));
+        assert!(matches!(other, Err(SnapshotError::Format { found: 2, supported: 3, .. })));
         let other = decode(&snapshot.encode(FORMAT, "3.9.9"));
         assert!(matches!(other, Err(SnapshotError::Mujoco { found, .. }) if found == "3.9.9"));
     }
@@ -425,6 +468,27 @@ mod tests {
         assert!(fault(&|state| state.drives.truncate(5)).is_some());
         assert!(fault(&|state| state.steps = MOST_STEPS + 1).is_some_and(|what| what.contains("steps")));
         assert_eq!(fault(&|state| state.steps = MOST_STEPS), None);
+    }
+
+    #[test]
+    fn properties_that_no_environment_has_are_refused() {
+        let fault = |change: &dyn Fn(&mut OwnProperties)| {
+            let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
+            let mut entries = snapshot.entries.to_vec();
+            change(Arc::make_mut(&mut entries[0].own));
+            snapshot.entries = entries.into();
+            match decode(&snapshot.encode(FORMAT, &mj::version_string())) {
+                Ok(_) => None,
+                Err(SnapshotError::Malformed { what, .. }) => Some(what),
+                Err(other) => panic!("{other}"),
+            }
+        };
+        assert_eq!(fault(&|_| {}), None, "control");
+        for bad in [vec![], vec![1.0, 2.0], vec![0.0], vec![f64::NAN], vec![-1.0]] {
+            assert!(fault(&|own| own.values[0].value = bad.clone().into()).is_some(), "{bad:?}");
+        }
+        assert!(fault(&|own| own.values[1].value = [0.1, -0.2, 0.0].into()).is_some());
+        assert!(fault(&|own| own.draws = MOST_STEPS + 1).is_some_and(|what| what.contains("draws")));
     }
 
     #[test]

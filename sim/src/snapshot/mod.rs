@@ -7,24 +7,30 @@
 //! with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
 //! threads.
 //!
+//! It also holds the [properties](crate::randomization) of each environment, by name: masses, friction, sizes, gains that were
+//! drawn, and how often it was drawn for. They belong to the environment, not to its state:
+//! [`restore`](SimulationManager::restore) leaves those of the environment it goes to alone (of a drive whose gain is drawn,
+//! what was set before is restored), as who resets to the same start after every draw wants it.
+//! [`restore_with_properties`](SimulationManager::restore_with_properties) restores them too.
+//!
 //! What it does not hold:
 //!
 //! * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
 //!   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory nobody else
 //!   knows; and measurements of one run would not belong to the other.
-//! * The model and the [properties](crate::randomization) of environments: masses, friction, gravity, gains that were drawn.
-//!   They belong to the environment, not to its state, and stay when a snapshot is restored; of a drive whose gain is drawn,
-//!   the snapshot holds the gain that was set before. A snapshot of a scene with other steps, another integrator or other
-//!   friction cones is refused, as that of another scene.
+//! * The model that all environments share. A snapshot of a scene with other steps, another integrator or other friction
+//!   cones is refused, as that of another scene.
 //! * What happened on the way: counts of warnings and of buffers that grew.
 
 mod bytes;
 mod error;
 mod file;
 mod layout;
+mod own;
 
 pub use error::SnapshotError;
 pub(crate) use layout::Layout;
+pub(crate) use own::OwnProperties;
 
 use crate::compile::Simulation;
 use crate::env::EnvState;
@@ -45,6 +51,8 @@ pub(crate) struct Entry {
     /// Where it was taken.
     pub(crate) env: usize,
     pub(crate) state: EnvState,
+    /// What the environment had for itself.
+    pub(crate) own: Arc<OwnProperties>,
 }
 
 impl Snapshot {
@@ -102,7 +110,10 @@ impl SimulationManager {
     /// An environment does not exist.
     pub fn snapshot(&self, env_ids: Option<&[EnvId]>) -> Result<Snapshot> {
         let envs = env_list(env_ids, self.num_envs())?;
-        let entry = |env| Entry { env, state: self.simulation.batch.read(env, |env| env.remember()) };
+        let entry = |env| {
+            let state = self.simulation.batch.read(env, |env| env.remember());
+            Entry { env, state, own: self.simulation.own_properties(env, self.draws[env]) }
+        };
         Ok(Snapshot::new(&self.simulation, envs.into_iter().map(entry).collect()))
     }
 
@@ -114,11 +125,7 @@ impl SimulationManager {
     /// An environment does not exist, the snapshot is of another scene, or it holds another number of states; then nothing
     /// is restored.
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
-        let taken = snapshot.env_ids();
-        let envs = env_list(Some(env_ids.unwrap_or(&taken)), self.num_envs())?;
-        let states = snapshot.states_for(envs.len(), &self.simulation)?;
-        let mut sources = vec![None; self.num_envs()];
-        envs.iter().zip(states).for_each(|(&env, state)| sources[env] = Some(state));
+        let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
         let entries = Arc::clone(snapshot.entries());
         self.simulation.batch.run(Arc::new(move |i, env| {
@@ -130,5 +137,15 @@ impl SimulationManager {
             self.sensors.reset(&chosen, &mut self.simulation);
         }
         Ok(())
+    }
+
+    /// Which entry of the snapshot each environment goes on from, if any.
+    fn sources(&self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<Vec<Option<usize>>> {
+        let taken = snapshot.env_ids();
+        let envs = env_list(Some(env_ids.unwrap_or(&taken)), self.num_envs())?;
+        let states = snapshot.states_for(envs.len(), &self.simulation)?;
+        let mut sources = vec![None; self.num_envs()];
+        envs.iter().zip(states).for_each(|(&env, state)| sources[env] = Some(state));
+        Ok(sources)
     }
 }

@@ -22,18 +22,12 @@ impl<'a> Shapes<'a> {
     /// The shape of a geom; `None` for kinds that are not drawn (signed distance fields), or a mesh without triangles.
     pub(super) fn get(&mut self, geom: usize) -> Option<Shape> {
         let size = &self.model.geom_size()[3 * geom..3 * geom + 3];
-        let [x, y, z] = [size[0] as f32, size[1] as f32, size[2] as f32];
         let data = usize::try_from(self.model.geom_dataid()[geom]).ok();
         Some(match self.model.geom_type()[geom] as u32 {
-            mj::mjGEOM_PLANE => Plane { half: [x.max(0.0), y.max(0.0)] }.into(),
-            mj::mjGEOM_SPHERE => Sphere { radius: x }.into(),
-            mj::mjGEOM_CAPSULE => Capsule { radius: x, half_length: y }.into(),
-            mj::mjGEOM_ELLIPSOID => Ellipsoid { radii: [x, y, z] }.into(),
-            mj::mjGEOM_CYLINDER => Cylinder { radius: x, half_length: y }.into(),
-            mj::mjGEOM_BOX => Cuboid { half: [x, y, z] }.into(),
+            mj::mjGEOM_PLANE => Plane { half: [(size[0] as f32).max(0.0), (size[1] as f32).max(0.0)] }.into(),
             mj::mjGEOM_MESH => Mesh { mesh: self.mesh(data?)? }.into(),
             mj::mjGEOM_HFIELD => self.height_field(data?)?.into(),
-            _ => return None,
+            kind => return sized(kind, size),
         })
     }
 
@@ -53,6 +47,19 @@ impl<'a> Shapes<'a> {
             })
             .clone()
     }
+}
+
+/// The shape of a kind that is all sizes \[m\]; `None` for others.
+pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
+    let [x, y, z] = [0, 1, 2].map(|k| size[k] as f32);
+    Some(match kind {
+        mj::mjGEOM_SPHERE => Sphere { radius: x }.into(),
+        mj::mjGEOM_CAPSULE => Capsule { radius: x, half_length: y }.into(),
+        mj::mjGEOM_ELLIPSOID => Ellipsoid { radii: [x, y, z] }.into(),
+        mj::mjGEOM_CYLINDER => Cylinder { radius: x, half_length: y }.into(),
+        mj::mjGEOM_BOX => Cuboid { half: [x, y, z] }.into(),
+        _ => return None,
+    })
 }
 
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are ours, smooth up to a

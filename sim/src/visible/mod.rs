@@ -8,6 +8,7 @@ mod geom;
 mod identity;
 mod lighting;
 mod overview;
+mod own;
 mod still;
 mod surface;
 mod urdf_visual;
@@ -16,6 +17,7 @@ use identity::GeomIdentity;
 pub use identity::MaskId;
 pub(crate) use identity::{Identities, Owner, of_simulation};
 pub use still::{FreeCamera, ModelCamera, Still};
+pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::mj::{Data, Model};

@@ -3,12 +3,14 @@
 use super::Visible;
 use crate::contents::GROUND_MASK_ID;
 use crate::error::{Error, Result};
-use scene::{Marker, PoseF32};
+use scene::{Marker, PoseF32, RenderScene};
 
 /// An environment in the overview.
 pub(super) struct Place<'a> {
     /// Where it is \[m\].
     pub(super) origin: [f32; 3],
+    /// What is in it.
+    pub(super) scene: &'a RenderScene,
     /// Where its instances are, in the environment.
     pub(super) poses: &'a [PoseF32],
     pub(super) markers: Vec<Marker>,
@@ -17,12 +19,12 @@ pub(super) struct Place<'a> {
 /// Repeats the instances of `visible` at every place, and puts markers among them; the ground is there once.
 pub(super) fn side_by_side(visible: &Visible, places: &[Place<'_>]) -> Result<(Visible, Vec<PoseF32>)> {
     let (mut instances, mut poses) = (Vec::new(), Vec::new());
-    for (index, Place { origin, poses: own, markers }) in places.iter().enumerate() {
+    for (index, Place { origin, scene, poses: own, markers }) in places.iter().enumerate() {
         let moved = |pose: &PoseF32| {
             let t = pose.translation;
             PoseF32 { translation: [t[0] + origin[0], t[1] + origin[1], t[2] + origin[2]], ..*pose }
         };
-        for (instance, pose) in visible.scene().instances().iter().zip(*own) {
+        for (instance, pose) in scene.instances().iter().zip(*own) {
             let ground = instance.mask_id == GROUND_MASK_ID;
             if index == 0 || !ground {
                 instances.push(instance.clone());

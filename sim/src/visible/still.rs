@@ -79,7 +79,7 @@ impl Still {
     /// There is no such environment.
     pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
         env_mask(Some(&[env]), sim.num_envs())?;
-        let visible = sim.visible();
+        let visible = sim.visible().seen_as(sim.own_scene(env));
         Ok(sim.batch().read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
@@ -93,12 +93,22 @@ impl Still {
         let envs = env_list(envs, sim.num_envs())?;
         env_list(Some(&markers.iter().map(|(env, _)| *env).collect::<Vec<_>>()), sim.num_envs())?;
         let (visible, origins) = (sim.visible(), sim.env_origins());
-        let stills: Vec<(usize, Self)> =
-            envs.iter().map(|&env| (env, sim.batch().read(env, |env| Self::of_data(&visible, env.data())))).collect();
+        let stills: Vec<(usize, Self)> = envs
+            .iter()
+            .map(|&env| {
+                (
+                    env,
+                    sim.batch().read(env, |here| {
+                        let visible = visible.seen_as(sim.own_scene(EnvId(env)));
+                        Self::of_data(&visible, here.data())
+                    }),
+                )
+            })
+            .collect();
         let places = stills.iter().map(|(env, still)| {
             let markers = markers.iter().filter(|(of, _)| of.0 == *env).map(|(_, marker)| *marker).collect();
             let origin = [0, 1, 2].map(|k| origins[(*env, k)] as f32);
-            overview::Place { origin, poses: &still.poses, markers }
+            overview::Place { origin, scene: still.visible.scene(), poses: &still.poses, markers }
         });
         let (visible, poses) = overview::side_by_side(&visible, &places.collect::<Vec<_>>())?;
         Ok(Self { visible: Arc::new(visible), poses, ..Self::of_env(sim, EnvId(0))? })

@@ -40,15 +40,11 @@ impl<'a> Surfaces<'a> {
         Self { model, materials, left_out }
     }
 
-    /// The look of a geom. A colour of the geom's own goes over its material's, as in MuJoCo's viewer.
+    /// The look of a geom.
     pub(super) fn of_geom(&self, geom: usize) -> Material {
-        /// MuJoCo's grey of geoms that say nothing.
-        const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
-        let rgba = &self.model.geom_rgba()[4 * geom..4 * geom + 4];
-        let rgba = [rgba[0], rgba[1], rgba[2], rgba[3]].map(|c| c.clamp(0.0, 1.0));
+        let rgba = color_of(self.model, geom);
         match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
             None => Material::from_rgba(rgba),
-            Some(material) if rgba == UNSET => material.clone(),
             Some(material) => Material { rgba, ..material.clone() },
         }
     }
@@ -56,6 +52,20 @@ impl<'a> Surfaces<'a> {
     /// What cannot be drawn.
     pub(super) fn left_out(&self) -> &[String] {
         &self.left_out
+    }
+}
+
+/// Colour and opacity of a geom. A colour of the geom's own goes over its material's, as in MuJoCo's viewer.
+pub(crate) fn color_of(model: &Model, geom: usize) -> [f32; 4] {
+    /// MuJoCo's grey of geoms that say nothing.
+    const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+    let own = &model.geom_rgba()[4 * geom..4 * geom + 4];
+    let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));
+    match usize::try_from(model.geom_matid()[geom]) {
+        Ok(material) if own == UNSET && material < model.nmat() => {
+            model.material(material).rgba.map(|c| c.clamp(0.0, 1.0))
+        }
+        _ => own,
     }
 }
 

@@ -3,10 +3,10 @@
 use super::order::neighbours_together;
 use crate::crew::Crew;
 use crate::ray::world::FixedWorld;
-use crate::ray::{Ray, RayHit, RayTargets, RayWorld};
+use crate::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
 use ndarray::Array2;
-use scene::PoseF64;
+use scene::{OwnScene, PoseF64};
 use std::fmt;
 use std::sync::Arc;
 
@@ -57,9 +57,13 @@ impl Rays for Vec<Ray> {
 pub(crate) struct Scan<R: Rays> {
     crew: Crew,
     targets: Arc<RayTargets>,
+    /// Where trees over meshes are, for targets of environments that look otherwise.
+    assets: RayAssets,
     rays: R,
     /// The order in which they are cast.
     order: Option<Vec<u32>>,
+    /// What rays hit in each environment; mostly one and the same.
+    looks: Vec<Look>,
     /// What does not move, in each environment; mostly one and the same.
     fixed: Vec<Arc<FixedWorld>>,
     max_distance: f64,
@@ -81,6 +85,14 @@ struct Task<V> {
     poses: Vec<PoseF64>,
 }
 
+/// What rays hit in an environment.
+#[derive(Clone, Debug)]
+struct Look {
+    /// What it was made of.
+    scene: OwnScene,
+    targets: Arc<RayTargets>,
+}
+
 #[derive(Clone, Debug)]
 struct Desk {
     world: RayWorld,
@@ -97,8 +109,11 @@ impl<R: Rays> Scan<R> {
         let desk =
             || Desk { world: RayWorld::new(&targets), placed: NOWHERE, rays: Vec::with_capacity(PART.min(count)) };
         let of_view = || (0..count).step_by(PART).map(|first| vec![RayHit::MISS; PART.min(count - first)]);
+        let look = Look { scene: OwnScene::default(), targets: Arc::clone(&targets) };
         Self {
             crew: context.crew.clone(),
+            assets: context.ray_assets.clone(),
+            looks: vec![look; n],
             order: rays.order(),
             rays,
             fixed: vec![nothing; n],
@@ -119,16 +134,27 @@ impl<R: Rays> Scan<R> {
         &self.rays
     }
 
-    /// Looks where things are that do not move, in an environment where somebody may have moved them.
-    pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>) {
-        let (targets, poses) = (&self.targets, row(poses, env));
+    /// Looks where things are that do not move, in an environment where somebody may have moved them or changed how they
+    /// look; `scene` is the environment's own.
+    pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>, scene: &OwnScene) {
+        let poses = row(poses, env);
+        let other = self.looks[env].scene != *scene;
+        if other {
+            let own = |scene: &_| Arc::new(RayTargets::new(scene, self.targets.instances(), &self.assets));
+            let targets = scene.0.as_deref().map_or_else(|| Arc::clone(&self.targets), own);
+            self.looks[env] = Look { scene: scene.clone(), targets };
+        }
+        let targets = &self.looks[env].targets;
         let is_here = |fixed: &Arc<FixedWorld>| fixed.is_at(targets, poses);
-        if is_here(&self.fixed[env]) {
+        if !other && is_here(&self.fixed[env]) {
             return;
         }
-        // They are at the same places in most environments.
-        let known = self.fixed.first().filter(|first| is_here(first)).map(Arc::clone);
-        self.fixed[env] = known.unwrap_or_else(|| Arc::new(FixedWorld::new(targets, poses)));
+        // They are the same things at the same places in most environments.
+        let known = self.fixed.first().filter(|first| {
+            let alike = env > 0 && Arc::ptr_eq(&self.looks[0].targets, targets);
+            alike && is_here(first)
+        });
+        self.fixed[env] = known.map_or_else(|| Arc::new(FixedWorld::new(targets, poses)), Arc::clone);
     }
 
     /// Casts the rays of the environments `envs`, with the view that `view` gives for each; `poses` are those of the
@@ -147,17 +173,19 @@ impl<R: Rays> Scan<R> {
             }
         }
         let (per_view, moving) = (self.per_view(), self.targets.moving_count());
-        let Self { crew, rays, order, fixed, max_distance, task, desks, parts, .. } = self;
+        let Self { crew, rays, order, looks, fixed, max_distance, task, desks, parts, .. } = self;
         let threads = (task.views.len() * rays.count() / WORTH_A_THREAD).clamp(1, desks.len());
         let desks = &mut desks[..threads];
         desks.iter_mut().for_each(|desk| desk.placed = NOWHERE);
         let parts = parts[..per_view * task.views.len()].iter_mut().enumerate();
-        let (rays, order, fixed, task, max_distance) = (&*rays, order.as_deref(), &*fixed, &*task, *max_distance);
+        let (rays, order, looks, fixed) = (&*rays, order.as_deref(), &*looks, &*fixed);
+        let (task, max_distance) = (&*task, *max_distance);
         crew.share(desks, parts, |desk, (part, hits)| {
             let (at, first) = (part / per_view, part % per_view * PART);
             let (env, view) = &task.views[at];
             if desk.placed != at {
-                desk.world.place_with(&fixed[*env], &task.poses[at * moving..(at + 1) * moving]);
+                let moving = &task.poses[at * moving..(at + 1) * moving];
+                desk.world.place_with(&looks[*env].targets, &fixed[*env], moving);
                 desk.placed = at;
             }
             desk.rays.clear();

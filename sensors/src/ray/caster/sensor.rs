@@ -107,7 +107,7 @@ impl RayCaster {
     /// The same, after somebody may have moved what does not move by itself.
     fn cast_anew(&mut self, envs: &[usize], state: &SceneState) {
         let Some(poses) = &state.instance_poses else { return };
-        envs.iter().for_each(|&env| self.scan.settle(env, poses));
+        envs.iter().for_each(|&env| self.scan.settle(env, poses, state.own_scene(env)));
         self.cast(envs, state);
     }
 

@@ -156,7 +156,8 @@ impl RobotFile {
         let part = PartOf { model, names, uid: cfg.uid, pose: &cfg.base_pose, stem: &self.stem, rig: Some(&rig) };
         mjcf.parts.push(Arc::new(MjcfPart::new(&part, self.sensors_left_out.clone(), &self.source)?));
         for plan in cfg.plans {
-            add_drive(mjcf, cfg.uid, description.joint(plan.joint), plan, rows);
+            let tendon = rows && (plan.friction > 0.0 || cfg.room_for_friction);
+            add_drive(mjcf, cfg.uid, description.joint(plan.joint), plan, tendon);
         }
         let links =
             self.links.iter().map(|&(body, body_from_link)| LinkFrame { body: self.body(cfg, body), body_from_link });

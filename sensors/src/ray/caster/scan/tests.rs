@@ -10,13 +10,21 @@ const ENVS: usize = 6;
 /// Not a whole number of parts.
 const RAYS: usize = 3 * PART + 100;
 
+/// A plane and twenty balls.
+fn balls(radius: f32) -> RenderScene {
+    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
+    instances.extend((0..20).map(|k| Instance::new(Sphere { radius }, Material::default(), 2 + k)));
+    RenderScene::new(instances).expect("a good scene")
+}
+
 /// Fans of rays into a plane and twenty balls, on `threads` threads.
 fn scan(threads: usize) -> Scan<Vec<Ray>> {
-    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
-    instances.extend((0..20).map(|k| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k)));
-    let scene = RenderScene::new(instances).expect("a good scene");
+    scan_of(&balls(0.3), threads)
+}
+
+fn scan_of(scene: &RenderScene, threads: usize) -> Scan<Vec<Ray>> {
     let context = SensorContext { num_envs: ENVS, threads, ..SensorContext::default() };
-    let targets = RayTargets::new(&scene, 0..21, &context.ray_assets);
+    let targets = RayTargets::new(scene, 0..21, &context.ray_assets);
     let ray = |k: usize| {
         let (angle, slope) = (0.618 * k as f64, 0.2 + 0.9 * k as f64 / RAYS as f64);
         let d = nalgebra::Vector3::new(angle.cos(), angle.sin(), -slope).normalize();
@@ -57,7 +65,7 @@ fn threads_change_no_bit() {
         let mut told = Vec::new();
         for step in 0..3 {
             let poses = poses(step);
-            all.iter().for_each(|&env| scan.settle(env, &poses));
+            all.iter().for_each(|&env| scan.settle(env, &poses, &OwnScene::default()));
             scan.cast(&all, &poses, view);
             told.push(bits(&scan));
         }
@@ -75,7 +83,7 @@ fn threads_change_no_bit() {
 fn only_what_was_cast_is_shown_and_clones_are_apart() {
     let mut scan = scan(2);
     let poses = poses(0);
-    (0..ENVS).for_each(|env| scan.settle(env, &poses));
+    (0..ENVS).for_each(|env| scan.settle(env, &poses, &OwnScene::default()));
     scan.cast(&[4, 1, 4], &poses, view);
     let count = |scan: &Scan<Vec<Ray>>, env| {
         let mut count = 0;
@@ -117,7 +125,7 @@ fn casting_allocates_nothing_on_any_thread() {
     scan.crew = Crew::new(Arc::<Counting>::clone(&counting));
     let all: Vec<usize> = (0..ENVS).collect();
     let states: Vec<_> = (0..4).map(poses).collect();
-    all.iter().for_each(|&env| scan.settle(env, &states[0]));
+    all.iter().for_each(|&env| scan.settle(env, &states[0], &OwnScene::default()));
     // Everybody's first time: every desk finds out how much scratch memory it needs.
     let crew = std::mem::take(&mut scan.crew);
     for _ in 0..4 {
@@ -134,4 +142,34 @@ fn casting_allocates_nothing_on_any_thread() {
     assert_eq!(seen, [(0, 40), (0, 120)], "allocations and visits of the calling thread and of the others");
     let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
     assert_eq!(control, 1, "the control: the counter counts");
+}
+
+/// An environment that looks otherwise is hit as one of a scan of that scene is, and the others as ever.
+#[test]
+fn environments_may_have_scenes_of_their_own() {
+    let all: Vec<usize> = (0..ENVS).collect();
+    let poses = poses(0);
+    let of_env = |scan: &Scan<Vec<Ray>>, env: usize| {
+        let mut hits = Vec::new();
+        scan.each_hit(env, |k, hit| hits.push((k, hit.distance.to_bits(), hit.instance)));
+        hits
+    };
+    let cast = |scan: &mut Scan<Vec<Ray>>, own: &[OwnScene]| {
+        all.iter().for_each(|&env| scan.settle(env, &poses, &own[env]));
+        scan.cast(&all, &poses, view);
+        all.iter().map(|&env| of_env(scan, env)).collect::<Vec<_>>()
+    };
+    let nothing = vec![OwnScene::default(); ENVS];
+    let (small, large) = (cast(&mut scan(2), &nothing), cast(&mut scan_of(&balls(0.45), 2), &nothing));
+    let mut own = nothing.clone();
+    for env in [0, 3] {
+        own[env] = OwnScene(Some(Arc::new(balls(0.45))));
+    }
+    let mut scan = scan(2);
+    let found = cast(&mut scan, &own);
+    for env in 0..ENVS {
+        let (expected, other) = if [0, 3].contains(&env) { (&large, &small) } else { (&small, &large) };
+        assert!(found[env] == expected[env] && found[env] != other[env], "environment {env}");
+    }
+    assert!(cast(&mut scan, &nothing) == small, "and back again");
 }

@@ -1,0 +1,103 @@
+//! What collides of an object that is a mesh file.
+
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::error::{Error, Result};
+use crate::objects::rigid_object::{BodyType, RigidObjectCfg};
+use crate::objects::shape::ObjectShape;
+use ::scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What collides of an object that is a mesh file. MuJoCo's contacts are those of convex shapes: a mesh that is not convex
+/// collides as one, as several, or as very many of them. Mass and moments are those of the mesh, whatever collides.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum MeshCollision {
+    /// Its convex hull: nothing lies in its hollows.
+    #[default]
+    Hull,
+    /// Convex pieces that together are nowhere higher above the surface than a tolerance; each is a hull, as
+    /// [`ObjectShape::Mesh`] says it. They are kept on disk with the hulls. A diagnostic says so where there are not pieces
+    /// enough for the tolerance. Each costs time where something is near the object.
+    Pieces(PiecesCfg),
+    /// Every triangle, exactly as it stands in the file, as the front of a prism: for what stands or is moved by hand, of up
+    /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it, and what comes through the
+    /// front by more than that falls through. Something small that slides over an edge between triangles is nudged a little,
+    /// since MuJoCo does not know that they are one surface.
+    Triangles {
+        /// Thickness of the prisms \[m\].
+        thickness: f64,
+    },
+}
+
+impl MeshCollision {
+    /// The most triangles that are exact: each is a shape of MuJoCo's.
+    pub const MAX_TRIANGLES: usize = 2000;
+
+    /// Checks the numbers, and whether the object can have it.
+    pub(crate) fn check(&self, cfg: &RigidObjectCfg) -> Result<()> {
+        let fail = |expected| Err(Error::Config { field: "mesh_collision", value: format!("{self:?}"), expected });
+        match self {
+            Self::Hull => Ok(()),
+            _ if !matches!(cfg.shape, ObjectShape::Mesh { .. }) => {
+                fail("only an ObjectShape::Mesh collides in pieces or triangles; leave it MeshCollision::Hull")
+            }
+            Self::Pieces(PiecesCfg { max_pieces, tolerance }) => {
+                let good = (1..=1024).contains(max_pieces) && *tolerance > 0.0 && tolerance.is_finite();
+                if good { Ok(()) } else { fail("max_pieces must be 1 to 1024, the tolerance a length above 0 m") }
+            }
+            Self::Triangles { .. } if cfg.body_type == BodyType::Dynamic => fail(
+                "exact triangles are for BodyType::Static and Kinematic; choose MeshCollision::Pieces for what moves",
+            ),
+            Self::Triangles { thickness } if !(thickness.is_finite() && (1e-5..=1e3).contains(thickness)) => {
+                fail("the thickness must be 1e-5 to 1e3 m")
+            }
+            Self::Triangles { .. } => Ok(()),
+        }
+    }
+
+    /// The convex shapes of a mesh file, whose triangles are `mesh`.
+    pub(super) fn shapes(
+        &self,
+        (uid, path): (&str, &Path),
+        mesh: &TriMesh,
+        scale: [f64; 3],
+        hull: &HullCfg,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<Vec<Arc<TriMesh>>> {
+        let failed = |error: MeshError| Error::ObjectMesh { object: uid.into(), error: Box::new(error) };
+        let cache = HullCache::default_location();
+        match self {
+            Self::Hull => Ok(vec![Arc::new(cache.hull_of_file(path, scale, hull).map_err(failed)?)]),
+            Self::Pieces(cfg) => {
+                let pieces = cache.pieces_of_file(path, scale, hull, cfg).map_err(failed)?;
+                if pieces.depth > cfg.tolerance {
+                    let (count, depth) = (pieces.hulls.len(), pieces.depth);
+                    diagnostics.push(Diagnostic::new(
+                        DiagnosticKind::CoarsePieces,
+                        None,
+                        format!(
+                            "object {uid:?}: {}: {count} convex pieces reach {depth:.2e} m above the surface; the tolerance is \
+                             {:.2e} m",
+                            path.display(),
+                            cfg.tolerance
+                        ),
+                    ));
+                }
+                Ok(pieces.hulls.into_iter().map(Arc::new).collect())
+            }
+            Self::Triangles { thickness } => {
+                let prisms = prisms(mesh, *thickness);
+                if prisms.is_empty() || prisms.len() > Self::MAX_TRIANGLES {
+                    let value = format!("Triangles of a mesh of {} triangles with an area", prisms.len());
+                    let expected =
+                        "1 to 2000 triangles can be exact; choose MeshCollision::Pieces, a terrain, or a coarser mesh";
+                    return Err(Error::Config { field: "mesh_collision", value, expected });
+                }
+                Ok(prisms.into_iter().map(Arc::new).collect())
+            }
+        }
+    }
+}

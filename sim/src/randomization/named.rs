@@ -1,0 +1,64 @@
+//! What an environment has for itself, by name: to be kept in a snapshot and found again.
+
+use super::Property;
+use super::properties::OwnValues;
+use super::tables::Tables;
+use crate::drive::table::DriveState;
+use std::collections::BTreeMap;
+
+/// A value of a property that an environment has for itself.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NamedValue {
+    pub(crate) property: Property,
+    /// Whose.
+    pub(crate) name: String,
+    /// Which of those that are called so: shapes of one body are called alike.
+    pub(crate) nth: u32,
+    pub(crate) value: Box<[f64]>,
+}
+
+/// Elements of a property, by name and number among those of the name.
+pub(crate) type Elements<'t> = BTreeMap<(&'t str, u32), usize>;
+
+impl Tables {
+    /// The elements of a property.
+    pub(crate) fn elements(&self, property: Property) -> Elements<'_> {
+        let (mut seen, mut elements) = (BTreeMap::<&str, u32>::new(), Elements::new());
+        for (element, name) in self.get(property).names.iter().enumerate() {
+            let nth = seen.entry(name).or_default();
+            elements.insert((name, *nth), element);
+            *nth += 1;
+        }
+        elements
+    }
+
+    /// What is not nominal, bit by bit, and the gains that are drawn.
+    pub(crate) fn named(&self, own: &OwnValues, drives: &DriveState) -> Vec<NamedValue> {
+        let mut values = Vec::new();
+        for property in Property::ALL {
+            let (table, width) = (self.get(property), property.width());
+            let of = |element: usize| -> Option<&[f64]> {
+                let at = element * width..(element + 1) * width;
+                let (mine, nominal) = (own[property as usize].as_ref()?.get(at.clone())?, &table.nominal[at]);
+                let same = mine.iter().map(|x| x.to_bits()).eq(nominal.iter().map(|x| x.to_bits()));
+                (!same).then_some(mine)
+            };
+            let gain = |element: usize| property.gain().and_then(|k| drives.drawn_values(table.places[element])[k]);
+            let has_own = match property.gain() {
+                Some(k) => table.places.iter().any(|&drive| drives.drawn_values(drive)[k].is_some()),
+                None => own[property as usize].is_some(),
+            };
+            if !has_own {
+                continue;
+            }
+            for ((name, nth), element) in self.elements(property) {
+                let value = match gain(element) {
+                    Some(gain) => Some([gain][..].into()),
+                    None => of(element).map(Box::from),
+                };
+                values.extend(value.map(|value| NamedValue { property, name: name.into(), nth, value }));
+            }
+        }
+        values
+    }
+}

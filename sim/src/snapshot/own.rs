@@ -1,0 +1,113 @@
+//! Properties of environments in snapshots.
+
+use super::{Snapshot, SnapshotError};
+use crate::compile::Simulation;
+use crate::error::Result;
+use crate::manager::{EnvId, SimulationManager};
+use crate::randomization::{NamedValue, Property, RandomizationError, Tables};
+use std::sync::Arc;
+
+/// What an environment has for itself, and how often it was drawn for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct OwnProperties {
+    pub(crate) values: Vec<NamedValue>,
+    pub(crate) draws: u64,
+}
+
+/// Values of properties of an environment, by element.
+type Found<'s> = Vec<(Property, usize, &'s [f64])>;
+
+impl OwnProperties {
+    /// Where the values are in a scene.
+    fn found_in<'s>(&'s self, tables: &Tables, env: usize) -> Result<Found<'s>> {
+        let mut found = Vec::with_capacity(self.values.len());
+        for values in self.values.chunk_by(|a, b| a.property == b.property) {
+            let elements = tables.elements(values[0].property);
+            for NamedValue { property, name, nth, value } in values {
+                let element = elements.get(&(name.as_str(), *nth)).copied().ok_or_else(|| {
+                    let difference = format!("it has {} of {name:?}, this scene has none", property.name());
+                    SnapshotError::OtherScene { difference }
+                })?;
+                if let Some(expected) = property.fault(value, tables.nominal(*property, element)) {
+                    let (property, name, value) = (property.name(), name.clone(), value.to_vec());
+                    return Err(RandomizationError::Value { env, property, name, value, expected }.into());
+                }
+                found.push((*property, element, &**value));
+            }
+        }
+        Ok(found)
+    }
+}
+
+impl Simulation {
+    /// The properties of an environment as a snapshot keeps them.
+    pub(crate) fn own_properties(&self, env: usize, draws: u64) -> Arc<OwnProperties> {
+        // Before an environment is locked: it looks at one.
+        self.tables();
+        let values = self.batch.read(env, |here| self.named_properties(env, here));
+        Arc::new(OwnProperties { values, draws })
+    }
+}
+
+impl SimulationManager {
+    /// As [`restore`](Self::restore), with the properties of each environment when the snapshot was taken: what it had for
+    /// itself, gains that were drawn included, and how often it was drawn for, so that what is drawn next is what was drawn
+    /// then. What was nominal becomes nominal. Going on is bit-identical, also from a file in a manager that was built
+    /// alike, and whatever was drawn or set in between.
+    ///
+    /// ```
+    /// use sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+    ///
+    /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
+    /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() })?;
+    /// let draw = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.5, 2.0]));
+    /// sim.randomize(&draw, None)?;
+    /// let (snapshot, mass) = (sim.snapshot(None)?, sim.properties(sim::EnvId(2))?.get(Property::Mass, "cube")?.to_vec());
+    /// sim.randomize(&draw, None)?;
+    /// sim.restore_with_properties(&snapshot, None)?;
+    /// assert_eq!(sim.properties(sim::EnvId(2))?.get(Property::Mass, "cube")?, mass);
+    /// # Ok::<(), sim::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`restore`](Self::restore); and where nothing of this scene has one of the properties, or not such a value. Then
+    /// nothing is restored.
+    pub fn restore_with_properties(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let sources = self.sources(snapshot, env_ids)?;
+        let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
+        let tables = Arc::clone(self.simulation.tables());
+        let entries = Arc::clone(snapshot.entries());
+        let own = |env: usize| sources[env].map(|source| &*entries[source].own);
+        let mut found: Vec<Found<'_>> = Vec::with_capacity(chosen.len());
+        for &env in &chosen {
+            found.push(own(env).map_or_else(|| Ok(Vec::new()), |own| own.found_in(&tables, env))?);
+        }
+        // Environments come in this order.
+        let mut values = found.iter();
+        self.simulation.change_properties(&chosen, |_, properties| {
+            properties.become_nominal();
+            let all = values.next().into_iter().flatten();
+            all.filter(|(property, ..)| property.gain().is_none()).for_each(|(property, element, value)| {
+                properties.put(*property, *element, value);
+            });
+            Ok(())
+        })?;
+        for (&env, values) in chosen.iter().zip(&found) {
+            let Some(source) = sources[env] else { continue };
+            self.draws[env] = entries[source].own.draws;
+            self.simulation.batch.write(env, |here| {
+                here.drives.forget_drawn();
+                here.recall(&entries[source].state);
+                for (property, element, value) in values {
+                    if let Some(kind) = property.gain() {
+                        here.drives.draw_gain(tables.place(*property, *element), kind, value[0]);
+                    }
+                }
+            });
+        }
+        if !self.sensors.is_empty() {
+            self.sensors.reset(&chosen, &mut self.simulation);
+        }
+        Ok(())
+    }
+}

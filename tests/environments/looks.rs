@@ -1,0 +1,421 @@
+//! Sizes and colours of single environments: what cameras and rays see, and what bodies lie on.
+//!
+//! The judge of most of it is a scene that was built with the sizes and colours that an environment of another got: the same
+//! bits, in pictures and in motion.
+
+use kinetoscope::ndarray::{Array3, Array4, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Shape;
+use kinetoscope::scene::pose::from_wxyz;
+use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sim::mj::{TARGET, Target};
+
+const ALL: Option<&[EnvId]> = None;
+/// Where the camera is, above everything and looking straight down.
+const EYE: [f64; 3] = [0.1, -0.05, 2.0];
+
+fn cfg() -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs: 3, threads: Some(2), ..Default::default() }
+}
+
+fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
+    let init_pose = Pose::translation(at[0], at[1], at[2]);
+    // Mass and moments of their own: they do not follow from the size.
+    let (mass, inertia) = (Some(1.0), Some([0.01, 0.012, 0.014]));
+    RigidObjectCfg { uid: uid.into(), shape, init_pose, mass, inertia, ..Default::default() }
+}
+
+/// What is the same in all environments but those that get their own.
+#[derive(Clone, Copy)]
+struct Look {
+    cube: [f64; 3],
+    ball: f64,
+    post: [f64; 2],
+    pill: [f64; 2],
+    color: [f64; 4],
+}
+
+const NOMINAL: Look =
+    Look { cube: [0.2, 0.2, 0.2], ball: 0.1, post: [0.1, 0.3], pill: [0.08, 0.2], color: [0.6, 0.6, 0.6, 1.0] };
+const OWN: Look =
+    Look { cube: [0.3, 0.14, 0.26], ball: 0.17, post: [0.06, 0.5], pill: [0.11, 0.1], color: [0.9, 0.2, 0.1, 1.0] };
+
+/// Things of every kind that has sizes, far enough apart for both looks, above the ground; a mesh that has none.
+fn world(look: Look) -> SimulationManager {
+    let mut sim = SimulationManager::new(cfg()).unwrap();
+    let [radius, length] = look.post;
+    let [across, along] = look.pill;
+    let box_ = ObjectShape::Box { size: look.cube };
+    sim.add_rigid_object(RigidObjectCfg { rgba: look.color, ..object("cube", box_, [0.0, 0.0, 0.3]) }).unwrap();
+    let ball = ObjectShape::Sphere { radius: look.ball };
+    sim.add_rigid_object(object("ball", ball, [0.5, 0.0, 0.4])).unwrap();
+    let post = ObjectShape::Cylinder { radius, length };
+    let post = RigidObjectCfg { body_type: BodyType::Static, ..object("post", post, [0.0, 0.5, 0.0]) };
+    sim.add_rigid_object(post).unwrap();
+    let pill = ObjectShape::Capsule { radius: across, length: along };
+    sim.add_rigid_object(object("pill", pill, [-0.5, 0.0, 0.5])).unwrap();
+    let cone = ObjectShape::Cone { radius: 0.1, height: 0.2 };
+    sim.add_rigid_object(object("cone", cone, [0.5, 0.5, 0.2])).unwrap();
+    sim
+}
+
+/// Gives an environment the other look.
+fn dress(sim: &mut SimulationManager, env: usize, look: Look) {
+    sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| {
+        properties.set(Property::Size, "cube", &look.cube.map(|length| length / 2.0))?;
+        // What a ball has no use for is not kept.
+        properties.set(Property::Size, "ball", &[look.ball, 7.0, -1.0])?;
+        properties.set(Property::Size, "post", &[look.post[0], look.post[1] / 2.0, 0.0])?;
+        properties.set(Property::Size, "pill", &[look.pill[0], look.pill[1] / 2.0, 0.0])?;
+        properties.set(Property::Color, "cube", &look.color)
+    })
+    .unwrap();
+}
+
+fn above() -> CameraCfg {
+    CameraCfg {
+        width: 121,
+        height: 101,
+        intrinsics: Intrinsics::Pixels { fx: 100.0, fy: 100.0, cx: 60.5, cy: 50.5 },
+        near: 0.01,
+        far: 10.0,
+        extrinsics: Extrinsics {
+            placement: Placement::Pose { pos: EYE, rotation: from_wxyz([0.0, 0.0, 1.0, 0.0]) },
+            ..Default::default()
+        },
+        channels: Channels::from_names(&["color", "depth", "mask", "normal"]).unwrap(),
+        ..Default::default()
+    }
+}
+
+type Pictures = (Array4<u8>, Array3<f32>, Array3<i32>, Array4<f32>);
+
+fn pictures(sim: &SimulationManager, id: SensorId<Camera>) -> Pictures {
+    let camera = sim.sensor(id).unwrap();
+    let (color, depth) = (camera.color().unwrap(), camera.depth().unwrap());
+    (color.to_owned(), depth.to_owned(), camera.mask().unwrap().to_owned(), camera.normal().unwrap().to_owned())
+}
+
+/// Whether environment `a` of one looks as environment `b` of the other, in every bit of every channel.
+fn same(one: &Pictures, a: usize, other: &Pictures, b: usize) -> bool {
+    one.0.index_axis(Axis(0), a) == other.0.index_axis(Axis(0), b)
+        && one.1.index_axis(Axis(0), a) == other.1.index_axis(Axis(0), b)
+        && one.2.index_axis(Axis(0), a) == other.2.index_axis(Axis(0), b)
+        && one.3.index_axis(Axis(0), a) == other.3.index_axis(Axis(0), b)
+}
+
+#[test]
+fn an_environment_looks_and_moves_as_a_scene_that_was_built_so() {
+    let (mut sim, mut built) = (world(NOMINAL), world(OWN));
+    let mut plain = world(NOMINAL);
+    // One camera from before, one from after.
+    let before = sim.add_sensor("before", above()).unwrap();
+    let nominal = pictures(&sim, before);
+    dress(&mut sim, 1, OWN);
+    let after = sim.add_sensor("after", above()).unwrap();
+    let judge = built.add_sensor("camera", above()).unwrap();
+    let control = plain.add_sensor("camera", above()).unwrap();
+    for steps in [0, 20, 300] {
+        for sim in [&mut sim, &mut built, &mut plain] {
+            sim.update(steps);
+        }
+        let (expected, others) = (pictures(&built, judge), pictures(&plain, control));
+        for camera in [before, after] {
+            let seen = pictures(&sim, camera);
+            assert!(same(&seen, 1, &expected, 1), "after {steps} steps it looks as if built so");
+            assert!(same(&seen, 0, &others, 0) && same(&seen, 2, &others, 2), "the others look as ever");
+            assert!(!same(&seen, 1, &others, 1), "control: it does not look as ever");
+        }
+        for uid in ["cube", "ball", "post", "pill"] {
+            let pose = |sim: &SimulationManager| sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose();
+            let (mine, built, plain) = (pose(&sim), pose(&built), pose(&plain));
+            assert_eq!((mine.row(1), mine.row(0)), (built.row(1), plain.row(0)), "{uid} after {steps} steps");
+        }
+    }
+    // Back to what it was, through a reset, which leaves properties alone.
+    sim.reset(None).unwrap();
+    assert!(!same(&pictures(&sim, before), 1, &nominal, 1));
+    sim.reset_properties(ALL).unwrap();
+    assert!((0..3).all(|env| same(&pictures(&sim, before), env, &nominal, env)));
+}
+
+/// MuJoCo's contacts are soft: on four or fewer corners a body of any mass sinks in by up to about
+/// (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) = 0.4 mm with its default reference (k = 1 / (0.95 · 0.02 s)²).
+#[test]
+fn bodies_rest_at_half_their_own_size() {
+    let mut sim = world(NOMINAL);
+    let heights = [0.05, 0.11, 0.16];
+    for (env, half) in heights.into_iter().enumerate() {
+        sim.randomize_with(Some(&[EnvId(env)]), |_, _, p| {
+            p.set(Property::Size, "cube", &[0.1, 0.12, half])?;
+            p.set(Property::Size, "ball", &[half, 0.0, 0.0])
+        })
+        .unwrap();
+    }
+    sim.update(300);
+    for uid in ["cube", "ball"] {
+        let pose = sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose();
+        for (env, half) in heights.into_iter().enumerate() {
+            let z = pose[(env, 2)];
+            assert!((z - half).abs() < 5e-4, "{uid} of environment {env} lies at {z}, not {half}");
+        }
+    }
+}
+
+/// A ray at (x, y) from the optical axis, per metre of depth, meets a ball of radius r below at distance d in the depth
+/// (d - sqrt(d² - (1 + x² + y²)(d² - r²))) / (1 + x² + y²). Pictures are in single precision.
+#[test]
+fn the_depth_of_a_ball_is_that_of_its_own_radius() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { gravity: [0.0; 3].into(), ..cfg() }).unwrap();
+    let ball = ObjectShape::Sphere { radius: 0.1 };
+    sim.add_rigid_object(object("ball", ball, [EYE[0], EYE[1], 0.7])).unwrap();
+    let rays = RayCasterCameraCfg { width: 121, height: 101, intrinsics: above().intrinsics, ..Default::default() };
+    let rays = RayCasterCameraCfg { extrinsics: above().extrinsics, ..rays };
+    let (raster, rays) = (sim.add_sensor("raster", above()).unwrap(), sim.add_sensor("rays", rays).unwrap());
+    let radii = [0.1, 0.23, 0.05];
+    for env in [1, 2] {
+        let radius = radii[env];
+        sim.randomize_with(Some(&[EnvId(env)]), |_, _, p| p.set(Property::Size, "ball", &[radius, 0.0, 0.0])).unwrap();
+    }
+    let id = sim.rigid_object(sim.rigid_object_id("ball").unwrap()).mask_id();
+    let (raster, rays) = (sim.sensor(raster).unwrap(), sim.sensor(rays).unwrap());
+    let (depth, mask) = (raster.depth().unwrap(), raster.mask().unwrap());
+    for (env, radius) in radii.into_iter().enumerate() {
+        let (mut compared, d) = (0, EYE[2] - 0.7);
+        for ((v, u), id_here) in mask.index_axis(Axis(0), env).indexed_iter() {
+            let (x, y) = ((u as f64 - 60.0) / 100.0, (v as f64 - 50.0) / 100.0);
+            let a = 1.0 + x * x + y * y;
+            let inside = d * d - a * (d * d - radius * radius);
+            // Off the outline, where a pixel may be seen or not.
+            if inside < 0.02 * d * d * (a - 1.0).max(1e-9) {
+                continue;
+            }
+            let expected = (d - inside.sqrt()) / a;
+            // At the limit the depth changes by d δ / sqrt(inside) with an error δ of the slope.
+            let tolerance = 2e-6 * (1.0 + d / inside.sqrt());
+            for found in [depth[(env, v, u)], rays.depth()[(env, v, u)]] {
+                let found = f64::from(found);
+                assert!((found - expected).abs() < tolerance, "environment {env}, {u} {v}: {found}, not {expected}");
+            }
+            assert_eq!((*id_here, rays.mask()[(env, v, u)]), (id, id));
+            compared += 1;
+        }
+        let area = std::f64::consts::PI * (100.0 * radius / (d * d - radius * radius).sqrt()).powi(2);
+        assert!(f64::from(compared) > 0.9 * area, "environment {env}: {compared} pixels of {area}");
+    }
+}
+
+/// MuJoCo's own rays in the environment's own model, beside ours from the sensor.
+#[test]
+fn rays_hit_what_mujocos_hit() {
+    let mut sim = world(NOMINAL);
+    let rays = RayCasterCfg {
+        pattern: Grid { resolution: 0.05, size: [1.6, 1.6], ..Grid::default() }.into(),
+        // Off edges, where rounding decides.
+        offset: Pose::translation(0.0137, 0.0071, 2.0),
+        ..Default::default()
+    };
+    let id = sim.add_sensor("rays", rays).unwrap();
+    dress(&mut sim, 1, OWN);
+    sim.update(30);
+    let rays = sim.sensor(id).unwrap();
+    let (starts, directions) = (rays.ray_starts(), rays.ray_directions());
+    let distances = rays.distances();
+    let mut apart = 0;
+    for env in 0..3 {
+        sim.batch().read(env, |here| {
+            for ray in 0..rays.num_rays() {
+                let row = |a: &Array3<f64>| std::array::from_fn(|k| a[(env, ray, k)]);
+                let theirs = here.data().ray(row(&starts), row(&directions), 0b111).unwrap();
+                let theirs = theirs.map_or(f64::INFINITY, |hit| hit.distance);
+                let ours = distances[(env, ray)];
+                assert!((ours - theirs).abs() < 1e-6, "environment {env}, ray {ray}: {ours}, not {theirs}");
+                apart += usize::from(env == 1 && (ours - distances[(0, ray)]).abs() > 1e-3);
+            }
+        });
+    }
+    assert!(apart > 30, "control: {apart} rays of the other environment hit something else");
+}
+
+/// A link of boxes, a mesh beside them, and what is seen instead of it.
+fn arm(scale: f64) -> String {
+    let size = |full: f64| format!("{} {} {}", full * scale, 0.5 * full * scale, 0.25 * full * scale);
+    format!(
+        r#"<robot name="arm"><link name="base"/>
+        <joint name="j" type="revolute"><parent link="base"/><child link="fore"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
+          <limit lower="-1" upper="1" effort="50" velocity="5"/></joint>
+        <link name="fore"><inertial><mass value="1"/><inertia ixx=".1" ixy="0" ixz="0" iyy=".1" iyz="0" izz=".1"/></inertial>
+          <visual><geometry><box size="{}"/></geometry><material name="m"><color rgba="0.1 0.5 0.9 1"/></material></visual>
+          <visual><origin xyz="0.6 0 0"/><geometry><sphere radius="{}"/></geometry></visual>
+          <collision><geometry><box size="{}"/></geometry></collision></link></robot>"#,
+        size(0.4),
+        0.1 * scale,
+        size(0.4)
+    )
+}
+
+#[test]
+fn links_of_robots_have_sizes_and_colours_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let build = |scale: f64| {
+        let path = dir.path().join(format!("arm{scale}.urdf"));
+        std::fs::write(&path, arm(scale)).unwrap();
+        let mut sim = SimulationManager::new(cfg()).unwrap();
+        let robot = RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(path), ..Default::default() };
+        sim.add_robot(robot).unwrap();
+        let camera = sim.add_sensor("camera", above()).unwrap();
+        (sim, camera)
+    };
+    let ((mut sim, camera), (built, judge)) = (build(1.0), build(1.5));
+    let nominal = pictures(&sim, camera);
+    let larger = Randomization::new().with(Property::Size, "arm/fore", Draw::Scale([1.5, 1.5]));
+    sim.randomize(&larger, Some(&[EnvId(2)])).unwrap();
+    let (seen, expected) = (pictures(&sim, camera), pictures(&built, judge));
+    assert!(same(&seen, 2, &expected, 2) && same(&seen, 0, &nominal, 0) && !same(&seen, 2, &nominal, 2));
+    // The shape that collides is scaled as well, and nothing weighs more.
+    sim.batch().read(2, |env| {
+        let model = env.data().model();
+        let geom = model.id(kinetoscope::sim::mj::ObjectKind::Geom, "arm/fore/collision0").unwrap();
+        for (k, half) in [0.3, 0.15, 0.075].into_iter().enumerate() {
+            assert!((model.geom_size()[3 * geom + k] - half).abs() < 1e-15);
+        }
+    });
+    let mass = |env| sim.properties(EnvId(env)).unwrap().get(Property::Mass, "arm/fore").unwrap().to_vec();
+    assert_eq!(mass(2), mass(0));
+    let color =
+        |sim: &SimulationManager| sim.properties(EnvId(2)).unwrap().get(Property::Color, "arm/fore").unwrap().to_vec();
+    let red = [0.9_f64, 0.05, 0.05, 1.0];
+    sim.randomize_with(Some(&[EnvId(2)]), |_, _, p| p.set(Property::Color, "arm/fore", &red)).unwrap();
+    assert_eq!(color(&sim), red);
+    // Red instead of blue, in the mean over what is not ground; highlights are white.
+    let picture = pictures(&sim, camera);
+    let sum = |channel: usize| {
+        let arm = picture.2.index_axis(Axis(0), 2);
+        let pixels = arm.indexed_iter().filter(|(_, id)| **id != arm[(0, 0)]);
+        pixels.map(|((v, u), _)| u64::from(picture.0[(2, v, u, channel)])).sum::<u64>()
+    };
+    assert!(sum(0) > 20_000 && sum(0) > 2 * sum(2), "{} {}", sum(0), sum(2));
+    assert_eq!(pictures(&sim, camera).1, seen.1, "a colour changes no depth");
+}
+
+/// Meshes keep their sizes, but not their colours, and neither ground nor terrain has a size.
+#[test]
+fn what_has_which() {
+    let mut sim = world(NOMINAL);
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    sim.add_robot(RobotCfg {
+        uid: "sr5".into(),
+        urdf,
+        init_pose: Pose::translation(3.0, 0.0, 0.0),
+        ..Default::default()
+    })
+    .unwrap();
+    let properties = sim.properties(EnvId(0)).unwrap();
+    // The links of the arm are boxes, cylinders and balls as well.
+    let mut sized = properties.names(Property::Size);
+    sized.retain(|name| !name.starts_with("sr5/"));
+    assert_eq!(sized, ["cube", "ball", "post", "pill"]);
+    let colored = properties.names(Property::Color);
+    assert!(["cube", "cone", "sr5/link3"].iter().all(|name| colored.contains(name)), "{colored:?}");
+    assert!(!colored.contains(&"ground"));
+    assert_eq!(properties.get(Property::Size, "pill").unwrap(), [0.08, 0.1, 0.0]);
+    assert_eq!(properties.nominal(Property::Color, "cube").unwrap(), [0.6_f32, 0.6, 0.6, 1.0].map(f64::from));
+    // The colour of a mesh.
+    let camera = sim.add_sensor("camera", above()).unwrap();
+    let before = pictures(&sim, camera);
+    let green = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
+    sim.randomize(&green, Some(&[EnvId(0)])).unwrap();
+    let hidden = pictures(&sim, camera);
+    let cone = sim.rigid_object(sim.rigid_object_id("cone").unwrap()).mask_id();
+    let seen = |p: &Pictures, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
+    assert!(seen(&before, 0) > 30 && seen(&hidden, 1) == seen(&before, 1));
+    assert_eq!(seen(&hidden, 0), 0, "with an opacity of 0 it is not there");
+}
+
+#[test]
+fn draws_are_seeded_small_and_carried_over() {
+    let draw = Randomization::new().with(Property::Size, "cube|ball", Draw::Scale([0.5, 1.5])).with(
+        Property::Color,
+        "cube",
+        Draw::Set([0.2, 0.8]),
+    );
+    let mut sim = world(NOMINAL);
+    let camera = sim.add_sensor("camera", above()).unwrap();
+    sim.randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
+    let sizes = |sim: &SimulationManager, env| {
+        sim.properties(EnvId(env)).unwrap().get(Property::Size, "cube").unwrap().to_vec()
+    };
+    let (first, third) = (sizes(&sim, 0), sizes(&sim, 2));
+    assert!(first[0] == first[1] && first[0] != third[0] && (0.05..=0.15).contains(&first[0]), "{first:?}");
+    let mut other = world(NOMINAL);
+    other.randomize(&draw, ALL).unwrap();
+    assert_eq!((sizes(&other, 0), sizes(&other, 2)), (first.clone(), third));
+    // What is the environment's own, array by array.
+    let base = sim.batch().model().clone();
+    let own: Vec<(&str, usize)> = sim.batch().read(0, |env| env.data().model().own_arrays().collect());
+    let geoms = base.ngeom();
+    let mut expected = vec![("geom_size", 24 * geoms), ("geom_rbound", 8 * geoms), ("geom_rgba", 16 * geoms)];
+    if TARGET == Target::V4 {
+        expected.push(("geom_aabb", 48 * geoms));
+    }
+    for array in &expected {
+        assert!(own.contains(array), "{array:?} of {own:?}");
+    }
+    // 4.x has boxes around the bodies as well, one of six numbers for each geom that collides.
+    let rest: Vec<&str> = own.iter().filter(|array| !expected.contains(array)).map(|(name, _)| *name).collect();
+    assert!(rest.is_empty() || (TARGET == Target::V4 && rest == ["bvh_aabb"]), "{rest:?}");
+    assert_eq!(sim.property_bytes(EnvId(1)).unwrap(), 0);
+    assert!(sim.batch().read(1, |env| env.data().model().arrays_apart(&base).is_empty()));
+    // More is added: the look stays, in pictures too.
+    let before = pictures(&sim, camera);
+    sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
+    assert_eq!(sizes(&sim, 0), first);
+    let after = pictures(&sim, camera);
+    assert!((0..3).all(|env| same(&before, env, &after, env)) && !same(&before, 0, &before, 1));
+}
+
+/// What looks at an environment from outside sees the same.
+#[test]
+fn stills_and_overviews_show_each_environment_as_it_is() {
+    let mut sim = world(NOMINAL);
+    dress(&mut sim, 1, OWN);
+    let half = |still: &Still| {
+        let boxes = still.visible().scene().instances().iter().filter_map(|instance| match &instance.shape {
+            Shape::Box(shape) => Some((shape.half, instance.material.rgba)),
+            _ => None,
+        });
+        boxes.collect::<Vec<_>>()
+    };
+    let (grey, red) = ([0.6, 0.6, 0.6, 1.0_f32], [0.9, 0.2, 0.1, 1.0_f32]);
+    let (small, large) = (([0.1_f32; 3], grey), ([0.15_f32, 0.07, 0.13], red));
+    let of_env = |sim: &mut SimulationManager, env| half(&Still::of_env(sim, EnvId(env)).unwrap());
+    assert_eq!((of_env(&mut sim, 0), of_env(&mut sim, 1)), (vec![small], vec![large]));
+    let overview = Still::overview(&mut sim, None, &[]).unwrap();
+    assert_eq!(half(&overview), [small, large, small]);
+}
+
+#[test]
+fn sizes_and_colours_that_cannot_be_are_named() {
+    let mut sim = world(NOMINAL);
+    let mut fault = |property, name: &str, value: &[f64]| {
+        let done = sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, name, value));
+        match done {
+            Err(error) => error.to_string(),
+            Ok(()) => panic!("{property:?} {name} {value:?}"),
+        }
+    };
+    for bad in [[0.0, 0.1, 0.1], [0.1, -0.1, 0.1], [0.1, 0.1, f64::NAN], [0.1, 2e6, 0.1]] {
+        let said = fault(Property::Size, "cube", &bad);
+        assert!(said.contains("environment 1") && said.contains("\"cube\"") && said.contains("1e-6"), "{said}");
+    }
+    let said = fault(Property::Size, "pill", &[0.1, 0.0, 0.0]);
+    assert!(said.contains("\"pill\""), "a capsule has a length: {said}");
+    for bad in [[1.1, 0.0, 0.0, 1.0], [0.0, -0.1, 0.0, 1.0], [0.0, 0.0, f64::NAN, 1.0]] {
+        let said = fault(Property::Color, "cube", &bad);
+        assert!(said.contains("opacity"), "{said}");
+    }
+    assert!(fault(Property::Size, "cone", &[0.1; 3]).contains("box, ball"));
+    assert!(fault(Property::Size, "cube", &[0.1; 2]).contains("3 numbers"));
+    assert!(fault(Property::Color, "ground", &[0.1; 4]).contains("body or terrain"));
+    assert!((0..3).all(|env| sim.property_bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
+}
