@@ -13,6 +13,7 @@ pub(crate) mod restitution;
 pub mod rigid_object;
 mod rigid_object_properties;
 pub mod robot;
+pub mod robot_cfg;
 mod robot_drives;
 pub mod robot_file;
 mod robot_joints;

@@ -1,11 +1,13 @@
-//! Robots: configuration, the loaded robot, and its views of a running simulation.
+//! Robots: the loaded robot, and its views of a running simulation.
+
+pub use super::robot_cfg::RobotCfg;
 
 use crate::compile::{JointIndexing, RobotIndex, Simulation};
 use crate::description::{Inertial, JointKind, LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::table::Gains;
-use crate::drive::{ActuatorSpec, DriveCfg, DriveModel};
+use crate::drive::{ActuatorSpec, DriveModel};
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::mj;
@@ -14,113 +16,18 @@ use crate::mjcf::robot::MeshKey;
 use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
 use crate::named::Named;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
-use crate::objects::robot_file::MjcfFile;
 use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation_cfg::SimulationManagerCfg;
-use crate::urdf::{UrdfCfg, assemble};
+use crate::urdf::assemble;
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
 use ::scene::pose::to_row;
 use nalgebra::Matrix3;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Configuration of a robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobotCfg {
-    /// Name of the robot, unique in the simulation; prefix of its names in MuJoCo.
-    pub uid: String,
-    /// The URDF files.
-    #[serde(deserialize_with = "crate::file_format::file_or_table")]
-    pub urdf: UrdfCfg,
-    /// The MJCF file, for a robot that is described by one: then there are no URDF files.
-    ///
-    /// MuJoCo itself compiles the file, and what it made of it is in the scene: geoms with their materials and contact
-    /// settings, sites, joints with anchors, references, springs and limits, equalities, tendons, sensors. The robot is the
-    /// only body in the file's world and what hangs on it.
-    ///
-    /// - **Links** are its bodies, then its named sites. Where hinges or slides hold the root body in the world, the root link
-    ///   is the file's `world`. **Joints** are its hinges and slides. What has no name is called by its kind and its number in
-    ///   MuJoCo's order: `joint3`.
-    /// - **Drives** take the place of its actuators. Where [`drive`](Self::drive) says nothing of a joint, position and velocity
-    ///   actuators of the file give stiffness and damping, force ranges (and control ranges of motors) the largest effort, and
-    ///   joints that no actuator of the file acts on stay passive. In a file without any actuator all joints are driven, as in
-    ///   a URDF.
-    /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive.
-    /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
-    /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits;
-    ///   pairs of geoms hold where [`self_collision`](Self::self_collision) is on.
-    /// - What stands in the file's world (a floor, lights) is no part of the robot, nor are settings for the whole model and
-    ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
-    ///
-    /// ```
-    /// use sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
-    /// use sim::objects::robot_file::MjcfFile;
-    ///
-    /// let arm = r#"<mujoco><worldbody><body name="base"><geom size="0.1"/>
-    ///     <body name="arm" pos="0 0 0.1"><joint name="elbow" axis="0 1 0" range="-90 90" limited="true"/>
-    ///       <geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" mass="1"/><site name="tip" pos="0.3 0 0"/></body>
-    ///   </body></worldbody>
-    ///   <actuator><position joint="elbow" kp="200"/></actuator></mujoco>"#;
-    /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
-    /// let robot = sim.add_robot(RobotCfg { mjcf: Some(MjcfFile::text(arm)), ..Default::default() })?;
-    /// let robot = sim.robot(robot);
-    /// assert_eq!((robot.joint_names(), robot.link_names()), (&["elbow".into()][..], vec!["base", "arm", "tip"]));
-    /// assert_eq!(robot.get_stiffness()[(0, 0)], 200.0);
-    /// # Ok::<(), sim::Error>(())
-    /// ```
-    #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
-    pub mjcf: Option<MjcfFile>,
-    /// Named groups of joints: patterns that each match whole joint names.
-    #[serde(with = "scene::file_format::pairs")]
-    pub control_parts: Vec<(String, Vec<String>)>,
-    /// Drive properties.
-    pub drive: DriveCfg,
-    /// Whether the root link stands fixed in the environment.
-    pub fix_base: bool,
-    /// Pose of the root link in the environment; of an MJCF file the pose of the file's world, in which the root link stands
-    /// as the file says.
-    #[serde(with = "scene::file_format::pose")]
-    pub init_pose: Pose,
-    /// Start positions by joint pattern or control part \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
-    #[serde(with = "scene::file_format::pairs")]
-    pub init_qpos: Vec<(String, f64)>,
-    /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
-    /// the density of water in the origin of a link without mass.
-    #[serde(with = "scene::file_format::pairs")]
-    pub payload: Vec<(String, f64)>,
-    /// Share of the range of each joint that is left between its soft limits, 0 to 1: see
-    /// [`Robot::soft_qpos_limits`].
-    pub soft_limit_factor: f64,
-    /// Whether links of this robot collide with each other.
-    pub self_collision: bool,
-    /// How collision meshes become convex hulls.
-    pub hull: HullCfg,
-}
-
-impl Default for RobotCfg {
-    fn default() -> Self {
-        Self {
-            uid: "robot".into(),
-            urdf: UrdfCfg::default(),
-            mjcf: None,
-            control_parts: Vec::new(),
-            drive: DriveCfg::default(),
-            fix_base: true,
-            init_pose: Pose::identity(),
-            init_qpos: Vec::new(),
-            payload: Vec::new(),
-            soft_limit_factor: 1.0,
-            self_collision: false,
-            hull: HullCfg::default(),
-        }
-    }
-}
 
 /// Column of a joint in `get_qpos` and its kin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
