@@ -142,7 +142,8 @@ fn a_ball_lies_in_a_valley_of_triangles() {
     assert!((found[2] + 0.2 - R).abs() < 2.2e-3 && found[0].hypot(found[1]) < 0.02, "{found:?}");
 }
 
-/// Sliding along a valley over edges between coplanar triangles: without friction and damping it neither climbs nor stops.
+/// Sliding along a valley over edges between coplanar triangles, without friction and damping: it neither climbs nor stops,
+/// but every edge brakes it a little, as `MeshCollision::Triangles` says.
 #[test]
 fn a_ball_slides_over_edges_of_triangles() {
     let files = Files::new();
@@ -164,7 +165,7 @@ fn a_ball_slides_over_edges_of_triangles() {
     }
     let (pose, velocity) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
     println!("{pose} {velocity} {highest}");
-    assert!(pose[(0, 1)] > 0.2, "it came along: {pose}");
+    assert!(pose[(0, 1)] > 0.2 && velocity[(0, 1)] > 0.3, "it came along: {pose} {velocity}");
     assert!((highest - height).abs() < 2e-3, "and did not jump: {highest}");
 }
 

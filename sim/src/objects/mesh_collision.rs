@@ -24,8 +24,9 @@ pub enum MeshCollision {
     Pieces(PiecesCfg),
     /// Every triangle, exactly as it stands in the file, as the front of a prism: for what stands or is moved by hand, of up
     /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it, and what comes through the
-    /// front by more than that falls through. Something small that slides over an edge between triangles is nudged a little,
-    /// since MuJoCo does not know that they are one surface.
+    /// front by more than that falls through. What lies is where it should be; what slides over edges between triangles is
+    /// braked, since MuJoCo does not know that they are one surface: a ball of 5 cm radius that slid along a smooth valley at
+    /// 0.5 m/s, over an edge every 5 cm on both sides, had lost a fifth of its speed after 0.6 m (MuJoCo 2.2.2).
     Triangles {
         /// Thickness of the prisms \[m\].
         thickness: f64,
