@@ -17,6 +17,7 @@ mod rival;
 mod row;
 mod startup;
 mod step;
+mod trace;
 
 use clap::Parser;
 use row::Row;
@@ -30,6 +31,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("mujoco-batch", mujoco_batch::run),
     ("camera", camera::run),
     ("rays", rays::run),
+    ("trace", trace::run),
     ("contacts", contacts::run),
     ("ik", ik::run),
     ("randomize", randomize::run),
@@ -51,7 +53,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, contacts, ik, randomize, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, trace, contacts, ik, randomize, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]
