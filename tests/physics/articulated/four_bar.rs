@@ -2,7 +2,9 @@
 //! `d/a cos θ₄ - d/c cos θ₂ + (a² - b² + c² + d²)/(2 a c) = cos(θ₂ - θ₄)`, and its derivative their velocities:
 //! `θ₄' = a θ₂' sin(θ₂ - θ₃)/(c sin(θ₄ - θ₃))`. The loop is closed by a weld of the rocker to a pin at the coupler's end.
 //!
-//! Tolerance: as for `slider_crank`: what the weld yields.
+//! Tolerance: as for `slider_crank`. In the time constant of the weld, two steps, the crank turns by 16 mrad, which is 1.6 %
+//! of its 8 rad/s that the velocity of the rocker lags behind its place at most: 0.2 rad/s; and 1e-3 of Freudenstein's
+//! equation, which is in units of the crank.
 
 use crate::lab::*;
 use crate::law::law;
@@ -90,7 +92,7 @@ fn holds() {
             "rad/s",
             0.0,
             velocity,
-            (0.05, "what the weld yields in a step"),
+            (0.2, "what the weld yields in two steps"),
         );
         m.control("largest residual in 2 s", "with the loop open", open);
         m.control("largest error of the rocker's velocity in 2 s", "with the loop open", open_velocity);

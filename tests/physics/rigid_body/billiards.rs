@@ -2,7 +2,7 @@
 //! sin α = b/2r from the way of the first, b being the impact parameter: the second leaves along it with v cos α, the first
 //! across it with v sin α, at right angles to each other. Momentum stays always.
 //!
-//! Tolerance: momentum to rounding. The bounce is a spring for about ten steps, in which the balls go 3 mm at 0.1 mm a step
+//! Tolerance: momentum to what the solver leaves, 1e-8 of the forces in each of ten steps. The bounce is a spring for about ten steps, in which the balls go 3 mm at 0.1 mm a step
 //! and the line of centres turns by 3 mm/2r: 0.5 %; 1 %.
 
 use crate::lab::*;
@@ -45,8 +45,8 @@ fn holds() {
         m.row("direction of the struck ball", "rad", -alpha, turn(&other), bounce);
         m.row("speed of the cue ball", "m/s", alpha.sin(), cue.norm(), bounce);
         m.row("angle between them", "rad", std::f64::consts::FRAC_PI_2, turn(&cue) - turn(&other), bounce);
-        m.row("momentum along the way, of m v", "", 1.0, cue.x + other.x, (1e-10, "rounding"));
-        m.row("momentum across the way, of m v", "", 0.0, cue.y + other.y, (1e-10, "rounding"));
+        m.row("momentum along the way, of m v", "", 1.0, cue.x + other.x, (2e-7, "the solver's tolerance"));
+        m.row("momentum across the way, of m v", "", 0.0, cue.y + other.y, (2e-7, "the solver's tolerance"));
         m.row("energy, of m v²/2", "", 1.0, cue.norm_squared() + other.norm_squared(), bounce);
         m.row("speed of the cue ball, full hit", "m/s", 0.0, full_cue.norm(), bounce);
         m.control("speed of the struck ball", "with a restitution of 0.3", dull_other.norm());

@@ -21,6 +21,7 @@ mod rolling_shell;
 mod rolling_sphere;
 mod sliding_block;
 mod spinning_top;
+mod stack;
 mod stick_creep;
 mod tilted_inertia;
 mod tipping;
