@@ -23,12 +23,11 @@ fn fell(masses: [f64; 2], coupled: bool) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "a = g (m₁ - m₂)/(m₁ + m₂)", |m| {
-        let (masses, names) = ([3.0, 2.0], ["heavy side", "light side"]);
+        let masses = [3.0, 2.0];
         let speed = 0.5 * G * (masses[0] - masses[1]) / (masses[0] + masses[1]);
         let (together, apart) = (fell(masses, true), fell(masses, false));
-        for k in 0..2 {
-            let quantity = format!("velocity after 0.5 s, {}", names[k]);
-            let sign = [1.0, -1.0][k];
+        for (k, (name, sign)) in [("heavy side", 1.0), ("light side", -1.0)].into_iter().enumerate() {
+            let quantity = format!("velocity after 0.5 s, {name}");
             m.row(&quantity, "m/s", sign * speed, together[k], (2e-4 * G * 0.5, "the coupling yields by 1e-4"));
             m.control(&quantity, "without the rope", apart[k]);
         }

@@ -24,10 +24,10 @@ fn holds() {
     law(module_path!(), "q(t; R g, R base) = q(t; g, base)", |m| {
         let (none, turn) = (UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(0.7, -1.1, 2.0));
         let (there, here, half) = (swung(turn, turn), swung(none, none), swung(none, turn));
-        for k in 0..2 {
+        for (k, (&here, (&there, &half))) in here.iter().zip(there.iter().zip(&half)).enumerate() {
             let quantity = format!("angle {}", k + 1);
-            m.row(&quantity, "rad", here[k], there[k], (1e-10, "rounding, and what it grows to"));
-            m.control(&quantity, "with only the base turned", half[k]);
+            m.row(&quantity, "rad", here, there, (1e-10, "rounding, and what it grows to"));
+            m.control(&quantity, "with only the base turned", half);
         }
     });
 }

@@ -36,8 +36,8 @@ fn holds() {
     law(module_path!(), "the last goes with v, the others rest; Σ v = v", |m| {
         let (elastic, soft) = (knocked(Some(1.0)), knocked(None));
         m.row("velocity of the last", "m/s", 1.0, elastic[4], (0.012, "four bounces, 0.003 each"));
-        for k in 0..4 {
-            m.row(&format!("velocity of ball {k}"), "m/s", 0.0, elastic[k], (0.006, "two bounces, 0.003 each"));
+        for (k, &velocity) in elastic.iter().enumerate().take(4) {
+            m.row(&format!("velocity of ball {k}"), "m/s", 0.0, velocity, (0.006, "two bounces, 0.003 each"));
         }
         m.row("sum of the velocities", "m/s", 1.0, elastic.iter().sum(), (1e-10, "rounding"));
         m.control("velocity of the last", "with MuJoCo's own contacts", soft[4]);
