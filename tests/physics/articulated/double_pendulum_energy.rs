@@ -34,7 +34,7 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
     lab.watch(5_000, |t, sim| {
         let change = (energy(sim) - start).abs();
         worst = worst.max(change);
-        if (t * 1e3).round() as u32 % 20 == 0 {
+        if ((t * 1e3).round() as u32).is_multiple_of(20) {
             curve.push([t, change.max(1e-16)]);
         }
     });

@@ -35,7 +35,7 @@ fn mean_square(cfg: SimulationManagerCfg) -> (f64, f64, Vec<[f64; 2]>) {
     lab.watch(steps, |t, sim| {
         let change = energy(sim) - start;
         sum += change * change;
-        if (t * 1e3).round() as u32 % 20 == 0 {
+        if ((t * 1e3).round() as u32).is_multiple_of(20) {
             curve.push([t, change]);
         }
     });

@@ -32,7 +32,7 @@ fn spun(cfg: SimulationManagerCfg) -> (f64, f64, Vec<[f64; 2]>) {
         let (e, l) = state(sim);
         worst_energy = worst_energy.max((e / energy - 1.0).abs());
         worst_momentum = worst_momentum.max((l - momentum).norm() / momentum.norm());
-        if (t * 1e3).round() as u32 % 100 == 0 {
+        if ((t * 1e3).round() as u32).is_multiple_of(100) {
             curve.push([t, (e / energy - 1.0).abs().max(1e-17)]);
         }
     });

@@ -30,7 +30,7 @@ fn apexes(restitution: Option<f64>, bounces: usize) -> (Vec<f64>, Vec<[f64; 2]>)
             apexes.push(height);
         }
         rising = ball.velocity.z > 0.0;
-        if (t * 1e4).round() as u32 % 100 == 0 {
+        if ((t * 1e4).round() as u32).is_multiple_of(100) {
             curve.push([t, height]);
         }
     });
