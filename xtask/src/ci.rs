@@ -1,11 +1,12 @@
 //! `cargo xtask ci`: everything a change has to pass, stage by stage, on both lines of MuJoCo.
 
 use crate::docs_check::TEST_COMMAND;
+use crate::physics_report::{self, PhysicsReportArgs};
 use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
 use crate::setup::{self, Line, Need, Ready, Wanted};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
-use crate::{arrows, docs_check, examples, source_check, wheel};
+use crate::{arrows, docs_check, examples, mutate, source_check, wheel};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
@@ -60,7 +61,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
     Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
     Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| arrows::run(c.repo) },
-    Stage { name: "rules", what: "rules of the tree", when: When::Always, run: |c| source_check::run(c.repo) },
+    Stage { name: "rules", what: "rules of the tree", when: When::Always, run: rules },
     Stage {
         name: "docs",
         what: "commands and links of the pages",
@@ -81,6 +82,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "benches", what: "benchmarks compile", when: When::Full, run: benches },
     Stage { name: "clippy-4", what: "lints, MuJoCo 4", when: When::Wheel, run: |c| clippy(&c.wheel()?) },
     Stage { name: "test-4", what: "tests, MuJoCo 4", when: When::Wheel, run: wheel_test },
+    Stage { name: "physics", what: "the page of numbers, both lines", when: When::Wheel, run: physics },
     Stage {
         name: "examples-4",
         what: "examples, MuJoCo 4",
@@ -92,6 +94,8 @@ const STAGES: &[Stage] = &[
 
 pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
     let context = Context { repo, changed_before: changed_files(repo) };
+    // Rows of an earlier run are of earlier code.
+    physics_report::forget_rows(repo)?;
     let chosen = chosen(args);
     let start = Instant::now();
     let mut table = Vec::new();
@@ -148,6 +152,11 @@ fn install(context: &Context<'_>) -> Outcome {
     setup::prepare(context.repo, Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip] }).map(|_| ())
 }
 
+fn rules(context: &Context<'_>) -> Outcome {
+    source_check::run(context.repo)?;
+    mutate::check(&context.repo.root)
+}
+
 fn fmt(context: &Context<'_>) -> Outcome {
     Cmd::new("cargo").args(["fmt", "--all", "--check"]).current_dir(&context.repo.root).run()
 }
@@ -182,6 +191,14 @@ fn readme_test(context: &Context<'_>) -> Outcome {
 fn wheel_test(context: &Context<'_>) -> Outcome {
     test::run(context.repo, &TestArgs { mujoco: Some(Line::Wheel), ..TestArgs::default() })
         .map_err(|failure| Failure { again: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
+}
+
+/// The tests of both lines wrote what they measured; where they did not run before this stage, they run now.
+fn physics(context: &Context<'_>) -> Outcome {
+    if physics_report::has_rows(context.repo) {
+        return physics_report::check_rows(context.repo);
+    }
+    physics_report::run(context.repo, &PhysicsReportArgs { check: true })
 }
 
 fn benches(context: &Context<'_>) -> Outcome {
@@ -227,6 +244,8 @@ mod tests {
         let names = names(false, None);
         assert!(!names.contains(&"unit"));
         assert!(names.contains(&"test") && names.contains(&"test-4"));
+        let at = |name| names.iter().position(|other| *other == name);
+        assert!(at("physics") > at("test-4"), "it compares what the tests wrote");
         assert_eq!(names.last(), Some(&"leftovers"));
     }
 

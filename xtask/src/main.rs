@@ -1,4 +1,4 @@
-//! The project's commands: `cargo xtask demo | test | ci | bench | bless`.
+//! The project's commands: `cargo xtask demo | test | ci | bench | physics-report | mutate | bless`.
 //!
 //! Every command first installs what is missing on the machine (`setup.rs`). This crate depends on no room of the
 //! project, so that it builds before MuJoCo is there.
@@ -11,6 +11,11 @@ mod ci;
 mod demo;
 mod docs_check;
 mod examples;
+mod mutate;
+mod mutations;
+mod physics_page;
+mod physics_report;
+mod plot;
 mod python;
 mod run;
 mod setup;
@@ -40,6 +45,10 @@ enum Task {
     Ci(ci::CiArgs),
     /// Ours and the rivals side by side; without a name also writes benches/RESULTS.md
     Bench(bench::BenchArgs),
+    /// The laws of physics on both lines of MuJoCo; writes docs/physics.md
+    PhysicsReport(physics_report::PhysicsReportArgs),
+    /// Break the code in many ways, one at a time, and see which test notices
+    Mutate(mutate::MutateArgs),
     /// Rewrite the expected outputs (goldens) of the tests from what the code gives now
     Bless(bless::BlessArgs),
 }
@@ -51,6 +60,8 @@ impl Cli {
             Task::Test(args) => test::run(repo, args),
             Task::Ci(args) => ci::run(repo, args),
             Task::Bench(args) => bench::run(repo, args),
+            Task::PhysicsReport(args) => physics_report::run(repo, args),
+            Task::Mutate(args) => mutate::run(repo, args),
             Task::Bless(args) => bless::run(repo, args),
         }
     }

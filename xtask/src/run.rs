@@ -168,6 +168,14 @@ impl Cmd {
         Ok(output.stdout)
     }
 
+    /// Whether the exit code is 0, and standard output; standard error is seen.
+    pub(crate) fn success_and_output(mut self) -> Outcome<(bool, String)> {
+        eprintln!("$ {self}");
+        self.inner.stderr(Stdio::inherit());
+        let output = self.inner.output().map_err(|e| self.not_started(&e))?;
+        Ok((output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned()))
+    }
+
     /// The exit code, or a failure if it still runs after `limit` (it is killed then) or a signal ended it.
     pub(crate) fn exit_code_within(mut self, limit: Duration) -> Outcome<i32> {
         eprintln!("$ {self}");

@@ -1,8 +1,8 @@
 //! `cargo xtask test`: every test of the workspace, doctests included, against one MuJoCo.
 
-use crate::python;
 use crate::run::{Failure, Outcome, Repo, in_ci};
 use crate::setup::{self, Line, Need, Wanted};
+use crate::{physics_report, python};
 
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TestArgs {
@@ -26,6 +26,11 @@ pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
     let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras })?;
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
     let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args));
+    // The laws of physics write what they measure, for the page of numbers to be compared with.
+    let everything = args.package.is_none() && args.filter.is_none() && args.test_args.is_empty();
+    if let Some(line) = args.mujoco.filter(|_| everything) {
+        cargo = cargo.env(physics_report::VARIABLE, physics_report::fresh_folder(repo, line)?);
+    }
     if judged {
         match python::with_mujoco(repo).filter(|python| python::OPENGL.install(python)) {
             Some(python) => cargo = cargo.env(python::VARIABLE, python),

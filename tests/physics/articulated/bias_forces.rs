@@ -1,0 +1,33 @@
+//! Coriolis and centrifugal forces: without gravity, the efforts c(q, q̇) that the judge asks for q̈ = 0 keep all velocities
+//! as they are.
+//!
+//! Tolerance: as for the mass matrix, rounding of v/h and the condition of M; 1e-9.
+
+use super::subjects::{KINDS, Kind, Subject, apart};
+use crate::law::law;
+use nalgebra::Vector3;
+
+/// The largest acceleration; `part` of the efforts are applied.
+fn accelerated(kind: Kind, part: f64) -> f64 {
+    let mut subject = Subject::new(kind, Vector3::zeros());
+    let still = vec![0.0; subject.dof()];
+    (0..10)
+        .map(|k| {
+            let (q, v) = (subject.spread(0.5, k), subject.spread(2.0, k + 50));
+            let bias: Vec<f64> =
+                subject.efforts(&q, &v, &still, Vector3::zeros()).iter().map(|tau| part * tau).collect();
+            apart(&subject.accelerations(&q, &v, &bias), &still)
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "τ = c(q, q̇) gives q̈ = 0", |m| {
+        for (kind, name) in KINDS {
+            let quantity = format!("largest acceleration, {name}");
+            m.row(&quantity, "rad/s²", 0.0, accelerated(kind, 1.0), (1e-9, "rounding times the condition of M"));
+            m.control(&quantity, "without these efforts", accelerated(kind, 0.0));
+        }
+    });
+}

@@ -1,0 +1,37 @@
+//! A pendulum that goes round in a cone: Ω² = g/(L cos θ) keeps its angle. The pivot is a hinge about the vertical, which a
+//! weightless ring carries, and one across it.
+//!
+//! Tolerance: the moments of ring and bob, 1e-9 kg m², are 1e-9/(m L²) of the pendulum's; RK4 of a steady motion. 1e-6.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+
+const LENGTH: f64 = 0.8;
+const ANGLE: f64 = 0.9;
+
+/// Angle gone round and angle of the cone after 3 s, started with `part` of the velocity.
+fn swung(part: f64) -> [f64; 2] {
+    let omega = part * (G / (LENGTH * ANGLE.cos())).sqrt();
+    let mut lab = Lab::new(rk4(earth()));
+    let links = [base(), Link::point("ring", 1e-6, [0.0; 3]), Link::point("bob", 1.3, [0.0, 0.0, -LENGTH])];
+    let round = Joint::hinge("round", ["base", "ring"], [0.0, 0.0, 1.0]);
+    let robot = lab.mechanism(&urdf(&links, &[round, Joint::hinge("cone", ["ring", "bob"], [0.0, 1.0, 0.0])]));
+    lab.write_joints(robot, &[0.0, ANGLE], &[omega, 0.0]);
+    lab.run(3.0);
+    let q = lab.q(robot);
+    [q[0], q[1]]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "Ω² = g/(L cos θ)", |m| {
+        let omega = (G / (LENGTH * ANGLE.cos())).sqrt();
+        let ([round, cone], [slow, low]) = (swung(1.0), swung(0.95));
+        let moments = (1e-6, "moments of the ring and of the bob");
+        m.row("angle gone round in 3 s", "rad", 3.0 * omega, round, moments);
+        m.row("angle of the cone after 3 s", "rad", ANGLE, cone, moments);
+        m.control("angle gone round in 3 s", "5 % slower", slow);
+        m.control("angle of the cone after 3 s", "5 % slower", low);
+    });
+}

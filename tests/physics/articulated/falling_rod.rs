@@ -1,0 +1,51 @@
+//! A rod that is hinged at one end falls from the horizontal: θ'' = m g L/2/(m L²/3) = 3 g/(2 L), its tip falls with 3/2 g,
+//! faster than a free body. Energy: ω² = 3 g sin θ/L at the angle θ below the horizontal.
+//!
+//! Tolerance: the first step to rounding; RK4's energy as in `double_pendulum_energy`, 1e-8 of ω².
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+use kinetoscope::prelude::*;
+
+const LENGTH: f64 = 1.4;
+
+/// Acceleration of the tip in the first step, and angle and velocity after 0.4 s.
+fn fell(moment: f64) -> [f64; 3] {
+    let text = {
+        let rod = Link::new("rod", 0.6, [1e-4, moment, moment]).at([LENGTH / 2.0, 0.0, 0.0]);
+        let links = [base(), rod, Link::new("tip", 0.0, [0.0; 3])];
+        let end = Joint::fixed("end", ["rod", "tip"]).at([LENGTH, 0.0, 0.0]);
+        urdf(&links, &[Joint::hinge("hinge", ["base", "rod"], [0.0, 1.0, 0.0]), end])
+    };
+    let fallen = |cfg: SimulationManagerCfg, seconds: f64| {
+        let mut lab = Lab::new(cfg);
+        let robot = lab.mechanism(&text);
+        lab.run(seconds);
+        let tip = lab.sim.robot(robot).link_velocity("tip").unwrap();
+        (tip[(0, 2)], lab.q(robot)[0], lab.v(robot)[0])
+    };
+    let (velocity, angle, _) = fallen(earth(), 1e-3);
+    let (_, q, v) = fallen(rk4(earth()), 0.4);
+    // The tip has turned by the angle of the step.
+    [velocity / 1e-3 / angle.cos(), q, v]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "tip: a = 3/2 g; ω² = 3 g sin θ/L", |m| {
+        let moment = 0.6 * LENGTH * LENGTH / 12.0;
+        let [tip, angle, velocity] = fell(moment);
+        m.row("acceleration of the tip", "m/s²", -1.5 * G, tip, (1e-9, "rounding of a step of 1 ms"));
+        let expected = (3.0 * G * angle.sin() / LENGTH).sqrt();
+        m.row("velocity after 0.4 s", "rad/s", expected, velocity, (1e-8 * expected, "RK4"));
+        // A point at the middle: g/(L/2), and the tip at 2 g.
+        let [light, point_angle, point_velocity] = fell(1e-3 * moment);
+        m.control("acceleration of the tip", "with the mass in the middle", light);
+        m.control(
+            "velocity after 0.4 s",
+            "with the mass in the middle",
+            point_velocity - (3.0 * G * point_angle.sin() / LENGTH).sqrt() + expected,
+        );
+    });
+}

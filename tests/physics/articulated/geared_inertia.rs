@@ -1,0 +1,39 @@
+//! Two wheels, the second coupled to turn n times as fast: an effort τ on the first feels I₁ + n² I₂.
+//!
+//! Tolerance: the coupling yields by 1e-4 of what its load would accelerate.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+
+const MOMENTS: [f64; 2] = [0.2, 0.05];
+const RATIO: f64 = -3.0;
+const EFFORT: f64 = 1.3;
+
+/// Velocities of both wheels after half a second.
+fn turned(coupled: bool) -> [f64; 2] {
+    let wheel = |name, moment| Link::new(name, 1.0, [moment; 3]);
+    let z = [0.0, 0.0, 1.0];
+    let second = Joint::hinge("second_joint", ["base", "second"], z).at([0.5, 0.0, 0.0]);
+    let second = if coupled { second.mimic("first_joint", RATIO) } else { second };
+    let mut lab = Lab::new(weightless());
+    let links = [base(), wheel("first", MOMENTS[0]), wheel("second", MOMENTS[1])];
+    let robot = lab.mechanism(&urdf(&links, &[Joint::hinge("first_joint", ["base", "first"], z), second]));
+    lab.push_joints(robot, &[EFFORT, 0.0]);
+    lab.run(0.5);
+    let v = lab.v(robot);
+    [v[0], v[1]]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "τ = (I₁ + n² I₂) q̈", |m| {
+        let ([first, second], [alone, idle]) = (turned(true), turned(false));
+        let speed = 0.5 * EFFORT / (MOMENTS[0] + RATIO * RATIO * MOMENTS[1]);
+        let yields = |v: f64| (1e-3 * v.abs(), "the coupling yields by 1e-4, ten times seen through n²");
+        m.row("velocity of the first wheel after 0.5 s", "rad/s", speed, first, yields(speed));
+        m.row("velocity of the second wheel after 0.5 s", "rad/s", RATIO * speed, second, yields(RATIO * speed));
+        m.control("velocity of the first wheel after 0.5 s", "without the gear", alone);
+        m.control("velocity of the second wheel after 0.5 s", "without the gear", idle);
+    });
+}

@@ -1,0 +1,38 @@
+//! The efforts g(q) that the judge asks for q̇ = q̈ = 0 hold a robot where it is: it has no velocity after a step, and none
+//! but what rounding grows to after a tenth of a second (a robot that stands on its efforts falls over like e^(λt), with λ
+//! of some 10 per second).
+//!
+//! Tolerance: 1e-12 m/s² of rounding in a step; times e^1 and the time, 1e-10.
+
+use super::subjects::{EARTH, KINDS, Kind, Subject, apart};
+use crate::law::law;
+
+/// The largest velocity after a step and after a tenth of a second, held by `part` of the efforts.
+fn moved(kind: Kind, part: f64) -> [f64; 2] {
+    let mut worst = [0.0_f64; 2];
+    for k in 0..5 {
+        let mut subject = Subject::new(kind, EARTH);
+        let still = vec![0.0; subject.dof()];
+        let q = subject.spread(0.5, k);
+        let hold: Vec<f64> = subject.efforts(&q, &still, &still, EARTH).iter().map(|tau| part * tau).collect();
+        let first = subject.accelerations(&q, &still, &hold);
+        worst[0] = worst[0].max(apart(&first, &still) * 1e-3);
+        subject.lab.run(0.1);
+        worst[1] = worst[1].max(apart(&subject.lab.v(subject.robot), &still));
+    }
+    worst
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "τ = g(q) holds still", |m| {
+        for (kind, name) in KINDS {
+            let (held, less) = (moved(kind, 1.0), moved(kind, 0.99));
+            for (k, when) in ["a step", "0.1 s"].into_iter().enumerate() {
+                let quantity = format!("largest velocity after {when}, {name}");
+                m.row(&quantity, "rad/s", 0.0, held[k], (1e-9, "rounding, and what it grows to"));
+                m.control(&quantity, "with 1 % less effort", less[k]);
+            }
+        }
+    });
+}

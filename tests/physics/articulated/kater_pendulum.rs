@@ -1,0 +1,47 @@
+//! Kater's pendulum: hung at l from its centre of mass or, turned over, at k²/l on the other side, k being its radius of
+//! gyration, a body swings with the same period: that of a point at l + k²/l. I = m (k² + l²), and I/(m l) is symmetric in l
+//! and k²/l.
+//!
+//! Tolerance: as for `pendulum_period`, 1e-8 of the period.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::rigid_body::dzhanibekov::complete_elliptic;
+use crate::urdf::{Joint, Link, base, urdf};
+
+const MASS: f64 = 2.0;
+const GYRATION: f64 = 0.3;
+const NEAR: f64 = 0.2;
+const ANGLE: f64 = 0.5;
+
+/// Period of the pendulum hung at `length` from its centre of mass.
+fn period(length: f64) -> f64 {
+    let mut lab = Lab::new(rk4(earth()));
+    let moment = MASS * GYRATION * GYRATION;
+    let body = Link::new("body", MASS, [moment, moment, 0.01]).at([0.0, 0.0, -length]);
+    let robot = lab.mechanism(&urdf(&[base(), body], &[Joint::hinge("pivot", ["base", "body"], [0.0, 1.0, 0.0])]));
+    lab.write_joints(robot, &[ANGLE], &[0.0]);
+    let (mut before, mut times) = ([0.0, ANGLE], Vec::new());
+    lab.watch(5_000, |t, sim| {
+        let q = sim.robot(robot).get_qpos()[(0, 0)];
+        if q * before[1] < 0.0 {
+            times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
+        }
+        before = [t, q];
+    });
+    (times[4] - times[0]) / 2.0
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "T(l) = T(k²/l) = 4 K(sin θ₀/2) √((l + k²/l)/g)", |m| {
+        let far = GYRATION * GYRATION / NEAR;
+        let expected = 4.0 * complete_elliptic((0.5 * ANGLE).sin()) * ((NEAR + far) / G).sqrt();
+        let order = (1e-8 * expected, "RK4 and crossings off straight lines");
+        for (name, length) in [("near pivot", NEAR), ("far pivot", far)] {
+            let quantity = format!("period at the {name}");
+            m.row(&quantity, "s", expected, period(length), order);
+            m.control(&quantity, "with the pivot 1 % farther", period(1.01 * length));
+        }
+    });
+}

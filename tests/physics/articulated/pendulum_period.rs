@@ -1,0 +1,46 @@
+//! A pendulum that swings by 90° to each side: T = 4 K(sin θ₀/2) √(I/(m g l)), K being the complete elliptic integral.
+//!
+//! Tolerance: RK4's (ω h)⁴ per radian is 1e-11 of the period; the crossings are read off straight lines where the
+//! acceleration passes through 0, off by less than h³. 1e-9 of the period.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::rigid_body::dzhanibekov::complete_elliptic;
+use crate::urdf::{Joint, Link, POINT, base, urdf};
+use kinetoscope::prelude::*;
+
+const LENGTH: f64 = 1.0;
+
+/// Period \[s\] from the passages of the lowest point, of a point mass that starts at rest at `angle`.
+fn period(cfg: SimulationManagerCfg, angle: f64) -> f64 {
+    let mut lab = Lab::new(cfg);
+    let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);
+    let robot = lab.mechanism(&urdf(&[base(), Link::point("bob", 1.0, [0.0, 0.0, -LENGTH])], &[joint]));
+    lab.write_joints(robot, &[angle], &[0.0]);
+    let (mut before, mut times) = ([0.0, angle], Vec::new());
+    let steps = (8.0 / lab.dt()).round() as u32;
+    lab.watch(steps, |t, sim| {
+        let q = sim.robot(robot).get_qpos()[(0, 0)];
+        if q * before[1] < 0.0 {
+            times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
+        }
+        before = [t, q];
+    });
+    // Two passages in a period.
+    (times[4] - times[0]) / 2.0
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "T = 4 K(sin θ₀/2) √(I/(m g l))", |m| {
+        for degrees in [10.0_f64, 90.0, 150.0] {
+            let angle = degrees.to_radians();
+            let pendulum = ((LENGTH * LENGTH + POINT) / (G * LENGTH)).sqrt();
+            let expected = 4.0 * complete_elliptic((0.5 * angle).sin()) * pendulum;
+            let quantity = format!("period at {degrees}°");
+            let found = period(rk4(earth()), angle);
+            m.row(&quantity, "s", expected, found, (1e-8 * expected, "RK4 and crossings off straight lines"));
+            m.control(&quantity, "at an angle 1 % smaller", period(rk4(earth()), 0.99 * angle));
+        }
+    });
+}

@@ -1,0 +1,1 @@
+//! Drives, limits and friction of joints.

@@ -1,0 +1,230 @@
+//! A place to measure in: a simulation with robots from URDF text and rigid objects, and their states as vectors.
+
+use kinetoscope::ndarray::{Array2, Array3};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::{from_row, to_row};
+use kinetoscope::sim::{self, Cone};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Gravity on earth \[m/s²\].
+pub(crate) const G: f64 = 9.81;
+
+/// Steps of a millisecond on one thread, gravity, no ground, no light.
+pub(crate) fn earth() -> SimulationManagerCfg {
+    SimulationManagerCfg {
+        physics_dt: 1e-3,
+        ground: None,
+        lights: Vec::new(),
+        threads: Some(1),
+        ..SimulationManagerCfg::default()
+    }
+}
+
+/// As [`earth`], without gravity.
+pub(crate) fn weightless() -> SimulationManagerCfg {
+    SimulationManagerCfg { gravity: Vector3::zeros(), ..earth() }
+}
+
+/// As [`earth`], on a ground plane that gravity is tilted against: a slope of `angle` \[rad\] down along x. Elliptic cones,
+/// and friction that creeps a hundred times less than MuJoCo's default.
+pub(crate) fn slope(angle: f64, friction: f64) -> SimulationManagerCfg {
+    SimulationManagerCfg {
+        gravity: G * Vector3::new(angle.sin(), 0.0, -angle.cos()),
+        ground: Some(GroundCfg::default()),
+        cone: Cone::Elliptic,
+        impratio: 100.0,
+        friction: [friction, 0.0, 0.0],
+        ..earth()
+    }
+}
+
+pub(crate) fn with_dt(dt: f64, cfg: SimulationManagerCfg) -> SimulationManagerCfg {
+    SimulationManagerCfg { physics_dt: dt, ..cfg }
+}
+
+/// Runge-Kutta of order 4: for passive robots, and those of [`explicit`] drives.
+pub(crate) fn rk4(cfg: SimulationManagerCfg) -> SimulationManagerCfg {
+    SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg }
+}
+
+/// No drive: joints move freely.
+pub(crate) fn passive() -> DriveCfg {
+    DriveCfg { drive_type: DriveType::None, ..DriveCfg::default() }
+}
+
+/// The default drive, evaluated at the end of the step.
+pub(crate) fn implicit(stiffness: f64, damping: f64) -> DriveCfg {
+    DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..DriveCfg::default() }
+}
+
+/// MuJoCo's own actuators, evaluated at the start of the step.
+pub(crate) fn explicit(stiffness: f64, damping: f64) -> DriveCfg {
+    DriveCfg { model: DriveModel::Actuator, ..implicit(stiffness, damping) }
+}
+
+/// One simulation.
+#[derive(Debug)]
+pub(crate) struct Lab {
+    pub(crate) sim: SimulationManager,
+    files: tempfile::TempDir,
+}
+
+impl Lab {
+    pub(crate) fn new(cfg: SimulationManagerCfg) -> Self {
+        Self { sim: SimulationManager::new(cfg).unwrap(), files: tempfile::tempdir().unwrap() }
+    }
+
+    /// A file in this lab's folder.
+    pub(crate) fn file(&self, name: &str, text: &str) -> std::path::PathBuf {
+        let path = self.files.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    /// A robot of this text; `cfg` says everything but the file.
+    pub(crate) fn robot(&mut self, text: &str, cfg: RobotCfg) -> RobotId {
+        let path = self.file(&format!("{}.urdf", cfg.uid), text);
+        self.sim.add_robot(RobotCfg { urdf: UrdfCfg::single(path), ..cfg }).unwrap()
+    }
+
+    /// A passive robot with a fixed base at the origin.
+    pub(crate) fn mechanism(&mut self, text: &str) -> RobotId {
+        self.robot(text, RobotCfg { drive: passive(), ..RobotCfg::default() })
+    }
+
+    /// A passive robot that nothing holds.
+    pub(crate) fn free(&mut self, text: &str, at: [f64; 3]) -> RobotId {
+        let init_pose = Pose::translation(at[0], at[1], at[2]);
+        self.robot(text, RobotCfg { drive: passive(), fix_base: false, init_pose, ..RobotCfg::default() })
+    }
+
+    pub(crate) fn object(&mut self, cfg: RigidObjectCfg) -> ObjectId {
+        self.sim.add_rigid_object(cfg).unwrap()
+    }
+
+    pub(crate) fn dt(&self) -> f64 {
+        self.sim.cfg().physics_dt
+    }
+
+    /// Steps for `seconds`, which must be a whole number of steps.
+    #[track_caller]
+    pub(crate) fn run(&mut self, seconds: f64) {
+        let steps = seconds / self.dt();
+        assert!((steps - steps.round()).abs() < 1e-6, "{seconds} s are no whole number of steps");
+        self.sim.update(steps.round() as u32);
+        self.assert_well();
+    }
+
+    /// Steps `steps` times and looks after each, `t` being the time \[s\] since the call.
+    pub(crate) fn watch(&mut self, steps: u32, mut look: impl FnMut(f64, &SimulationManager)) {
+        for step in 1..=steps {
+            self.sim.update(1);
+            look(f64::from(step) * self.dt(), &self.sim);
+        }
+        self.assert_well();
+    }
+
+    /// No environment diverged, and MuJoCo warned of nothing.
+    #[track_caller]
+    pub(crate) fn assert_well(&self) {
+        assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
+        let counts = self.sim.warning_counts();
+        assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
+    }
+
+    /// Positions and velocities of all joints, in their order.
+    pub(crate) fn write_joints(&mut self, robot: RobotId, q: &[f64], v: &[f64]) {
+        let mut robot = self.sim.robot_mut(robot);
+        robot.write_qpos(&row(q), None, None).unwrap();
+        robot.write_qvel(&row(v), None, None).unwrap();
+    }
+
+    /// Velocity of the root link's frame and its angular velocity, in world axes.
+    pub(crate) fn write_root_velocity(&mut self, robot: RobotId, linear: [f64; 3], angular: [f64; 3]) {
+        let v = [linear, angular].concat();
+        self.sim.robot_mut(robot).write_root_velocity(&row(&v), None).unwrap();
+    }
+
+    pub(crate) fn write_velocity(&mut self, object: ObjectId, linear: [f64; 3], angular: [f64; 3]) {
+        let v = [linear, angular].concat();
+        self.sim.rigid_object_mut(object).write_velocity(&row(&v), None).unwrap();
+    }
+
+    /// Efforts of all joints, from the next step on.
+    pub(crate) fn push_joints(&mut self, robot: RobotId, efforts: &[f64]) {
+        self.sim.robot_mut(robot).set_qf(&row(efforts), None, None).unwrap();
+    }
+
+    /// A force in the centre of mass of a link and a torque, in world axes, from the next step on.
+    pub(crate) fn push_link(&mut self, robot: RobotId, link: &str, force: Vector3<f64>, torque: Vector3<f64>) {
+        let link = self.sim.robot(robot).link_id(link).unwrap();
+        let [force, torque] = [force, torque].map(|v| Array3::from_shape_fn((1, 1, 3), |(_, _, k)| v[k]));
+        let mut robot = self.sim.robot_mut(robot);
+        robot.set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[link]), None).unwrap();
+    }
+
+    /// As [`push_link`](Self::push_link), of an object.
+    pub(crate) fn push(&mut self, object: ObjectId, force: Vector3<f64>, torque: Vector3<f64>) {
+        let (force, torque) = (row(force.as_slice()), row(torque.as_slice()));
+        self.sim.rigid_object_mut(object).set_external_wrench(&force, &torque, WrenchFrame::World, None).unwrap();
+    }
+
+    pub(crate) fn q(&self, robot: RobotId) -> Vec<f64> {
+        self.sim.robot(robot).get_qpos().row(0).to_vec()
+    }
+
+    pub(crate) fn v(&self, robot: RobotId) -> Vec<f64> {
+        self.sim.robot(robot).get_qvel().row(0).to_vec()
+    }
+
+    /// Efforts of the drives in the last step.
+    pub(crate) fn effort(&self, robot: RobotId) -> Vec<f64> {
+        self.sim.robot(robot).get_qf().row(0).to_vec()
+    }
+
+    pub(crate) fn root(&self, robot: RobotId) -> Body {
+        root(&self.sim, robot)
+    }
+
+    pub(crate) fn body(&self, object: ObjectId) -> Body {
+        body(&self.sim, object)
+    }
+}
+
+/// Where a body is and how it moves, in the world; velocity is that of its frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body {
+    pub(crate) position: Vector3<f64>,
+    pub(crate) rotation: UnitQuaternion<f64>,
+    pub(crate) velocity: Vector3<f64>,
+    pub(crate) spin: Vector3<f64>,
+}
+
+impl Body {
+    fn new(pose: &Array2<f64>, velocity: &Array2<f64>) -> Self {
+        let pose = from_row(&std::array::from_fn(|k| pose[(0, k)]));
+        let at = |k: usize| Vector3::new(velocity[(0, k)], velocity[(0, k + 1)], velocity[(0, k + 2)]);
+        Self { position: pose.translation.vector, rotation: pose.rotation, velocity: at(0), spin: at(3) }
+    }
+}
+
+/// The root link of a robot.
+pub(crate) fn root(sim: &SimulationManager, robot: RobotId) -> Body {
+    let robot: sim::Robot<'_> = sim.robot(robot);
+    Body::new(&robot.get_root_pose(), &robot.get_root_velocity())
+}
+
+/// A rigid object.
+pub(crate) fn body(sim: &SimulationManager, object: ObjectId) -> Body {
+    let object = sim.rigid_object(object);
+    Body::new(&object.get_pose(), &object.get_velocity())
+}
+
+pub(crate) fn row(values: &[f64]) -> Array2<f64> {
+    Array2::from_shape_vec((1, values.len()), values.to_vec()).unwrap()
+}
+
+/// A pose as the row that is written.
+pub(crate) fn pose_row(pose: &Pose) -> Array2<f64> {
+    row(&to_row(pose))
+}

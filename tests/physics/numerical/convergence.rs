@@ -1,0 +1,32 @@
+//! How fast an answer gets better with the step: e(h) = C hᵖ, so p = log₂(e(2h)/e(h)).
+
+use crate::articulated::double_pendulum_energy;
+use crate::lab::*;
+use kinetoscope::prelude::*;
+use std::f64::consts::FRAC_PI_2;
+
+/// Angles of a double pendulum half a second after it was let go from the horizontal, moving.
+pub(super) fn double_pendulum(integrator: Integrator, dt: f64) -> Vec<f64> {
+    let mut lab = Lab::new(SimulationManagerCfg { integrator, ..with_dt(dt, earth()) });
+    let robot = lab.mechanism(&double_pendulum_energy::text());
+    lab.write_joints(robot, &[FRAC_PI_2, 0.3], &[1.0, -2.0]);
+    lab.run(0.512);
+    lab.q(robot)
+}
+
+/// Errors at the steps against an answer: (h, e).
+pub(super) fn errors(steps: &[f64], answer: &[f64], of: impl Fn(f64) -> Vec<f64>) -> Vec<[f64; 2]> {
+    let error = |h: f64| of(h).iter().zip(answer).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    steps.iter().map(|&h| [h, error(h)]).collect()
+}
+
+/// The order between the last two of the errors, whose steps halve.
+pub(super) fn order(errors: &[[f64; 2]]) -> f64 {
+    let [[coarse, large], [fine, small]] = [errors[errors.len() - 2], errors[errors.len() - 1]];
+    (large / small).ln() / (coarse / fine).ln()
+}
+
+/// The answer: RK4 in steps of an eighth of a millisecond, off by 1e-12.
+pub(super) fn reference() -> Vec<f64> {
+    double_pendulum(Integrator::Rk4, 1.25e-4)
+}

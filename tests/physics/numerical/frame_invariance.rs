@@ -1,0 +1,33 @@
+//! Space has no direction: with gravity and the base both turned, and the base elsewhere, a robot's joints move as before.
+//!
+//! Tolerance: rounding of 1e-16 that a second of a double pendulum makes e³ times as large, with room: 1e-10.
+
+use crate::articulated::double_pendulum_energy;
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+/// Joint angles after a second, with gravity turned by `gravity` and the base by `base`.
+fn swung(gravity: UnitQuaternion<f64>, base: UnitQuaternion<f64>) -> Vec<f64> {
+    let mut lab = Lab::new(SimulationManagerCfg { gravity: gravity * Vector3::new(0.0, 0.0, -G), ..earth() });
+    let init_pose = Pose::from_parts(Translation3::new(3.0, -2.0, 1.0), base);
+    let text = double_pendulum_energy::text();
+    let robot = lab.robot(&text, RobotCfg { drive: passive(), init_pose, ..RobotCfg::default() });
+    lab.write_joints(robot, &[1.0, 0.5], &[0.0, 1.0]);
+    lab.run(1.0);
+    lab.q(robot)
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "q(t; R g, R base) = q(t; g, base)", |m| {
+        let (none, turn) = (UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(0.7, -1.1, 2.0));
+        let (there, here, half) = (swung(turn, turn), swung(none, none), swung(none, turn));
+        for (k, (&here, (&there, &half))) in here.iter().zip(there.iter().zip(&half)).enumerate() {
+            let quantity = format!("angle {}", k + 1);
+            m.row(&quantity, "rad", here, there, (1e-10, "rounding, and what it grows to"));
+            m.control(&quantity, "with only the base turned", half);
+        }
+    });
+}

@@ -1,0 +1,45 @@
+//! Uniform motion cannot be felt: two balls that meet part in the same way when both, before it, move along with 7, -3 and
+//! 5 m/s more.
+//!
+//! Tolerance: places of some metres instead of centimetres: 1e-15 of rounding in the depth times a stiffness of the contact
+//! of 1e5/s² over ten steps: 1e-10, with room 1e-8.
+
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+use nalgebra::Vector3;
+
+/// Velocities after half a second, less what both had from the start.
+fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
+    let mut lab = Lab::new(weightless());
+    let mut ball = |uid: &str, at: [f64; 3]| {
+        lab.object(RigidObjectCfg {
+            uid: uid.into(),
+            shape: ObjectShape::Sphere { radius: 0.1 },
+            restitution: Some(0.7),
+            init_pose: Pose::translation(at[0], at[1], at[2]),
+            ..RigidObjectCfg::default()
+        })
+    };
+    let (left, right) = (ball("left", [-0.3, 0.03, 0.0]), ball("right", [0.0; 3]));
+    lab.write_velocity(left, [along[0] + 1.0 + faster, along[1], along[2]], [0.0; 3]);
+    lab.write_velocity(right, along, [0.0; 3]);
+    lab.run(0.5);
+    [left, right].map(|id| lab.body(id).velocity - Vector3::from(along))
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "v' - u = v'(u = 0)", |m| {
+        let along = [7.0, -3.0, 5.0];
+        let (here, there, faster) = (parted([0.0; 3], 0.0), parted(along, 0.0), parted(along, 0.001));
+        for (k, name) in ["left", "right"].into_iter().enumerate() {
+            for (axis, letter) in ["x", "y"].into_iter().enumerate() {
+                let quantity = format!("velocity of the {name} ball, {letter}");
+                let rounding = (1e-8, "rounding of places, times the stiffness of the contact");
+                m.row(&quantity, "m/s", here[k][axis], there[k][axis], rounding);
+                m.control(&quantity, "met 1 mm/s faster", faster[k][axis]);
+            }
+        }
+    });
+}

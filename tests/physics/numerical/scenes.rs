@@ -1,0 +1,65 @@
+//! Scenes with everything in them, to be run in more than one way: quadrupeds with drives that fall on the ground.
+
+use crate::lab::*;
+use kinetoscope::prelude::*;
+
+/// A quadruped of each environment that falls from half a metre, otherwise turned and pushed in each.
+#[derive(Debug)]
+pub(super) struct Fall {
+    pub(super) sim: SimulationManager,
+    robot: RobotId,
+}
+
+impl Fall {
+    /// `nudge` is added to the first joint's velocity in environment 0 \[rad/s\].
+    pub(super) fn new(cfg: SimulationManagerCfg, nudge: f64) -> Self {
+        let mut sim = SimulationManager::new(cfg).unwrap();
+        let robot = RobotCfg {
+            urdf: UrdfCfg::single(assets::path("quadruped/quadruped.urdf").unwrap()),
+            drive: implicit(80.0, 5.0),
+            fix_base: false,
+            ..RobotCfg::default()
+        };
+        let robot = sim.add_robot(robot).unwrap();
+        for env in 0..sim.num_envs() {
+            let k = env as f64;
+            let pose = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.8], [0.3 * k.sin(), 0.2, 0.1 * k]);
+            let ids = [EnvId(env)];
+            let mut written = sim.robot_mut(robot);
+            written.write_root_pose(&pose_row(&pose), Some(&ids)).unwrap();
+            let velocity = [0.5 * k.cos(), 0.1, 0.0, 0.0, 1.0, k.sin()];
+            written.write_root_velocity(&row(&velocity), Some(&ids)).unwrap();
+            let mut v = vec![0.0; written.read().dof()];
+            v[0] = if env == 0 { nudge } else { 0.0 };
+            written.write_qvel(&row(&v), None, Some(&ids)).unwrap();
+        }
+        Self { sim, robot }
+    }
+
+    /// Everything that moves in one environment.
+    pub(super) fn state(&self, env: usize) -> Vec<f64> {
+        let robot = self.sim.robot(self.robot);
+        let arrays = [robot.get_root_state(), robot.get_qpos(), robot.get_qvel(), robot.get_qf()];
+        arrays.iter().flat_map(|array| array.row(env).to_vec()).collect()
+    }
+
+    /// Whether something touches the ground, so that contacts are part of what is compared.
+    pub(super) fn has_landed(&self) -> bool {
+        (0..self.sim.num_envs()).all(|env| self.state(env)[2] < 0.7)
+    }
+}
+
+/// The legged preset on `threads`, with `num_envs` environments.
+pub(super) fn legged(num_envs: usize, threads: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs, threads: Some(threads), lights: Vec::new(), ..SimulationManagerCfg::legged() }
+}
+
+/// The largest difference of two states; infinite where their bits differ and their numbers do not.
+pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let apart = |(a, b): (&f64, &f64)| {
+        let apart = (a - b).abs();
+        if a.to_bits() != b.to_bits() && apart == 0.0 { f64::INFINITY } else { apart }
+    };
+    a.iter().zip(b).map(apart).fold(0.0, f64::max)
+}

@@ -1,0 +1,33 @@
+//! Mechanical similarity: a pendulum four times as long swings twice as slowly (Landau, Lifshitz, Mechanics, § 10). With
+//! twice the step, Euler's recursion is the same numbers: h² g/L is, and velocities are half.
+//!
+//! Tolerance: rounding, 2000 steps; 1e-10. Control: the same step for both.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+
+/// Angle and velocity after 2000 steps.
+fn swung(length: f64, dt: f64) -> [f64; 2] {
+    let mut lab = Lab::new(with_dt(dt, earth()));
+    let joint = Joint::hinge("pivot", ["base", "rod"], [0.0, 1.0, 0.0]);
+    let moment = length * length / 12.0;
+    let rod = Link::new("rod", 1.0, [moment, moment, 1e-3 * moment]).at([0.0, 0.0, -length / 2.0]);
+    let robot = lab.mechanism(&urdf(&[base(), rod], &[joint]));
+    lab.write_joints(robot, &[1.1], &[0.0]);
+    lab.sim.update(2000);
+    [lab.q(robot)[0], lab.v(robot)[0]]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "q(4 L, 2 t) = q(L, t), q̇(4 L, 2 t) = q̇(L, t)/2", |m| {
+        let ([q, v], [long_q, long_v]) = (swung(0.6, 1e-3), swung(2.4, 2e-3));
+        let rounding = (1e-10, "rounding of 2000 steps");
+        m.row("angle of the long one", "rad", q, long_q, rounding);
+        m.row("velocity of the long one", "rad/s", v / 2.0, long_v, rounding);
+        let [same_q, same_v] = swung(2.4, 1e-3);
+        m.control("angle of the long one", "at the same time", same_q);
+        m.control("velocity of the long one", "at the same time", same_v);
+    });
+}

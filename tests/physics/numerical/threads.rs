@@ -1,0 +1,24 @@
+//! The same bits for any number of threads: sixteen quadrupeds fall on the ground, on 1 thread and on 8.
+//!
+//! Tolerance: none. Control: one joint of one of them is a billionth of a rad/s faster.
+
+use super::scenes::{Fall, difference, legged};
+use crate::law::law;
+
+const ENVS: usize = 16;
+
+fn fallen(threads: usize, nudge: f64) -> Vec<f64> {
+    let mut fall = Fall::new(legged(ENVS, threads), nudge);
+    fall.sim.update(150);
+    assert!(fall.has_landed());
+    (0..ENVS).flat_map(|env| fall.state(env)).collect()
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "x(8 threads) = x(1 thread), bit for bit", |m| {
+        let one = fallen(1, 0.0);
+        m.row("largest difference", "", 0.0, difference(&one, &fallen(8, 0.0)), (0.0, "the same bits"));
+        m.control("largest difference", "with a nudge of 1e-9 rad/s", difference(&one, &fallen(8, 1e-9)));
+    });
+}

@@ -1,0 +1,36 @@
+//! Mechanics runs backwards as well: a double pendulum swings for a second, its velocities are turned round, and after
+//! another second it is where it started, at rest.
+//!
+//! Tolerance: twice the error of RK4 at 1 ms, 1e-9 rad (`order_of_runge_kutta`), times what a second of a pendulum that
+//! swings wide makes of it, some e³: 1e-7. Euler is of order 1.
+
+use crate::articulated::double_pendulum_energy;
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+
+const START: [f64; 2] = [1.3, -0.4];
+
+/// Largest errors of the angles and of the velocities.
+fn returned(cfg: SimulationManagerCfg) -> [f64; 2] {
+    let mut lab = Lab::new(cfg);
+    let robot = lab.mechanism(&double_pendulum_energy::text());
+    lab.write_joints(robot, &START, &[0.0, 0.0]);
+    lab.run(1.0);
+    let (q, v) = (lab.q(robot), lab.v(robot));
+    lab.write_joints(robot, &q, &[-v[0], -v[1]]);
+    lab.run(1.0);
+    let (q, v) = (lab.q(robot), lab.v(robot));
+    [(q[0] - START[0]).abs().max((q[1] - START[1]).abs()), v[0].abs().max(v[1].abs())]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "x(t, -v(t)) after t = x(0)", |m| {
+        let ([q, v], [euler_q, euler_v]) = (returned(rk4(earth())), returned(earth()));
+        m.row("largest error of an angle", "rad", 0.0, q, (1e-7, "RK4 at 1 ms"));
+        m.row("largest error of a velocity", "rad/s", 0.0, v, (1e-6, "RK4 at 1 ms, times 10 rad/s"));
+        m.control("largest error of an angle", "with Euler", euler_q);
+        m.control("largest error of a velocity", "with Euler", euler_v);
+    });
+}

@@ -1,0 +1,60 @@
+//! A rod that lies free is struck at one end. The impulse P moves its centre with P/m and turns it with P (L/2)/(m L²/12):
+//! the velocity at x from the centre, the strike being at -L/2, is P/m (1 - 6 x/L). Two thirds of the rod from the strike,
+//! at x = L/6, nothing moves: the centre of percussion. The struck end goes with 4 P/m.
+//!
+//! Tolerance: rounding of one step.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, urdf};
+use nalgebra::Vector3;
+
+const LENGTH: f64 = 1.2;
+const MASS: f64 = 0.5;
+const FORCE: f64 = 300.0;
+
+/// Velocities across the rod at the struck end and at two thirds of it, which are frames of links that are fixed to it.
+fn struck(off_centre: bool) -> [f64; 2] {
+    let moment = MASS * LENGTH * LENGTH / 12.0;
+    let mut lab = Lab::new(weightless());
+    let frame = |name| Link::new(name, 0.0, [0.0; 3]);
+    let links = [Link::new("rod", MASS, [1e-6, moment, moment]), frame("end"), frame("percussion")];
+    let at = |name, child, x| Joint::fixed(name, ["rod", child]).at([x, 0.0, 0.0]).turned([0.0, 0.0, 0.3]);
+    let joints = [at("a", "end", -LENGTH / 2.0), at("b", "percussion", LENGTH / 6.0)];
+    let robot = lab.free(&urdf(&links, &joints), [1.0, 2.0, 3.0]);
+    let torque = if off_centre { -FORCE * LENGTH / 2.0 } else { 0.0 };
+    lab.push_link(robot, "rod", Vector3::new(0.0, FORCE, 0.0), Vector3::new(0.0, 0.0, torque));
+    lab.run(1e-3);
+    // The rod has turned by 2.5e-3 rad by now; these are components in world axes of points of it.
+    ["end", "percussion"].map(|link| {
+        let v = lab.sim.robot(robot).link_velocity(link).unwrap();
+        let turned = lab.root(robot).rotation.inverse() * Vector3::new(v[(0, 0)], v[(0, 1)], v[(0, 2)]);
+        turned.y
+    })
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "v(x) = P/m (1 - 6 x/L): 4 P/m at the struck end, 0 at 2 L/3 from it", |m| {
+        let [end, percussion] = struck(true);
+        let central = struck(false);
+        let impulse = FORCE * 1e-3;
+        // The axes have turned by ω h = 2.5 mrad since the velocity was P/m along the old y: its cosine shows.
+        let spin = impulse * (LENGTH / 2.0) / (MASS * LENGTH * LENGTH / 12.0);
+        let cosine = (spin * 1e-3).cos();
+        let rounding = (1e-12, "rounding of one step");
+        let (of_centre, of_turn) = (impulse / MASS * cosine, spin);
+        m.row("velocity of the struck end", "m/s", of_centre + of_turn * LENGTH / 2.0, end, rounding);
+        m.row("velocity at 2 L/3", "m/s", of_centre - of_turn * LENGTH / 6.0, percussion, rounding);
+        m.row(
+            "velocity at 2 L/3, continuous",
+            "m/s",
+            0.0,
+            percussion,
+            (1e-5, "P/m (ω h)²/2, the turn within the step"),
+        );
+        m.control("velocity of the struck end", "struck in the middle", central[0]);
+        m.control("velocity at 2 L/3", "struck in the middle", central[1]);
+        m.control("velocity at 2 L/3, continuous", "struck in the middle", central[1]);
+    });
+}

@@ -1,0 +1,61 @@
+//! A ball falls from h and comes up again to e² h, e being its restitution; where nothing is lost, to h again and again.
+//!
+//! Tolerance: `RigidObjectCfg::restitution` is a spring for about ten steps, and says how far off it may be: 0.003 at 1, 0.03
+//! at 0.8, 0.06 at 0.5; the apex is off by 2 e times that, of h. In ten bounces errors of 1 add up ten times.
+
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+
+const HEIGHT: f64 = 0.5;
+const RADIUS: f64 = 0.1;
+
+/// Greatest heights between bounces, and all heights, sampled.
+fn apexes(restitution: Option<f64>, bounces: usize) -> (Vec<f64>, Vec<[f64; 2]>) {
+    let cfg = SimulationManagerCfg { ground: Some(GroundCfg::default()), ..with_dt(1e-4, earth()) };
+    let mut lab = Lab::new(cfg);
+    let ball = lab.object(RigidObjectCfg {
+        shape: ObjectShape::Sphere { radius: RADIUS },
+        mass: Some(0.7),
+        restitution,
+        init_pose: Pose::translation(0.0, 0.0, RADIUS + HEIGHT),
+        ..RigidObjectCfg::default()
+    });
+    let (mut apexes, mut rising, mut curve) = (Vec::new(), false, Vec::new());
+    let steps = 6_400 * (bounces as u32 + 1);
+    lab.watch(steps, |t, sim| {
+        let ball = body(sim, ball);
+        let height = ball.position.z - RADIUS;
+        if rising && ball.velocity.z <= 0.0 {
+            apexes.push(height);
+        }
+        rising = ball.velocity.z > 0.0;
+        if ((t * 1e4).round() as u32).is_multiple_of(100) {
+            curve.push([t, height]);
+        }
+    });
+    (apexes, curve)
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "apex = e² h", |m| {
+        let (mut curves, mut soft) = (Vec::new(), f64::NAN);
+        for (e, off, name) in [(1.0, 0.003, "e = 1"), (0.8, 0.03, "e = 0.8"), (0.5, 0.06, "e = 0.5")] {
+            let (found, curve) = apexes(Some(e), 2);
+            let tolerance = (2.0 * e * off * HEIGHT, "what the restitution promises");
+            m.row(&format!("apex, {name}"), "m", e * e * HEIGHT, found[0], tolerance);
+            curves.push((name, curve));
+        }
+        let (ten, _) = apexes(Some(1.0), 10);
+        m.row("apex after ten bounces, e = 1", "m", HEIGHT, ten[9], (0.06 * HEIGHT, "ten times that of one"));
+        for name in ["e = 1", "e = 0.8", "e = 0.5"] {
+            if soft.is_nan() {
+                soft = apexes(None, 2).0[0];
+            }
+            m.control(&format!("apex, {name}"), "with MuJoCo's own contacts", soft);
+        }
+        m.control("apex after ten bounces, e = 1", "with e = 0.8", apexes(Some(0.8), 10).0[9]);
+        m.plot("A ball bounces", ["time [s]", "height [m]"], false, &curves);
+    });
+}

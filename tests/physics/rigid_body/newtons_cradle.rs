@@ -1,0 +1,46 @@
+//! A ball meets a row of four that stand a little apart: each hands its whole velocity on, and the last goes on alone.
+//! m v = m Σ v, m v² = m Σ v² for two equal masses has no other solution.
+//!
+//! Tolerance: each of the four bounces is known to 0.003 (`RigidObjectCfg::restitution`): 0.012 for the last, 0.006 for what
+//! the others keep.
+
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+
+const RADIUS: f64 = 0.1;
+
+/// Velocities of the five along the row, 2 s after the first was pushed.
+fn knocked(restitution: Option<f64>) -> Vec<f64> {
+    let mut lab = Lab::new(with_dt(2e-4, weightless()));
+    let balls: Vec<ObjectId> = (0..5)
+        .map(|k| {
+            let at = f64::from(k) * (2.0 * RADIUS + 0.01) - if k == 0 { 0.2 } else { 0.0 };
+            lab.object(RigidObjectCfg {
+                uid: format!("ball {k}"),
+                shape: ObjectShape::Sphere { radius: RADIUS },
+                mass: Some(0.3),
+                restitution,
+                init_pose: Pose::translation(at, 0.0, 0.0),
+                ..RigidObjectCfg::default()
+            })
+        })
+        .collect();
+    lab.write_velocity(balls[0], [1.0, 0.0, 0.0], [0.0; 3]);
+    lab.run(2.0);
+    balls.into_iter().map(|id| lab.body(id).velocity.x).collect()
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "the last goes with v, the others rest; Σ v = v", |m| {
+        let (elastic, soft) = (knocked(Some(1.0)), knocked(None));
+        m.row("velocity of the last", "m/s", 1.0, elastic[4], (0.012, "four bounces, 0.003 each"));
+        for (k, &velocity) in elastic.iter().enumerate().take(4) {
+            m.row(&format!("velocity of ball {k}"), "m/s", 0.0, velocity, (0.006, "two bounces, 0.003 each"));
+        }
+        m.row("sum of the velocities", "m/s", 1.0, elastic.iter().sum(), (1e-10, "rounding"));
+        m.control("velocity of the last", "with MuJoCo's own contacts", soft[4]);
+        m.control("velocity of ball 0", "with MuJoCo's own contacts", soft[0]);
+    });
+}

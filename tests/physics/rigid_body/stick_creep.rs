@@ -1,0 +1,40 @@
+//! What sticks creeps: MuJoCo's friction is a damper. A row of friction holds with `R f = -B v` at rest, with
+//! `R = (1 - d)/d A/impratio` and `B = 2/(dmax tc)`. A flat block on four corners has f = m g sin θ/4 in each and A = 1/m:
+//!
+//! ```text
+//! v = (1 - d)/d g sin θ/4 dmax tc/(2 impratio),   d of the depth under m g cos θ/4
+//! ```
+//!
+//! Tolerance: the pull at the bottom tips the block, h tan θ/w = 1 % of the load goes to the lower corners, which changes
+//! their d a little, but not the sum; 1 % of the creep. The law is that creep is there, how large it is and that impratio
+//! divides it.
+
+use super::soft_contact::{LARGEST, TIME, depth, impedance};
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Link, urdf};
+use kinetoscope::prelude::*;
+
+const ANGLE: f64 = 10.0;
+
+fn creep(impratio: f64) -> f64 {
+    let mut lab = Lab::new(SimulationManagerCfg { impratio, ..slope(ANGLE.to_radians(), 1.0) });
+    let robot = lab.free(&urdf(&[Link::brick("block", 1.2, [0.4, 0.4, 0.02])], &[]), [0.0, 0.0, 0.01]);
+    lab.run(2.0);
+    lab.root(robot).velocity.x
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "v = (1 - d)/d g sin θ/4 dmax tc/(2 impratio)", |m| {
+        let (sin, cos) = ANGLE.to_radians().sin_cos();
+        let d = impedance(depth(G * cos / 4.0));
+        let v = (1.0 - d) / d * G * sin / 4.0 * LARGEST * TIME / 2.0;
+        for impratio in [1.0, 10.0, 100.0] {
+            let quantity = format!("creep on 10°, impratio {impratio}");
+            let tipping = (0.01 * v / impratio, "1 % of the load goes to the lower corners");
+            m.row(&quantity, "m/s", v / impratio, creep(impratio), tipping);
+            m.control(&quantity, "with an impratio twice as large", creep(2.0 * impratio));
+        }
+    });
+}

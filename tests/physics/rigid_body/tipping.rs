@@ -1,0 +1,30 @@
+//! A block on a slope that it cannot slide on stands while the weight is above its foot, tan θ < w/h, and tips over beyond:
+//! 5 % below and above. When it has tipped it lies on its long side, a quarter turn on.
+//!
+//! Tolerance: standing, the lower edge sinks in deeper than the upper one, at most by the depth under all of the weight,
+//! 1 mm on 0.2 m; lying, as little. 0.02 rad.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Link, urdf};
+use std::f64::consts::FRAC_PI_2;
+
+/// The turn after 4 s \[rad\].
+fn turned(part: f64, height: f64) -> f64 {
+    let mut lab = Lab::new(slope((part * 0.5_f64).atan(), 3.0));
+    let block = Link::brick("block", 2.0, [0.2, 0.3, height]);
+    let robot = lab.free(&urdf(&[block], &[]), [0.0, 0.0, height / 2.0]);
+    lab.run(4.0);
+    lab.root(robot).rotation.angle()
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "tan θ < w/h: stands; tan θ > w/h: tips by π/2", |m| {
+        let edges = (0.02, "edges sink in by 1 mm");
+        m.row("turn at 0.95 w/h", "rad", 0.0, turned(0.95, 0.4), edges);
+        m.row("turn at 1.05 w/h", "rad", FRAC_PI_2, turned(1.05, 0.4), edges);
+        m.control("turn at 0.95 w/h", "with a block 10 % higher", turned(0.95, 0.44));
+        m.control("turn at 1.05 w/h", "with a block 10 % lower", turned(1.05, 0.36));
+    });
+}

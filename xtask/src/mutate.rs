@@ -1,0 +1,165 @@
+//! `cargo xtask mutate`: breaks the code in one place, runs the tests that should notice, and so for every mutation of the
+//! list (`mutations.rs`). All are done in a copy of the tree below the target folder.
+
+use crate::mutations::{MUTATIONS, Mutation};
+use crate::run::{Failure, Outcome, Repo, no_findings};
+use crate::setup::{self, Line, Wanted};
+use crate::source_check::files_below;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct MutateArgs {
+    /// Only mutations whose name contains this
+    filter: Option<String>,
+}
+
+/// What the tests said of a mutation.
+#[derive(Debug, PartialEq, Eq)]
+enum Verdict {
+    /// Names of the tests that failed.
+    Caught(Vec<String>),
+    Survived,
+    /// The changed code is no code, or no test ran.
+    NotTried(String),
+}
+
+pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
+    check(&repo.root)?;
+    let ready = setup::prepare(repo, Wanted { line: Some(Line::Debian), extras: &[] })?;
+    let folder = repo.target.join("mutate");
+    let tree = folder.join("tree");
+    copy(&repo.root, &tree)?;
+    let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| mutation.name.contains(filter));
+    let (mut findings, mut table) = (Vec::new(), String::new());
+    for mutation in MUTATIONS.iter().filter(chosen) {
+        let path = tree.join(mutation.file);
+        let good = read(&path)?;
+        write(&path, &good.replace(mutation.search, mutation.replacement))?;
+        let (binary, tests) = mutation.tests;
+        let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
+        let tested =
+            cargo.args(["test", "--package", "kinetoscope", "--test", binary, "--"]).args(tests).success_and_output();
+        write(&path, &good)?;
+        let (passed, said) = tested?;
+        let verdict = verdict(passed, &said);
+        let line = match &verdict {
+            Verdict::Caught(by) => format!("caught   {}: {}", mutation.name, by.join(", ")),
+            Verdict::Survived => format!("SURVIVED {} ({})", mutation.name, mutation.file),
+            Verdict::NotTried(why) => format!("ERROR    {} ({}): {why}", mutation.name, mutation.file),
+        };
+        println!("{line}");
+        table.push_str(&format!("{line}\n"));
+        if !matches!(verdict, Verdict::Caught(_)) {
+            findings.push(line);
+        }
+    }
+    if table.is_empty() {
+        return Err(Failure::new("no mutation has such a name"));
+    }
+    println!("\n{table}");
+    no_findings("mutations that no test noticed", &findings)
+}
+
+/// Every mutation still finds its place: the search text stands in the file exactly once.
+pub(crate) fn check(root: &Path) -> Outcome {
+    let mut findings = Vec::new();
+    for Mutation { name, file, search, replacement, .. } in MUTATIONS {
+        let times = read(&root.join(file))?.matches(search).count();
+        if times != 1 || search == replacement {
+            findings.push(format!("{name}: its text stands {times} times in {file}, not once: {search:?}"));
+        }
+    }
+    no_findings("mutations that do not fit the code (xtask/src/mutations.rs)", &findings)
+}
+
+fn verdict(passed: bool, said: &str) -> Verdict {
+    let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_string());
+    let caught: Vec<String> = said.lines().filter_map(failed).collect();
+    // A test binary that dies says no more than which test it was in.
+    if !caught.is_empty() {
+        return Verdict::Caught(caught);
+    }
+    if !passed {
+        return Verdict::NotTried("no test failed: the change does not compile, or the tests died".into());
+    }
+    if said.lines().any(|line| line.starts_with("running ") && !line.starts_with("running 0 ")) {
+        Verdict::Survived
+    } else {
+        Verdict::NotTried("no test has such a name".into())
+    }
+}
+
+/// Brings `to` up to date with the files below `from`; files that are the same keep their time, so that cargo builds only
+/// what changed.
+fn copy(from: &Path, to: &Path) -> Outcome {
+    let wanted = files_below(from);
+    for file in &wanted {
+        let (source, copy): (PathBuf, PathBuf) = (from.join(file), to.join(file));
+        let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", copy.display()));
+        let bytes = fs::read(&source).map_err(fail)?;
+        if fs::read(&copy).is_ok_and(|old| old == bytes) {
+            continue;
+        }
+        if let Some(folder) = copy.parent() {
+            fs::create_dir_all(folder).map_err(fail)?;
+        }
+        fs::write(&copy, bytes).map_err(fail)?;
+    }
+    for file in files_below(to).into_iter().filter(|file| wanted.binary_search(file).is_err()) {
+        let path = to.join(file);
+        fs::remove_file(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Outcome<String> {
+    fs::read_to_string(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+}
+
+fn write(path: &Path, text: &str) -> Outcome {
+    fs::write(path, text).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_enough_and_each_fits() {
+        assert!(MUTATIONS.len() >= 25);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        check(&root).expect("every text stands once");
+        for (k, mutation) in MUTATIONS.iter().enumerate() {
+            assert!(MUTATIONS[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
+            assert!(!mutation.tests.1.is_empty(), "{}", mutation.name);
+        }
+    }
+
+    #[test]
+    fn what_tests_say_is_understood() {
+        let failed = "running 2 tests\ntest a::holds ... FAILED\ntest b::holds ... ok\n";
+        assert_eq!(verdict(false, failed), Verdict::Caught(vec!["a::holds".into()]));
+        assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n"), Verdict::Survived);
+        assert!(matches!(verdict(false, ""), Verdict::NotTried(_)));
+        assert!(matches!(verdict(true, "running 0 tests\n"), Verdict::NotTried(_)));
+    }
+
+    #[test]
+    fn a_copy_follows_the_tree() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let [from, to] = ["from", "to"].map(|name| dir.path().join(name));
+        fs::create_dir_all(from.join("a")).expect("writable");
+        for (file, text) in [("a/b.rs", "1"), ("c.rs", "2")] {
+            fs::write(from.join(file), text).expect("writable");
+        }
+        copy(&from, &to).expect("copied");
+        let time = || fs::metadata(to.join("a/b.rs")).and_then(|data| data.modified()).expect("a file");
+        let before = time();
+        fs::remove_file(from.join("c.rs")).expect("there");
+        fs::write(from.join("d.rs"), "3").expect("writable");
+        copy(&from, &to).expect("copied");
+        assert_eq!(files_below(&to), ["a/b.rs", "d.rs"]);
+        assert_eq!(time(), before);
+    }
+}

@@ -1,0 +1,418 @@
+//! The page of numbers: what the laws of physics measured, as tables, and whether a page still says the truth.
+
+use crate::plot::{Plot, Series};
+use crate::run::{Failure, Outcome};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Groups in the order of the page: folder of the tests, and heading.
+const GROUPS: [(&str, &str); 5] = [
+    ("rigid_body", "Rigid bodies"),
+    ("articulated", "Mechanisms"),
+    ("drives", "Drives"),
+    ("contacts", "Contacts and sensors"),
+    ("numerical", "Numerical promises"),
+];
+/// The part of its tolerance by which a number may differ between two machines, or two lines of MuJoCo, without a reason.
+const SAME: f64 = 0.1;
+/// Digits behind the first of the numbers on the page.
+const DIGITS: usize = 8;
+
+/// One number of a law on one MuJoCo.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) group: String,
+    pub(crate) law: String,
+    pub(crate) statement: String,
+    pub(crate) quantity: String,
+    pub(crate) unit: String,
+    pub(crate) expected: f64,
+    pub(crate) measured: f64,
+    pub(crate) tolerance: f64,
+    pub(crate) mujoco: String,
+    pub(crate) pass: bool,
+    /// Why the lines of MuJoCo differ, where the law says so.
+    pub(crate) lines_differ: Option<String>,
+}
+
+/// What one run measured.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Measured {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) controls: usize,
+    /// Names of the laws, their plots and the version.
+    pub(crate) plots: Vec<(String, Plot, String)>,
+}
+
+/// Reads the files that the tests wrote into `folder`, in the order of the page.
+pub(crate) fn read(folder: &Path) -> Outcome<Measured> {
+    let fail = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", folder.display()));
+    let mut laws = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| fail(&e))? {
+        let path = entry.map_err(|e| fail(&e))?.path();
+        let text = std::fs::read_to_string(&path).map_err(|e| fail(&e))?;
+        let law: Value = serde_json::from_str(&text).map_err(|e| fail(&e))?;
+        laws.push(law);
+    }
+    let order = |law: &Value| GROUPS.iter().position(|(group, _)| law["group"] == *group);
+    if let Some(law) = laws.iter().find(|law| order(law).is_none()) {
+        return Err(fail(&format!("a law of the unknown group {}", law["group"])));
+    }
+    laws.sort_by_key(|law| (order(law), law["name"].as_str().map(str::to_string)));
+    let mut measured = Measured::default();
+    for law in &laws {
+        add(&mut measured, law).ok_or_else(|| fail(&format!("not what a law writes: {law}")))?;
+    }
+    if measured.rows.is_empty() {
+        return Err(fail(&"no law wrote what it measured"));
+    }
+    Ok(measured)
+}
+
+fn add(to: &mut Measured, law: &Value) -> Option<()> {
+    let text = |value: &Value| value.as_str().map(str::to_string);
+    // JSON has no NaN: null is one.
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+    let (name, mujoco, measured) = (text(&law["name"])?, text(&law["mujoco"])?, &law["measured"]);
+    for row in measured["rows"].as_array()? {
+        to.rows.push(Row {
+            group: text(&law["group"])?,
+            law: name.clone(),
+            statement: text(&law["statement"])?,
+            quantity: text(&row["quantity"])?,
+            unit: text(&row["unit"])?,
+            expected: number(&row["expected"]),
+            measured: number(&row["measured"]),
+            tolerance: number(&row["tolerance"]),
+            mujoco: mujoco.clone(),
+            pass: row["pass"].as_bool()?,
+            lines_differ: text(&measured["lines_differ"]),
+        });
+    }
+    to.controls += measured["controls"].as_array()?.len();
+    for plot in measured["plots"].as_array()? {
+        let mut series = Vec::new();
+        for curve in plot["series"].as_array()? {
+            let points = curve["points"].as_array()?.iter().map(|p| [number(&p[0]), number(&p[1])]).collect();
+            series.push(Series { name: text(&curve["name"])?, points });
+        }
+        let axes = [text(&plot["x"])?, text(&plot["y"])?];
+        let plot = Plot { title: text(&plot["title"])?, axes, log: plot["log"].as_bool()?, series };
+        to.plots.push((name.clone(), plot, mujoco.clone()));
+    }
+    Some(())
+}
+
+/// The plots of all runs by the name of their file, which is that of the law; curves that differ between lines of MuJoCo are drawn for each.
+pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
+    let mut found: Vec<(String, Plot)> = Vec::new();
+    for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
+        let with_version = |series: &Series| Series { name: format!("{}, {mujoco}", series.name), ..series.clone() };
+        match found.iter_mut().find(|(_, other)| other.title == plot.title) {
+            None => {
+                let others = found.iter().filter(|(name, _)| name.split('-').next() == Some(law)).count();
+                let name = if others == 0 { law.clone() } else { format!("{law}-{}", others + 1) };
+                found.push((name, plot.clone()));
+            }
+            Some((_, other)) => {
+                let new: Vec<Series> = plot
+                    .series
+                    .iter()
+                    .filter(|s| !other.series.iter().any(|o| looks_as(o, s)))
+                    .map(with_version)
+                    .collect();
+                other.series.extend(new);
+            }
+        }
+    }
+    found
+}
+
+fn looks_as(a: &Series, b: &Series) -> bool {
+    let near = |x: f64, y: f64| (x - y).abs() <= 0.02 * x.abs().max(y.abs());
+    let pairs = || a.points.iter().zip(&b.points);
+    // Numbers that are rounding differ by anything.
+    let rounding = |y: f64| y.abs() < 1e-12;
+    a.name == b.name
+        && a.points.len() == b.points.len()
+        && pairs().all(|(p, q)| near(p[0], q[0]) && (near(p[1], q[1]) || rounding(p[1]) && rounding(q[1])))
+}
+
+/// The page.
+///
+/// # Errors
+/// The lines of MuJoCo differ and no law says why.
+pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
+    let rows: Vec<&Row> = runs.iter().flat_map(|run| &run.rows).collect();
+    let mut laws: Vec<(&str, &str)> = rows.iter().map(|row| (row.group.as_str(), row.law.as_str())).collect();
+    laws.sort_unstable();
+    laws.dedup();
+    let mut versions: Vec<&str> = Vec::new();
+    for row in &rows {
+        if !versions.contains(&row.mujoco.as_str()) {
+            versions.push(&row.mujoco);
+        }
+    }
+    let failed = rows.iter().filter(|row| !row.pass).count();
+    let controls: usize = runs.iter().map(|run| run.controls).sum();
+    let mut out = format!(
+        "# Laws of physics\n\nWritten by `cargo xtask physics-report`; do not edit. {} laws, each with a closed form or a \
+         conservation law, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls} \
+         controls, in which the effect is taken away, miss by more than the tolerance.\n\nThe derivation of a law, and where its \
+         tolerance comes from, stand at the head of its file. A number is as true on another machine if it differs by less than a \
+         tenth of its tolerance; that is what CI asks of this page.\n",
+        laws.len(),
+        versions.join(" and "),
+        rows.len(),
+        if failed == 0 { "all of which hold".to_string() } else { format!("**{failed} of which FAIL**") },
+    );
+    for (group, heading) in GROUPS {
+        if rows.iter().all(|row| row.group != group) {
+            continue;
+        }
+        let _ = write!(
+            out,
+            "\n## {heading}\n\n| test | law | quantity | expected | measured | error | tolerance | MuJoCo | |\n\
+             |---|---|---|--:|--:|--:|--:|---|---|\n"
+        );
+        // Lines of MuJoCo next to each other: rows in the order of the first run, then what only another has.
+        let mut done: Vec<(&str, &str)> = Vec::new();
+        for row in rows.iter().filter(|row| row.group == group) {
+            if done.contains(&(row.law.as_str(), row.quantity.as_str())) {
+                continue;
+            }
+            done.push((row.law.as_str(), row.quantity.as_str()));
+            for row in rows.iter().filter(|other| is_same(other, row)) {
+                let _ = writeln!(out, "{}", table_row(row));
+            }
+        }
+    }
+    out.push_str(&differences(&rows, &versions)?);
+    let plots = plots(runs);
+    if !plots.is_empty() {
+        out.push_str("\n## Pictures\n");
+        for (law, plot) in plots {
+            let _ = write!(out, "\n![{}](physics/{law}.svg)\n", plot.title);
+        }
+    }
+    Ok(out)
+}
+
+fn is_same(a: &Row, b: &Row) -> bool {
+    (&a.group, &a.law, &a.quantity) == (&b.group, &b.law, &b.quantity)
+}
+
+fn table_row(row: &Row) -> String {
+    let Row { group, law, statement, quantity, unit, expected, measured, tolerance, mujoco, pass, .. } = row;
+    let quantity = if unit.is_empty() { quantity.clone() } else { format!("{quantity} [{unit}]") };
+    let cells = [
+        format!("[{law}](../tests/physics/{group}/{law}.rs)"),
+        statement.clone(),
+        quantity,
+        number(*expected),
+        number(*measured),
+        format!("{:.1e}", measured - expected),
+        format!("{tolerance:.1e}"),
+        mujoco.clone(),
+        (if *pass { "pass" } else { "**FAIL**" }).to_string(),
+    ];
+    format!("| {} |", cells.map(|cell| cell.replace('|', "\\|")).join(" | "))
+}
+
+/// A number that reads well, with nine digits.
+fn number(x: f64) -> String {
+    let plain = x == 0.0 || (1e-4..1e7).contains(&x.abs());
+    if !plain {
+        return format!("{x:.DIGITS$e}");
+    }
+    let before = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
+    let digits = usize::try_from(DIGITS as i32 - before).unwrap_or(0);
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
+}
+
+/// The table of what the lines of MuJoCo do not have in common.
+fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
+    let [first, second] = versions else { return Ok(String::new()) };
+    let mut out = format!(
+        "\n## Where {first} and {second} differ\n\nAll other numbers of both agree within a tenth of their tolerances.\n\n\
+         | test | quantity | {first} | {second} | why |\n|---|---|--:|--:|---|\n"
+    );
+    let (mut unexplained, mut some) = (Vec::new(), false);
+    for row in rows.iter().filter(|row| row.mujoco == **first) {
+        let Some(other) = rows.iter().find(|other| other.mujoco == **second && is_same(other, row)) else {
+            some = true;
+            let why = row.lines_differ.as_deref().unwrap_or("not measured there");
+            let _ = writeln!(out, "| {} | {} | {} | - | {why} |", row.law, row.quantity, number(row.measured));
+            continue;
+        };
+        let most = row.tolerance.min(other.tolerance) * SAME;
+        if (row.measured - other.measured).abs() <= most {
+            continue;
+        }
+        some = true;
+        match &row.lines_differ {
+            None => unexplained.push(format!(
+                "{} ({}): {} and {}, with a tolerance of {:.1e}",
+                row.law,
+                row.quantity,
+                number(row.measured),
+                number(other.measured),
+                row.tolerance
+            )),
+            Some(why) => {
+                let (law, quantity) = (&row.law, &row.quantity);
+                let (a, b) = (number(row.measured), number(other.measured));
+                let _ = writeln!(out, "| {law} | {quantity} | {a} | {b} | {} |", why.replace('|', "\\|"));
+            }
+        }
+    }
+    for row in rows.iter().filter(|row| row.mujoco == **second) {
+        if !rows.iter().any(|other| other.mujoco == **first && is_same(other, row)) {
+            some = true;
+            let why = row.lines_differ.as_deref().unwrap_or("not measured there");
+            let _ = writeln!(out, "| {} | {} | - | {} | {why} |", row.law, row.quantity, number(row.measured));
+        }
+    }
+    crate::run::no_findings(
+        "numbers differ between the lines of MuJoCo by more than a tenth of the tolerance, and the law does not say why \
+         (`lines_differ`)",
+        &unexplained,
+    )?;
+    Ok(if some { out } else { String::new() })
+}
+
+/// What a page says that was not measured: numbers that changed by more than a tenth of their tolerance, rows that are
+/// missing or too many.
+pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
+    let mut said: Vec<Vec<String>> = page.lines().filter_map(cells).filter(|cells| cells.len() == 9).collect();
+    said.retain(|cells| cells[0].starts_with('['));
+    let mut findings = Vec::new();
+    for row in runs.iter().flat_map(|run| &run.rows) {
+        // As it would be written: what is the same text is the same row.
+        let new = cells(&table_row(row)).unwrap_or_default();
+        let name = format!("{} ({}, MuJoCo {})", row.law, row.quantity, row.mujoco);
+        let key = |cells: &[String]| [0, 2, 7].map(|k| cells[k].clone());
+        let Some(at) = said.iter().position(|old| key(old) == key(&new)) else {
+            findings.push(format!("{name} is not on the page"));
+            continue;
+        };
+        let old = said.swap_remove(at);
+        let parsed = |cell: &str| cell.parse::<f64>().unwrap_or(f64::NAN);
+        for (k, what) in [(3, "expected"), (4, "measured")] {
+            let (was, is) = (parsed(&old[k]), parsed(&new[k]));
+            let most = SAME * row.tolerance + 10.0_f64.powi(1 - DIGITS as i32) * is.abs();
+            // Not `>`: a NaN is no number to agree with.
+            let agrees = (was - is).abs() <= most;
+            if !agrees {
+                findings.push(format!("{name}: {what} {} on the page, {} now", old[k], new[k]));
+            }
+        }
+        for k in [1, 6, 8] {
+            if old[k] != new[k] {
+                findings.push(format!("{name}: `{}` on the page, `{}` now", old[k], new[k]));
+            }
+        }
+    }
+    findings.extend(said.iter().map(|row| format!("{} ({}, MuJoCo {}) was not measured", row[0], row[2], row[7])));
+    findings
+}
+
+/// The cells of a line of a table.
+fn cells(line: &str) -> Option<Vec<String>> {
+    let inner = line.strip_prefix("| ")?.strip_suffix(" |")?.replace("\\|", "\u{1}");
+    Some(inner.split(" | ").map(|cell| cell.replace('\u{1}', "|")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(mujoco: &str, measured: f64) -> Row {
+        Row {
+            group: "rigid_body".into(),
+            law: "free_fall".into(),
+            statement: "|z| = g t²/2".into(),
+            quantity: "height".into(),
+            unit: "m".into(),
+            expected: 1.095,
+            measured,
+            tolerance: 1e-6,
+            mujoco: mujoco.into(),
+            pass: true,
+            lines_differ: None,
+        }
+    }
+
+    fn run(mujoco: &str, measured: f64) -> Measured {
+        Measured { rows: vec![row(mujoco, measured)], controls: 1, plots: Vec::new() }
+    }
+
+    #[test]
+    fn a_page_has_a_row_for_each_version_and_is_true_of_what_it_was_made_from() {
+        let runs = [run("2.2.2", 1.095), run("4.0.0", 1.095_000_01)];
+        let page = page(&runs).expect("they agree");
+        assert!(page.contains("| [free_fall](../tests/physics/rigid_body/free_fall.rs) | \\|z\\| = g t²/2 | height [m] | 1.095 | 1.095 | 0.0e0 | 1.0e-6 | 2.2.2 | pass |"), "{page}");
+        assert_eq!(page.matches("| pass |").count(), 2);
+        assert_eq!(untrue(&page, &runs), Vec::<String>::new());
+        assert!(page.contains("1 laws") && !page.contains("FAIL") && !page.contains("differ\n"), "{page}");
+    }
+
+    #[test]
+    fn what_changed_is_untrue() {
+        let page = page(&[run("2.2.2", 1.095)]).expect("one line");
+        assert_eq!(untrue(&page, &[run("2.2.2", 1.095 + 5e-8)]), Vec::<String>::new());
+        let found = untrue(&page, &[run("2.2.2", 1.095 + 3e-7)]);
+        assert!(found.len() == 1 && found[0].contains("1.0950003 now"), "{found:?}");
+        assert_eq!(untrue(&page, &[run("4.0.0", 1.095)]).len(), 2);
+        let mut failed = run("2.2.2", 1.095);
+        failed.rows[0].pass = false;
+        assert!(untrue(&page, &[failed])[0].contains("FAIL"));
+        let mut other = run("2.2.2", 1.095);
+        other.rows[0].statement = "z = 0".into();
+        assert_eq!(untrue(&page, &[other]).len(), 1);
+    }
+
+    #[test]
+    fn a_difference_of_the_lines_needs_a_reason() {
+        let mut runs = [run("2.2.2", 1.095), run("4.0.0", 1.095 + 5e-7)];
+        let failure = page(&runs).expect_err("no reason");
+        assert!(failure.message.contains("free_fall"), "{failure}");
+        for run in &mut runs {
+            run.rows[0].lines_differ = Some("it was mended".into());
+        }
+        assert!(page(&runs).expect("a reason").contains("| it was mended |"));
+    }
+
+    #[test]
+    fn numbers_read_well() {
+        for (x, text) in [(0.0, "0"), (1.095, "1.095"), (-0.25, "-0.25"), (1e-9, "1.00000000e-9"), (123456.0, "123456")]
+        {
+            assert_eq!(number(x), text);
+        }
+        assert_eq!(number(2.367_842_123_456), "2.36784212");
+    }
+
+    #[test]
+    fn curves_that_differ_are_drawn_for_each_line() {
+        let plot = |y: f64| {
+            let series = vec![Series { name: "RK4".into(), points: vec![[1.0, y], [2.0, 1.0]] }];
+            Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series }
+        };
+        let of =
+            |mujoco: &str, y| Measured { plots: vec![("law".into(), plot(y), mujoco.into())], ..Measured::default() };
+        assert_eq!(plots(&[of("2.2.2", 1.0), of("4.0.0", 1.001)])[0].1.series.len(), 1);
+        let both = plots(&[of("2.2.2", 1.0), of("4.0.0", 1.5)]);
+        assert_eq!(both[0].1.series[1].name, "RK4, 4.0.0");
+    }
+
+    #[test]
+    fn files_of_unknown_groups_and_empty_folders_are_errors() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        assert!(read(dir.path()).is_err());
+        std::fs::write(dir.path().join("x.json"), "{\"group\": \"cooking\"}").expect("writable");
+        assert!(read(dir.path()).expect_err("unknown").message.contains("cooking"));
+        assert!(read(&dir.path().join("none")).is_err());
+    }
+}

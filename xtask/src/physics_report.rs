@@ -1,0 +1,114 @@
+//! `cargo xtask physics-report`: the laws of physics on both lines of MuJoCo, and the page with what they measured.
+
+use crate::physics_page::{self, Measured};
+use crate::plot;
+use crate::run::{Failure, Outcome, Repo, no_findings};
+use crate::setup::{self, Line, Wanted};
+use std::fs;
+use std::path::PathBuf;
+
+const PAGE: &str = "docs/physics.md";
+/// The plots, one file per law.
+const PLOTS: &str = "docs/physics";
+/// Names a folder to the tests, into which each law writes what it measured.
+pub(crate) const VARIABLE: &str = "KINETOSCOPE_PHYSICS_ROWS";
+const LINES: [Line; 2] = [Line::Debian, Line::Wheel];
+/// How far a curve may move before a picture is no longer that of these numbers \[pixels\].
+const PIXELS: f64 = 1.0;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PhysicsReportArgs {
+    /// Measure and compare with the page; write nothing
+    #[arg(long)]
+    pub(crate) check: bool,
+}
+
+/// Where the laws' rows of a line are, below the target folder.
+fn folder(repo: &Repo, line: Line) -> PathBuf {
+    let name = match line {
+        Line::Debian => "2",
+        Line::Wheel => "4",
+    };
+    repo.target.join("physics-rows").join(name)
+}
+
+/// An empty folder for the rows of a line, so that none of an earlier run counts.
+pub(crate) fn fresh_folder(repo: &Repo, line: Line) -> Outcome<PathBuf> {
+    let folder = folder(repo, line);
+    let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", folder.display()));
+    if folder.exists() {
+        fs::remove_dir_all(&folder).map_err(fail)?;
+    }
+    fs::create_dir_all(&folder).map_err(fail)?;
+    Ok(folder)
+}
+
+/// Removes the rows of earlier runs.
+pub(crate) fn forget_rows(repo: &Repo) -> Outcome {
+    LINES.iter().try_for_each(|&line| fresh_folder(repo, line).map(|_| ()))
+}
+
+pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
+    let mut failed = Ok(());
+    for line in LINES {
+        let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
+        let rows = fresh_folder(repo, line)?;
+        let tests = ready.cargo().env(VARIABLE, rows).args(["test", "--package", "kinetoscope", "--test", "physics"]);
+        // What a law that fails measured is on the page, too.
+        failed = failed.and(tests.run());
+    }
+    let runs = measured(repo)?;
+    if args.check {
+        compare(repo, &runs)?;
+    } else {
+        write(repo, &runs)?;
+        println!("written to {PAGE} and {PLOTS}");
+    }
+    failed
+}
+
+/// Compares the page with the rows that the tests of both lines wrote while they ran ([`fresh_folder`]).
+pub(crate) fn check_rows(repo: &Repo) -> Outcome {
+    compare(repo, &measured(repo)?)
+}
+
+/// Whether both lines have written rows.
+pub(crate) fn has_rows(repo: &Repo) -> bool {
+    LINES.iter().all(|&line| fs::read_dir(folder(repo, line)).is_ok_and(|mut files| files.next().is_some()))
+}
+
+fn measured(repo: &Repo) -> Outcome<Vec<Measured>> {
+    LINES.iter().map(|&line| physics_page::read(&folder(repo, line))).collect()
+}
+
+fn pictures(runs: &[Measured]) -> Vec<(String, String)> {
+    physics_page::plots(runs).into_iter().map(|(law, plot)| (format!("{law}.svg"), plot::svg(&plot))).collect()
+}
+
+fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
+    let page = physics_page::page(runs)?;
+    let plots = repo.root.join(PLOTS);
+    let fail = |e: std::io::Error| Failure::new(format!("{PLOTS}: {e}"));
+    if plots.exists() {
+        fs::remove_dir_all(&plots).map_err(fail)?;
+    }
+    fs::create_dir_all(&plots).map_err(fail)?;
+    for (name, text) in pictures(runs) {
+        fs::write(plots.join(name), text).map_err(fail)?;
+    }
+    fs::write(repo.root.join(PAGE), page).map_err(|e| Failure::new(format!("{PAGE}: {e}")))
+}
+
+fn compare(repo: &Repo, runs: &[Measured]) -> Outcome {
+    // Fails where the lines differ without a reason.
+    physics_page::page(runs)?;
+    let mut findings = physics_page::untrue(&repo.read(PAGE)?, runs);
+    for (name, text) in pictures(runs) {
+        match repo.read(&format!("{PLOTS}/{name}")) {
+            Ok(old) if plot::agree(&old, &text, PIXELS) => {}
+            Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves")),
+            Err(_) => findings.push(format!("{PLOTS}/{name} is not there")),
+        }
+    }
+    no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
+}
