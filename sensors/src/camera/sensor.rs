@@ -45,6 +45,8 @@ pub struct Camera {
     depth_miss: DepthMiss,
     lazy: bool,
     phases: Phases,
+    /// Physics step \[s\].
+    dt: f64,
     captures: Captures,
     frame_counts: Array1<u64>,
     /// Rows that are due, between updates without meaning: its memory is kept.
@@ -208,6 +210,7 @@ impl Camera {
             depth_miss: cfg.depth_miss,
             lazy: cfg.lazy,
             phases: schedule.phases(rows),
+            dt: context.dt,
             captures,
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
@@ -588,7 +591,8 @@ impl fmt::Display for Camera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Camera")?;
         writeln!(f, "  environments       : {}", self.env_ids.len())?;
-        writeln!(f, "  update period steps: {}", self.phases.schedule().period_steps())?;
+        let period = self.phases.schedule().period_steps() as f64 * self.dt;
+        writeln!(f, "  update period (s)  : {period}")?;
         writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
         write!(f, "  channels           : {}", self.channels.names().join(", "))
     }
