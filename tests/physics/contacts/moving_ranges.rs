@@ -1,7 +1,7 @@
 //! Ranges to shapes in motion. A ray along x at the height b over the centre of a ball of radius R that comes along x
-//! measures x(t) - √(R² - b²), x(t) = D - v t. One to the axis of a brick that turns with ω about it, at D, measures D
-//! - a/(2 cos φ), φ being the turn from the face that looks at it: within 45° of ω t. One to a rod across, a capsule,
-//! that turns in a plane around D with its end towards the ray measures D - l/2 - R at ω t = 0 and D - R at a quarter.
+//! measures x(t) - √(R² - b²), x(t) = D - v t. One to the axis of a brick of edge a that turns with ω about it, at D,
+//! measures D - a/(2 cos φ), φ being ω t up to quarter turns, within 45°. One to a capsule that turns in a plane around
+//! D measures D - l/2 - R where its end looks at the ray, and D - R after a quarter turn.
 //!
 //! Tolerance: motions without forces are exact; what is seen has single precision in sizes and poses, 6e-8 of 3 m, a
 //! few of them: 1e-6 m.

@@ -4,9 +4,9 @@
 //! R²)))/a, with a = x² + y² + 1, b = (x, y, 1)·c.
 //!
 //! Tolerance: pixels are counted by their centres. Along the silhouette each is off by a part of one with any sign, the
-//! area by √(2 π r/12), r being 60 pixels; a dozen times that is taken, 4 √(2 π r), and of the middle 0.1 pixels. Depths
-//! have single precision, and a root in them. The nearest pixel is 0.71 pixels beside the axis, where the ball is (0.71/f)²
-//! D (D - R)/2R less near: 2e-5 m, five times.
+//! area by √(2 π r/12), r being 60 pixels; a dozen times that is taken, 4 √(2 π r), and of the middle 0.1 pixels.
+//! Depths have single precision, and a root in them. The nearest pixel is 0.71 pixels beside the axis, where the ball
+//! is (0.71/f)² D (D - R)/2R less near: 2e-5 m, five times.
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
@@ -20,8 +20,8 @@ const RADIUS: f64 = 0.3;
 /// A ball of this radius at this place of the optical frame.
 type Ball = ([f64; 3], f64);
 
-/// What the rasterizer or the rays show of a ball: area and middle, nearest depth, and the largest error of a pixel's depth
-/// against the closed form of `judge`, up to a metre.
+/// What the rasterizer or the rays show of a ball: area and middle, nearest depth, and the largest error of a pixel's
+/// depth against the closed form of the second ball, up to a metre.
 fn seen((at, radius): Ball, (center, r): Ball, rays: bool) -> (Seen, f64, f64) {
     let mut lab = Lab::new(weightless());
     // The optical frame (x right, y down, z forward) looks along the world's x.

@@ -5,10 +5,10 @@
 //! Gains of 1e4 N/m and 1e3 N s/m in steps of 10 ms are h d/M = 1000: taken at the start of the step they throw the
 //! fingers through the block. That is the control.
 //!
-//! Tolerance: forces at rest up to the solver's tolerance, 1e-4 of them. What sticks creeps (law `stick_creep`): v = (1
-//! - d)/d A m g/2 B⁻¹ with d >= 0.9, the inverse inertia A = 1/m + 1/3M of MuJoCo's estimate and B⁻¹ = dmax tc/(2
-//! impratio): less than 1 mm/s. Friction that slides is at its limit up to 1 % (law `sliding_block`): for the first 0.1
-//! s. What slides faster drives such light fingers off, in MuJoCo 2.2.2 from 0.7 m/s on.
+//! Tolerance: forces at rest up to the solver's tolerance, 1e-4 of them. What sticks creeps (law `stick_creep`): with
+//! 0.9 or more for d, the inverse inertia A = 1/m + 1/3M of MuJoCo's estimate and B⁻¹ = dmax tc/(2 impratio), its v = (1 - d)/d A
+//! m g/2 B⁻¹ is less than 1 mm/s. Friction that slides is at its limit up to 1 % (law `sliding_block`): for the first
+//! 0.1 s. In MuJoCo 2.2.2 what slides with 0.7 m/s or more drives such light fingers off.
 
 use crate::lab::*;
 use crate::law::law;
@@ -32,7 +32,7 @@ struct Pinch {
     acceleration: f64,
 }
 
-/// The block is carried from outside for 1.2 s, in which the fingers come to rest on it, and let go 0.3 s before the end.
+/// The block is carried from outside for 1.2 s, in which the fingers come to rest on it, and let go for 0.3 s.
 fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
     let cfg = SimulationManagerCfg { friction: [friction, 0.0, 0.0], ground: None, ..slope(0.0, friction) };
     let mut lab = Lab::new(with_dt(0.01, cfg));

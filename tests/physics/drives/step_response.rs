@@ -90,7 +90,7 @@ fn response(drive: DriveCfg) -> Response {
         }
         highest = highest.max(part);
         before = [t, part];
-        if (t / H).round() as u32 % 50 == 0 {
+        if ((t / H).round() as u32).is_multiple_of(50) {
             curve.push([t, part]);
         }
     });
