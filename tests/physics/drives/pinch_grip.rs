@@ -6,8 +6,8 @@
 //! fingers through the block. That is the control.
 //!
 //! Tolerance: forces at rest up to the solver's tolerance, 1e-4 of them. What sticks creeps (law `stick_creep`): with
-//! 0.9 or more for d, the inverse inertia A = 1/m + 1/3M of MuJoCo's estimate and B⁻¹ = dmax tc/(2 impratio), its v = (1 - d)/d A
-//! m g/2 B⁻¹ is less than 1 mm/s. Friction that slides is at its limit up to 1 % (law `sliding_block`): for the first
+//! 0.9 or more for d, the inverse inertia A = 1/m + 1/3M of MuJoCo's estimate and B⁻¹ = dmax tc/(2 impratio), its
+//! v = (1 - d)/d A m g/2 B⁻¹ is less than 1 mm/s. Friction that slides is at its limit up to 1 % (law `sliding_block`): for the first
 //! 0.1 s. In MuJoCo 2.2.2 what slides with 0.7 m/s or more drives such light fingers off.
 
 use crate::lab::*;
