@@ -1,7 +1,7 @@
 //! Single bodies, and several that touch.
 
 mod incline;
-mod soft_contact;
+pub(crate) mod soft_contact;
 
 mod asymmetric_top;
 mod billiards;

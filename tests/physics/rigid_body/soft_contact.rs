@@ -10,22 +10,22 @@
 //! Source: MuJoCo, "Computation: Solver parameters" (solref, solimp), with its defaults.
 
 /// Time constant of `solref` \[s\]; its damping ratio is 1.
-pub(super) const TIME: f64 = 0.02;
+pub(crate) const TIME: f64 = 0.02;
 /// Impedances at the surface and deep below, and the depth at which the second is reached \[m\].
 const IMPEDANCE: [f64; 2] = [0.9, 0.95];
 const WIDTH: f64 = 1e-3;
 /// The largest of the impedances: MuJoCo scales damping and stiffness by it.
-pub(super) const LARGEST: f64 = IMPEDANCE[1];
+pub(crate) const LARGEST: f64 = IMPEDANCE[1];
 
 /// `solimp` at `depth` \[m\]: two parabolas that meet in the middle.
-pub(super) fn impedance(depth: f64) -> f64 {
+pub(crate) fn impedance(depth: f64) -> f64 {
     let x = (depth / WIDTH).clamp(0.0, 1.0);
     let y = if x < 0.5 { 2.0 * x * x } else { 1.0 - 2.0 * (1.0 - x) * (1.0 - x) };
     IMPEDANCE[0] + y * (IMPEDANCE[1] - IMPEDANCE[0])
 }
 
 /// Depth \[m\] at rest under a contact force that would accelerate by `load` = A f \[m/s²\].
-pub(super) fn depth(load: f64) -> f64 {
+pub(crate) fn depth(load: f64) -> f64 {
     let of = |r: f64| {
         let d = impedance(r);
         (1.0 - d) / (d * d) * load * (LARGEST * TIME).powi(2)

@@ -1,0 +1,46 @@
+//! How a pinhole camera sees a ball: in closed form.
+//!
+//! A ball of radius R at (x, y, z) of the optical frame is inside of the cone that touches it. The plane of the picture
+//! cuts an ellipse from it, with s = z² - R²:
+//!
+//! ```text
+//! middle (c + f (x, y) z/s),   area π f² R² √(x² + y² + s)/s^(3/2)
+//! ```
+//!
+//! (Its half axes are f R/√s across and f R √(x² + y² + s)/s along the way to the principal point.)
+
+use kinetoscope::ndarray::{ArrayView2, ArrayView3, Axis};
+use std::f64::consts::PI;
+
+/// Size of the picture, its focal length and principal point \[pixels\].
+pub(super) const SIZE: [usize; 2] = [320, 240];
+pub(super) const FOCAL: f64 = 280.0;
+pub(super) const MIDDLE: [f64; 2] = [160.0, 120.0];
+
+/// What a picture shows of one thing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Area \[pixels\].
+    pub(super) area: f64,
+    /// Mean of the centres of its pixels \[pixels\].
+    pub(super) centroid: [f64; 2],
+}
+
+/// The closed form.
+pub(super) fn expected([x, y, z]: [f64; 3], radius: f64) -> Seen {
+    let s = z * z - radius * radius;
+    let area = PI * FOCAL * FOCAL * radius * radius * (x * x + y * y + s).sqrt() / s.powf(1.5);
+    Seen { area, centroid: [MIDDLE[0] + FOCAL * x * z / s, MIDDLE[1] + FOCAL * y * z / s] }
+}
+
+/// The pixels of a mask id.
+pub(super) fn found(mask: &ArrayView3<'_, i32>, id: i32) -> Seen {
+    let mask: ArrayView2<'_, i32> = mask.index_axis(Axis(0), 0);
+    let (mut area, mut sum) = (0.0, [0.0; 2]);
+    for ((v, u), _) in mask.indexed_iter().filter(|(_, found)| **found == id) {
+        area += 1.0;
+        sum[0] += u as f64 + 0.5;
+        sum[1] += v as f64 + 0.5;
+    }
+    Seen { area, centroid: sum.map(|x| x / area) }
+}

@@ -1,0 +1,56 @@
+//! Friction is against the motion, and as large in all directions: f = -μ N v/|v|. Elliptic cones do that. A pyramid
+//! with its edges along x and y is smaller between them: |f_x| + |f_y| <= μ N, which is μ N/√2 at 45°.
+//!
+//! Tolerance: of size and direction 1 %, as for `sliding_block`.
+
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+use kinetoscope::sim::Cone;
+use nalgebra::{Rotation2, Vector2};
+
+const FRICTION: f64 = 0.3;
+
+/// Friction along the motion and across it, in parts of the normal force, of a plate that slides at this angle to x.
+fn slid(angle: f64, cone: Cone) -> [f64; 2] {
+    let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, FRICTION) });
+    let plate = lab.object(RigidObjectCfg {
+        uid: "plate".into(),
+        shape: ObjectShape::Box { size: [0.4, 0.4, 0.02] },
+        mass: Some(1.5),
+        init_pose: Pose::translation(0.0, 0.0, 0.01),
+        ..RigidObjectCfg::default()
+    });
+    let id = lab.sim.add_sensor("contact", ContactSensorCfg::of("plate")).unwrap();
+    lab.run(0.5);
+    let way = Rotation2::new(angle) * Vector2::x();
+    lab.write_velocity(plate, [2.0 * way.x, 2.0 * way.y, 0.0], [0.0; 3]);
+    let (mut friction, mut normal) = (Vector2::zeros(), 0.0);
+    lab.watch(400, |_, sim| {
+        let sensor = sim.sensor(id).unwrap();
+        let force = sensor.friction_forces_w();
+        friction += Vector2::new(force[(0, 0, 0)], force[(0, 0, 1)]);
+        normal += sensor.net_forces_w()[(0, 0, 2)];
+    });
+    [friction.dot(&way) / normal, way.perp(&friction) / normal]
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "f = -μ N v/|v|", |m| {
+        let sliding = (0.01 * FRICTION, "1 %, as a sliding block");
+        for degrees in [0.0_f64, 22.5, 45.0, 70.0] {
+            let [along, across] = slid(degrees.to_radians(), Cone::Elliptic);
+            m.row(&format!("along the motion, {degrees}°"), "", -FRICTION, along, sliding);
+            m.row(&format!("across the motion, {degrees}°"), "", 0.0, across, sliding);
+        }
+        let [between, skewed] = slid(22.5_f64.to_radians(), Cone::Pyramidal);
+        m.control("along the motion, 22.5°", "with a pyramid", between);
+        m.control("across the motion, 22.5°", "with a pyramid", skewed);
+        let [edge, _] = slid(45.0_f64.to_radians(), Cone::Pyramidal);
+        m.control("along the motion, 45°", "with a pyramid", edge);
+        let least = -FRICTION / 2.0_f64.sqrt();
+        m.row("along the motion, 45°, pyramid", "", least, edge, (0.02 * FRICTION, "edges give way, 2 %"));
+        m.control("along the motion, 45°, pyramid", "with a cone", slid(45.0_f64.to_radians(), Cone::Elliptic)[0]);
+    });
+}

@@ -1,0 +1,47 @@
+//! An IMU in the bob of a pendulum feels the rod alone: along it g cos θ + ω² L, which with L ω² = 2 g (cos θ - cos θ₀)
+//! is g (3 cos θ - 2 cos θ₀): g (3 - 2 cos θ₀) at the bottom, g cos θ₀ at the ends; across it nothing. Half way up the
+//! rod it feels half of g sin θ across.
+//!
+//! Tolerance: MuJoCo's Euler keeps H - h/2 ω ∂V/∂θ, which is H at the bottom and at the ends: the reading is off by (ω₀
+//! h)², 1e-7, and by what a step misses of an extremum, as much; 1e-6 g.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+use kinetoscope::prelude::*;
+
+const LENGTH: f64 = 1.0;
+const START: f64 = 1.0;
+
+/// Along the rod: most and least; across it: most, of a swing from `angle` with the IMU `part` of the way down.
+fn felt(angle: f64, part: f64) -> [f64; 3] {
+    let mut lab = Lab::new(with_dt(1e-4, earth()));
+    let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);
+    let robot = lab.mechanism(&urdf(&[base(), Link::point("bob", 1.0, [0.0, 0.0, -LENGTH])], &[joint]));
+    let offset = Pose::translation(0.0, 0.0, -part * LENGTH);
+    let id = lab.sim.add_sensor("imu", ImuCfg { offset, ..ImuCfg::on("bob") }).unwrap();
+    lab.write_joints(robot, &[angle], &[0.0]);
+    let mut felt = [0.0_f64, f64::INFINITY, 0.0];
+    // A half swing takes 1.07 s from here.
+    lab.watch(11_500, |_, sim| {
+        let a = sim.sensor(id).unwrap().lin_acc_b();
+        felt = [felt[0].max(a[(0, 2)]), felt[1].min(a[(0, 2)]), felt[2].max(a[(0, 0)].abs())];
+    });
+    felt
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "along: g (3 cos θ - 2 cos θ₀); across: 0", |m| {
+        let (bob, middle, lower) = (felt(START, 1.0), felt(START, 0.5), felt(0.99 * START, 1.0));
+        let order = (1e-6 * G, "(ω₀ h)², and a step at the extremum");
+        m.row("along the rod at the bottom", "m/s²", G * (3.0 - 2.0 * START.cos()), bob[0], order);
+        m.row("along the rod at the ends", "m/s²", G * START.cos(), bob[1], order);
+        m.row("across the rod", "m/s²", 0.0, bob[2], order);
+        m.row("across the rod in the middle", "m/s²", 0.5 * G * START.sin(), middle[2], order);
+        m.control("along the rod at the bottom", "from 1 % lower", lower[0]);
+        m.control("along the rod at the ends", "from 1 % lower", lower[1]);
+        m.control("across the rod", "in the middle of the rod", middle[2]);
+        m.control("across the rod in the middle", "in the bob", bob[2]);
+    });
+}

@@ -1,0 +1,67 @@
+//! What a joint exerts on its load. One that hangs is held with m g, and what is off its axis with the torque r x m g.
+//! One that turns with ω at the radius r is pulled inwards with m ω² r; and where its axis is not principal the bearing
+//! turns the angular momentum with it: ω x (I ω), which about z is ω² (-I_yz, I_xz, 0). A drive is felt about the axis.
+//!
+//! Tolerance: rounding of accelerations over a step of 1 ms, times 3 kg: 1e-9.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+use kinetoscope::prelude::*;
+use nalgebra::Matrix3;
+
+const MASS: f64 = 3.0;
+const RADIUS: f64 = 0.25;
+const SPIN: f64 = 8.0;
+/// I_xz and I_yz \[kg m²\].
+const SKEW: [f64; 2] = [0.01, -0.006];
+
+/// Force and torque on the load, in its axes, after 0.2 s.
+fn carried(skew: [f64; 2], spin: f64, mass: f64, effort: f64) -> [f64; 6] {
+    let mut lab = Lab::new(earth());
+    let inertia = Matrix3::new(0.05, 0.0, skew[0], 0.0, 0.06, skew[1], skew[0], skew[1], 0.04);
+    let load = Link { inertia, ..Link::new("load", mass, [0.0; 3]).at([RADIUS, 0.0, 0.0]) };
+    let text = urdf(&[base(), load], &[Joint::hinge("turn", ["base", "load"], [0.0, 0.0, 1.0]).at([0.1, 0.2, 1.0])]);
+    let robot = lab.mechanism(&text);
+    let links = vec!["load".into()];
+    let id = lab.sim.add_sensor("wrench", JointWrenchCfg { links, ..JointWrenchCfg::default() }).unwrap();
+    lab.write_joints(robot, &[0.0], &[spin]);
+    lab.push_joints(robot, &[effort]);
+    lab.run(0.2);
+    let wrench = lab.sim.sensor(id).unwrap();
+    let (force, torque) = (wrench.forces(), wrench.torques());
+    std::array::from_fn(|k| if k < 3 { force[(0, 0, k)] } else { torque[(0, 0, k - 3)] })
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "F = m (a - g); T = r x F + I α + ω x (I ω)", |m| {
+        let names = ["force x", "force y", "force z", "torque x", "torque y", "torque z"];
+        let moment = 0.04 + MASS * RADIUS * RADIUS;
+        let effort = 0.5;
+        for (name, spin, effort) in [("at rest", 0.0, 0.0), ("turning", SPIN, 0.0), ("speeding up", SPIN, effort)] {
+            let alpha = effort / moment;
+            // What it reads is of the beginning of the last step.
+            let omega = spin + alpha * (0.2 - 1e-3);
+            let square = omega * omega;
+            let expected = [
+                -MASS * square * RADIUS,
+                MASS * alpha * RADIUS,
+                MASS * G,
+                SKEW[0] * alpha - SKEW[1] * square,
+                SKEW[1] * alpha + SKEW[0] * square - RADIUS * MASS * G,
+                effort,
+            ];
+            let found = carried(SKEW, spin, MASS, effort);
+            let other = carried([0.5 * SKEW[0], 0.5 * SKEW[1]], 0.9 * spin, 1.1 * MASS, 0.9 * effort);
+            for (k, axis) in names.into_iter().enumerate() {
+                let quantity = format!("{axis}, {name}");
+                let unit = if k < 3 { "N" } else { "N m" };
+                m.row(&quantity, unit, expected[k], found[k], (1e-9, "rounding of a velocity over 1 ms"));
+                if expected[k] != 0.0 {
+                    m.control(&quantity, "of another load", other[k]);
+                }
+            }
+        }
+    });
+}

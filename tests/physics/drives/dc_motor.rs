@@ -1,0 +1,54 @@
+//! A motor's effort falls with its speed: τ = s (1 - v/v₀) up to a limit L. Asked for all it has, a wheel under a load
+//! τ speeds up with (L + τ)/I until v₁ = v₀ (1 - L/s), and from there as v₀' - (v₀' - v₁) e^(-s t/(I v₀)) to v₀' = v₀
+//! (1 + τ/s). In steps of h the exponential is (1 - h s/(I v₀))^n.
+//!
+//! Tolerance: rounding of 1000 sums; of continuous time, which starts on the line up to a step late, h s/(I v₀) of the
+//! way: 0.2 %.
+
+use super::wheel::{MOMENT, Wheel};
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+
+const STALL: f64 = 1.0;
+const LIMIT: f64 = 0.6;
+const FREE: f64 = 10.0;
+
+/// Velocities after 20 ms, 1 s and 10 s.
+fn spun(stall: f64, load: f64) -> [f64; 3] {
+    let drive = DriveCfg {
+        actuators: vec![(".*".into(), DcMotor { saturation_effort: stall }.into())],
+        max_effort: Some(LIMIT.into()),
+        max_velocity: Some(FREE.into()),
+        ..implicit(0.0, 0.0)
+    };
+    let mut wheel = Wheel::new(weightless(), drive);
+    wheel.effort(100.0);
+    wheel.load(load);
+    [0.02, 0.98, 9.0].map(|seconds| {
+        wheel.lab.run(seconds);
+        wheel.v()
+    })
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "τ = min(s (1 - v/v₀), L)", |m| {
+        for (name, load) in [("without load", 0.0), ("under a load", -0.2)] {
+            let ([early, later, end], [_, other, _]) = (spun(STALL, load), spun(1.5 * STALL, load));
+            let of = |what: &str| format!("{what} {name}");
+            let rounding = (1e-10, "rounding of 1000 steps");
+            m.row(&of("velocity after 20 ms"), "rad/s", (LIMIT + load) / MOMENT * 0.02, early, rounding);
+            let (corner, free) = (FREE * (1.0 - LIMIT / STALL), FREE * (1.0 + load / STALL));
+            let reached = corner * MOMENT / (LIMIT + load);
+            let smooth = free - (free - corner) * (-(1.0 - reached) * STALL / (MOMENT * FREE)).exp();
+            let late = (1e-3 * STALL / (MOMENT * FREE) * free, "a step late on the line");
+            m.row(&of("velocity after 1 s"), "rad/s", smooth, later, late);
+            m.row(&of("velocity at the end"), "rad/s", free, end, (1e-7, "e^-19 of it is left"));
+            m.control(&of("velocity after 1 s"), "with a stall effort half as large again", other);
+            let [pulled, _, fast] = spun(STALL, load - 0.1);
+            m.control(&of("velocity after 20 ms"), "under 0.1 N m more", pulled);
+            m.control(&of("velocity at the end"), "under 0.1 N m more", fast);
+        }
+    });
+}

@@ -1,0 +1,62 @@
+//! Links whose gravity is compensated weigh nothing and have all their inertia: an arm without drives stays where it
+//! is, a drive has no error, and an effort τ in a joint at rest gives the same acceleration as without gravity. The
+//! rest of the world falls.
+//!
+//! Tolerance: the compensation is -m g in the centre of mass, gravity as MuJoCo sums it: they differ by rounding, 1e-15
+//! of 30 N m, which moves the arm by 1e-13 rad in a second.
+
+use crate::lab::*;
+use crate::law::law;
+use crate::urdf::{Joint, Link, base, urdf};
+use kinetoscope::prelude::*;
+
+const START: [f64; 2] = [0.4, -0.9];
+
+fn arm(cfg: SimulationManagerCfg, drive: DriveCfg, compensated: bool) -> (Lab, RobotId) {
+    let links = [
+        base(),
+        Link::brick("upper", 3.0, [0.5, 0.1, 0.1]).at([0.25, 0.0, 0.02]).ghost(),
+        Link::brick("lower", 1.5, [0.4, 0.06, 0.06]).at([0.2, 0.01, 0.0]).ghost(),
+    ];
+    let y = [0.0, 1.0, 0.0];
+    let elbow = Joint::hinge("elbow", ["upper", "lower"], y).at([0.5, 0.0, 0.0]);
+    let mut lab = Lab::new(cfg);
+    let init_qpos = vec![("shoulder".into(), START[0]), ("elbow".into(), START[1])];
+    let text = urdf(&links, &[Joint::hinge("shoulder", ["base", "upper"], y), elbow]);
+    let robot = lab.robot(&text, RobotCfg { drive, init_qpos, ..RobotCfg::default() });
+    lab.sim.robot_mut(robot).set_gravity_compensation(compensated, None, None).unwrap();
+    (lab, robot)
+}
+
+/// How far the undriven arm gets in a second, and how far a soft drive is off.
+fn moved(compensated: bool) -> [f64; 2] {
+    [passive(), implicit(200.0, 20.0)].map(|drive| {
+        let (mut lab, robot) = arm(earth(), drive, compensated);
+        lab.run(1.0);
+        lab.q(robot).iter().zip(START).map(|(q, start)| (q - start).abs()).fold(0.0, f64::max)
+    })
+}
+
+/// Acceleration of the elbow in the first step under 2 N m in it.
+fn pushed(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
+    let (mut lab, robot) = arm(cfg, passive(), compensated);
+    lab.push_joints(robot, &[0.0, 2.0]);
+    lab.run(1e-3);
+    lab.v(robot)[1] / 1e-3
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "Σ τ = τ_gravity(q) + Jᵀ (-m g) = 0", |m| {
+        let ([free, held], [fallen, sagged]) = (moved(true), moved(false));
+        let rounding = (1e-12, "rounding of 30 N m for a second, ten times");
+        m.row("motion of an arm without drives", "rad", 0.0, free, rounding);
+        m.row("error of its drives", "rad", 0.0, held, rounding);
+        m.control("motion of an arm without drives", "without compensation", fallen);
+        m.control("error of its drives", "without compensation", sagged);
+        let expected = pushed(weightless(), false);
+        let sums = (1e-10, "rounding of a velocity over 1 ms");
+        m.row("acceleration under an effort", "rad/s²", expected, pushed(earth(), true), sums);
+        m.control("acceleration under an effort", "without compensation", pushed(earth(), false));
+    });
+}

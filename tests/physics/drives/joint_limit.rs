@@ -1,0 +1,49 @@
+//! A joint ends at its limits. They are as soft as contacts are: an effort τ presses it beyond by the depth of
+//! [`soft_contact`](crate::rigid_body::soft_contact) under A τ = τ/I. A drive never presses: its target ends at the
+//! limit.
+//!
+//! Tolerance: the depth is a fixed point of arithmetic, of which e^-100 is left after 2 s: 1e-8 of it. The drive with
+//! k/d = 10/s comes as near as e^-30.
+
+use super::wheel::{MOMENT, Wheel, hinge};
+use crate::lab::*;
+use crate::law::law;
+use crate::rigid_body::soft_contact::depth;
+use crate::urdf::Joint;
+
+const RANGE: [f64; 2] = [-0.4, 0.7];
+const EFFORT: f64 = 0.6;
+
+fn ends(limited: bool) -> Joint {
+    if limited { hinge().limit(RANGE[0], RANGE[1], 1e3) } else { hinge() }
+}
+
+/// Where an effort ends, undriven.
+fn pressed(effort: f64, limited: bool) -> f64 {
+    let mut wheel = Wheel::on(weightless(), passive(), ends(limited), MOMENT);
+    wheel.effort(effort);
+    wheel.lab.run(3.0);
+    wheel.q()
+}
+
+/// Where a drive ends that is asked for 2 rad.
+fn driven(limited: bool) -> f64 {
+    let mut wheel = Wheel::on(weightless(), implicit(1e2, 1e1), ends(limited), MOMENT);
+    wheel.aim(2.0);
+    wheel.lab.run(3.0);
+    wheel.q()
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "q = limit + (1 - d)/d² τ/I dmax² tc²", |m| {
+        let beyond = depth(EFFORT / MOMENT);
+        let left = (1e-8 * beyond + 1e-15, "what is left of the motion");
+        m.row("pressed to the upper limit", "rad", RANGE[1] + beyond, pressed(EFFORT, true), left);
+        m.row("pressed to the lower limit", "rad", RANGE[0] - beyond, pressed(-EFFORT, true), left);
+        m.row("driven beyond the upper limit", "rad", RANGE[1], driven(true), (1e-11, "e^-30 of the way is left"));
+        m.control("pressed to the upper limit", "with 1 % more effort", pressed(1.01 * EFFORT, true));
+        m.control("pressed to the lower limit", "without limits", pressed(-EFFORT, false));
+        m.control("driven beyond the upper limit", "without limits", driven(false));
+    });
+}

@@ -1,0 +1,134 @@
+//! A step of the target q* of a drive within its limits: I q'' + d q' + k (q - q*) = 0, with ω² = k/I and z = d/(2 I ω)
+//! < 1:
+//!
+//! ```text
+//! e(t) = (q* - q)/q* = exp(-z ω t) (cos ω' t + z/√(1 - z²) sin ω' t),   ω' = ω √(1 - z²)
+//! first at the target: (π - acos z)/ω';   overshoot: exp(-π z/√(1 - z²));   under a load τ: q* - q = τ/k
+//! ```
+//!
+//! and 5 % of the step are left at the last time where |e| = 0.05, found by halving in the formula. A delay of the
+//! target shifts all times by it.
+//!
+//! Tolerance: steps of h make both laws an oscillator that is a little off. At the end of the step, k (q + h q') and d
+//! (q' + h q''/2) change z by (1 - z²) ω h/2 and ω by z ω h/2; at its start z and ω change by less than that, with d
+//! (q' - h q''/2). Times are off by ω h of themselves and two steps, the overshoot by d ln/dz of it: π ω h/√(1 - z²) of
+//! itself holds twice that. Of the static error exp(-15) is left.
+
+use super::wheel::{MOMENT, Wheel};
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+use std::f64::consts::PI;
+
+const H: f64 = 1e-4;
+const OMEGA: f64 = 20.0;
+const RATIO: f64 = 0.5;
+const AIM: f64 = 0.1;
+const LOAD: f64 = 0.3;
+const BAND: f64 = 0.05;
+const DELAY: u32 = 40;
+
+/// What a step of the target looks like: times \[s\], overshoot of the step, error under a load \[rad\].
+#[derive(Clone, Debug)]
+struct Response {
+    rise: f64,
+    overshoot: f64,
+    settling: f64,
+    error: f64,
+    curve: Vec<[f64; 2]>,
+}
+
+fn error(t: f64) -> f64 {
+    let root = (1.0 - RATIO * RATIO).sqrt();
+    let (sin, cos) = (OMEGA * root * t).sin_cos();
+    (-RATIO * OMEGA * t).exp() * (cos + RATIO / root * sin)
+}
+
+/// The last time at which 5 % of the step are left: after the first overshoot, before the undershoot, which is smaller.
+fn settling() -> f64 {
+    let half_period = PI / (OMEGA * (1.0 - RATIO * RATIO).sqrt());
+    assert!(error(half_period) < -BAND && error(2.0 * half_period) < BAND);
+    let [mut low, mut high] = [half_period, 2.0 * half_period];
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if error(middle) < -BAND { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// Gains are in the units of the mode; `stiffer` multiplies the stiffness.
+fn drive(mode: &str, stiffer: f64) -> DriveCfg {
+    let [k, d] = [stiffer * OMEGA * OMEGA, 2.0 * RATIO * OMEGA];
+    let model = |model: ActuatorModel| {
+        // As a motor: lines of torque and speed that are far away.
+        let [max_effort, max_velocity] = [Some(1e3.into()), Some(1e3.into())];
+        DriveCfg { actuators: vec![(".*".into(), model)], max_effort, max_velocity, ..implicit(MOMENT * k, MOMENT * d) }
+    };
+    match mode {
+        "implicit" => implicit(MOMENT * k, MOMENT * d),
+        "actuator" => explicit(MOMENT * k, MOMENT * d),
+        "acceleration" => DriveCfg { drive_type: DriveType::Acceleration, ..implicit(k, d) },
+        "ideal_pd" => model(IdealPd {}.into()),
+        "dc_motor" => model(DcMotor { saturation_effort: 1e4 }.into()),
+        _ => model(DelayedPd { delay: DELAY, max_delay: DELAY }.into()),
+    }
+}
+
+fn response(drive: DriveCfg) -> Response {
+    let mut wheel = Wheel::new(with_dt(H, weightless()), drive);
+    wheel.aim(AIM);
+    let (mut rise, mut highest, mut settling, mut before) = (f64::NAN, 0.0_f64, f64::NAN, [0.0, 0.0]);
+    let (robot, mut curve) = (wheel.robot, Vec::new());
+    wheel.lab.watch(7_500, |t, sim| {
+        let part = sim.robot(robot).get_qpos()[(0, 0)] / AIM;
+        let crossed = |level: f64| before[0] + (t - before[0]) * (level - before[1]) / (part - before[1]);
+        if rise.is_nan() && part >= 1.0 {
+            rise = crossed(1.0);
+        }
+        if part <= 1.0 + BAND && before[1] > 1.0 + BAND {
+            settling = crossed(1.0 + BAND);
+        }
+        highest = highest.max(part);
+        before = [t, part];
+        if ((t / H).round() as u32).is_multiple_of(50) {
+            curve.push([t, part]);
+        }
+    });
+    wheel.load(-LOAD);
+    wheel.lab.run(1.5);
+    Response { rise, overshoot: highest - 1.0, settling, error: AIM - wheel.q(), curve }
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "q = q* (1 - exp(-z ω t) (cos ω' t + z/√(1 - z²) sin ω' t)); q* - q = τ/k", |m| {
+        let root = (1.0 - RATIO * RATIO).sqrt();
+        let mut curves =
+            vec![("closed form", (0..150).map(|k| 5e-3 * f64::from(k)).map(|t| [t, 1.0 - error(t)]).collect())];
+        for mode in ["implicit", "actuator", "acceleration", "ideal_pd", "dc_motor", "delayed_pd"] {
+            let delay = if mode == "delayed_pd" { f64::from(DELAY) * H } else { 0.0 };
+            let (found, stiff) = (response(drive(mode, 1.0)), response(drive(mode, 2.0)));
+            let rise = (PI - RATIO.acos()) / (OMEGA * root) + delay;
+            let overshoot = (-PI * RATIO / root).exp();
+            let late = delay + settling();
+            let static_error = LOAD / (MOMENT * OMEGA * OMEGA);
+            let time = |t: f64| (OMEGA * H * t + 2.0 * H, "a first-order step shifts ω by z ω h/2, and time by h");
+            let of = |what: &str| format!("{what}, {mode}");
+            m.row(&of("first at the target"), "s", rise, found.rise, time(rise));
+            let shape = (PI * OMEGA * H / root * overshoot, "a first-order step shifts z by (1 - z²) ω h/2");
+            m.row(&of("overshoot of the step"), "", overshoot, found.overshoot, shape);
+            m.row(&of("within 5 %"), "s", late, found.settling, time(late));
+            let left = (1e-6 * static_error, "exp(-15) of the motion is left");
+            m.row(&of("error under a load"), "rad", static_error, found.error, left);
+            let without = "with twice the stiffness";
+            m.control(&of("first at the target"), without, stiff.rise);
+            m.control(&of("overshoot of the step"), without, stiff.overshoot);
+            m.control(&of("within 5 %"), without, stiff.settling);
+            m.control(&of("error under a load"), without, stiff.error);
+            if mode == "implicit" || mode == "delayed_pd" {
+                curves.push((mode, found.curve));
+            }
+        }
+        m.plot("A drive answers a step of its target", ["time [s]", "part of the step"], false, &curves);
+    });
+}

@@ -1,0 +1,68 @@
+//! A wheel on a motor, without gravity: what most laws of drives are measured on.
+
+use crate::lab::*;
+use crate::urdf::{Joint, Link, base, urdf};
+use kinetoscope::prelude::*;
+
+/// Its moment of inertia \[kg m²\].
+pub(super) const MOMENT: f64 = 0.05;
+
+/// One wheel in a simulation.
+#[derive(Debug)]
+pub(super) struct Wheel {
+    pub(super) lab: Lab,
+    pub(super) robot: RobotId,
+}
+
+/// A hinge about z from the base to the wheel.
+pub(super) fn hinge() -> Joint {
+    Joint::hinge("motor", ["base", "wheel"], [0.0, 0.0, 1.0])
+}
+
+impl Wheel {
+    /// A wheel on a joint without limits.
+    pub(super) fn new(cfg: SimulationManagerCfg, drive: DriveCfg) -> Self {
+        Self::on(cfg, drive, hinge(), MOMENT)
+    }
+
+    pub(super) fn on(cfg: SimulationManagerCfg, drive: DriveCfg, joint: Joint, moment: f64) -> Self {
+        let mut lab = Lab::new(cfg);
+        let text = urdf(&[base(), Link::new("wheel", 1.0, [moment; 3])], &[joint]);
+        let robot = lab.robot(&text, RobotCfg { drive, ..RobotCfg::default() });
+        Self { lab, robot }
+    }
+
+    /// Asks for a position \[rad\].
+    pub(super) fn aim(&mut self, position: f64) {
+        self.lab.sim.robot_mut(self.robot).set_qpos(&row(&[position]), None, None).unwrap();
+    }
+
+    /// Asks for a velocity \[rad/s\].
+    pub(super) fn speed(&mut self, velocity: f64) {
+        self.lab.sim.robot_mut(self.robot).set_qvel(&row(&[velocity]), None, None).unwrap();
+    }
+
+    /// Adds an effort to what the drive gives, or is all that there is where there is none \[N m\].
+    pub(super) fn effort(&mut self, effort: f64) {
+        self.lab.push_joints(self.robot, &[effort]);
+    }
+
+    /// A torque from outside \[N m\].
+    pub(super) fn load(&mut self, torque: f64) {
+        let [zero, torque] = [0.0, torque].map(|z| nalgebra::Vector3::new(0.0, 0.0, z));
+        self.lab.push_link(self.robot, "wheel", zero, torque);
+    }
+
+    pub(super) fn q(&self) -> f64 {
+        self.lab.q(self.robot)[0]
+    }
+
+    pub(super) fn v(&self) -> f64 {
+        self.lab.v(self.robot)[0]
+    }
+
+    /// Effort of the drive in the last step \[N m\].
+    pub(super) fn given(&self) -> f64 {
+        self.lab.effort(self.robot)[0]
+    }
+}
