@@ -237,7 +237,10 @@ impl RobotFile {
             let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
             let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
             let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
-            if links.iter().map(mass).sum::<f64>() == self.model.body_mass()[body] {
+            // The file holds its root body, which may be a frame without mass; a free one needs some, as in a URDF.
+            let is_freed = body == self.root.body && !fix_base && self.root.free_joint.is_none() && !self.root.is_world;
+            let sum = links.iter().map(mass).sum::<f64>();
+            if sum == self.model.body_mass()[body] && !(is_freed && sum == 0.0) {
                 continue;
             }
             let rigid = RigidBody { links, moves: !still };
