@@ -111,7 +111,9 @@ impl Wrenches {
         }
         let gravity = Vector3::from(data.model().gravity());
         for &body in &self.weightless {
-            let weight = data.model().body_mass()[body] * gravity;
+            // What MuJoCo lifts by itself (4.x) is not lifted twice.
+            let felt = 1.0 - data.model().body_gravity_compensation(body);
+            let weight = felt * data.model().body_mass()[body] * gravity;
             add(data, body, &-weight, &Vector3::zeros());
         }
     }

@@ -1,9 +1,9 @@
 //! Fixed and free bases, and robots whose first body is joined to the world.
 
-use super::{empty, passive};
+use super::{empty, passive, robot};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj;
+use kinetoscope::sim::{DiagnosticKind, mj};
 
 /// A cart with a wheel; `%` is what holds the cart.
 const CART: &str = r#"<mujoco><worldbody><body name="cart" pos="0.5 0 1" euler="0 0 90">%
@@ -98,4 +98,24 @@ fn a_body_that_is_joined_to_the_world_hangs_on_a_link_called_world() {
         error.contains("joint \"rail\" holds the root body \"cart\"") && error.contains("fix_base: true"),
         "{error}"
     );
+}
+
+/// A frame without mass that a file fixes gets what a free body needs, as a URDF's does, and that is said once.
+#[test]
+fn a_first_body_without_mass_can_be_free() {
+    let text = r#"<mujoco><worldbody><body name="frame"><body name="arm"><joint name="j" axis="0 0 1"/>
+        <geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"#;
+    let mut sim = empty(1);
+    let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("r", text) }).unwrap();
+    let massless = sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::MasslessLink).count();
+    assert_eq!((massless, sim.robot(id).total_mass()), (1, 1.0));
+    let start = sim.robot(id).get_root_pose()[(0, 2)];
+    sim.update(100);
+    // Euler's rule falls by g h² n (n + 1) / 2; all parts fall alike.
+    let (fallen, expected) = (start - sim.robot(id).get_root_pose()[(0, 2)], 9.81 * 4e-6 * 100.0 * 101.0 / 2.0);
+    assert!((fallen - expected).abs() < 1e-6, "{fallen} {expected}");
+    // Where it stands fixed nothing is needed.
+    let mut sim = empty(1);
+    sim.add_robot(robot("r", text)).unwrap();
+    assert!(sim.diagnostics().iter().all(|d| d.kind != DiagnosticKind::MasslessLink));
 }

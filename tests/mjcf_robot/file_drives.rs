@@ -32,9 +32,10 @@ fn gains_and_limits_are_those_of_the_file_unless_the_configuration_names_others(
     let robot_ = sim.robot(id);
     assert_eq!(robot_.joint_names(), JOINTS);
     let infinite = f64::INFINITY;
-    // The gear counts twice in gains and once in efforts; 1e4 and 1e3 where the file says only that there is an effort.
-    assert_eq!(robot_.get_stiffness(), array![[120.0, 1e4, 0.0, 1e4, 1e4, 0.0]]);
-    assert_eq!(robot_.get_damping(), array![[0.0, 1e3, 0.7, 1e3, 1e3, 0.0]]);
+    // Gear and coefficients count twice in gains and once in efforts; 1e4 and 1e3 where the file says only that there is an
+    // effort.
+    assert_eq!(robot_.get_stiffness(), array![[120.0, 1e4, 0.0, 25.0, 400.0, 0.0]]);
+    assert_eq!(robot_.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 0.0]]);
     assert_eq!(robot_.qf_limits(), array![[8.0, 11.0, infinite, 5.0, 20.0, infinite]]);
     assert_eq!(robot_.get_armature()[(0, 0)], 0.1);
     assert_eq!(robot_.get_friction()[(0, 5)], 0.3);
@@ -54,8 +55,8 @@ fn gains_and_limits_are_those_of_the_file_unless_the_configuration_names_others(
     let mut sim = empty(1);
     let id = sim.add_robot(RobotCfg { drive, ..robot("m", MACHINE) }).unwrap();
     let robot_ = sim.robot(id);
-    assert_eq!(robot_.get_stiffness(), array![[50.0, 1e4, 0.0, 1e4, 1e4, 50.0]]);
-    assert_eq!(robot_.get_damping(), array![[0.0, 1e3, 0.7, 1e3, 1e3, 1e3]]);
+    assert_eq!(robot_.get_stiffness(), array![[50.0, 1e4, 0.0, 25.0, 400.0, 50.0]]);
+    assert_eq!(robot_.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 1e3]]);
     assert_eq!(robot_.qf_limits()[(0, 1)], 7.0);
     assert_eq!((robot_.get_armature()[(0, 0)], robot_.get_armature()[(0, 2)]), (0.1, 0.4));
 

@@ -3,10 +3,13 @@
 
 mod alone;
 mod bases;
+mod contacts;
+mod coupled_drives;
 mod couplings;
 mod file_drives;
 mod kinematics;
 mod named;
+mod newer;
 mod quadruped;
 mod refused;
 mod samples;

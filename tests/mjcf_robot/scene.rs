@@ -166,3 +166,19 @@ fn a_dump_is_a_model_of_its_own() {
     assert!((here.translation.vector - there.translation.vector).norm() < 1e-9);
     assert!(here.rotation.angle_to(&there.rotation) < 1e-7);
 }
+
+/// A slide without limits and without efforts is written so that it can be read again, and is not limited then.
+#[test]
+fn the_urdf_of_a_dump_can_be_read() {
+    let text = r#"<mujoco><worldbody><body name="base"><geom size="0.1" mass="1"/><body name="cart">
+        <joint name="rail" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"#;
+    let mut sim = empty(1);
+    let id = sim.add_robot(robot("cart", text)).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    sim.dump(dir.path()).unwrap();
+    let urdf = UrdfCfg::single(dir.path().join("robot.urdf"));
+    let mut other = empty(1);
+    let again = other.add_robot(RobotCfg { urdf, ..Default::default() }).unwrap();
+    assert_eq!(other.robot(again).qpos_limits(), sim.robot(id).qpos_limits());
+    assert_eq!(other.robot(again).qpos_limits()[(0, 0, 1)], f64::INFINITY);
+}

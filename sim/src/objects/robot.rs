@@ -204,7 +204,7 @@ fn described(
         return Err(Error::Config { field: "mjcf", value: format!("{:?}", file.path), expected });
     }
     let mut found = Vec::new();
-    let loading = Loading { uid: &cfg.uid, index, fix_base: cfg.fix_base, scene };
+    let loading = Loading { uid: &cfg.uid, index, fix_base: cfg.fix_base, self_collision: cfg.self_collision, scene };
     let (file, description) = RobotFile::load(file, &loading, |error| file_error(cfg, error), &mut found)?;
     Ok((Some(file), description, found))
 }

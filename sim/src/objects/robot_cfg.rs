@@ -28,11 +28,24 @@ pub struct RobotCfg {
     /// - **Drives** take the place of its actuators. Where [`drive`](Self::drive) says nothing of a joint, position and velocity
     ///   actuators of the file give stiffness and damping, force ranges (and control ranges of motors) the largest effort, and
     ///   joints that no actuator of the file acts on stay passive. In a file without any actuator all joints are driven, as in
-    ///   a URDF.
+    ///   a URDF. One number for all joints (`stiffness: 100.0.into()`) names the passive ones too, and drives them.
+    /// - An actuator of a joint that **follows** another, or of a **tendon** over joints, is in the drive of the joint that is
+    ///   followed: with J, the effort there by the force of the actuator, gains times J² and efforts times |J|. A tendon over
+    ///   joints that do not follow each other becomes a drive of each, whose targets do not know of each other. Limits of
+    ///   efforts are symmetric, activations (filters, integrators, muscles) are gone, targets are not limited by control
+    ///   ranges: [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator of which that is not the whole.
     /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive.
     /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
-    /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits;
-    ///   pairs of geoms hold where [`self_collision`](Self::self_collision) is on.
+    /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits, also those that
+    ///   collide in pairs with what stands in the file's world alone; friction and softness of such pairs are not kept.
+    ///   Other pairs of geoms hold where [`self_collision`](Self::self_collision) is on. What the file excludes from colliding
+    ///   with its own world collides with the scene.
+    /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
+    ///   `solimpfriction` hold for the others. A joint that follows by a curve starts at its own `ref`, wherever
+    ///   [`init_qpos`](Self::init_qpos) lets its driver start, and the coupling pulls it from there.
+    /// - Named sites are links on fixed joints, which the end of a control part
+    ///   ([`Tip::of_part`](crate::kinematics::Tip::of_part)) follows where there is exactly one: to add a site to the last body,
+    ///   for a touch sensor say, moves that end. Name the link ([`Tip::at`](crate::kinematics::Tip::at)) where it matters.
     /// - What stands in the file's world (a floor, lights) is no part of the robot, nor are settings for the whole model and
     ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
     ///

@@ -150,6 +150,10 @@ impl Writer {
         if !matches!(joint.kind, JointKind::Fixed | JointKind::Floating) {
             self.empty("axis", &[("xyz", row(joint.axis.as_slice()))]);
         }
+        // A reader that is as strict as ours wants one for these; without ends it limits nothing.
+        if joint.limit.is_none() && matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic) {
+            self.empty("limit", &[]);
+        }
         if let Some(limit) = &joint.limit {
             let values = [
                 ("lower", limit.lower),

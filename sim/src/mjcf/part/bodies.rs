@@ -178,7 +178,9 @@ impl Writing<'_> {
             true => element.attr("limited", "true").numbers("range", row(m.jnt_range(), 2, joint)),
             false => element.attr("limited", "false"),
         };
-        if let Some(range) = m.joint_actuator_force(joint)
+        // A robot's drives have that limit in their largest effort, which the configuration may raise.
+        if self.rig.is_none()
+            && let Some(range) = m.joint_actuator_force(joint)
             && self.newer("joint", joint, &format!("actuatorfrcrange {range:?}"))
         {
             element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
@@ -222,7 +224,7 @@ impl Writing<'_> {
         }
         let of_file = [m.geom_contype()[geom], m.geom_conaffinity()[geom]];
         let [contype, conaffinity] = match self.rig {
-            Some(rig) if of_file != [0, 0] => rig.contact,
+            Some(rig) if of_file != [0, 0] || rig.colliding.contains(&geom) => rig.contact,
             _ => of_file,
         };
         element = pose(element, &place)

@@ -28,7 +28,9 @@ impl Writing<'_> {
             Element::new("exclude").attr("body1", body(first)).attr("body2", body(second)).leaf()
         };
         let is_kept = |p: &usize| self.rig.is_none_or(|rig| !rig.pairs.contains(p));
-        (0..m.npair()).filter(is_kept).map(pair).chain(m.excluded_bodies().map(exclude)).collect()
+        // The world of the scene is not that of a robot's file.
+        let excluded = m.excluded_bodies().filter(|bodies| self.rig.is_none() || !bodies.contains(&0));
+        (0..m.npair()).filter(is_kept).map(pair).chain(excluded.map(exclude)).collect()
     }
 
     pub(super) fn equalities(&self) -> Result<Vec<String>, PartError> {

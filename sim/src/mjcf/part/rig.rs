@@ -3,8 +3,8 @@
 use super::super::document::Inertial;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What differs from the file in a part that is a robot: what stands in the file's world, actuators and the pairs in `pairs`
-/// are not written at all.
+/// What differs from the file in a part that is a robot: what stands in the file's world, actuators, the joints' limits of
+/// actuators' forces, excluded bodies together with the world, and the pairs in `pairs` are not written at all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Passive properties of each joint of the file.
@@ -15,6 +15,8 @@ pub struct Rig {
     pub contact: [i32; 2],
     /// Pairs of geoms that are left out, by their numbers.
     pub pairs: BTreeSet<usize>,
+    /// Geoms that collide though the file's bits say that they do not, by their numbers.
+    pub colliding: BTreeSet<usize>,
     /// Mass properties of bodies that are not the file's.
     pub inertials: BTreeMap<usize, Inertial>,
 }

@@ -66,6 +66,21 @@ pub(super) fn of_joints(
     couplings
 }
 
+/// The joint that `joint` follows in the end, or itself, and the ratio of the chain; `None` where something else holds it.
+pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Option<(usize, f64)> {
+    let mut ratio = 1.0;
+    loop {
+        match &couplings[joint] {
+            None => return Some((joint, ratio)),
+            Some(Coupling::Other) => return None,
+            Some(Coupling::Mimic { driver, multiplier, .. }) => {
+                joint = *driver;
+                ratio *= multiplier;
+            }
+        }
+    }
+}
+
 /// Whether following mimics from `joint` ends at `end`, or passes it.
 fn leads_to(couplings: &[Option<Coupling>], mut joint: usize, end: usize) -> bool {
     loop {

@@ -1,9 +1,13 @@
 //! What the actuators of a file say of the drives that take their place.
 //!
-//! MuJoCo's actuator of a joint with gear g gives the torque `g (gain u + b0 + b1 g q + b2 g v)`, the force in the brackets
-//! clamped. A position actuator has `gain = -b1` and `b0 = 0`: its stiffness is `-b1 g²`, its damping `-b2 g²`, whatever the
-//! scale of its control. One that follows velocities has no `b1` and `gain = -b2`.
+//! An actuator on the length `l = g Σ cᵢ qᵢ` (of a joint: c = 1) with the force F along it gives each joint the effort
+//! `g cᵢ F`. Joints that follow another by `qᵢ = mᵢ q + oᵢ` have no drive of their own: by virtual work the joint that they
+//! follow feels `J F` with `J = g Σ cᵢ mᵢ`, over all joints of the length that follow it and itself. A drive of it with the
+//! stiffness `k J²`, the damping `d J²` and the largest effort `|J| Fmax` does the same. Where a length is of several joints
+//! that do not follow each other, each has the drive that the actuator is while the others stand.
 
+use super::actuator::law;
+use super::couplings::{Coupling, followed};
 use super::error::RobotFileError;
 use super::places::Places;
 use crate::description::FileDrive;
@@ -11,6 +15,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj::Model;
 use crate::mj::words::{self, PathPoint};
 use crate::mjcf::part::PartNames;
+use std::collections::BTreeMap;
 
 /// What acts on a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,74 +26,134 @@ pub(super) struct Acting {
     pub(super) effort: Option<f64>,
 }
 
-/// Row `index` of an array with `count` rows.
-fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
-    let width = values.len() / count.max(1);
-    &values[width * index..width * (index + 1)]
+/// How an actuator acts on a joint and those that follow it.
+#[derive(Clone, Debug, Default)]
+struct Arm {
+    /// Effort by force: J.
+    total: f64,
+    /// The sum of the sizes of its terms.
+    size: f64,
+    /// The joints of the file, and how each follows.
+    joints: Vec<(usize, f64)>,
+    /// The largest effort that the joints' own limits leave, with the force at its limit; infinite where there is none.
+    effort: f64,
 }
 
-/// What acts on each joint of the file. Says which actuators are gone.
+/// What an actuator acts on.
+struct Target {
+    /// Joints and their coefficients.
+    path: Vec<(usize, f64)>,
+    /// Name of the tendon that they are the path of.
+    tendon: Option<String>,
+}
+
+/// What acts on each joint of the file that follows no other. Says which actuators are gone, and what no drive does as they do.
 pub(super) fn of_joints(
     owner: &str,
     model: &Model,
     names: &PartNames,
     places: &Places,
+    couplings: &[Option<Coupling>],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<Vec<Acting>, RobotFileError> {
     let unsaid = if model.nactuator() == 0 { FileDrive::Unsaid } else { FileDrive::Passive };
-    let mut acting = vec![Acting { drive: unsaid, effort: None }; model.njnt()];
+    let own_limit = |joint: usize| model.joint_actuator_force(joint).map(|[low, high]| low.abs().max(high.abs()));
+    let mut acting: Vec<Acting> =
+        (0..model.njnt()).map(|joint| Acting { drive: unsaid, effort: own_limit(joint) }).collect();
+    // Joints that are acted on, by the joint that they follow.
+    let mut acted: BTreeMap<usize, BTreeMap<usize, f64>> = BTreeMap::new();
     let mut replaced = Vec::new();
     for actuator in 0..model.nactuator() {
         let name = &names.actuators[actuator];
-        let at = || places.get("actuator", name);
-        let refused = |target: String| RobotFileError::Actuator { at: at(), actuator: name.clone(), target };
+        let Target { path, tendon } = target(model, names, actuator).map_err(|target| RobotFileError::Actuator {
+            at: places.get("actuator", name),
+            actuator: name.clone(),
+            target,
+        })?;
         let gear = model.actuator_gear()[6 * actuator];
-        let id = usize::try_from(model.actuator_trnid()[2 * actuator]).unwrap_or(0);
-        match words::transmission(model.actuator_trntype()[actuator]) {
-            Some("joint" | "jointinparent") => {
-                if !is_single(model, id) {
-                    return Err(refused(format!("the free joint {:?}", names.joints[id])));
-                }
-                let (stiffness, damping) = gains(model, actuator);
-                let limit = force_limit(model, actuator).map(|force| force * gear.abs());
-                add(&mut acting[id], stiffness * gear * gear, damping * gear * gear, limit);
-                replaced.push(format!("{name:?}"));
+        let law = law(model, actuator, gear, &path);
+        let quoted = |joint: usize| format!("{:?}", names.joints[joint]);
+        let mut notes = law.unsaid;
+        let mut arms: BTreeMap<usize, Arm> = BTreeMap::new();
+        for &(joint, coefficient) in &path {
+            let Some((driver, ratio)) = followed(couplings, joint) else {
+                notes.push(format!("it has no part in {}, which an equality holds that no mimic says", quoted(joint)));
+                continue;
+            };
+            if driver != joint {
+                notes.push(format!("{} follows {}, whose drive takes its place", quoted(joint), quoted(driver)));
             }
-            Some("tendon") => {
-                let first = model.tendon_adr()[id] as usize;
-                let path = first..first + model.tendon_num()[id] as usize;
-                let is_joint = |p: usize| words::path_point(model.wrap_type()[p]) == Some(PathPoint::Joint);
-                let tendon = &names.tendons[id];
-                if !path.clone().all(is_joint) {
-                    return Err(refused(format!("the spatial tendon {tendon:?}")));
-                }
-                let mut driven = Vec::new();
-                for point in path {
-                    let joint = model.wrap_objid()[point] as usize;
-                    let limit = force_limit(model, actuator).map(|f| f * (gear * model.wrap_prm()[point]).abs());
-                    add(&mut acting[joint], 0.0, 0.0, limit);
-                    driven.push(format!("{:?}", names.joints[joint]));
-                }
-                let message = format!(
-                    "{owner}: actuator {name:?} acts on the tendon {tendon:?}; a drive of each of its joints takes its place: {}",
-                    driven.join(", ")
-                );
-                diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at(), message));
+            let arm = arms.entry(driver).or_default();
+            let (own, force) = (own_limit(joint).unwrap_or(f64::INFINITY), law.force.unwrap_or(f64::INFINITY));
+            let coefficient = gear * coefficient;
+            arm.total += coefficient * ratio;
+            arm.size += (coefficient * ratio).abs();
+            if coefficient * ratio != 0.0 {
+                arm.effort += ratio.abs() * own.min(force * coefficient.abs());
+                arm.joints.push((joint, ratio));
             }
-            other => return Err(refused(format!("a {}", other.unwrap_or("kind of object that has no name")))),
+        }
+        // What is left of terms that cancel is their rounding.
+        arms.retain(|&driver, arm| {
+            let acts = arm.total.abs() > 1e-12 * arm.size && law.force != Some(0.0);
+            if !acts {
+                notes.push(format!("it never moves {}, so no drive of it is made", quoted(driver)));
+            }
+            acts
+        });
+        if arms.len() > 1 {
+            let joints: Vec<String> = arms.keys().map(|&joint| quoted(joint)).collect();
+            notes.push(format!("it moves {} together, and each has a drive of its own", joints.join(", ")));
+        }
+        for (driver, arm) in arms {
+            let force = law.force.map_or(f64::INFINITY, |force| force * arm.total.abs());
+            let (limit, scale) = (arm.effort.min(force), arm.total * arm.total);
+            let first = !acted.contains_key(&driver);
+            add(&mut acting[driver], first, law.stiffness * scale, law.damping * scale, limit);
+            acted.entry(driver).or_default().extend(arm.joints);
+        }
+        if let Some(tendon) = &tendon {
+            notes.insert(0, format!("acts on the tendon {tendon:?}, and drives of joints take its place"));
+        } else {
+            replaced.push(format!("{name:?}"));
+        }
+        if !notes.is_empty() {
+            let differs = if tendon.is_some() { "" } else { "differs from its drive: " };
+            let message = format!("{owner}: actuator {name:?} {differs}{}", notes.join("; "));
+            diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, places.get("actuator", name), message));
         }
     }
     if !replaced.is_empty() {
         let message = format!("{owner}: drives take the place of the actuators {}", replaced.join(", "));
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, places.file(), message));
     }
-    for (joint, acting) in acting.iter_mut().enumerate() {
-        if let Some([low, high]) = model.joint_actuator_force(joint) {
-            let limit = low.abs().max(high.abs());
-            acting.effort = Some(acting.effort.map_or(limit, |effort| effort.min(limit)));
-        }
+    for (driver, joints) in acted {
+        let own: f64 =
+            joints.iter().map(|(&joint, ratio)| ratio.abs() * own_limit(joint).unwrap_or(f64::INFINITY)).sum();
+        let effort = acting[driver].effort.unwrap_or(f64::INFINITY).min(own);
+        acting[driver].effort = effort.is_finite().then_some(effort);
     }
     Ok(acting)
+}
+
+/// What an actuator acts on; the words for what no drive acts on.
+fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<Target, String> {
+    let id = usize::try_from(model.actuator_trnid()[2 * actuator]).unwrap_or(0);
+    match words::transmission(model.actuator_trntype()[actuator]) {
+        Some("joint" | "jointinparent") if is_single(model, id) => Ok(Target { path: vec![(id, 1.0)], tendon: None }),
+        Some("joint" | "jointinparent") => Err(format!("the free joint {:?}", names.joints[id])),
+        Some("tendon") => {
+            let first = model.tendon_adr()[id] as usize;
+            let points = first..first + model.tendon_num()[id] as usize;
+            let tendon = &names.tendons[id];
+            if !points.clone().all(|p| words::path_point(model.wrap_type()[p]) == Some(PathPoint::Joint)) {
+                return Err(format!("the spatial tendon {tendon:?}"));
+            }
+            let path = points.map(|p| (model.wrap_objid()[p] as usize, model.wrap_prm()[p])).collect();
+            Ok(Target { path, tendon: Some(tendon.clone()) })
+        }
+        other => Err(format!("a {}", other.unwrap_or("kind of object that has no name"))),
+    }
 }
 
 /// A hinge or a slide.
@@ -96,14 +161,10 @@ pub(super) fn is_single(model: &Model, joint: usize) -> bool {
     matches!(words::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }
 
-/// One more actuator of a joint.
-fn add(acting: &mut Acting, stiffness: f64, damping: f64, limit: Option<f64>) {
-    let first = matches!(acting.drive, FileDrive::Unsaid | FileDrive::Passive);
-    acting.effort = match (first, acting.effort, limit) {
-        (true, _, limit) => limit,
-        (false, Some(old), Some(limit)) => Some(old + limit),
-        (false, ..) => None,
-    };
+/// One more actuator of a joint; `limit` is infinite where there is none.
+fn add(acting: &mut Acting, first: bool, stiffness: f64, damping: f64, limit: f64) {
+    let old = if first { 0.0 } else { acting.effort.unwrap_or(f64::INFINITY) };
+    acting.effort = Some(old + limit).filter(|effort| effort.is_finite());
     let (old_stiffness, old_damping) = match acting.drive {
         FileDrive::Servo { stiffness, damping } => (stiffness, damping),
         _ => (0.0, 0.0),
@@ -111,32 +172,4 @@ fn add(acting: &mut Acting, stiffness: f64, damping: f64, limit: Option<f64>) {
     let (stiffness, damping) = (old_stiffness + stiffness, old_damping + damping);
     let follows = stiffness > 0.0 || damping > 0.0;
     acting.drive = if follows { FileDrive::Servo { stiffness, damping } } else { FileDrive::Effort };
-}
-
-/// Stiffness and damping of an actuator before its gear; zeros where it follows nothing.
-fn gains(model: &Model, actuator: usize) -> (f64, f64) {
-    let count = model.nactuator();
-    let affine = words::gain(model.actuator_gaintype()[actuator]) == Some("fixed")
-        && words::bias(model.actuator_biastype()[actuator]) == Some("affine");
-    let gain = row_of(model.actuator_gainprm(), count, actuator)[0];
-    let bias = row_of(model.actuator_biasprm(), count, actuator);
-    let (stiffness, damping) = (-bias[1], -bias[2]);
-    let follows_position = stiffness > 0.0 && gain == stiffness && damping >= 0.0;
-    let follows_velocity = bias[1] == 0.0 && damping > 0.0 && gain == damping;
-    if affine && bias[0] == 0.0 && (follows_position || follows_velocity) { (stiffness, damping) } else { (0.0, 0.0) }
-}
-
-/// The largest force of an actuator before its gear: that of its own range, or that of a motor at the end of its control's.
-fn force_limit(model: &Model, actuator: usize) -> Option<f64> {
-    let end = |range: &[f64]| range[0].abs().max(range[1].abs());
-    if model.actuator_forcelimited(actuator) {
-        return Some(end(&model.actuator_forcerange()[2 * actuator..2 * actuator + 2]));
-    }
-    let control = model.actuator_control(actuator);
-    let motor = words::gain(model.actuator_gaintype()[actuator]) == Some("fixed")
-        && words::bias(model.actuator_biastype()[actuator]) == Some("none")
-        && words::dynamics(model.actuator_dyntype()[actuator]) == Some("none");
-    let gain = row_of(model.actuator_gainprm(), model.nactuator(), actuator)[0];
-    (motor && model.actuator_ctrllimited(control))
-        .then(|| gain.abs() * end(&model.actuator_ctrlrange()[2 * control..2 * control + 2]))
 }

@@ -3,6 +3,7 @@
 //!
 //! Why a part and not bodies of our own: docs/decisions/0012.
 
+mod actuator;
 mod couplings;
 mod drives;
 mod error;
@@ -58,6 +59,8 @@ pub(crate) struct Loading<'a> {
     pub(crate) index: usize,
     /// Whether its base stands fixed.
     pub(crate) fix_base: bool,
+    /// Whether its links collide with each other.
+    pub(crate) self_collision: bool,
     /// The scene so far.
     pub(crate) scene: &'a Model,
 }
@@ -76,8 +79,9 @@ impl RobotFile {
         let owner = format!("robot {:?}", of.uid);
         let root = tree::root(&model, &names, &places, of.fix_base).map_err(&wrong)?;
         world::check(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
-        let acting = drives::of_joints(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
+        world::say_contacts(&owner, &model, &names, of.self_collision, &places.file(), diagnostics);
         let couplings = couplings::of_joints(&owner, &model, &names, &places, diagnostics);
+        let acting = drives::of_joints(&owner, &model, &names, &places, &couplings, diagnostics).map_err(&wrong)?;
         let describing = Describing {
             uid: of.uid,
             model: &model,
@@ -151,7 +155,8 @@ impl RobotFile {
             Base::AsFile => self.root.free_joint.map(|joint| self.full(cfg, &self.names.joints[joint])),
         };
         let inertials = self.loaded_bodies(description, cfg.fix_base, diagnostics);
-        let rig = Rig { joints, base, contact, pairs: world::pairs(&self.model, self_collision), inertials };
+        let (pairs, colliding) = (world::pairs(&self.model, self_collision), world::colliding(&self.model));
+        let rig = Rig { joints, base, contact, pairs, colliding, inertials };
         let (model, names) = (&self.model, &self.names);
         let part = PartOf { model, names, uid: cfg.uid, pose: &cfg.base_pose, stem: &self.stem, rig: Some(&rig) };
         mjcf.parts.push(Arc::new(MjcfPart::new(&part, self.sensors_left_out.clone(), &self.source)?));
@@ -232,7 +237,10 @@ impl RobotFile {
             let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
             let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
             let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
-            if links.iter().map(mass).sum::<f64>() == self.model.body_mass()[body] {
+            // The file holds its root body, which may be a frame without mass; a free one needs some, as in a URDF.
+            let is_freed = body == self.root.body && !fix_base && self.root.free_joint.is_none() && !self.root.is_world;
+            let sum = links.iter().map(mass).sum::<f64>();
+            if sum == self.model.body_mass()[body] && !(is_freed && sum == 0.0) {
                 continue;
             }
             let rigid = RigidBody { links, moves: !still };

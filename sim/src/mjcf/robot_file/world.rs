@@ -6,6 +6,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj::Model;
 use crate::mj::words::{self, PathPoint};
 use crate::mjcf::part::{LeftOut, PartNames, sensors_left_out};
+use crate::source::Source;
 use std::collections::BTreeSet;
 
 /// An index of MuJoCo's, where -1 is none.
@@ -73,6 +74,13 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)>
         if left_out.iter().any(|(other, _)| *other == sensor) {
             continue;
         }
+        // Drives are rows or forces of ours, of which MuJoCo's sum over actuators knows nothing.
+        let word = words::sensor(model.sensor_type()[sensor]).map_or("", |word| word.word);
+        if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
+            let what = format!("the type {word}, the force of actuators, whose place drives take");
+            left_out.push((sensor, LeftOut { element: "sensor", name: names.sensors[sensor].clone(), what }));
+            continue;
+        }
         let observed = [
             (model.sensor_objtype()[sensor], model.sensor_objid()[sensor]),
             (model.sensor_reftype()[sensor], model.sensor_refid()[sensor]),
@@ -94,6 +102,63 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)>
     }
     left_out.sort_by_key(|(sensor, _)| *sensor);
     left_out
+}
+
+/// Says which contacts of the file are not those of the robot: pairs of geoms that are left out, and bodies that the file
+/// keeps from colliding with what stands in its world.
+pub(super) fn say_contacts(
+    owner: &str,
+    model: &Model,
+    names: &PartNames,
+    self_collision: bool,
+    file: &Source,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let mut say = |message: String| {
+        diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, file.clone(), format!("{owner}: {message}")));
+    };
+    let geom = |id: i32| some(id).map_or_else(String::new, |id| format!("{:?}", names.geoms[id]));
+    let named = |pairs: &BTreeSet<usize>| {
+        let named = |&p: &usize| format!("{} and {}", geom(model.pair_geom1()[p]), geom(model.pair_geom2()[p]));
+        pairs.iter().map(named).collect::<Vec<_>>().join(", ")
+    };
+    let with_world = pairs(model, true);
+    if !with_world.is_empty() {
+        let colliding: Vec<String> = colliding(model).iter().map(|&id| format!("{:?}", names.geoms[id])).collect();
+        let more = match colliding.as_slice() {
+            [] => String::new(),
+            geoms => format!(
+                "; these geoms, which collide in such pairs alone, collide as the others do: {}",
+                geoms.join(", ")
+            ),
+        };
+        say(format!(
+            "pairs with what stands in the file's world are no part of it, nor are their friction and softness: {}{more}",
+            named(&with_world)
+        ));
+    }
+    let own = &pairs(model, self_collision) - &with_world;
+    if !own.is_empty() {
+        say(format!("pairs of its own geoms hold only with self_collision: true: {}", named(&own)));
+    }
+    for bodies in model.excluded_bodies().filter(|bodies| bodies.contains(&0)) {
+        let body = &names.bodies[bodies[0].max(bodies[1])];
+        say(format!(
+            "body {body:?} collides with the scene, though the file excludes it from colliding with its world"
+        ));
+    }
+}
+
+/// Geoms of the robot that the file's bits let collide with nothing, and its pairs with what stands in its world.
+pub(super) fn colliding(model: &Model) -> BTreeSet<usize> {
+    let mut geoms = BTreeSet::new();
+    for pair in pairs(model, true) {
+        let both = [model.pair_geom1()[pair], model.pair_geom2()[pair]];
+        geoms.extend(both.into_iter().filter_map(some).filter(|&geom| {
+            model.geom_bodyid()[geom] > 0 && model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0
+        }));
+    }
+    geoms
 }
 
 /// Pairs of geoms that are left out: those with what stands in the file's world, and all where the robot does not collide
