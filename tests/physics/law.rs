@@ -3,6 +3,11 @@
 use crate::rows;
 use serde::Serialize;
 
+/// The larger of two numbers, NaN if either is: `f64::max` would drop what went wrong.
+pub(crate) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
 /// One number that a law predicts.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Row {
@@ -17,6 +22,8 @@ pub(crate) struct Row {
     /// Where the tolerance comes from.
     pub(crate) why: String,
     pub(crate) pass: bool,
+    /// Why the two lines of MuJoCo differ in this row, where they do.
+    pub(crate) lines_differ: Option<String>,
 }
 
 /// The same number where the effect was taken away: it must miss.
@@ -55,7 +62,7 @@ pub(crate) struct Measured {
     rows: Vec<Row>,
     controls: Vec<Control>,
     plots: Vec<Plot>,
-    /// Why the two lines of MuJoCo give different numbers, where they do.
+    /// Why the two lines of MuJoCo give different numbers, where any of them may.
     lines_differ: Option<String>,
 }
 
@@ -74,7 +81,7 @@ impl Measured {
         // Not `error > tolerance`: a measured NaN fails.
         let pass = (measured - expected).abs() <= tolerance;
         let [quantity, unit, why] = [quantity, unit, why].map(str::to_string);
-        self.rows.push(Row { quantity, unit, expected, measured, tolerance, why, pass });
+        self.rows.push(Row { quantity, unit, expected, measured, tolerance, why, pass, lines_differ: None });
     }
 
     /// The row called `quantity`, measured again in a world `without` the effect, must miss by more than its tolerance.
@@ -90,6 +97,12 @@ impl Measured {
     /// that they do not.
     pub(crate) fn lines_differ(&mut self, why: &str) {
         self.lines_differ = Some(why.into());
+    }
+
+    /// As [`lines_differ`](Self::lines_differ), of one row only.
+    pub(crate) fn lines_differ_in(&mut self, quantity: &str, why: &str) {
+        let row = self.rows.iter_mut().find(|row| row.quantity == quantity).expect("a row that exists");
+        row.lines_differ = Some(why.into());
     }
 
     /// A picture for the page of numbers: series of (x, y).
@@ -142,6 +155,12 @@ mod tests {
         m.row("x", "m", expected, measured, (tolerance, "by hand"));
         m.control("x", "without it", control);
         m.failures()
+    }
+
+    #[test]
+    fn the_worse_of_anything_and_nan_is_nan() {
+        assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, worse), 3.0);
+        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, worse).is_nan());
     }
 
     #[test]

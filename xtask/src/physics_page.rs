@@ -87,7 +87,7 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
             tolerance: number(&row["tolerance"]),
             mujoco: mujoco.clone(),
             pass: row["pass"].as_bool()?,
-            lines_differ: text(&measured["lines_differ"]),
+            lines_differ: text(&row["lines_differ"]).or_else(|| text(&measured["lines_differ"])),
         });
     }
     to.controls += measured["controls"].as_array()?.len();
@@ -106,27 +106,30 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
 
 /// The plots of all runs by the name of their file, which is that of the law; curves that differ between lines of MuJoCo are drawn for each.
 pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
-    let mut found: Vec<(String, Plot)> = Vec::new();
+    let mut found: Vec<(String, Plot, &str)> = Vec::new();
     for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
-        let with_version = |series: &Series| Series { name: format!("{}, {mujoco}", series.name), ..series.clone() };
-        match found.iter_mut().find(|(_, other)| other.title == plot.title) {
+        let labelled = |series: &Series, mujoco: &str| Series {
+            name: format!("{}, {mujoco}", series.name),
+            points: series.points.clone(),
+        };
+        match found.iter_mut().find(|(_, other, _)| other.title == plot.title) {
             None => {
-                let others = found.iter().filter(|(name, _)| name.split('-').next() == Some(law)).count();
+                let others = found.iter().filter(|(name, ..)| name.split('-').next() == Some(law)).count();
                 let name = if others == 0 { law.clone() } else { format!("{law}-{}", others + 1) };
-                found.push((name, plot.clone()));
+                found.push((name, plot.clone(), mujoco));
             }
-            Some((_, other)) => {
-                let new: Vec<Series> = plot
-                    .series
-                    .iter()
-                    .filter(|s| !other.series.iter().any(|o| looks_as(o, s)))
-                    .map(with_version)
-                    .collect();
-                other.series.extend(new);
+            Some((_, other, first)) => {
+                for series in &plot.series {
+                    let Some(at) = other.series.iter().position(|old| old.name == series.name) else { continue };
+                    if !looks_as(&other.series[at], series) {
+                        other.series[at] = labelled(&other.series[at], first);
+                        other.series.push(labelled(series, mujoco));
+                    }
+                }
             }
         }
     }
-    found
+    found.into_iter().map(|(name, plot, _)| (name, plot)).collect()
 }
 
 fn looks_as(a: &Series, b: &Series) -> bool {
@@ -404,7 +407,8 @@ mod tests {
             |mujoco: &str, y| Measured { plots: vec![("law".into(), plot(y), mujoco.into())], ..Measured::default() };
         assert_eq!(plots(&[of("2.2.2", 1.0), of("4.0.0", 1.001)])[0].1.series.len(), 1);
         let both = plots(&[of("2.2.2", 1.0), of("4.0.0", 1.5)]);
-        assert_eq!(both[0].1.series[1].name, "RK4, 4.0.0");
+        let names: Vec<&str> = both[0].1.series.iter().map(|series| series.name.as_str()).collect();
+        assert_eq!(names, ["RK4, 2.2.2", "RK4, 4.0.0"]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! Tolerance: as for the mass matrix, rounding of v/h and the condition of M; 1e-9.
 
 use super::subjects::{KINDS, Kind, Subject, apart};
-use crate::law::law;
+use crate::law::{law, worse};
 use nalgebra::Vector3;
 
 /// The largest acceleration; `part` of the efforts are applied.
@@ -18,7 +18,7 @@ fn accelerated(kind: Kind, part: f64) -> f64 {
                 subject.efforts(&q, &v, &still, Vector3::zeros()).iter().map(|tau| part * tau).collect();
             apart(&subject.accelerations(&q, &v, &bias), &still)
         })
-        .fold(0.0, f64::max)
+        .fold(0.0, worse)
 }
 
 #[test]

@@ -6,7 +6,7 @@
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
 use crate::lab::*;
-use crate::law::law;
+use crate::law::{law, worse};
 use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
 
@@ -33,7 +33,7 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
     let (mut worst, mut curve) = (0.0_f64, Vec::new());
     lab.watch(5_000, |t, sim| {
         let change = (energy(sim) - start).abs();
-        worst = worst.max(change);
+        worst = worse(worst, change);
         if ((t * 1e3).round() as u32).is_multiple_of(20) {
             curve.push([t, change.max(1e-16)]);
         }

@@ -5,7 +5,7 @@
 //! Tolerance: 1e-12 m/s² of rounding in a step; times e^1 and the time, 1e-10.
 
 use super::subjects::{EARTH, KINDS, Kind, Subject, apart};
-use crate::law::law;
+use crate::law::{law, worse};
 
 /// The largest velocity after a step and after a tenth of a second, held by `part` of the efforts.
 fn moved(kind: Kind, part: f64) -> [f64; 2] {
@@ -16,9 +16,9 @@ fn moved(kind: Kind, part: f64) -> [f64; 2] {
         let q = subject.spread(0.5, k);
         let hold: Vec<f64> = subject.efforts(&q, &still, &still, EARTH).iter().map(|tau| part * tau).collect();
         let first = subject.accelerations(&q, &still, &hold);
-        worst[0] = worst[0].max(apart(&first, &still) * 1e-3);
+        worst[0] = worse(worst[0], apart(&first, &still) * 1e-3);
         subject.lab.run(0.1);
-        worst[1] = worst[1].max(apart(&subject.lab.v(subject.robot), &still));
+        worst[1] = worse(worst[1], apart(&subject.lab.v(subject.robot), &still));
     }
     worst
 }

@@ -6,7 +6,7 @@
 
 use super::newton_euler::{Motion, Tree, joints};
 use crate::lab::*;
-use crate::law::law;
+use crate::law::{law, worse};
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
 
@@ -30,8 +30,8 @@ fn largest(cfg: SimulationManagerCfg) -> [f64; 3] {
         let motion = Motion { pose, velocity: body.velocity, spin: body.spin, ..Motion::rest(Vector3::zeros()) };
         let still = vec![0.0; q.len()];
         let (p, l) = tree.momentum(&joints(robot.joint_names(), &q, &v, &still), motion);
-        let fastest = v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        worst = [worst[0].max(p.norm()), worst[1].max(l.norm()), worst[2].max(fastest)];
+        let fastest = v.iter().fold(0.0, |m, v: &f64| worse(m, v.abs()));
+        worst = [worse(worst[0], p.norm()), worse(worst[1], l.norm()), worse(worst[2], fastest)];
     });
     worst
 }

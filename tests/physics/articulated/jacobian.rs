@@ -5,7 +5,7 @@
 
 use super::subjects::{EARTH, KINDS, Kind, Subject};
 use crate::lab::row;
-use crate::law::law;
+use crate::law::{law, worse};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
 
@@ -36,8 +36,8 @@ fn errors(kind: Kind, shift: f64) -> [f64; 2] {
             let linear = (high.translation.vector - low.translation.vector) / (2.0 * STEP);
             let angular = (high.rotation * low.rotation.inverse()).scaled_axis() / (2.0 * STEP);
             for axis in 0..3 {
-                worst[0] = worst[0].max((jacobian[(0, axis, j)] - linear[axis]).abs());
-                worst[1] = worst[1].max((jacobian[(0, 3 + axis, j)] - angular[axis]).abs());
+                worst[0] = worse(worst[0], (jacobian[(0, axis, j)] - linear[axis]).abs());
+                worst[1] = worse(worst[1], (jacobian[(0, 3 + axis, j)] - angular[axis]).abs());
             }
         }
     }

@@ -5,7 +5,7 @@
 //! 4 kg; 1e-9.
 
 use super::subjects::{KINDS, Kind, Subject, apart};
-use crate::law::law;
+use crate::law::{law, worse};
 use nalgebra::Vector3;
 
 /// The largest error of an acceleration; the efforts are those for joints that are `shift` off.
@@ -20,7 +20,7 @@ fn error(kind: Kind, shift: f64) -> f64 {
             let mut unit = still.clone();
             unit[j] = 1.0;
             let column = subject.efforts(&other, &still, &unit, Vector3::zeros());
-            worst = worst.max(apart(&subject.accelerations(&q, &still, &column), &unit));
+            worst = worse(worst, apart(&subject.accelerations(&q, &still, &column), &unit));
         }
     }
     worst

@@ -219,11 +219,6 @@ impl Tree {
         found
     }
 
-    /// Mass \[kg\].
-    pub(super) fn mass(&self) -> f64 {
-        self.bodies.values().map(|body| body.mass).sum()
-    }
-
     /// Momentum, and angular momentum about the world's origin.
     pub(super) fn momentum(&self, joints: &Joints, root: Motion) -> (Vector3<f64>, Vector3<f64>) {
         let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());

@@ -1,4 +1,4 @@
-//! Links that fixed joints hold are one body: m = Σ m, c = Σ m c/m, and I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)) about c, d being
+//! Links that fixed joints hold, of one file or of several that are merged, are one body: m = Σ m, c = Σ m c/m, and I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)) about c, d being
 //! from c to each centre. By how it moves: a torque τ for one step from rest gives ω = h I⁻¹ τ, a force F in its centre of
 //! mass v = h F/m and no turn.
 //!
@@ -7,6 +7,7 @@
 use crate::lab::*;
 use crate::law::law;
 use crate::urdf::{Joint, Link, urdf};
+use kinetoscope::prelude::*;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 const TORQUE: [f64; 3] = [0.5, -0.8, 1.1];
@@ -29,8 +30,8 @@ fn isometry(xyz: [f64; 3], rpy: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(Vector3::from(xyz)), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
-/// Mass, centre of mass and inertia about it; `steiner` of the parallel-axis terms.
-fn composed(steiner: f64) -> (f64, Vector3<f64>, Matrix3<f64>) {
+/// Mass, centre of mass and inertia about it.
+fn composed() -> (f64, Vector3<f64>, Matrix3<f64>) {
     let bodies: Vec<(f64, Vector3<f64>, Matrix3<f64>)> = parts()
         .into_iter()
         .map(|(link, xyz, rpy)| {
@@ -43,50 +44,109 @@ fn composed(steiner: f64) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let com = bodies.iter().map(|b| b.0 * b.1).sum::<Vector3<f64>>() / mass;
     let about = |(m, c, i): &(f64, Vector3<f64>, Matrix3<f64>)| {
         let d = c - com;
-        i + steiner * *m * (Matrix3::identity() * d.norm_squared() - d * d.transpose())
+        i + *m * (Matrix3::identity() * d.norm_squared() - d * d.transpose())
     };
     (mass, com, bodies.iter().map(about).sum())
+}
+
+/// How the parts are put together.
+#[derive(Clone, Copy, Debug)]
+enum Robot {
+    /// One file, in which fixed joints hold them.
+    OneFile,
+    /// A file each, merged.
+    Merged,
+}
+
+/// What it weighs, and how it moves after a step from rest.
+#[derive(Debug)]
+struct Moved {
+    mass: f64,
+    com: Vector3<f64>,
+    velocity: Vector3<f64>,
+    spin: Vector3<f64>,
+}
+
+/// A step with a force in the centre of mass and a torque.
+fn moved(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], torque: [f64; 3]) -> Moved {
+    let start = Vector3::new(1.0, 2.0, 3.0);
+    let mut lab = Lab::new(weightless());
+    let robot = match kind {
+        Robot::OneFile => {
+            let links: Vec<Link> = parts.iter().map(|part| part.0.clone()).collect();
+            let joint = |(link, xyz, rpy): &(Link, [f64; 3], [f64; 3])| {
+                Joint::fixed(&format!("to {}", link.name), ["trunk", &link.name]).at(*xyz).turned(*rpy)
+            };
+            let joints: Vec<Joint> = parts.iter().skip(1).map(joint).collect();
+            lab.free(&urdf(&links, &joints), start.into())
+        }
+        Robot::Merged => {
+            let component = |(k, (link, xyz, rpy)): (usize, &(Link, [f64; 3], [f64; 3]))| {
+                let file = lab.file(&format!("{}.urdf", link.name), &urdf(std::slice::from_ref(link), &[]));
+                let on_trunk = (k > 0).then(|| "trunk".to_string());
+                ComponentCfg {
+                    transform: isometry(*xyz, *rpy),
+                    parent: on_trunk.clone(),
+                    parent_link: on_trunk,
+                    ..ComponentCfg::new(link.name.clone(), file)
+                }
+            };
+            let urdf = UrdfCfg { components: parts.iter().enumerate().map(component).collect(), ..UrdfCfg::default() };
+            let init_pose = Pose::translation(start.x, start.y, start.z);
+            let cfg = RobotCfg { urdf, drive: passive(), fix_base: false, init_pose, ..RobotCfg::default() };
+            lab.sim.add_robot(cfg).unwrap()
+        }
+    };
+    let com = lab.sim.robot(robot).get_root_com_position();
+    let com = Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)]) - start;
+    lab.push_link(robot, "trunk", force.into(), torque.into());
+    lab.run(1e-3);
+    let root = lab.root(robot);
+    Moved { mass: lab.sim.robot(robot).total_mass(), com, velocity: root.velocity, spin: root.spin }
 }
 
 #[test]
 fn holds() {
     law(module_path!(), "I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)), c = Σ m c/Σ m", |m| {
-        let joint = |(link, xyz, rpy): &(Link, [f64; 3], [f64; 3])| {
-            Joint::fixed(&format!("to {}", link.name), ["trunk", &link.name]).at(*xyz).turned(*rpy)
-        };
-        let joints: Vec<Joint> = parts().iter().skip(1).map(joint).collect();
-        let links: Vec<Link> = parts().into_iter().map(|part| part.0).collect();
-        let moved = |force: [f64; 3], torque: [f64; 3]| {
-            let mut lab = Lab::new(weightless());
-            let robot = lab.free(&urdf(&links, &joints), [1.0, 2.0, 3.0]);
-            let com = lab.sim.robot(robot).get_root_com_position();
-            let com = Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)]) - Vector3::new(1.0, 2.0, 3.0);
-            lab.push_link(robot, "head", force.into(), torque.into());
-            lab.run(1e-3);
-            let root = lab.root(robot);
-            (com, root.velocity, root.spin, lab.sim.robot(robot).total_mass())
-        };
-        let (mass, com, inertia) = composed(1.0);
-        let (found_com, _, spin, found_mass) = moved([0.0; 3], TORQUE);
-        let (_, velocity, turn, _) = moved(FORCE, [0.0; 3]);
-        let expected = 1e-3 * inertia.try_inverse().unwrap() * Vector3::from(TORQUE);
-        let dropped = 1e-3 * composed(0.0).2.try_inverse().unwrap() * Vector3::from(TORQUE);
+        let (mass, com, inertia) = composed();
+        let spin = 1e-3 * inertia.try_inverse().unwrap() * Vector3::from(TORQUE);
+        // The same parts, moved so that all centres of mass are in one point.
+        let concentric = parts()
+            .into_iter()
+            .map(|(link, xyz, rpy)| {
+                let shift = com - (isometry(xyz, rpy) * isometry(link.com, link.rpy)).translation.vector;
+                let xyz = if link.name == "trunk" { xyz } else { (Vector3::from(xyz) + shift).into() };
+                let com = if link.name == "trunk" { com.into() } else { link.com };
+                (Link { com, ..link }, xyz, rpy)
+            })
+            .collect::<Vec<_>>();
         let rounding = (1e-12, "rounding of principal axes");
-        m.row("mass", "kg", mass, found_mass, rounding);
-        m.control("mass", "without the tail", mass - 0.7);
-        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            m.row(&format!("centre of mass, {axis}"), "m", com[k], found_com[k], rounding);
-            m.control(&format!("centre of mass, {axis}"), "of the trunk alone", parts()[0].0.com[k]);
-            m.row(&format!("angular velocity by a torque, {axis}"), "rad/s", expected[k], spin[k], rounding);
-            m.control(&format!("angular velocity by a torque, {axis}"), "without parallel-axis terms", dropped[k]);
-            m.row(&format!("velocity by a force, {axis}"), "m/s", 1e-3 * FORCE[k] / mass, velocity[k], rounding);
-            m.control(
-                &format!("velocity by a force, {axis}"),
-                "with the mass of the trunk alone",
-                1e-3 * FORCE[k] / 3.0,
-            );
+        for (kind, name) in [(Robot::OneFile, "one file"), (Robot::Merged, "merged files")] {
+            let pushed = |parts: &[_], force, torque| moved(kind, parts, force, torque);
+            let (turned, driven) = (pushed(&parts(), [0.0; 3], TORQUE), pushed(&parts(), FORCE, [0.0; 3]));
+            let trunk = pushed(&parts()[..1], FORCE, [0.0; 3]);
+            let no_arms = pushed(&concentric, [0.0; 3], TORQUE);
+            m.row(&format!("mass, {name}"), "kg", mass, turned.mass, rounding);
+            m.control(&format!("mass, {name}"), "without head and tail", trunk.mass);
+            for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+                let quantity = format!("centre of mass, {axis}, {name}");
+                m.row(&quantity, "m", com[k], turned.com[k], rounding);
+                m.control(&quantity, "without head and tail", trunk.com[k]);
+                let quantity = format!("angular velocity by a torque, {axis}, {name}");
+                m.row(&quantity, "rad/s", spin[k], turned.spin[k], rounding);
+                m.control(&quantity, "with all centres of mass in one point", no_arms.spin[k]);
+                // The frame goes round the centre of mass, which stands.
+                let (quantity, at_frame) =
+                    (format!("velocity of the frame by a torque, {axis}, {name}"), spin.cross(&-com));
+                m.row(&quantity, "m/s", at_frame[k], turned.velocity[k], rounding);
+                m.control(&quantity, "with all centres of mass in one point", no_arms.velocity[k]);
+                let quantity = format!("velocity by a force, {axis}, {name}");
+                m.row(&quantity, "m/s", 1e-3 * FORCE[k] / mass, driven.velocity[k], rounding);
+                m.control(&quantity, "without head and tail", trunk.velocity[k]);
+            }
+            let quantity = format!("turn by a force in the centre of mass, {name}");
+            m.row(&quantity, "rad/s", 0.0, driven.spin.norm(), rounding);
+            m.control(&quantity, "with a torque", turned.spin.norm());
         }
-        m.row("turn by a force in the centre of mass", "rad/s", 0.0, turn.norm(), rounding);
-        m.control("turn by a force in the centre of mass", "with a torque", spin.norm());
     });
 }

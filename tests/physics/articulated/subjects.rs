@@ -3,6 +3,7 @@
 
 use super::newton_euler::{Joints, Motion, Tree, joints};
 use crate::lab::*;
+use crate::law::worse;
 use crate::urdf::{Joint, Link, urdf};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
@@ -129,7 +130,7 @@ impl Subject {
 
 /// The largest difference of two lists.
 pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, worse)
 }
 
 pub(super) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -G);

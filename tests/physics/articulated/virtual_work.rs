@@ -6,7 +6,7 @@
 
 use super::subjects::{KINDS, Kind, Subject, apart};
 use crate::lab::row;
-use crate::law::law;
+use crate::law::{law, worse};
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
 
@@ -38,7 +38,7 @@ fn accelerated(kind: Kind, part: f64) -> f64 {
             })
             .collect();
         subject.lab.push_link(subject.robot, &link, force, torque);
-        worst = worst.max(apart(&subject.accelerations(&q, &still, &hold), &still));
+        worst = worse(worst, apart(&subject.accelerations(&q, &still, &hold), &still));
     }
     worst
 }

@@ -11,7 +11,7 @@ fn holds() {
         let mut alone = Fall::new(legged(1, 1), 0.0);
         let mut many = Fall::new(legged(64, 2), 0.0);
         for fall in [&mut alone, &mut many] {
-            fall.sim.update(120);
+            fall.update(120);
             assert!(fall.has_landed());
         }
         let first = alone.state(0);

@@ -8,7 +8,7 @@ use crate::law::law;
 fn fallen(parts: &[u32]) -> Vec<f64> {
     let mut fall = Fall::new(legged(2, 1), 0.0);
     for &steps in parts {
-        fall.sim.update(steps);
+        fall.update(steps);
     }
     fall.state(0)
 }

@@ -8,7 +8,7 @@ use kinetoscope::prelude::*;
 
 fn fallen(dt: f64, substeps: u32, updates: u32) -> Vec<f64> {
     let mut fall = Fall::new(SimulationManagerCfg { physics_dt: dt, substeps, ..legged(1, 1) }, 0.0);
-    fall.sim.update(updates);
+    fall.update(updates);
     assert!(fall.has_landed());
     fall.state(0)
 }

@@ -9,7 +9,7 @@ const ENVS: usize = 16;
 
 fn fallen(threads: usize, nudge: f64) -> Vec<f64> {
     let mut fall = Fall::new(legged(ENVS, threads), nudge);
-    fall.sim.update(150);
+    fall.update(150);
     assert!(fall.has_landed());
     (0..ENVS).flat_map(|env| fall.state(env)).collect()
 }

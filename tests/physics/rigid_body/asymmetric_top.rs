@@ -6,7 +6,7 @@
 //! by ω h/2 per radian, percents.
 
 use crate::lab::*;
-use crate::law::law;
+use crate::law::{law, worse};
 use crate::urdf::{Link, urdf};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
@@ -30,8 +30,8 @@ fn spun(cfg: SimulationManagerCfg) -> (f64, f64, Vec<[f64; 2]>) {
     let (mut worst_energy, mut worst_momentum, mut curve) = (0.0_f64, 0.0_f64, Vec::new());
     lab.watch(10_000, |t, sim| {
         let (e, l) = state(sim);
-        worst_energy = worst_energy.max((e / energy - 1.0).abs());
-        worst_momentum = worst_momentum.max((l - momentum).norm() / momentum.norm());
+        worst_energy = worse(worst_energy, (e / energy - 1.0).abs());
+        worst_momentum = worse(worst_momentum, (l - momentum).norm() / momentum.norm());
         if ((t * 1e3).round() as u32).is_multiple_of(100) {
             curve.push([t, (e / energy - 1.0).abs().max(1e-17)]);
         }

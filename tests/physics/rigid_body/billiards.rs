@@ -2,8 +2,9 @@
 //! sin α = b/2r from the way of the first, b being the impact parameter: the second leaves along it with v cos α, the first
 //! across it with v sin α, at right angles to each other. Momentum stays always.
 //!
-//! Tolerance: momentum to what the solver leaves, 1e-8 of the forces in each of ten steps. The bounce is a spring for about ten steps, in which the balls go 3 mm at 0.1 mm a step
-//! and the line of centres turns by 3 mm/2r: 0.5 %; 1 %.
+//! Tolerance: momentum to what MuJoCo's solver leaves, 1e-8 of the impulse m v cos α on each of the two balls. The bounce is
+//! a spring for about ten steps, in which the balls go 1 mm at 0.1 mm a step and the line of centres turns by as much over
+//! 2r: 0.5 %; twice, as they come and go: 1 %.
 
 use crate::lab::*;
 use crate::law::law;
@@ -12,20 +13,21 @@ use nalgebra::Vector3;
 
 const RADIUS: f64 = 0.1;
 
-/// Velocities after the second was hit.
-fn hit(impact: f64, restitution: f64) -> [Vector3<f64>; 2] {
+/// Velocities after the second was hit, which alone is slowed by `drag` \[N s/m\].
+fn hit(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(SimulationManagerCfg { friction: [0.0; 3], ..with_dt(1e-4, weightless()) });
-    let mut ball = |uid: &str, at: [f64; 3]| {
+    let mut ball = |uid: &str, at: [f64; 3], linear_damping: f64| {
         lab.object(RigidObjectCfg {
             uid: uid.into(),
             shape: ObjectShape::Sphere { radius: RADIUS },
             mass: Some(0.17),
             restitution: Some(restitution),
+            linear_damping,
             init_pose: Pose::translation(at[0], at[1], at[2]),
             ..RigidObjectCfg::default()
         })
     };
-    let (cue, other) = (ball("cue", [-0.4, impact, 0.0]), ball("other", [0.0; 3]));
+    let (cue, other) = (ball("cue", [-0.4, impact, 0.0], 0.0), ball("other", [0.0; 3], drag));
     lab.write_velocity(cue, [1.0, 0.0, 0.0], [0.0; 3]);
     lab.run(0.8);
     [cue, other].map(|id| lab.body(id).velocity)
@@ -36,19 +38,27 @@ fn holds() {
     law(module_path!(), "v₂ = v cos α along the centres, v₁ = v sin α across", |m| {
         let impact = RADIUS;
         let alpha = (impact / (2.0 * RADIUS)).asin();
-        let [cue, other] = hit(impact, 1.0);
-        let [dull_cue, dull_other] = hit(impact, 0.3);
-        let [full_cue, full_other] = hit(0.0, 1.0);
+        let [cue, other] = hit(impact, 1.0, 0.0);
+        let [dull_cue, dull_other] = hit(impact, 0.3, 0.0);
+        let [full_cue, full_other] = hit(0.0, 1.0, 0.0);
         let turn = |v: &Vector3<f64>| v.y.atan2(v.x);
+        let solver = (2e-8 * alpha.cos(), "the solver's 1e-8 of the impulse, on each ball");
         let bounce = (0.01, "the line of centres turns while they touch");
         m.row("speed of the struck ball", "m/s", alpha.cos(), other.norm(), bounce);
         m.row("direction of the struck ball", "rad", -alpha, turn(&other), bounce);
         m.row("speed of the cue ball", "m/s", alpha.sin(), cue.norm(), bounce);
         m.row("angle between them", "rad", std::f64::consts::FRAC_PI_2, turn(&cue) - turn(&other), bounce);
-        m.row("momentum along the way, of m v", "", 1.0, cue.x + other.x, (2e-7, "the solver's tolerance"));
-        m.row("momentum across the way, of m v", "", 0.0, cue.y + other.y, (2e-7, "the solver's tolerance"));
+        m.row("momentum along the way, of m v", "", 1.0, cue.x + other.x, solver);
+        m.row("momentum across the way, of m v", "", 0.0, cue.y + other.y, solver);
         m.row("energy, of m v²/2", "", 1.0, cue.norm_squared() + other.norm_squared(), bounce);
         m.row("speed of the cue ball, full hit", "m/s", 0.0, full_cue.norm(), bounce);
+        let [held_cue, held_other] = hit(impact, 1.0, 0.1);
+        let [along, across] = [held_cue.x + held_other.x, held_cue.y + held_other.y];
+        m.control("momentum along the way, of m v", "with a drag on the second", along);
+        m.control("momentum across the way, of m v", "with a drag on the second", across);
+        for quantity in ["momentum along the way, of m v", "momentum across the way, of m v"] {
+            m.lines_differ_in(quantity, "what each line's solver leaves, below its 1e-8");
+        }
         m.control("speed of the struck ball", "with a restitution of 0.3", dull_other.norm());
         m.control("angle between them", "with a restitution of 0.3", turn(&dull_cue) - turn(&dull_other));
         m.control(
@@ -58,7 +68,7 @@ fn holds() {
         );
         m.control("direction of the struck ball", "hit in the middle", turn(&full_other));
         m.control("speed of the cue ball", "hit in the middle", full_cue.norm());
-        let alone = hit(3.0 * RADIUS, 1.0)[0];
+        let alone = hit(3.0 * RADIUS, 1.0, 0.0)[0];
         m.control("speed of the cue ball, full hit", "past the other", alone.norm());
     });
 }

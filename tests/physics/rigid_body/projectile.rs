@@ -5,7 +5,7 @@
 //! Tolerance: rounding, 1200 sums of numbers below 10.
 
 use crate::lab::*;
-use crate::law::law;
+use crate::law::{law, worse};
 use crate::urdf::{Link, urdf};
 use kinetoscope::prelude::*;
 
@@ -19,7 +19,7 @@ fn thrown(cfg: SimulationManagerCfg) -> ([f64; 3], f64) {
     let up = G * lab.dt() * f64::from(STEPS + 1) / 2.0;
     lab.write_root_velocity(robot, [THROW[0], THROW[1], up], [0.0; 3]);
     let mut apex = 0.0_f64;
-    lab.watch(STEPS, |_, sim| apex = apex.max(root(sim, robot).position.z));
+    lab.watch(STEPS, |_, sim| apex = worse(apex, root(sim, robot).position.z));
     (lab.root(robot).position.into(), apex)
 }
 
