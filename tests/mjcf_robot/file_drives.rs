@@ -109,3 +109,15 @@ fn the_drive_of_a_servo_moves_as_the_actuator() {
     }
     assert!(farthest > 0.5, "it overshoots: {farthest}");
 }
+
+/// The softness of dry friction is the drives' where they hold it; a file that sets its own is told so, one that does not is not.
+#[test]
+fn softness_of_friction_that_a_drive_does_not_keep_is_said() {
+    for (softness, times) in [("", 0), (r#"solreffriction="0.05 1""#, 1), (r#"solimpfriction="0.8 0.9 0.001""#, 1)] {
+        let text = MACHINE.replace(r#"frictionloss="0.3""#, &format!(r#"frictionloss="0.3" {softness}"#));
+        let mut sim = empty(1);
+        sim.add_robot(robot("m", &text)).unwrap();
+        let is_said = |d: &&Diagnostic| d.message.contains("solreffriction") && d.message.contains("\"idle\"");
+        assert_eq!(sim.diagnostics().iter().filter(is_said).count(), times, "{softness}: {:?}", sim.diagnostics());
+    }
+}

@@ -31,6 +31,8 @@ fn snapshots_bring_back_and_what_is_added_later_changes_nothing() {
     sim.update(40);
     assert_eq!(state(&sim, id), end, "going on is bit-identical");
 
+    sim.update(460);
+    let end = state(&sim, id);
     sim.restore(&snapshot, None).unwrap();
     sim.add_rigid_object(RigidObjectCfg {
         uid: "cube".into(),
@@ -40,9 +42,10 @@ fn snapshots_bring_back_and_what_is_added_later_changes_nothing() {
     .unwrap();
     sim.add_robot(RobotCfg { init_pose: Pose::translation(0.0, 5.0, 0.0), ..robot("second", ODD) }).unwrap();
     assert_eq!(state(&sim, id), there, "bit-equal right after");
-    sim.update(40);
-    // The solver stops at a residual of 1e-8 of the whole scene, which is another one.
-    assert!((sim.robot(id).get_qpos() - &end.0).iter().all(|d| d.abs() < 1e-6));
+    sim.update(500);
+    // A second without any contact: what is added is no part of the robot's equations.
+    let off = (sim.robot(id).get_qpos() - &end.0).iter().fold(0.0f64, |far, d| far.max(d.abs()));
+    assert!(off < 1e-9, "{off}");
 }
 
 /// Gravity compensation of all links holds an arm that nothing else holds; gravity of one kilogram is felt by an external

@@ -7,6 +7,7 @@ mod actuator;
 mod couplings;
 mod drives;
 mod error;
+mod friction;
 mod places;
 mod tree;
 mod world;
@@ -82,6 +83,7 @@ impl RobotFile {
         world::say_contacts(&owner, &model, &names, of.self_collision, &places.file(), diagnostics);
         let couplings = couplings::of_joints(&owner, &model, &names, &places, diagnostics);
         let acting = drives::of_joints(&owner, &model, &names, &places, &couplings, diagnostics).map_err(&wrong)?;
+        friction::say(&owner, &model, &names, &couplings, &places.file(), diagnostics);
         let describing = Describing {
             uid: of.uid,
             model: &model,

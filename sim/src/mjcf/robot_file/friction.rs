@@ -1,0 +1,37 @@
+//! How soft dry friction is: where implicit drives hold it, as the drives are.
+
+use super::couplings::Coupling;
+use super::drives::is_single;
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::mj::Model;
+use crate::mjcf::part::PartNames;
+use crate::source::Source;
+
+/// MuJoCo's `solref` and `solimp` where nothing is said.
+const DEFAULTS: ([f64; 2], [f64; 5]) = ([0.02, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0]);
+
+/// Says of which joints the file's own softness of dry friction holds only without an implicit drive.
+pub(super) fn say(
+    owner: &str,
+    model: &Model,
+    names: &PartNames,
+    couplings: &[Option<Coupling>],
+    file: &Source,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let is_soft = |&joint: &usize| {
+        let dof = model.jnt_dofadr()[joint] as usize;
+        let (solref, solimp) = (&model.dof_solref()[2 * dof..2 * dof + 2], &model.dof_solimp()[5 * dof..5 * dof + 5]);
+        let rubs = model.dof_frictionloss()[dof] > 0.0;
+        rubs && (solref != DEFAULTS.0 || solimp != DEFAULTS.1)
+    };
+    let joints = (0..model.njnt()).filter(|&joint| is_single(model, joint) && couplings[joint].is_none());
+    let named: Vec<String> = joints.filter(is_soft).map(|joint| format!("{:?}", names.joints[joint])).collect();
+    if !named.is_empty() {
+        let message = format!(
+            "{owner}: solreffriction and solimpfriction of these joints hold only where no implicit drive is: {}",
+            named.join(", ")
+        );
+        diagnostics.push(Diagnostic::new(DiagnosticKind::SettingIgnored, file.clone(), message));
+    }
+}
