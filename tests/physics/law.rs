@@ -84,7 +84,7 @@ impl Measured {
         self.rows.push(Row { quantity, unit, expected, measured, tolerance, why, pass, lines_differ: None });
     }
 
-    /// The row called `quantity`, measured again in a world `without` the effect, must miss by more than its tolerance.
+    /// Every row needs at least one: the row called `quantity`, measured again in a world `without` the effect, must miss by more than its tolerance.
     #[track_caller]
     pub(crate) fn control(&mut self, quantity: &str, without: &str, measured: f64) {
         let row = self.rows.iter().find(|row| row.quantity == quantity).expect("a control of a row that exists");
@@ -125,8 +125,13 @@ impl Measured {
         for Control { quantity, without, measured, .. } in self.controls.iter().filter(|control| !control.misses) {
             failures.push(format!("the control passes: {quantity} is {measured:.12e} also {without}"));
         }
-        if self.rows.is_empty() || self.controls.is_empty() {
-            failures.push("a law needs rows and a control".into());
+        for Row { quantity, .. } in &self.rows {
+            if !self.controls.iter().any(|control| control.quantity == *quantity) {
+                failures.push(format!("{quantity} has no control, which would show that it can fail"));
+            }
+        }
+        if self.rows.is_empty() {
+            failures.push("a law needs rows".into());
         }
         failures
     }
@@ -173,10 +178,13 @@ mod tests {
     }
 
     #[test]
-    fn a_law_without_rows_or_control_fails() {
-        assert_eq!(Measured::default().failures().len(), 1);
+    fn a_law_without_rows_and_a_row_without_control_fail() {
+        assert_eq!(Measured::default().failures(), ["a law needs rows"]);
         let mut m = Measured::default();
         m.row("x", "", 1.0, 1.0, (0.0, "the same number"));
-        assert_eq!(m.failures(), ["a law needs rows and a control"]);
+        assert_eq!(m.failures(), ["x has no control, which would show that it can fail"]);
+        m.control("x", "without it", 2.0);
+        m.row("y", "", 1.0, 1.0, (0.0, "the same number"));
+        assert!(m.failures()[0].starts_with("y has no control"));
     }
 }

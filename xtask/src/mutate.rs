@@ -5,6 +5,7 @@ use crate::mutations::{MUTATIONS, Mutation};
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
 use crate::source_check::files_below;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,8 +18,8 @@ pub(crate) struct MutateArgs {
 /// What the tests said of a mutation.
 #[derive(Debug, PartialEq, Eq)]
 enum Verdict {
-    /// Names of the tests that failed.
-    Caught(Vec<String>),
+    /// Names of the tests that failed, and words of the mutation that no failed test has in its name.
+    Caught(Vec<String>, Vec<String>),
     Survived,
     /// The changed code is no code, or no test ran.
     NotTried(String),
@@ -31,26 +32,43 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     let tree = folder.join("tree");
     copy(&repo.root, &tree)?;
     let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| mutation.name.contains(filter));
+    let chosen: Vec<&Mutation> = MUTATIONS.iter().filter(chosen).collect();
     let (mut findings, mut table) = (Vec::new(), String::new());
-    for mutation in MUTATIONS.iter().filter(chosen) {
+    let test = |binary: &str, words: &[&str]| {
+        let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
+        cargo.args(["test", "--package", "kinetoscope", "--test", binary, "--"]).args(words).success_and_output()
+    };
+    // A test that fails on the code as it is would seem to catch everything.
+    for (binary, words) in binaries(&chosen) {
+        let (passed, said) = test(binary, &words)?;
+        if verdict(passed, &said, &words) != Verdict::Survived {
+            let what = format!("the tests of `{binary}` fail, or do not run, on code that is not mutated");
+            return Err(Failure::new(format!("{what}:\n{said}")));
+        }
+    }
+    for mutation in chosen {
         let path = tree.join(mutation.file);
         let good = read(&path)?;
         write(&path, &good.replace(mutation.search, mutation.replacement))?;
         let (binary, tests) = mutation.tests;
-        let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
-        let tested =
-            cargo.args(["test", "--package", "kinetoscope", "--test", binary, "--"]).args(tests).success_and_output();
+        let tested = test(binary, tests);
         write(&path, &good)?;
         let (passed, said) = tested?;
-        let verdict = verdict(passed, &said);
+        let verdict = verdict(passed, &said, tests);
         let line = match &verdict {
-            Verdict::Caught(by) => format!("caught   {}: {}", mutation.name, by.join(", ")),
+            Verdict::Caught(by, not_by) if not_by.is_empty() => {
+                format!("caught   {}: {}", mutation.name, by.join(", "))
+            }
+            Verdict::Caught(by, not_by) => {
+                let (by, not_by) = (by.join(", "), not_by.join(", "));
+                format!("caught   {}: {by}; not by {not_by}", mutation.name)
+            }
             Verdict::Survived => format!("SURVIVED {} ({})", mutation.name, mutation.file),
             Verdict::NotTried(why) => format!("ERROR    {} ({}): {why}", mutation.name, mutation.file),
         };
         println!("{line}");
         table.push_str(&format!("{line}\n"));
-        if !matches!(verdict, Verdict::Caught(_)) {
+        if !matches!(verdict, Verdict::Caught(..)) {
             findings.push(line);
         }
     }
@@ -73,12 +91,26 @@ pub(crate) fn check(root: &Path) -> Outcome {
     no_findings("mutations that do not fit the code (xtask/src/mutations.rs)", &findings)
 }
 
-fn verdict(passed: bool, said: &str) -> Verdict {
+/// The test binaries of some mutations, each with the words of all of them.
+fn binaries(mutations: &[&Mutation]) -> BTreeMap<&'static str, Vec<&'static str>> {
+    let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (binary, words) in mutations.iter().map(|mutation| mutation.tests) {
+        let all = found.entry(binary).or_default();
+        all.extend(words);
+        all.sort_unstable();
+        all.dedup();
+    }
+    found
+}
+
+fn verdict(passed: bool, said: &str, words: &[&str]) -> Verdict {
     let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_string());
     let caught: Vec<String> = said.lines().filter_map(failed).collect();
     // A test binary that dies says no more than which test it was in.
     if !caught.is_empty() {
-        return Verdict::Caught(caught);
+        let misses = |word: &&&str| !caught.iter().any(|name| name.contains(**word));
+        let missing = words.iter().filter(misses).map(|word| (*word).to_string()).collect();
+        return Verdict::Caught(caught, missing);
     }
     if !passed {
         return Verdict::NotTried("no test failed: the change does not compile, or the tests died".into());
@@ -139,10 +171,22 @@ mod tests {
     #[test]
     fn what_tests_say_is_understood() {
         let failed = "running 2 tests\ntest a::holds ... FAILED\ntest b::holds ... ok\n";
-        assert_eq!(verdict(false, failed), Verdict::Caught(vec!["a::holds".into()]));
-        assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n"), Verdict::Survived);
-        assert!(matches!(verdict(false, ""), Verdict::NotTried(_)));
-        assert!(matches!(verdict(true, "running 0 tests\n"), Verdict::NotTried(_)));
+        assert_eq!(verdict(false, failed, &["a"]), Verdict::Caught(vec!["a::holds".into()], Vec::new()));
+        let partly = Verdict::Caught(vec!["a::holds".into()], vec!["b".into()]);
+        assert_eq!(verdict(false, failed, &["a", "b"]), partly);
+        assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n", &["a"]), Verdict::Survived);
+        assert!(matches!(verdict(false, "", &["a"]), Verdict::NotTried(_)));
+        assert!(matches!(verdict(true, "running 0 tests\n", &["a"]), Verdict::NotTried(_)));
+    }
+
+    #[test]
+    fn each_binary_is_tried_once_with_all_its_words() {
+        let all = binaries(&MUTATIONS.iter().collect::<Vec<_>>());
+        for mutation in MUTATIONS {
+            let (binary, words) = mutation.tests;
+            assert!(words.iter().all(|word| all[binary].contains(word)), "{}", mutation.name);
+        }
+        assert!(all["physics"].windows(2).all(|pair| pair[0] != pair[1]), "{all:?}");
     }
 
     #[test]

@@ -156,7 +156,7 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
         "drive pushes the wrong way",
         "sim/src/drive/implicit.rs",
         ["gains.kp * (target.position - q)", "gains.kp * (q - target.position)"],
-        &["gyroscope", "threads"],
+        &["gyroscope"],
     ),
     Mutation {
         name: "effort limit forgotten",
@@ -220,13 +220,12 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
         ["(2.0 * ratio * frequency).max(1e-9)", "(ratio * frequency).max(1e-9)"],
         &["elastic_bounce"],
     ),
-    Mutation {
-        name: "friction of an object forgotten",
-        file: "sim/src/mjcf/scene.rs",
-        search: "        role,\n        friction: cfg.friction,\n",
-        replacement: "        role,\n        friction: None,\n",
-        tests: ("objects", &["properties"]),
-    },
+    physics(
+        "friction of an object forgotten",
+        "sim/src/mjcf/scene.rs",
+        ["        role,\n        friction: cfg.friction,\n", "        role,\n        friction: None,\n"],
+        &["conveyor"],
+    ),
     physics(
         "mass of an object from its density only",
         "sim/src/objects/mass_properties.rs",

@@ -41,6 +41,8 @@ pub(crate) struct Row {
 pub(crate) struct Measured {
     pub(crate) rows: Vec<Row>,
     pub(crate) controls: usize,
+    /// Those of them that do not miss: the law, the quantity and what was taken away.
+    pub(crate) idle_controls: Vec<String>,
     /// Names of the laws, their plots and the version.
     pub(crate) plots: Vec<(String, Plot, String)>,
 }
@@ -90,7 +92,13 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
             lines_differ: text(&row["lines_differ"]).or_else(|| text(&measured["lines_differ"])),
         });
     }
-    to.controls += measured["controls"].as_array()?.len();
+    for control in measured["controls"].as_array()? {
+        to.controls += 1;
+        if !control["misses"].as_bool()? {
+            let (quantity, without) = (text(&control["quantity"])?, text(&control["without"])?);
+            to.idle_controls.push(format!("{name}, {quantity}, {without} (MuJoCo {mujoco})"));
+        }
+    }
     for plot in measured["plots"].as_array()? {
         let mut series = Vec::new();
         for curve in plot["series"].as_array()? {
@@ -104,7 +112,8 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
     Some(())
 }
 
-/// The plots of all runs by the name of their file, which is that of the law; curves that differ between lines of MuJoCo are drawn for each.
+/// The plots of all runs by the name of their file, which is that of the law; curves that differ between lines of MuJoCo are
+/// drawn for each.
 pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
     let mut found: Vec<(String, Plot, &str)> = Vec::new();
     for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
@@ -159,10 +168,17 @@ pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
     }
     let failed = rows.iter().filter(|row| !row.pass).count();
     let controls: usize = runs.iter().map(|run| run.controls).sum();
+    let idle: Vec<&str> = runs.iter().flat_map(|run| &run.idle_controls).map(String::as_str).collect();
+    let controls = if idle.is_empty() {
+        format!(
+            "{controls} controls, in which an effect is taken away or altered, all miss by more than the tolerance."
+        )
+    } else {
+        format!("**{} of {controls} controls hold as well and show nothing**: {}.", idle.len(), idle.join("; "))
+    };
     let mut out = format!(
         "# Laws of physics\n\nWritten by `cargo xtask physics-report`; do not edit. {} laws, each with a closed form or a \
-         conservation law, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls} \
-         controls, in which the effect is taken away, miss by more than the tolerance.\n\nThe derivation of a law, and where its \
+         conservation law, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls}\n\nThe derivation of a law, and where its \
          tolerance comes from, stand at the head of its file. A number is as true on another machine if it differs by less than a \
          tenth of its tolerance; that is what CI asks of this page.\n",
         laws.len(),
@@ -287,11 +303,22 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
 }
 
 /// What a page says that was not measured: numbers that changed by more than a tenth of their tolerance, rows that are
-/// missing or too many.
+/// missing or too many, and what the text around the tables says.
 pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
+    let mut findings = Vec::new();
+    let now = match self::page(runs) {
+        Ok(now) => now,
+        Err(failure) => return vec![failure.message],
+    };
+    // Lines that are no rows of numbers: counts, versions, whether all hold, headings, pictures.
+    let is_text = |line: &&str| !line.starts_with("| ");
+    let (was, is): (Vec<&str>, Vec<&str>) =
+        (page.lines().filter(is_text).collect(), now.lines().filter(is_text).collect());
+    findings.extend(is.iter().filter(|line| !was.contains(line)).map(|line| format!("not on the page: {line}")));
+    findings.extend(was.iter().filter(|line| !is.contains(line)).map(|line| format!("only on the page: {line}")));
+    findings.extend(untrue_differences(page, &now, runs));
     let mut said: Vec<Vec<String>> = page.lines().filter_map(cells).filter(|cells| cells.len() == 9).collect();
     said.retain(|cells| cells[0].starts_with('['));
-    let mut findings = Vec::new();
     for row in runs.iter().flat_map(|run| &run.rows) {
         // As it would be written: what is the same text is the same row.
         let new = cells(&table_row(row)).unwrap_or_default();
@@ -303,9 +330,11 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
         };
         let old = said.swap_remove(at);
         let parsed = |cell: &str| cell.parse::<f64>().unwrap_or(f64::NAN);
-        for (k, what) in [(3, "expected"), (4, "measured")] {
+        for (k, what) in [(3, "expected"), (4, "measured"), (5, "error")] {
             let (was, is) = (parsed(&old[k]), parsed(&new[k]));
-            let most = SAME * row.tolerance + 10.0_f64.powi(1 - DIGITS as i32) * is.abs();
+            // An error is written with two digits.
+            let digits = if k == 5 { 1 } else { DIGITS as i32 };
+            let most = SAME * row.tolerance + 10.0_f64.powi(1 - digits) * is.abs();
             // Not `>`: a NaN is no number to agree with.
             let agrees = (was - is).abs() <= most;
             if !agrees {
@@ -319,6 +348,38 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
         }
     }
     findings.extend(said.iter().map(|row| format!("{} ({}, MuJoCo {}) was not measured", row[0], row[2], row[7])));
+    findings
+}
+
+/// What the table of differences between the lines of MuJoCo says that was not measured.
+fn untrue_differences(page: &str, now: &str, runs: &[Measured]) -> Vec<String> {
+    let table = |text: &str| -> Vec<Vec<String>> {
+        text.lines().filter_map(cells).filter(|cells| cells.len() == 5 && cells[0] != "test").collect()
+    };
+    let (was, is) = (table(page), table(now));
+    let same = |a: &[String], b: &[String]| [0, 1, 4].iter().all(|&k| a[k] == b[k]);
+    let near = |old: &[String], new: &[String]| {
+        let of_row = |row: &&Row| row.law == new[0] && row.quantity == new[1];
+        let tolerance =
+            runs.iter().flat_map(|run| &run.rows).filter(of_row).map(|row| row.tolerance).fold(0.0, f64::max);
+        [2, 3].iter().all(|&k| match (old[k].parse::<f64>(), new[k].parse::<f64>()) {
+            (Ok(was), Ok(is)) => (was - is).abs() <= SAME * tolerance + 10.0_f64.powi(1 - DIGITS as i32) * is.abs(),
+            _ => old[k] == new[k],
+        })
+    };
+    let mut findings = Vec::new();
+    for new in &is {
+        match was.iter().find(|old| same(old, new)) {
+            None => findings.push(format!("{} ({}): that the lines differ is not on the page", new[0], new[1])),
+            Some(old) if !near(old, new) => {
+                let [old, new] = [old, new].map(|cells| cells[2..4].join(" and "));
+                findings.push(format!("differences of the lines: {old} on the page, {new} now"));
+            }
+            Some(_) => {}
+        }
+    }
+    let gone = |old: &&Vec<String>| !is.iter().any(|new| same(old, new));
+    findings.extend(was.iter().filter(gone).map(|old| format!("{} ({}): the lines no longer differ", old[0], old[1])));
     findings
 }
 
@@ -349,7 +410,7 @@ mod tests {
     }
 
     fn run(mujoco: &str, measured: f64) -> Measured {
-        Measured { rows: vec![row(mujoco, measured)], controls: 1, plots: Vec::new() }
+        Measured { rows: vec![row(mujoco, measured)], controls: 1, ..Measured::default() }
     }
 
     #[test]
@@ -368,10 +429,16 @@ mod tests {
         assert_eq!(untrue(&page, &[run("2.2.2", 1.095 + 5e-8)]), Vec::<String>::new());
         let found = untrue(&page, &[run("2.2.2", 1.095 + 3e-7)]);
         assert!(found.len() == 1 && found[0].contains("1.0950003 now"), "{found:?}");
-        assert_eq!(untrue(&page, &[run("4.0.0", 1.095)]).len(), 2);
+        // The row, the row that is no more, and the version in the text, which is old and new.
+        assert_eq!(untrue(&page, &[run("4.0.0", 1.095)]).len(), 4);
         let mut failed = run("2.2.2", 1.095);
         failed.rows[0].pass = false;
-        assert!(untrue(&page, &[failed])[0].contains("FAIL"));
+        assert!(untrue(&page, &[failed]).iter().any(|finding| finding.contains("`pass` on the page, `**FAIL**` now")));
+        let mut more = run("2.2.2", 1.095);
+        more.controls = 2;
+        assert!(untrue(&page, &[more])[0].contains("2 controls"));
+        let forged = page.replace("| 0.0e0 |", "| 3.0e-7 |");
+        assert!(untrue(&forged, &[run("2.2.2", 1.095)])[0].contains("error"), "{forged}");
         let mut other = run("2.2.2", 1.095);
         other.rows[0].statement = "z = 0".into();
         assert_eq!(untrue(&page, &[other]).len(), 1);
@@ -385,7 +452,29 @@ mod tests {
         for run in &mut runs {
             run.rows[0].lines_differ = Some("it was mended".into());
         }
-        assert!(page(&runs).expect("a reason").contains("| it was mended |"));
+        let page = page(&runs).expect("a reason");
+        assert!(page.contains("| it was mended |"));
+        assert_eq!(untrue(&page, &runs), Vec::<String>::new());
+        let forged = page.replace("| it was mended |", "| it was always so |");
+        assert_eq!(untrue(&forged, &runs).len(), 2);
+        let forged = page.replace("| height | 1.095 | 1.0950005 |", "| height | 1.095 | 1.0960005 |");
+        assert!(untrue(&forged, &runs)[0].contains("1.0960005 on the page"), "{forged}");
+    }
+
+    #[test]
+    fn a_control_that_holds_is_told() {
+        let control =
+            |misses: bool| serde_json::json!({ "quantity": "height", "without": "without gravity", "misses": misses });
+        let law = |misses| {
+            let measured = serde_json::json!({ "rows": [], "controls": [control(true), control(misses)], "plots": [] });
+            serde_json::json!({ "name": "free_fall", "mujoco": "2.2.2", "measured": measured })
+        };
+        for (misses, text) in [(true, "2 controls, in which"), (false, "**1 of 2 controls hold as well")] {
+            let mut measured = Measured { rows: vec![row("2.2.2", 1.095)], ..Measured::default() };
+            add(&mut measured, &law(misses)).expect("a law");
+            let page = page(&[measured]).expect("one line");
+            assert!(page.contains(text), "{page}");
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Atwood's machine: two masses on a rope over a pulley, a = g (m₁ - m₂)/(m₁ + m₂). The rope is a mimic joint with the ratio
 //! -1.
 //!
-//! Tolerance: the coupling yields by 1e-4 of the acceleration that its load would cause: 2e-4 of it.
+//! Tolerance: the coupling is soft by 1e-4, which shows in places only: once the rope is taut, after some steps, what it
+//! yields holds its load, and the velocities are a rigid rope's. Rounding of 500 sums of up to 5 m/s: 1e-12.
 
 use crate::lab::*;
 use crate::law::law;
@@ -28,7 +29,7 @@ fn holds() {
         let (together, apart) = (fell(masses, true), fell(masses, false));
         for (k, (name, sign)) in [("heavy side", 1.0), ("light side", -1.0)].into_iter().enumerate() {
             let quantity = format!("velocity after 0.5 s, {name}");
-            m.row(&quantity, "m/s", sign * speed, together[k], (2e-4 * G * 0.5, "the coupling yields by 1e-4"));
+            m.row(&quantity, "m/s", sign * speed, together[k], (1e-12, "rounding of 500 steps"));
             m.control(&quantity, "without the rope", apart[k]);
         }
     });

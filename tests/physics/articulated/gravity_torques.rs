@@ -30,7 +30,7 @@ fn holds() {
             let (held, less) = (moved(kind, 1.0), moved(kind, 0.99));
             for (k, when) in ["a step", "0.1 s"].into_iter().enumerate() {
                 let quantity = format!("largest velocity after {when}, {name}");
-                m.row(&quantity, "rad/s", 0.0, held[k], (1e-9, "rounding, and what it grows to"));
+                m.row(&quantity, "rad/s", 0.0, held[k], (1e-10, "rounding, and what it grows to"));
                 m.control(&quantity, "with 1 % less effort", less[k]);
             }
         }

@@ -2,7 +2,7 @@
 //! which the yaw turns round. Its angular momentum I ω turns with it: dL/dt = Ω x I ω, a torque I ω Ω about the pitch axis.
 //!
 //! Tolerance: the pitch drive sags by δ = τ/kp = 1.2e-4 rad, at which the yaw turns the wrist's other moments out of their
-//! axes: I Ω² δ = 5e-6 N m. The yaw drive has come to rest.
+//! axes: I Ω² δ = 5e-6 N m. The yaw drive has come to rest after 2 s.
 
 use crate::lab::*;
 use crate::law::law;
@@ -13,8 +13,8 @@ const ROTOR: f64 = 0.02;
 const YAW: f64 = 1.5;
 const SPIN: f64 = 40.0;
 
-/// Efforts of the yaw and of the pitch drive after 1 s, and the spin of the rotor.
-fn held(yaw: f64, spin: f64) -> [f64; 3] {
+/// Efforts of the yaw and of the pitch drive after `seconds`, and the spin of the rotor.
+fn held(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
     let across = 0.6 * ROTOR;
     let links = [
         base(),
@@ -36,7 +36,7 @@ fn held(yaw: f64, spin: f64) -> [f64; 3] {
     let robot = lab.robot(&urdf(&links, &joints), RobotCfg { drive, ..RobotCfg::default() });
     lab.write_joints(robot, &[0.0; 3], &[yaw, 0.0, spin]);
     lab.sim.robot_mut(robot).set_qvel(&row(&[yaw, 0.0, 0.0]), None, None).unwrap();
-    lab.run(2.0);
+    lab.run(seconds);
     let effort = lab.effort(robot);
     [effort[0], effort[1], lab.v(robot)[2]]
 }
@@ -44,14 +44,15 @@ fn held(yaw: f64, spin: f64) -> [f64; 3] {
 #[test]
 fn holds() {
     law(module_path!(), "τ = I ω Ω across yaw and spin", |m| {
-        let [yaw, pitch, spin] = held(YAW, SPIN);
+        let [yaw, pitch, spin] = held(YAW, SPIN, 2.0);
         let torque = ROTOR * SPIN * YAW;
         m.row("effort of the pitch drive", "N m", torque, pitch, (1e-5, "I Ω² times the sag"));
         m.row("effort of the yaw drive", "N m", 0.0, yaw, (1e-6, "what is left of the start"));
         m.row("spin of the rotor", "rad/s", SPIN, spin, (1e-3, "the pitch sags by 1e-4 rad while it turns"));
-        let still = held(YAW, 0.0);
+        m.control("effort of the yaw drive", "5 ms after the start", held(YAW, SPIN, 5e-3)[0]);
+        let still = held(YAW, 0.0, 2.0);
         m.control("effort of the pitch drive", "without spin", still[1]);
         m.control("spin of the rotor", "without spin", still[2]);
-        m.control("effort of the pitch drive", "turned the other way", held(-YAW, SPIN)[1]);
+        m.control("effort of the pitch drive", "turned the other way", held(-YAW, SPIN, 2.0)[1]);
     });
 }

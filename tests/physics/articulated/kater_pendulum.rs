@@ -2,7 +2,7 @@
 //! gyration, a body swings with the same period: that of a point at l + k²/l. I = m (k² + l²), and I/(m l) is symmetric in l
 //! and k²/l.
 //!
-//! Tolerance: as for `pendulum_period`, 1e-8 of the period.
+//! Tolerance: as for `pendulum_period`, 1e-9 of the period.
 
 use crate::lab::*;
 use crate::law::law;
@@ -37,7 +37,7 @@ fn holds() {
     law(module_path!(), "T(l) = T(k²/l) = 4 K(sin θ₀/2) √((l + k²/l)/g)", |m| {
         let far = GYRATION * GYRATION / NEAR;
         let expected = 4.0 * complete_elliptic((0.5 * ANGLE).sin()) * ((NEAR + far) / G).sqrt();
-        let order = (1e-8 * expected, "RK4 and crossings off straight lines");
+        let order = (1e-9 * expected, "RK4 and crossings off straight lines");
         for (name, length) in [("near pivot", NEAR), ("far pivot", far)] {
             let quantity = format!("period at the {name}");
             m.row(&quantity, "s", expected, period(length), order);

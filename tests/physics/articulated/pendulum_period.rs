@@ -39,7 +39,7 @@ fn holds() {
             let expected = 4.0 * complete_elliptic((0.5 * angle).sin()) * pendulum;
             let quantity = format!("period at {degrees}°");
             let found = period(rk4(earth()), angle);
-            m.row(&quantity, "s", expected, found, (1e-8 * expected, "RK4 and crossings off straight lines"));
+            m.row(&quantity, "s", expected, found, (1e-9 * expected, "RK4 and crossings off straight lines"));
             m.control(&quantity, "at an angle 1 % smaller", period(rk4(earth()), 0.99 * angle));
         }
     });

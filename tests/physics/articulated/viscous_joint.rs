@@ -1,7 +1,7 @@
 //! A wheel in an oil bearing: I ω' = -c ω. MuJoCo's Euler takes the damping at the end of the step, ω(n+1) = ω(n)/(1 + h c/I),
 //! so that ω(n) = ω₀ (1 + h c/I)^-n, which goes to ω₀ e^(-c t/I) with the step.
 //!
-//! Tolerance: rounding of 1000 divisions; of continuous time, (h c/I)/2 per e-fold: 0.4 % of ω after 2 of them.
+//! Tolerance: rounding of 1000 divisions.
 
 use crate::lab::*;
 use crate::law::law;
@@ -23,13 +23,10 @@ fn slowed(damping: f64) -> f64 {
 
 #[test]
 fn holds() {
-    law(module_path!(), "ω = ω₀ (1 + h c/I)^(-t/h) -> ω₀ e^(-c t/I)", |m| {
+    law(module_path!(), "ω = ω₀ (1 + h c/I)^(-t/h)", |m| {
         let found = slowed(DAMPING);
         let stepped = START * (1.0 + 1e-3 * DAMPING / MOMENT).powi(-1000);
-        let smooth = START * (-DAMPING / MOMENT).exp();
         m.row("angular velocity after 1 s", "rad/s", stepped, found, (1e-11, "rounding of 1000 divisions"));
-        m.row("the same in continuous time", "rad/s", smooth, found, (4e-3 * smooth, "h c/2I per e-fold"));
         m.control("angular velocity after 1 s", "without oil", slowed(0.0));
-        m.control("the same in continuous time", "without oil", slowed(0.0));
     });
 }

@@ -1,6 +1,7 @@
-//! Environments do not know of each other: environment 0 is the same, bit for bit, alone and with 63 others.
+//! Environments do not know of each other: environment 0 is the same, bit for bit, alone and with 63 others, of
+//! which another is pushed.
 //!
-//! Tolerance: none. Control: environment 1 of the 64 is not it.
+//! Tolerance: none. Control: one joint of environment 0 is 1e-12 rad/s faster.
 
 use super::scenes::{Fall, difference, legged};
 use crate::law::law;
@@ -9,13 +10,21 @@ use crate::law::law;
 fn holds() {
     law(module_path!(), "x₀(1 environment) = x₀(64 environments), bit for bit", |m| {
         let mut alone = Fall::new(legged(1, 1), 0.0);
-        let mut many = Fall::new(legged(64, 2), 0.0);
-        for fall in [&mut alone, &mut many] {
+        let (mut many, mut nudged) = (Fall::new(legged(64, 2), 0.0), Fall::new(legged(64, 2), 1e-12));
+        let mut pushed = Fall::new(legged(64, 2), 0.0);
+        pushed.hasten(1, 0.5);
+        for fall in [&mut alone, &mut many, &mut nudged, &mut pushed] {
             fall.update(120);
             assert!(fall.has_landed());
         }
         let first = alone.state(0);
         m.row("largest difference", "", 0.0, difference(&first, &many.state(0)), (0.0, "the same bits"));
-        m.control("largest difference", "with environment 1", difference(&first, &many.state(1)));
+        let quantity = "largest difference, environment 1 pushed";
+        m.row(quantity, "", 0.0, difference(&first, &pushed.state(0)), (0.0, "the same bits"));
+        assert!(difference(&many.state(1), &pushed.state(1)) > 1e-3, "the push is felt where it is");
+        for quantity in ["largest difference", quantity] {
+            let differs = difference(&first, &nudged.state(0));
+            m.control(quantity, "with a nudge of 1e-12 rad/s to environment 0", differs);
+        }
     });
 }

@@ -1,4 +1,6 @@
-//! How fast an answer gets better with the step: e(h) = C hᵖ, so p = log₂(e(2h)/e(h)).
+//! How fast an answer gets better with the step: e(h) = C hᵖ, so p = log₂(e(2h)/e(h)). The answer is
+//! that of the same equations in much smaller steps: an order says how an integrator converges, and other laws, in closed
+//! form, where to.
 
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;

@@ -2,7 +2,7 @@
 //! 5 m/s more.
 //!
 //! Tolerance: places of some metres instead of centimetres: 1e-15 of rounding in the depth times a stiffness of the contact
-//! of 1e5/s² over ten steps: 1e-10, with room 1e-8.
+//! of 1e5/s² over ten steps: 1e-10.
 
 use crate::lab::*;
 use crate::law::law;
@@ -36,7 +36,7 @@ fn holds() {
         for (k, name) in ["left", "right"].into_iter().enumerate() {
             for (axis, letter) in ["x", "y"].into_iter().enumerate() {
                 let quantity = format!("velocity of the {name} ball, {letter}");
-                let rounding = (1e-8, "rounding of places, times the stiffness of the contact");
+                let rounding = (1e-10, "rounding of places, times the stiffness of the contact");
                 m.row(&quantity, "m/s", here[k][axis], there[k][axis], rounding);
                 m.control(&quantity, "met 1 mm/s faster", faster[k][axis]);
             }

@@ -1,7 +1,7 @@
 //! RK4 of the orientation of a free body. Orientations do not add: 4.x advances them within a step as a Runge-Kutta-
 //! Munthe-Kaas method does, of order 4; 2.2.2 adds up angular velocities of different axes, which leaves order 2.
 //!
-//! Tolerance: the next term of the error, 0.1.
+//! Tolerance: the next term of the error, (ω h)² of it at 16 ms and 7 rad/s: 1.3 % of the ratio, 0.02 of the order.
 
 use super::convergence::{errors, order};
 use crate::lab::*;
@@ -28,7 +28,7 @@ fn holds() {
         let steps = [6.4e-2, 3.2e-2, 1.6e-2, 8e-3];
         let found = errors(&steps, &answer, |h| orientation(Integrator::Rk4, h));
         let euler = errors(&steps, &answer, |h| orientation(Integrator::Euler, h));
-        m.row("order", "", expected, order(&found), (0.1, "the next term of the error"));
+        m.row("order", "", expected, order(&found), (0.02, "the next term of the error"));
         m.control("order", "with Euler", order(&euler));
         let curves = [("RK4", found), ("Euler", euler)];
         m.plot("Torque-free top after 1.024 s", ["step [s]", "error of the quaternion"], true, &curves);

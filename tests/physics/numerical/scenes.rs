@@ -37,6 +37,14 @@ impl Fall {
         Self { sim, robot }
     }
 
+    /// Adds to the velocity of the first joint of an environment \[rad/s\].
+    pub(super) fn hasten(&mut self, env: usize, faster: f64) {
+        let mut robot = self.sim.robot_mut(self.robot);
+        let mut v = robot.read().get_qvel().row(env).to_vec();
+        v[0] += faster;
+        robot.write_qvel(&row(&v), None, Some(&[EnvId(env)])).unwrap();
+    }
+
     /// Steps and finds no environment diverged and no warning of MuJoCo.
     #[track_caller]
     pub(super) fn update(&mut self, steps: u32) {

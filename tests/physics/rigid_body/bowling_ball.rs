@@ -4,7 +4,8 @@
 //!
 //! Tolerance: the point of contact is half of the depth above the ground's plane and nearer to the centre, as in
 //! `rolling_sphere`: v₀ δ/2r. While it slides, MuJoCo's elliptic cones lift a contact that slips with v as if it were μ B v
-//! deeper, so that it hops a little before it settles: a slow ball, 2 % of the friction from 0.1 s on.
+//! deeper, so that it hops a little before it settles: a slow ball, 2 % of the friction from 0.1 s on (calibrated, not
+//! derived).
 
 use super::soft_contact::depth;
 use crate::lab::*;

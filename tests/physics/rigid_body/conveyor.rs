@@ -6,7 +6,7 @@
 //!
 //! (SimBenchmark has 25 balls and an oblique pull. Source: leggedrobotics, SimBenchmark, "Rolling test".)
 //!
-//! Tolerance: the friction of a sliding box is known to 1 % (law `sliding_block`) and is two thirds of the pull, twice what
+//! Tolerance: the friction of a sliding box is known to 1 % (law `sliding_block`, calibrated) and is two thirds of the pull, twice what
 //! is left to accelerate; 3 %.
 
 use crate::lab::*;

@@ -68,7 +68,7 @@ fn holds() {
                 "s",
                 flip_time(w),
                 between,
-                (1e-6, "RK4, times e-folds to a flip"),
+                (1e-8, "a crossing off a straight line"),
             );
             let off = flips([w[0] * 1.1, w[1], w[2] * 1.1]);
             m.control(&format!("time between flips, {name}"), "pushed 10 % harder", (off[2] - off[0]) / 2.0);

@@ -1,7 +1,8 @@
 //! A ball falls from h and comes up again to e² h, e being its restitution; where nothing is lost, to h again and again.
 //!
 //! Tolerance: `RigidObjectCfg::restitution` is a spring for about ten steps, and says how far off it may be: 0.003 at 1, 0.03
-//! at 0.8, 0.06 at 0.5; the apex is off by 2 e times that, of h. In ten bounces errors of 1 add up ten times.
+//! at 0.8, 0.06 at 0.5; what it says is the
+//! product's promise, no derivation; the apex is off by 2 e times that, of h. In ten bounces errors of 1 add up ten times.
 
 use crate::lab::*;
 use crate::law::law;

@@ -1,7 +1,7 @@
 //! A block on a slope stays where tan θ < μ and slides with a = g (sin θ - μ cos θ) where tan θ > μ: 5 % below and above.
 //!
 //! Tolerance: below, the creep of soft friction, 1e-5 m/s with impratio 100 (law `stick_creep`). Above, the friction of 95 %
-//! of what pulls is known to 1 % (law `sliding_block`): a fifth of what is left.
+//! of what pulls is known to 1 % (law `sliding_block`, calibrated): a fifth of what is left.
 
 use super::incline::acceleration;
 use crate::lab::*;

@@ -10,8 +10,8 @@ use kinetoscope::prelude::*;
 
 const RADIUS: f64 = 0.1;
 
-/// Velocities of the five along the row, 2 s after the first was pushed.
-fn knocked(restitution: Option<f64>) -> Vec<f64> {
+/// Velocities of the five along the row, 2 s after the first was pushed, with a drag of `linear_damping` \[N s/m\].
+fn knocked(restitution: Option<f64>, linear_damping: f64) -> Vec<f64> {
     let mut lab = Lab::new(with_dt(2e-4, weightless()));
     let balls: Vec<ObjectId> = (0..5)
         .map(|k| {
@@ -21,6 +21,7 @@ fn knocked(restitution: Option<f64>) -> Vec<f64> {
                 shape: ObjectShape::Sphere { radius: RADIUS },
                 mass: Some(0.3),
                 restitution,
+                linear_damping,
                 init_pose: Pose::translation(at, 0.0, 0.0),
                 ..RigidObjectCfg::default()
             })
@@ -34,12 +35,17 @@ fn knocked(restitution: Option<f64>) -> Vec<f64> {
 #[test]
 fn holds() {
     law(module_path!(), "the last goes with v, the others rest; Σ v = v", |m| {
-        let (elastic, soft) = (knocked(Some(1.0)), knocked(None));
+        let (elastic, soft) = (knocked(Some(1.0), 0.0), knocked(None, 0.0));
         m.row("velocity of the last", "m/s", 1.0, elastic[4], (0.012, "four bounces, 0.003 each"));
         for (k, &velocity) in elastic.iter().enumerate().take(4) {
             m.row(&format!("velocity of ball {k}"), "m/s", 0.0, velocity, (0.006, "two bounces, 0.003 each"));
         }
         m.row("sum of the velocities", "m/s", 1.0, elastic.iter().sum(), (1e-10, "rounding"));
+        let dull = knocked(Some(0.5), 0.0);
+        for (k, &velocity) in dull.iter().enumerate().take(4).skip(1) {
+            m.control(&format!("velocity of ball {k}"), "with a restitution of 0.5", velocity);
+        }
+        m.control("sum of the velocities", "with a drag", knocked(Some(1.0), 0.01).iter().sum());
         m.control("velocity of the last", "with MuJoCo's own contacts", soft[4]);
         m.control("velocity of ball 0", "with MuJoCo's own contacts", soft[0]);
     });

@@ -38,6 +38,8 @@ fn holds() {
         let (place, high) = thrown(weightless());
         m.control("height after the flight", "without gravity", place[2]);
         m.control("apex", "without gravity", high);
-        m.control("range along x", "with twice the step", thrown(with_dt(2e-3, earth())).0[0]);
+        let long = thrown(with_dt(2e-3, earth())).0;
+        m.control("range along x", "with twice the step", long[0]);
+        m.control("range along y", "with twice the step", long[1]);
     });
 }

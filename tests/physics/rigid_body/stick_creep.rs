@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Tolerance: the pull at the bottom tips the block, h tan θ/w = 1 % of the load goes to the lower corners, which changes
-//! their d a little, but not the sum; 1 % of the creep. The law is that creep is there, how large it is and that impratio
+//! their d one way and that of the upper ones the other: what is left is (1 %)² of the creep. The law is that creep is there, how large it is and that impratio
 //! divides it.
 
 use super::soft_contact::{LARGEST, TIME, depth, impedance};
@@ -32,7 +32,7 @@ fn holds() {
         let v = (1.0 - d) / d * G * sin / 4.0 * LARGEST * TIME / 2.0;
         for impratio in [1.0, 10.0, 100.0] {
             let quantity = format!("creep on 10°, impratio {impratio}");
-            let tipping = (0.01 * v / impratio, "1 % of the load goes to the lower corners");
+            let tipping = (1e-4 * v / impratio, "(1 %)² of what goes to the lower corners");
             m.row(&quantity, "m/s", v / impratio, creep(impratio), tipping);
             m.control(&quantity, "with an impratio twice as large", creep(2.0 * impratio));
         }
