@@ -44,7 +44,7 @@ fn run(args: &Args) -> launcher::Result {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation()?
+        ..args.launcher.simulation_drawn_anyhow()?
     })?;
 
     println!("Loading robot...");

@@ -61,8 +61,8 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result {
     let renderer = match (args.enable_rt, args.launcher.renderer) {
-        (true, Renderer::Raster | Renderer::Hybrid) => {
-            return Err("--enable-rt asks for a ray tracer: use it with --renderer rt or fast-rt, or without".into());
+        (true, Renderer::Raster) => {
+            return Err("--enable-rt asks for rays: use it with --renderer rt, fast-rt or hybrid, or without".into());
         }
         (true, Renderer::Auto) => Renderer::Rt,
         (_, renderer) => renderer,
@@ -72,7 +72,7 @@ fn run(args: &Args) -> launcher::Result {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation()?
+        ..args.launcher.simulation_drawn_anyhow()?
     })?;
 
     println!("Loading robot...");

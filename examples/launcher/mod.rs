@@ -71,7 +71,8 @@ pub(crate) enum Device {
     Cuda,
 }
 
-/// How images are drawn; examples that draw none accept the names so that scripts run.
+/// How images are drawn; examples that draw none accept the names so that scripts run, and those that draw in one way only
+/// refuse the others ([`Launcher::simulation`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renderer {
     /// The default
@@ -89,13 +90,13 @@ pub(crate) enum Renderer {
 /// Flags of path tracing, for examples that draw with it.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct PathFlags {
-    /// Ray tracing: paths per pixel
-    #[arg(long, alias = "rt_samples", value_name = "PATHS", default_value_t = 64)]
-    pub(crate) rt_samples: u32,
-    /// Ray tracing: surfaces that light goes over after the one that is seen, at most
-    #[arg(long, alias = "rt_bounces", value_name = "BOUNCES", default_value_t = 4)]
-    pub(crate) rt_bounces: u32,
-    /// Ray tracing: leave the noise as it is
+    /// Path tracing: paths per pixel [default: 64]
+    #[arg(long, alias = "rt_samples", value_name = "PATHS")]
+    pub(crate) rt_samples: Option<u32>,
+    /// Path tracing: surfaces that light goes over after the one that is seen, at most [default: 4]
+    #[arg(long, alias = "rt_bounces", value_name = "BOUNCES")]
+    pub(crate) rt_bounces: Option<u32>,
+    /// Path tracing: leave the noise as it is
     #[arg(long, alias = "rt_noisy")]
     pub(crate) rt_noisy: bool,
 }
@@ -104,17 +105,23 @@ impl Renderer {
     /// What cameras call it.
     ///
     /// # Errors
-    /// Numbers of paths or bounces that are not possible.
+    /// Numbers of paths or bounces that are not possible, or any without path tracing.
     pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::sensors::camera::Renderer> {
         use kinetoscope::sensors::camera::Renderer as Known;
+        let PathFlags { rt_samples, rt_bounces, rt_noisy } = flags;
+        if self != Self::Rt && (rt_samples.is_some() || rt_bounces.is_some() || rt_noisy) {
+            return Err(
+                "--rt-samples, --rt-bounces and --rt-noisy are of path tracing: use them with --renderer rt".into()
+            );
+        }
         let renderer = match self {
             Self::Auto | Self::Raster => Known::Raster,
             Self::Hybrid => Known::Hybrid,
             Self::FastRt => Known::FastRayTraced,
             Self::Rt => Known::RayTraced {
-                samples: flags.rt_samples,
-                max_bounces: flags.rt_bounces,
-                denoise: !flags.rt_noisy,
+                samples: rt_samples.unwrap_or(64),
+                max_bounces: rt_bounces.unwrap_or(4),
+                denoise: !rt_noisy,
                 seed: 0,
             },
         };
@@ -124,11 +131,27 @@ impl Renderer {
 }
 
 impl Launcher {
-    /// The simulation these flags ask for.
+    /// The simulation these flags ask for, of an example that draws with the rasterizer or not with a camera.
+    ///
+    /// # Errors
+    /// The device is not supported, or another renderer is asked for.
+    pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
+        if !matches!(self.renderer, Renderer::Auto | Renderer::Raster) {
+            let name = self.renderer.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
+            return Err(format!(
+                "--renderer {name} is not for this example: use --renderer raster or auto here, or create_sensor or \
+                 render_model, which draw with every renderer"
+            )
+            .into());
+        }
+        self.simulation_drawn_anyhow()
+    }
+
+    /// The simulation these flags ask for, of an example that draws as they say or accepts them all.
     ///
     /// # Errors
     /// The device is not supported.
-    pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
+    pub(crate) fn simulation_drawn_anyhow(&self) -> Result<SimulationManagerCfg> {
         if self.device == Device::Cuda {
             return Err("--device cuda is not supported: Kinetoscope simulates on the CPU; use --device cpu, \
                         and --threads to choose how many cores"

@@ -64,6 +64,10 @@ const TABLE: &[Run] = &[
     run_of("create_sensor", &[0], "--headless --steps 1 --renderer hybrid --width 160 --height 120 --out {out}/hybrid"),
     run_of("create_sensor", &[2], "--headless --steps 1 --renderer rt --rt-samples 0 --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --renderer raster --enable-rt --out {out}/none"),
+    run_of("create_sensor", &[2], "--headless --steps 1 --renderer fast-rt --rt-samples 4 --out {out}/none"),
+    run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --renderer rt --out {out}/none"),
+    run_of("run_camera", &[2], "--headless --steps 1 --renderer hybrid"),
+    run_of("run_ray_caster", &[2], "--headless --steps 1 --renderer fast-rt"),
     run_of(
         "add_sensors_on_robot",
         &[0],

@@ -59,8 +59,7 @@ fn draw(
     }
     let Some(color) = color else { return };
     film.resize([width, height], denoise);
-    let eye = projection.world_from_camera.translation;
-    film.lamps.prepare(shot.scene, shot.lights.unwrap_or(&shot.scene.lights), cfg.shadows, eye);
+    film.lamps.prepare(shot.scene, shot.lights.unwrap_or(&shot.scene.lights), cfg.shadows, projection);
     let (lamps, rows) = film.rows(ROWS);
     let (scene, poses, tracer) = (shot.scene, shot.poses, &plan.tracer);
     let paths = Paths { scene, poses, tracer, projection, samples, max_bounces, seed, lamps };
@@ -68,6 +67,14 @@ fn draw(
         rows.expose(&paths, denoise, rasterizer.brush.stack());
     });
     let size = width * ROWS;
+    if denoise && samples == 1 {
+        let Film { pixels, next, guides, .. } = &mut *film;
+        let (pixels, guides) = (&*pixels, &*guides);
+        crew.share(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
+            smooth::guess([width, k * ROWS], pixels, guides, to);
+        });
+        std::mem::swap(&mut film.pixels, &mut film.next);
+    }
     for pass in (0..smooth::PASSES).filter(|_| denoise) {
         let Film { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);

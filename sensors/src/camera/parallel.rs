@@ -84,9 +84,7 @@ impl ParallelRasterizer {
     pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
         let Self { rasterizers, plans, crew } = self;
         let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
-        let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
-        let cost = cost.saturating_mul(renderer.slowness());
-        let threads = rasterizers.len().min(cost / (WORTH_A_THREAD / 2)).max(1);
+        let threads = worth(cfg, renderer, jobs).min(rasterizers.len());
         let rasterizers = &mut rasterizers[..threads];
         let failure = Failure::default();
         if renderer.follows_paths() {
@@ -116,6 +114,12 @@ impl ParallelRasterizer {
         }
         failure.first()
     }
+}
+
+/// How many threads some shots are worth; at least 1.
+fn worth(cfg: RasterCfg, renderer: Renderer, jobs: &[Job<'_>]) -> usize {
+    let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
+    (cost.saturating_mul(renderer.slowness()) / (WORTH_A_THREAD / 2)).max(1)
 }
 
 /// The first shot that could not be drawn.
@@ -183,4 +187,32 @@ fn bands<'a>(
         let pixels = width * (rows * BLOCK).min(height - first * BLOCK);
         (first, rows, rest.split_off_first(pixels))
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::camera::{Channels, Frame};
+    use crate::visibility::View;
+    use scene::shape::Sphere;
+    use scene::{Instance, Material, PoseF32, RenderScene};
+
+    /// A small picture of many paths takes seconds, one of few is drawn before a thread has woken.
+    #[test]
+    fn many_paths_and_bounces_are_worth_threads() {
+        let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
+        let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
+        let mut frame = Frame::new(32, 32, Channels::ALL);
+        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None };
+        let jobs = [(shot, frame.as_mut())];
+        // Without shadow maps, whose cost is that of many more pixels.
+        let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
+        let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
+        assert_eq!(worth(cfg, Renderer::Raster, &jobs), 1);
+        assert_eq!(worth(cfg, paths(1, 0), &jobs), 1);
+        assert!(worth(cfg, paths(256, 0), &jobs) >= 64);
+        assert!(worth(cfg, paths(16, 15), &jobs) >= 64);
+        assert!(worth(cfg, paths(Renderer::MAX_SAMPLES, Renderer::MAX_BOUNCES), &jobs) >= 1 << 16);
+    }
 }

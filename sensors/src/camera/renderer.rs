@@ -3,7 +3,9 @@
 use crate::visibility::RenderError;
 use serde::{Deserialize, Serialize};
 
-/// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes.
+/// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes,
+/// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](super::RasterCfg::lod), which is on by default, its
+/// surfaces are moved as is said there, and no other renderer's are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -16,32 +18,39 @@ pub enum Renderer {
     /// ([`RasterCfg::lod`](super::RasterCfg::lod) is for shadow maps only).
     FastRayTraced,
     /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too. Meshes
-    /// are never drawn coarser.
+    /// are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
+    /// goes dark triangle by triangle.
     Hybrid,
     /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
     /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
     ///
     /// - **Lamps** are as bright as the rasterizer draws them: a white matt surface that faces a lamp of colour L has the
-    ///   radiance L. A lamp with a [`radius`](scene::Light::radius) is a disc that faces what it lights. Ambient light of lamps
-    ///   and of the headlight reaches everything, as in the rasterizer.
+    ///   radiance L. A lamp with a [`radius`](scene::Light::radius) is a disc that faces what it lights: half of one on a
+    ///   ceiling would be behind the ceiling, so keep it the radius below. Ambient light of lamps and of the headlight reaches
+    ///   everything, as in the rasterizer. The headlight is shaded by nothing that is before the near plane. 16 lamps count,
+    ///   the first, and the headlight.
     /// - **The dome** is [`RenderScene::ambient`](scene::RenderScene::ambient): its sky's radiance from above the horizon, its
-    ///   ground's from below. Where nothing is in the way a surface gets what the rasterizer gives it. Cameras and mirrors see
+    ///   ground's from below. Where nothing is in the way a matt surface (specular 0) gets what the rasterizer gives it; below a glossy
+    ///   layer it gets what the layer leaves. Cameras and mirrors see
     ///   [`RenderScene::sky`](scene::RenderScene::sky) there instead.
-    /// - **Emission** of a material lights other things.
+    /// - **Emission** of a material lights other things, with `max_bounces` 0 too.
     /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
     ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
     ///   1). The layer mirrors a lamp's `specular` colour and everything else's only colour. `reflectance` of the light is
-    ///   mirrored perfectly. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight.
+    ///   mirrored perfectly. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
+    ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface
+    ///   itself.
     ///
     /// The tone curve and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
     /// any number of threads.
     RayTraced {
         /// Paths per pixel; 1 to 65536. A power of two spreads them best.
         samples: u32,
-        /// Surfaces that light goes over after the one that is seen, at most; 0 is light from lamps and the dome alone. At
-        /// most 64.
+        /// Surfaces that light goes over after the one that is seen, at most; 0 is light that comes from lamps, from the
+        /// dome and from what glows at once. At most 64.
         max_bounces: u32,
-        /// Whether noise is smoothed where colour, normals and depth of the surface are alike.
+        /// Whether noise is smoothed where normals and depth of the surface are alike and light differs no more than noise does.
+        /// The surface's own colours stay as they are.
         denoise: bool,
         /// Another seed has other noise.
         seed: u32,
@@ -84,6 +93,12 @@ impl Renderer {
 
     /// How much longer a pixel takes than the rasterizer's, about.
     pub(crate) fn slowness(self) -> usize {
-        if self == Self::Raster { 1 } else { 20 }
+        match self {
+            Self::Raster => 1,
+            Self::Hybrid | Self::FastRayTraced => 20,
+            Self::RayTraced { samples, max_bounces, .. } => {
+                (samples as usize).saturating_mul(20 * (1 + max_bounces as usize))
+            }
+        }
     }
 }

@@ -25,7 +25,7 @@ pub(crate) struct Brush {
     painter: Painter,
     /// Of rays that are cast for a picture, and of those that are cast while it is shaded.
     stack: Stack,
-    shade_stack: RefCell<Stack>,
+    shade_stack: Stack,
     colors: Vec<Colors>,
     edges: Edges,
 }
@@ -39,7 +39,7 @@ impl Brush {
             + self.colors.capacity() * size_of::<Colors>()
             + self.edges.bytes()
             + self.stack.bytes()
-            + self.shade_stack.borrow().bytes()
+            + self.shade_stack.bytes()
     }
 
     /// Scratch memory of rays.
@@ -105,7 +105,9 @@ impl Brush {
         }
         tile.settle();
         let wants_detail = frame.wants(Stage::Detail);
-        let context = plan.context(shot, projection, shade_stack, wants_detail);
+        // A pixel's rays need it where only shared things are at hand.
+        let shade_stack = RefCell::new(shade_stack);
+        let context = plan.context(shot, projection, &shade_stack, wants_detail);
         let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
         if veils {
             veiled.copy(tile);

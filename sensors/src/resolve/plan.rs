@@ -156,7 +156,7 @@ impl Plan {
         &'a self,
         shot: &Shot<'a>,
         projection: &'a Projection,
-        stack: &'a RefCell<Stack>,
+        stack: &'a RefCell<&'a mut Stack>,
         detail: bool,
     ) -> Context<'a> {
         Context {

@@ -15,7 +15,7 @@ const ABOVE: f32 = 1e-5;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowRays<'a> {
     pub(crate) tracer: &'a Tracer,
-    pub(crate) stack: &'a RefCell<Stack>,
+    pub(crate) stack: &'a RefCell<&'a mut Stack>,
 }
 
 impl ShadowRays<'_> {

@@ -202,6 +202,10 @@ fn smoothing_takes_noise_away_and_keeps_the_picture() {
     let (rough, smooth, more) = (error(&paths(4, false, 1)), error(&paths(4, true, 1)), error(&paths(16, false, 1)));
     println!("off by {rough} of 255 with 4 paths, {smooth} smoothed, {more} with 16 paths");
     assert!(smooth < 0.6 * rough, "{smooth} of {rough}");
+    // One path does not know its own noise: it is that of its neighbours.
+    let (one, smoothed) = (error(&paths(1, false, 1)), error(&paths(1, true, 1)));
+    println!("off by {one} of 255 with 1 path, {smoothed} smoothed");
+    assert!(smoothed < 0.6 * one, "{smoothed} of {one}");
     // A control of the measure: noise falls as paths are added.
     assert!(more < 0.75 * rough, "{more} of {rough}");
 }
@@ -221,4 +225,65 @@ fn numbers_that_no_path_has_are_refused() {
     assert_eq!(error(1 << 17, 1), RenderError::Paths { samples: 1 << 17, limit });
     assert_eq!(error(1, 65), RenderError::Bounces { max_bounces: 65, limit: 64 });
     assert_eq!(error(0, 1).to_string(), "0 paths per pixel; 1 to 65536 are possible");
+}
+
+/// A box over a floor, its shadow by rays: where its edge is, and how bright the floor is on both sides.
+#[test]
+fn hybrid_shadows_end_where_the_light_passes_and_are_as_dark_as_what_is_left() {
+    let matt = Material { specular: 0.0, ..Material::from_rgba([0.7, 0.7, 0.7, 1.0]) };
+    let mut scene = RenderScene::new(vec![
+        Instance::new(Plane::INFINITE, matt.clone(), 1),
+        Instance::new(scene::shape::Box { half: [1.0, 2.0, 0.1] }, matt, 2),
+    ])
+    .unwrap();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.1; 3], ground: [0.1; 3] };
+    // From -2 to 0 along x, 0.9 to 1.1 high.
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
+    let view = View::look_at([201, 201], 0.9, [2.2, -0.3, 0.8], [1.0, 0., 0.], [0., 0., 1.]).unwrap();
+    let lamp = Light { diffuse: [0.7; 3], attenuation: [1., 0., 0.], ..Light::default() };
+    let slanted = Light { direction: [1., 0., -1.], ..lamp };
+    let near = Light { kind: LightKind::Point, position: [-1.0, 0.0, 2.3], ..lamp };
+    // Past the box's upper edge, 1.1 high: 1.1 m on at 45 degrees; from 1.2 m above and 1 m behind it, 1.1 / 1.2 m on.
+    for (light, edge) in [(slanted, 1.1f32), (near, 1.1 / 1.2)] {
+        scene.lights = vec![light];
+        let cosine = |p: &[f32]| match light.kind {
+            LightKind::Directional => 0.5f32.sqrt(),
+            _ => 2.3 / ((p[0] + 1.0).powi(2) + p[1].powi(2) + 2.3 * 2.3).sqrt(),
+        };
+        let albedo = scene::material::decode_srgb(0.7);
+        // sRGB, below where the tone curve bends.
+        let byte = |x: f32| 255.0 * (1.055 * x.powf(1.0 / 2.4) - 0.055);
+        let count = |frame: &Frame| {
+            let (mask, position) = (frame.mask.as_ref().unwrap(), frame.position.as_ref().unwrap());
+            let (mut counts, mut wrong) = ([0, 0], 0);
+            for (k, p) in position.chunks(3).enumerate() {
+                // A pixel is up to 0.02 m long on the floor; the box's sides do not end here.
+                if mask[k] != 1 || (p[0] - edge).abs() < 0.03 || p[1].abs() > 1.5 || !(0.0..3.0).contains(&p[0]) {
+                    continue;
+                }
+                let lit = p[0] > edge;
+                let expected = byte(albedo * (0.1 + if lit { 0.7 * cosine(p) } else { 0.0 }));
+                counts[usize::from(lit)] += 1;
+                // A quarter for the polynomial, a half for rounding.
+                let color = &frame.color.as_ref().unwrap()[4 * k..4 * k + 3];
+                wrong += usize::from(color.iter().any(|&c| (f32::from(c) - expected).abs() > 0.8));
+            }
+            (counts, wrong)
+        };
+        let (counts, wrong) = count(&draw(Renderer::Hybrid, EXACT, &scene, &poses, &view));
+        assert!(counts.iter().all(|&n| n > 2000), "{counts:?}");
+        assert_eq!(wrong, 0, "{light:?}: of {counts:?}");
+        // A control: without shadows all that is dark is wrong, and nothing else.
+        let unshaded = RasterCfg { shadows: false, ..EXACT };
+        let (counts, wrong) = count(&draw(Renderer::Hybrid, unshaded, &scene, &poses, &view));
+        assert_eq!(wrong, counts[0]);
+    }
+}
+
+#[test]
+fn rasterizers_may_be_shared_between_threads() {
+    fn shared<T: Send + Sync>(_: &T) {}
+    shared(&Rasterizer::default());
+    shared(&ParallelRasterizer::new(EXACT, 2));
 }

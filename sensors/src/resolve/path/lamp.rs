@@ -1,8 +1,9 @@
 //! Lamps, as paths see them.
 
 use super::lobe::{Basis, on_disc};
-use crate::ray::vector::{V3, along, dot, scale, sub, unit};
+use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use crate::resolve::shade::cos_deg;
+use crate::visibility::Projection;
 use scene::{Light, LightKind};
 
 /// A lamp of a frame.
@@ -20,6 +21,8 @@ pub(super) struct Lamp {
     pub(super) diffuse: V3,
     pub(super) specular: V3,
     pub(super) cast_shadow: bool,
+    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\].
+    sight: Option<(V3, f64)>,
 }
 
 /// Light from a lamp at a point.
@@ -27,7 +30,7 @@ pub(super) struct Lamp {
 pub(super) struct Incoming {
     /// Unit vector to where it comes from.
     pub(super) direction: V3,
-    /// How far that is \[m\].
+    /// How far it may be cut off \[m\].
     pub(super) distance: f64,
     /// How much of it arrives.
     pub(super) strength: f64,
@@ -54,11 +57,12 @@ impl Lamp {
             diffuse: wide(light.diffuse),
             specular: wide(light.specular),
             cast_shadow: light.cast_shadow,
+            sight: None,
         }
     }
 
     /// A lamp at a camera.
-    pub(super) fn of_camera(headlight: &scene::Headlight, position: V3) -> Self {
+    pub(super) fn of_camera(headlight: &scene::Headlight, view: &Projection) -> Self {
         let light = Light {
             kind: LightKind::Point,
             ambient: headlight.ambient,
@@ -66,7 +70,9 @@ impl Lamp {
             specular: headlight.specular,
             ..Light::default()
         };
-        Self { position, ..Self::new(&light) }
+        let (position, forward) = (view.world_from_camera.translation, view.world_from_camera.rotation.map(|r| r[2]));
+        let sight = Some((to_f64(forward), f64::from(view.near)));
+        Self { position: to_f64(position), sight, ..Self::new(&light) }
     }
 
     /// Light at `point` from the point of the lamp's disc that two numbers in 0..1 choose; `None` where none arrives.
@@ -89,7 +95,14 @@ impl Lamp {
             strength *= power(cos.max(0.0), self.exponent);
         }
         let to = self.spread(to, toward, choice)?;
-        Some(Incoming { direction: unit(to)?, distance: dot(to, to).sqrt(), strength })
+        let direction = unit(to)?;
+        let mut distance = dot(to, to).sqrt();
+        if let Some((forward, near)) = self.sight {
+            // What is nearer than the camera sees, its housing, does not shade it.
+            let cos = -dot(direction, forward);
+            distance -= if cos > 1e-3 { near / cos } else { 0.0 };
+        }
+        Some(Incoming { direction, distance, strength })
     }
 
     /// From the middle of the disc to a point of it.

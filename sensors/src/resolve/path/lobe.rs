@@ -142,8 +142,11 @@ impl Lobe {
     }
 
     /// Chooses where light comes from that goes to `o` (unit, in the frame of the point), by three numbers in 0..1. The mean
-    /// of the weight times the light from there is the light that goes to `o`.
+    /// of the weight times the light from there is the light that goes to `o`; `None` is none, along the surface too.
     pub(super) fn choose(&self, o: V3, lobe: f64, at: [f64; 2]) -> Option<Scattered> {
+        if o[2] <= 0.0 {
+            return None;
+        }
         if lobe < self.mirror {
             return Some(Scattered { direction: [-o[0], -o[1], o[2]], weight: [1.0; 3], mirrored: true });
         }
@@ -269,6 +272,19 @@ mod tests {
             let close = |x: f64, y: f64| (x - y).abs() < 1e-12 * x.abs().max(1e-3);
             assert!(close(there.layer / i[2], back.layer / o[2]));
             assert!(close(there.below[0] / i[2], back.below[0] / o[2]));
+        }
+    }
+
+    #[test]
+    fn along_the_surface_nothing_is_scattered() {
+        for (specular, reflectance) in [(1.0, 0.0), (0.0, 0.0), (0.5, 0.5)] {
+            let lobe = Lobe::new(&Material { specular, reflectance, ..Material::default() }, [0.5; 3]);
+            for chance in [0.0, 0.3, 0.6, 0.99] {
+                assert!(lobe.choose([1.0, 0.0, 0.0], chance, [0.3, 0.7]).is_none());
+                // A control: a little above, something is, and it is a number.
+                let next = lobe.choose(toward(0.5), chance, [0.3, 0.7]);
+                assert!(next.is_none_or(|next| next.weight.iter().all(|x| x.is_finite())));
+            }
         }
     }
 

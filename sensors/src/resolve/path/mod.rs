@@ -18,7 +18,7 @@ mod tests;
 
 use crate::ray::Ray;
 use crate::ray::bvh::Stack;
-use crate::ray::vector::{V3, along, dot, scale, to_f64};
+use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use crate::resolve::tone;
 use crate::visibility::Projection;
 use crate::visibility::trace::Tracer;
@@ -29,12 +29,14 @@ use scene::{Light, PoseF32, RenderScene};
 use sobol::{Sample, Sequence};
 use std::f64::consts::PI;
 
-/// Lamps that are asked, at most.
+/// Lamps that are asked, at most; the camera's comes besides.
 const MAX_LAMPS: usize = crate::resolve::shade::MAX_LIGHTS;
 /// Paths begin this part of their coordinates above a surface.
 const ABOVE: f64 = 1e-7;
 /// Bounces after which paths may end by chance.
 const SURE: u32 = 2;
+/// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
+const REACH: f64 = 1.0 - 1e-6;
 /// Surfaces that are not opaque that a path goes through, at most.
 const MAX_PASSES: u32 = 64;
 /// Pairs of numbers: in the pixel, and at each surface where to go on, which lobe and whether at all, whether through.
@@ -70,19 +72,19 @@ pub(crate) struct Lamps {
 }
 
 impl Lamps {
-    /// Prepares the light. `shadows` is whether lamps cast any, `eye` where the camera is.
-    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadows: bool, eye: [f32; 3]) {
+    /// Prepares the light. `shadows` is whether lamps cast any, `view` where the camera is.
+    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadows: bool, view: &Projection) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
         let Self { lamps, dome, sky, haze } = self;
         *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
         lamps.clear();
-        lamps.extend(lights.iter().filter(|l| l.active).map(Lamp::new));
+        lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
+        // After the others, of which it takes no place: it is a point, and needs no numbers of its own.
         if scene.headlight.active {
-            lamps.insert(0, Lamp::of_camera(&scene.headlight, to_f64(eye)));
+            lamps.push(Lamp::of_camera(&scene.headlight, view));
         }
-        lamps.truncate(MAX_LAMPS);
         for lamp in lamps {
             lamp.cast_shadow &= shadows;
         }
@@ -107,6 +109,7 @@ pub(crate) struct Found {
     /// Mean radiance, linear.
     pub(crate) color: V3,
     /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
+    /// 0 of one sample.
     pub(crate) variance: f64,
     /// Means over what is seen: colour of the surface (1 for mirrors and sky), normal, distance (0 for the sky).
     pub(crate) albedo: V3,
@@ -133,6 +136,8 @@ impl Paths<'_> {
             let sample = sequence.sample(index);
             let [dx, dy] = sample.pair(IN_PIXEL);
             let (color, first) = self.radiance(sample, [at[0] as f64 + dx, at[1] as f64 + dy], stack);
+            // Lamps and skies may be anything; what is no number would spread over its neighbours.
+            let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
             let bright = brightness(color);
             squares += bright * bright / n;
             out.color = along(out.color, 1.0 / n, color);
@@ -243,6 +248,7 @@ impl Paths<'_> {
         let local = basis.to_local(o);
         let matt = 1.0 - point.lobe.mirror;
         let mut out = [0.0; 3];
+        let mut origin = None;
         for (lamp, k) in self.lamps.lamps.iter().zip(4..) {
             let choice = if lamp.has_size() { sample.pair(dims + k) } else { [0.0; 2] };
             let Some(light) = lamp.at(point.position, choice) else { continue };
@@ -253,15 +259,26 @@ impl Paths<'_> {
                 continue;
             }
             let passes = if lamp.cast_shadow {
-                let origin = above(&Point { position: point.lifted, ..*point }, 1.0);
+                let origin = *origin.get_or_insert_with(|| self.lifted(point, stack));
                 let ray = Ray { origin, direction: light.direction };
-                self.tracer.passes(&ray, light.distance, stack)
+                self.tracer.passes(&ray, light.distance * REACH, stack)
             } else {
                 1.0
             };
             out = along(out, light.strength * passes, sent);
         }
         out
+    }
+
+    /// Where shadow rays of a point begin: where its smooth normals mean it to be, unless something is between.
+    fn lifted(&self, point: &Point, stack: &mut Stack) -> V3 {
+        let (here, lifted) = (above(point, 1.0), above(&Point { position: point.lifted, ..*point }, 1.0));
+        let way = sub(lifted, here);
+        let (far, Some(direction)) = (dot(way, way).sqrt(), unit(way)) else { return lifted };
+        match self.tracer.nearest(&Ray { origin: here, direction }, far, stack) {
+            Some(_) => here,
+            None => lifted,
+        }
     }
 }
 

@@ -7,6 +7,9 @@ use crate::ray::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use crate::visibility::trace::Hit;
 use scene::{Instance, PoseF32, RenderMesh, RenderScene, TextureKind};
 
+/// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
+const LIFT: f64 = 0.15;
+
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
@@ -102,7 +105,9 @@ fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner 
     let normal = [0, 1, 2].map(|k| (0..3).map(|n| share[n] * normals[n][k]).sum());
     // How far the point is below the plane of each corner.
     let below = [0, 1, 2].map(|n| (side * dot(sub(at, ends[n]), normals[n])).min(0.0));
-    let lift = [0, 1, 2].map(|k| (0..3).map(|n| -side * share[n] * below[n] * normals[n][k]).sum());
+    let lift: V3 = [0, 1, 2].map(|k| (0..3).map(|n| -side * share[n] * below[n] * normals[n][k]).sum());
+    let (far, most) = (dot(lift, lift).sqrt(), LIFT * area.sqrt().sqrt());
+    let lift = if far > most { scale(lift, most / far) } else { lift };
     let uv = mesh.uvs().map(|uvs| {
         let t = corners.map(|i| uvs[i].map(f64::from));
         let uv = [0, 1].map(|k| (0..3).map(|n| share[n] * t[n][k]).sum());

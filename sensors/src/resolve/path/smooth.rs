@@ -12,8 +12,8 @@ use super::{Found, brightness};
 pub(crate) const PASSES: u32 = 5;
 /// Weights of a pixel and of those one and two steps away: a cubic B-spline's.
 const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
-/// Surfaces may bend off the plane of a pixel by this part of their distance, per pixel.
-const BEND: f32 = 2e-3;
+/// Distances of a surface may differ by this part of themselves, per pixel.
+const BEND: f32 = 0.016;
 /// Light may differ by so many standard deviations of its noise.
 const NOISE: f32 = 4.0;
 
@@ -34,6 +34,30 @@ impl Guide {
             normal: found.normal.map(|x| x as f32),
             distance: found.distance as f32,
         }
+    }
+}
+
+/// The pixels of some rows, of which the first is `first`, with a variance from what is around each, where nothing else says
+/// how much noise there is: of one path. Source: Schied et al. 2017, section 4.2.
+pub(crate) fn guess([width, first]: [usize; 2], from: &[Pixel], guides: &[Guide], to: &mut [Pixel]) {
+    let height = from.len() / width.max(1);
+    for (k, to) in to.iter_mut().enumerate() {
+        let [x, y] = [k % width, first + k / width];
+        let at = y * width + x;
+        let (mut whole, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for py in y.saturating_sub(2)..(y + 3).min(height) {
+            for px in x.saturating_sub(2)..(x + 3).min(width) {
+                let other = py * width + px;
+                let reach = px.abs_diff(x).max(py.abs_diff(y)) as f32;
+                let weight = if other == at { 1.0 } else { alike(&guides[at], &guides[other], reach) };
+                let bright = light(&from[other]);
+                whole += weight;
+                sum += weight * bright;
+                squares += weight * bright * bright;
+            }
+        }
+        let mean = sum / whole;
+        *to = Pixel { variance: (squares / whole - mean * mean).max(0.0), ..from[at] };
     }
 }
 
@@ -104,7 +128,7 @@ fn alike(a: &Guide, b: &Guide, reach: f32) -> f32 {
     let cosine = a.normal.iter().zip(b.normal).map(|(x, y)| x * y).sum::<f32>().max(0.0);
     // To the 64th power; the sky has no normal.
     let facing = if a.distance == 0.0 { 1.0 } else { (0..6).fold(cosine, |x, _| x * x) };
-    let depth = (a.distance - b.distance).abs() / (BEND * 8.0 * a.distance.max(1e-6) * reach.max(1.0));
+    let depth = (a.distance - b.distance).abs() / (BEND * a.distance.max(1e-6) * reach.max(1.0));
     let near = (1.0 - depth * depth).max(0.0);
     facing * near * near
 }

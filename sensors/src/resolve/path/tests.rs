@@ -40,8 +40,8 @@ fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_b
     tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
     tracer.place(scene, poses);
     let mut lamps = Lamps::default();
-    lamps.prepare(scene, &scene.lights, true, view.world_from_camera.translation);
     let projection = &Projection::from(view);
+    lamps.prepare(scene, &scene.lights, true, projection);
     let count = 16u32;
     let mut stack = Stack::default();
     let all: Vec<f64> = (0..count)
@@ -283,4 +283,158 @@ fn the_headlight_and_ambient_light_are_those_of_the_rasterizer() {
     let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &looking([3.0, 0.0, 4.0], [0.0; 3]), 4, 2);
     let expected = albedo(0.6) * (0.8 * f64::from(0.4f32) + f64::from(0.1f32) + f64::from(0.3f32));
     assert!((mean - expected).abs() < 1e-5, "{mean}, not {expected}");
+}
+
+/// A camera in a housing that is nearer than it sees from: the picture is the one without.
+#[test]
+fn the_headlight_shines_out_of_the_cameras_housing() {
+    let floor = Instance::new(Plane::INFINITE, matt(0.6), 1);
+    let housing = Instance::new(Box { half: [0.05; 3] }, matt(0.6), 2);
+    let mut scene = dark(vec![floor, housing]);
+    scene.headlight = Headlight { ambient: [0.0; 3], diffuse: [0.4; 3], specular: [0.0; 3], active: true };
+    let eye = [3.0f32, 0.0, 4.0];
+    let view = View { near: 0.1, ..looking(eye, [0.0; 3]) };
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation(eye)];
+    let expected = albedo(0.6) * 0.8 * f64::from(0.4f32);
+    let (mean, _) = seen(&scene, &poses, &view, 4, 0);
+    assert!((mean - expected).abs() < 1e-5, "{mean}, not {expected}");
+    // A control: a lamp at the same place is shaded by it.
+    scene.headlight.active = false;
+    scene.lights = vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, eye, [0., 0., -1.]) }];
+    assert_eq!(seen(&scene, &poses, &view, 4, 0).0, 0.0);
+}
+
+/// Sixteen lamps and the camera's: all count.
+#[test]
+fn the_headlight_takes_no_place_of_a_lamp() {
+    let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1)]);
+    let down = Light { diffuse: [0.03; 3], ..lamp(LightKind::Directional, [0.; 3], [0., 0., -1.]) };
+    scene.lights = vec![down; 16];
+    scene.headlight = Headlight { ambient: [0.0; 3], diffuse: [0.4; 3], specular: [0.0; 3], active: true };
+    let view = looking([3.0, 0.0, 4.0], [0.0; 3]);
+    let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &view, 4, 0);
+    let expected = albedo(0.6) * (16.0 * f64::from(0.03f32) + 0.8 * f64::from(0.4f32));
+    // A sixteenth of the lamps would be 0.018.
+    assert!((mean - expected).abs() < 1e-5, "{mean}, not {expected}");
+}
+
+/// A point lamp exactly on a ceiling, which is not between it and the floor.
+#[test]
+fn a_lamp_on_a_ceiling_is_not_behind_it() {
+    let ceiling = Instance::new(Box { half: [3.0, 3.0, 0.5] }, matt(0.0), 2);
+    let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1), ceiling]);
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, 2.5])];
+    for k in 0..40 {
+        let at = [0.03 * k as f32 - 0.6, 0.017 * k as f32 - 0.2, 0.0];
+        for height in [2.0f32, 2.001] {
+            scene.lights =
+                vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, [0., 0., height], [0., 0., -1.]) }];
+            let (mean, _) = seen(&scene, &poses, &looking([1.5, 0.3, 0.6], at), 1, 0);
+            let flat = f64::from(at[0]).hypot(at[1].into());
+            let expected = albedo(0.6) * f64::from(0.9f32) * 2.0 / 2.0f64.hypot(flat);
+            // The control: a millimetre inside it is.
+            let expected = if height > 2.0 { 0.0 } else { expected };
+            assert!((mean - expected).abs() < 1e-5, "{at:?}, {height}: {mean}, not {expected}");
+        }
+    }
+}
+
+/// What is no number is left out, wherever it comes from.
+#[test]
+fn lamps_that_are_no_numbers_spoil_no_picture() {
+    let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1)]);
+    let view = looking([3.0, 0.0, 4.0], [0.0; 3]);
+    for bad in [f32::NAN, f32::INFINITY] {
+        let good = lamp(LightKind::Point, [0., 0., 1.], [0., 0., -1.]);
+        for light in [
+            Light { diffuse: [bad; 3], ..good },
+            Light { ambient: [bad; 3], ..good },
+            Light { position: [bad; 3], ..good },
+            Light { attenuation: [bad; 3], ..good },
+        ] {
+            scene.lights = vec![light];
+            let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &view, 4, 1);
+            assert!(mean.is_finite(), "{light:?}: {mean}");
+        }
+    }
+}
+
+/// A lamp in a black glossy floor, seen where the floor mirrors it and beside: Walter et al. 2007, Schlick 1994.
+#[test]
+fn highlights_are_those_of_ggx() {
+    for (specular, shininess) in [(1.0f32, 1.0f32), (0.5, 0.25), (0.1, 0.05)] {
+        let shiny = Material { specular, shininess, ..matt(0.0) };
+        let mut scene = dark(vec![Instance::new(Plane::INFINITE, shiny, 1)]);
+        let toward_lamp = [0.8f64, 0.0, 0.6];
+        let light = Light { diffuse: [0.0; 3], specular: [0.5; 3], ..Light::default() };
+        scene.lights = vec![Light { direction: toward_lamp.map(|x| -x as f32), ..light }];
+        let mut all = Vec::new();
+        // The first is the mirror's direction.
+        for eye in [[-1.6f32, 0.0, 1.2], [-1.5, 0.3, 1.2], [-1.0, 0.5, 2.0], [0.0, 0.0, 2.0]] {
+            let (mean, _) = seen(&scene, &[PoseF32::IDENTITY], &looking(eye, [0.0; 3]), 1, 0);
+            let o = crate::ray::vector::unit(eye.map(f64::from)).unwrap();
+            let h = crate::ray::vector::unit(add(o, toward_lamp)).unwrap();
+            let alpha2 = 2.0 / ((128.0 * f64::from(shininess)).max(1.0) + 2.0);
+            let d = alpha2 / (PI * (h[2] * h[2] * (alpha2 - 1.0) + 1.0).powi(2));
+            let lambda = |cos: f64| ((1.0 + alpha2 * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0) / 2.0;
+            let g = 1.0 / (1.0 + lambda(o[2]) + lambda(0.6));
+            let (f0, f90) = (0.08 * f64::from(specular), (4.0 * f64::from(specular)).min(1.0));
+            let f = f0 + (f90 - f0) * (1.0 - dot(h, o)).powi(5);
+            // A lamp of colour L has the irradiance PI L.
+            let expected = PI * 0.5 * d * g * f / (4.0 * o[2]);
+            // The pixel, the camera and the lamp are single precision; the sharpest lobe bends by 1e3 per radian.
+            assert!(
+                (mean - expected).abs() < 2e-4 * expected,
+                "{specular} {shininess} {eye:?}: {mean}, not {expected}"
+            );
+            all.push(mean);
+        }
+        // Controls: there is a highlight, and it is where the lamp is mirrored.
+        assert!(all[0] > 0.0 && all[0] > all[2] && all[2] > all[3], "{all:?}");
+    }
+}
+
+/// A brick whose corners share their normals, or some of them one inside the other.
+fn bricks(halves: &[f32]) -> Shape {
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for half in halves {
+        let first = positions.len() as u32;
+        positions.extend((0..8).map(|k| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { *half } else { -half })));
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = sides.iter().flat_map(|&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]]);
+        triangles.extend(faces.map(|t| t.map(|k| k + first)));
+    }
+    let mesh = scene::mesh::TriMesh::from_triangles(positions, triangles);
+    scene::shape::Mesh { mesh: std::sync::Arc::new(scene::RenderMesh::new(&mesh, std::f32::consts::PI)) }.into()
+}
+
+/// The smooth normals of a brick of 1 m mean a point 0.33 m above the middle of its top; a lid 0.05 m above it shades it.
+#[test]
+fn what_is_close_above_a_smooth_surface_shades_it() {
+    let lid = Instance::new(Box { half: [0.3, 0.3, 0.001] }, matt(0.6), 2);
+    let mut scene = dark(vec![Instance::new(bricks(&[0.5]), matt(0.6), 1), lid]);
+    scene.lights = vec![lamp(LightKind::Directional, [0.; 3], [0., 0., -1.])];
+    let view = looking([2.0, 0.1, 0.53], [0.0, 0.0, 0.5]);
+    for (height, lit) in [(0.55, false), (0.7, false), (0.45, true)] {
+        let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, height])];
+        let (mean, _) = seen(&scene, &poses, &view, 1, 0);
+        assert!(if lit { mean > 0.1 } else { mean == 0.0 }, "{height}: {mean}");
+    }
+}
+
+/// One mesh of glass bricks one inside the other: light goes through all of their fronts, as many as it has.
+#[test]
+fn every_front_of_a_thing_takes_its_alpha() {
+    let mut glass = matt(0.0);
+    glass.rgba[3] = 0.3;
+    for (halves, fronts) in [(&[0.2f32][..], 1), (&[0.2, 0.1], 2), (&[0.2, 0.15, 0.1], 3)] {
+        let glass = Instance::new(bricks(halves), glass.clone(), 2);
+        let mut scene = dark(vec![Instance::new(Plane::INFINITE, matt(0.6), 1), glass]);
+        scene.lights = vec![lamp(LightKind::Directional, [0.; 3], [0., 0., -1.])];
+        let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, 1.0])];
+        let at = [0.03, 0.01, 0.0];
+        let (mean, _) = seen(&scene, &poses, &looking([1.0, 0.0, 0.5], at), 4, 0);
+        let expected = albedo(0.6) * f64::from(0.9f32) * (1.0 - f64::from(0.3f32)).powi(fronts);
+        assert!((mean - expected).abs() < 1e-5, "{halves:?}: {mean}, not {expected}");
+    }
 }

@@ -26,6 +26,11 @@ use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
 use tree::Tree;
 
+/// Surfaces of one thing that is not opaque that a shadow ray goes through, at most.
+const MAX_FRONTS: usize = 64;
+/// Rays go on this part of their coordinates past a surface.
+const PAST: f64 = 1e-9;
+
 /// What rays meet of an instance, in its own frame.
 #[derive(Clone, Debug)]
 enum Body {
@@ -159,10 +164,7 @@ impl Tracer {
         let mut meet = |thing: u32, limit: f64| {
             let Thing { instance, world_from_instance, alpha } = &self.things[thing as usize];
             if *alpha < 1.0 {
-                let front = self.meet(thing, ray, limit, stack).and_then(|found| self.hit(found));
-                if front.is_some_and(|hit| dot(hit.normal, ray.direction) < 0.0) {
-                    left *= 1.0 - alpha;
-                }
+                left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, stack));
                 return limit;
             }
             let local = seen_from(ray, world_from_instance);
@@ -184,6 +186,22 @@ impl Tracer {
         }
         self.tree.visit(ray, limit, meet);
         left
+    }
+
+    /// How many fronts of a thing a ray goes through, at most [`MAX_FRONTS`].
+    fn fronts(&self, thing: u32, ray: &Ray, limit: f64, stack: &mut Stack) -> i32 {
+        // Closed forms are convex: after the first surface there is only a back.
+        let body = &self.bodies[self.things[thing as usize].instance as usize];
+        let most = if matches!(body, Some(Body::Closed(_))) { 1 } else { MAX_FRONTS };
+        let (mut from, mut left, mut count) = (*ray, limit, 0);
+        for _ in 0..most {
+            let Some(hit) = self.meet(thing, &from, left, stack).and_then(|found| self.hit(found)) else { break };
+            count += i32::from(dot(hit.normal, ray.direction) < 0.0);
+            let onward = hit.distance + PAST * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));
+            from.origin = along(from.origin, onward, from.direction);
+            left -= onward;
+        }
+        count
     }
 
     /// Where a ray meets a thing.
