@@ -11,9 +11,9 @@ use nalgebra::{Rotation2, Vector2};
 
 const FRICTION: f64 = 0.3;
 
-/// Friction along the motion and across it, in parts of the normal force, of a plate that slides at this angle to x.
-fn slid(angle: f64, cone: Cone) -> [f64; 2] {
-    let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, FRICTION) });
+/// Friction in parts of the normal force, of a plate that slides at this angle to x.
+fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
+    let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, coefficient) });
     let plate = lab.object(RigidObjectCfg {
         uid: "plate".into(),
         shape: ObjectShape::Box { size: [0.4, 0.4, 0.02] },
@@ -32,7 +32,13 @@ fn slid(angle: f64, cone: Cone) -> [f64; 2] {
         friction += Vector2::new(force[(0, 0, 0)], force[(0, 0, 1)]);
         normal += sensor.net_forces_w()[(0, 0, 2)];
     });
-    [friction.dot(&way) / normal, way.perp(&friction) / normal]
+    friction / normal
+}
+
+/// Parts along the direction at this angle to x, and across it.
+fn parts(friction: Vector2<f64>, angle: f64) -> [f64; 2] {
+    let way = Rotation2::new(angle) * Vector2::x();
+    [friction.dot(&way), way.perp(&friction)]
 }
 
 #[test]
@@ -40,17 +46,24 @@ fn holds() {
     law(module_path!(), "f = -μ N v/|v|", |m| {
         let sliding = (0.01 * FRICTION, "1 %, as a sliding block");
         for degrees in [0.0_f64, 22.5, 45.0, 70.0] {
-            let [along, across] = slid(degrees.to_radians(), Cone::Elliptic);
+            let angle = degrees.to_radians();
+            let [along, across] = parts(slid(angle, Cone::Elliptic, FRICTION), angle);
+            let [weak, beside] = parts(slid(angle + 0.1, Cone::Elliptic, 0.5 * FRICTION), angle);
             m.row(&format!("along the motion, {degrees}°"), "", -FRICTION, along, sliding);
+            m.control(&format!("along the motion, {degrees}°"), "with half the friction", weak);
             m.row(&format!("across the motion, {degrees}°"), "", 0.0, across, sliding);
+            m.control(&format!("across the motion, {degrees}°"), "of a motion 0.1 rad beside", beside);
         }
-        let [between, skewed] = slid(22.5_f64.to_radians(), Cone::Pyramidal);
+        let skew = 22.5_f64.to_radians();
+        let [between, skewed] = parts(slid(skew, Cone::Pyramidal, FRICTION), skew);
         m.control("along the motion, 22.5°", "with a pyramid", between);
         m.control("across the motion, 22.5°", "with a pyramid", skewed);
-        let [edge, _] = slid(45.0_f64.to_radians(), Cone::Pyramidal);
+        let half = 45.0_f64.to_radians();
+        let [edge, _] = parts(slid(half, Cone::Pyramidal, FRICTION), half);
         m.control("along the motion, 45°", "with a pyramid", edge);
         let least = -FRICTION / 2.0_f64.sqrt();
         m.row("along the motion, 45°, pyramid", "", least, edge, (0.02 * FRICTION, "edges give way, 2 %"));
-        m.control("along the motion, 45°, pyramid", "with a cone", slid(45.0_f64.to_radians(), Cone::Elliptic)[0]);
+        let [round, _] = parts(slid(half, Cone::Elliptic, FRICTION), half);
+        m.control("along the motion, 45°, pyramid", "with a cone", round);
     });
 }

@@ -63,10 +63,7 @@ fn holds() {
             m.row(&of("ball"), "m", ball, found[0], single);
             m.control(&of("ball"), "standing still", still[0]);
             m.row(&of("brick"), "m", brick, found[1], single);
-            // After 2 s it has turned by a quarter, and looks as it did.
-            if seconds < 2.0 {
-                m.control(&of("brick"), "standing still", still[1]);
-            }
+            m.control(&of("brick"), "turning half as fast", ranges(speed, 0.5 * spin, seconds)[1]);
         }
         let quarter = ranges(0.0, spin, 2.0)[2];
         m.row("range to the end of the rod", "m", AWAY - LENGTH / 2.0 - RADIUS / 2.0, still[2], single);
