@@ -47,9 +47,10 @@ pub enum DiagnosticKind {
     /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
     SettingIgnored,
     /// The surface of an object's mesh is open, encloses nothing, or is inside out in a part: it weighs and turns as its convex
-    /// hull.
+    /// hull; or it is open, and collides in pieces or triangles: they do not hold all that is behind it.
     OpenMesh,
-    /// The convex pieces of an object's mesh are farther above its surface than they should be.
+    /// The convex pieces of an object's mesh are farther off its surface than they should be, or some of its triangles are too
+    /// thin to collide.
     CoarsePieces,
     /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
     ExportReduced,

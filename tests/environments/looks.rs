@@ -206,6 +206,7 @@ fn the_depth_of_a_ball_is_that_of_its_own_radius() {
 }
 
 /// MuJoCo's own rays in the environment's own model, beside ours from the sensor.
+/// MuJoCo's pass through what has an opacity of 0.
 #[test]
 fn rays_hit_what_mujocos_hit() {
     let mut sim = world(NOMINAL);
@@ -217,11 +218,12 @@ fn rays_hit_what_mujocos_hit() {
     };
     let id = sim.add_sensor("rays", rays).unwrap();
     dress(&mut sim, 1, OWN);
+    sim.randomize_with(Some(&[EnvId(2)]), |_, _, p| p.set(Property::Color, "cube", &[1.0, 0.0, 0.0, 0.0])).unwrap();
     sim.update(30);
     let rays = sim.sensor(id).unwrap();
     let (starts, directions) = (rays.ray_starts(), rays.ray_directions());
     let distances = rays.distances();
-    let mut apart = 0;
+    let mut apart = [0; 3];
     for env in 0..3 {
         sim.batch().read(env, |here| {
             for ray in 0..rays.num_rays() {
@@ -230,11 +232,11 @@ fn rays_hit_what_mujocos_hit() {
                 let theirs = theirs.map_or(f64::INFINITY, |hit| hit.distance);
                 let ours = distances[(env, ray)];
                 assert!((ours - theirs).abs() < 1e-6, "environment {env}, ray {ray}: {ours}, not {theirs}");
-                apart += usize::from(env == 1 && (ours - distances[(0, ray)]).abs() > 1e-3);
+                apart[env] += usize::from((ours - distances[(0, ray)]).abs() > 1e-3);
             }
         });
     }
-    assert!(apart > 30, "control: {apart} rays of the other environment hit something else");
+    assert!(apart[1] > 30 && apart[2] > 3, "control: {apart:?} rays of the others hit something else");
 }
 
 /// A link of boxes, a mesh beside them, and what is seen instead of it.
@@ -323,11 +325,23 @@ fn what_has_which() {
     // The colour of a mesh.
     let camera = sim.add_sensor("camera", above()).unwrap();
     let before = pictures(&sim, camera);
-    let green = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
-    sim.randomize(&green, Some(&[EnvId(0)])).unwrap();
-    let hidden = pictures(&sim, camera);
     let cone = sim.rigid_object(sim.rigid_object_id("cone").unwrap()).mask_id();
     let seen = |p: &Pictures, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
+    // Draws are of colours, and leave the opacity: 1, though a factor of 1.5 would be beyond it.
+    let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0])).with(
+        Property::Color,
+        "cube",
+        Draw::Scale([1.5, 1.5]),
+    );
+    sim.randomize(&black, Some(&[EnvId(0)])).unwrap();
+    let color =
+        |sim: &SimulationManager, of| sim.properties(EnvId(0)).unwrap().get(Property::Color, of).unwrap().to_vec();
+    assert_eq!(color(&sim, "cone"), [0.0, 0.0, 0.0, 1.0]);
+    let brighter = f64::from(0.6_f32) * 1.5;
+    assert_eq!(color(&sim, "cube"), [brighter, brighter, brighter, 1.0]);
+    assert_eq!(seen(&pictures(&sim, camera), 0), seen(&before, 0));
+    sim.randomize_with(Some(&[EnvId(0)]), |_, _, p| p.set(Property::Color, "cone", &[0.0; 4])).unwrap();
+    let hidden = pictures(&sim, camera);
     assert!(seen(&before, 0) > 30 && seen(&hidden, 1) == seen(&before, 1));
     assert_eq!(seen(&hidden, 0), 0, "with an opacity of 0 it is not there");
 }

@@ -10,8 +10,8 @@
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 
-use super::TriMesh;
 use super::builder::{cross, dot, sub};
+use super::{MeshFault, TriMesh};
 
 /// Changes whenever the same input may give another hull; part of the key of [`super::HullCache`].
 pub(super) const ALGORITHM: u32 = 1;
@@ -68,6 +68,32 @@ pub enum HullError {
         value: f64,
         /// What is accepted.
         expected: &'static str,
+    },
+    /// The thickness of prisms is none.
+    #[error("the thickness of prisms is {value} m; expected a length above 0")]
+    InvalidThickness {
+        /// The thickness \[m\].
+        value: f64,
+    },
+    /// A mesh breaks a promise of its type.
+    #[error("{source}")]
+    Mesh {
+        /// Which.
+        source: MeshFault,
+    },
+    /// A mesh has more triangles than are cut into pieces.
+    #[error("{found} triangles; at most {most} are cut into convex pieces: simplify the mesh, or let its hull collide")]
+    TooManyTriangles {
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// No triangle of a mesh has an area.
+    #[error("none of {triangles} triangles has an area")]
+    NoArea {
+        /// How many there are.
+        triangles: usize,
     },
     /// Fewer than four points.
     #[error("{found} points; a hull needs at least 4")]

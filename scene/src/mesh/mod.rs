@@ -2,6 +2,7 @@
 
 mod affine;
 mod builder;
+mod cell;
 mod dae;
 mod dae_material;
 mod error;
@@ -15,6 +16,7 @@ mod obj;
 mod pieces;
 mod pieces_cache;
 mod polygon;
+mod prisms;
 mod solid;
 mod stl;
 #[cfg(test)]
@@ -31,7 +33,8 @@ pub use error::MeshError;
 pub use hull::{HullCfg, HullError, convex_hull};
 pub use hull_cache::HullCache;
 pub use load::{DaeUpAxis, MeshOptions, load, load_bytes, load_with};
-pub use pieces::{Pieces, PiecesCfg, convex_pieces, prisms};
+pub use pieces::{Pieces, PiecesCfg, convex_pieces};
+pub use prisms::prisms;
 pub use solid::Solid;
 pub use trimesh::MeshFault;
 pub use write::{write_binary_stl, write_obj};

@@ -1,16 +1,22 @@
-//! Convex pieces of a mesh that is not convex, and thin convex ones of its triangles.
+//! Convex pieces of a mesh that is not convex.
 //!
-//! The mesh is cut by planes where the hull of a piece is farthest above its surface, until it nowhere is by more than a
-//! tolerance. Triangles are cut exactly; the hull of a piece is that of the triangles that are left, so that no piece is
-//! larger than what it stands for but by what its hull spans. Cuts are not closed by faces of their own: in the middle of a
-//! solid, where three of them meet, a corner of a piece may be missing, which nothing touches from outside.
+//! The mesh is cut by planes where the hull of a piece is farthest from its surface, until it nowhere is by more than a
+//! tolerance. Triangles are cut exactly; the hull of a piece is that of the triangles that are left and of the corners of its
+//! [cell](super::cell) that are in the solid: what the solid and the cell have in common is all in the hull, its inside too.
 
 use super::builder::{cross, dot, sub};
+use super::cell::{Cell, winding};
 use super::{HullCfg, HullError, TriMesh, convex_hull};
 use serde::{Deserialize, Serialize};
 
 /// Changes whenever the same input may give other pieces; part of the key of [`super::HullCache`].
-pub(super) const ALGORITHM: u32 = 1;
+pub(super) const ALGORITHM: u32 = 2;
+
+/// The most triangles of a mesh that is cut: the time for a cut goes with their number.
+const MAX_TRIANGLES: usize = 50_000;
+
+/// The most vertices of a hull of a piece.
+const MAX_VERTICES: usize = 4096;
 
 /// How a mesh is cut into convex pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,7 +24,7 @@ pub(super) const ALGORITHM: u32 = 1;
 pub struct PiecesCfg {
     /// The most pieces, 1 to 1024.
     pub max_pieces: usize,
-    /// How far the hull of a piece may be above its surface \[m\], along the surface's normal, above 0.
+    /// How far the hull of a piece may be above its surface \[m\], along the surface's normal, or below it, above 0.
     pub tolerance: f64,
 }
 
@@ -35,18 +41,22 @@ pub struct Pieces {
     /// Convex, closed, outside the front; in the order in which they were cut.
     pub hulls: Vec<TriMesh>,
     /// How far the hull of a piece is above its surface at most \[m\], measured at the corners of its triangles, the middles of
-    /// their edges and their middles. More than the tolerance where there were not pieces enough.
+    /// their edges and their middles, or how far a corner is outside its hull, which has only so many vertices. More than the
+    /// tolerance where there were not pieces enough.
     pub depth: f64,
 }
 
 type V3 = [f64; 3];
-type Triangle = [V3; 3];
+pub(super) type Triangle = [V3; 3];
 
 /// A part of the surface and its hull.
 struct Piece {
     surface: Vec<Triangle>,
+    cell: Cell,
+    /// How many cuts in a row made nothing better.
+    idle: u32,
     hull: TriMesh,
-    /// How far the hull is above the surface at most, where, and the normal of the surface there.
+    /// How far the hull is from the surface at most, where, and the normal of the one or the other there.
     depth: f64,
     at: V3,
     normal: V3,
@@ -67,14 +77,36 @@ impl PiecesCfg {
 
 /// Cuts a mesh into convex pieces. One that is convex within the tolerance is one piece: its hull.
 ///
+/// Together the pieces hold the whole solid, but for what hulls leave out: points that stick out by less than
+/// [`HullCfg::tolerance`], or by half of the tolerance of the pieces where that is less, and what
+/// [`HullCfg::max_vertices`] cuts off, which `depth` tells. A solid is what a [closed](TriMesh::is_closed) mesh encloses,
+/// whichever way its triangles turn. A hollow that is closed all around is a surface as others: it is cut out, too.
+///
+/// Of an open mesh the pieces hold the surface, and of what is behind it what their hulls span; outside is the side from
+/// which its triangles turn counter-clockwise. Pieces of it that are flat get [`HullCfg::min_thickness`], behind their front.
+///
 /// # Errors
-/// A configuration out of its range; as [`convex_hull`] for the mesh as a whole.
+/// A configuration out of its range, a mesh that breaks a promise of [`TriMesh`], more than 50000 triangles or none that has
+/// an area; as [`convex_hull`] for the mesh as a whole.
 pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<Pieces, HullError> {
     cfg.check()?;
-    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize].map(f64::from));
-    let surface: Vec<Triangle> = mesh.triangles.iter().map(corners).filter(|t| unit_normal(t).is_some()).collect();
-    let whole = convex_hull(&mesh.positions, hull)?;
-    let mut pieces = vec![Piece::of(surface, whole)];
+    if hull.max_vertices > MAX_VERTICES {
+        let (field, value) = ("max_vertices", hull.max_vertices as f64);
+        return Err(HullError::InvalidCfg { field, value, expected: "4 to 4096 for a mesh in pieces" });
+    }
+    if mesh.triangles.len() > MAX_TRIANGLES {
+        return Err(HullError::TooManyTriangles { found: mesh.triangles.len(), most: MAX_TRIANGLES });
+    }
+    let surface: Vec<Triangle> = triangles_of(mesh)?.into_iter().filter(|t| unit_normal(t).is_some()).collect();
+    if surface.is_empty() {
+        return Err(HullError::NoArea { triangles: mesh.triangles.len() });
+    }
+    let (lo, hi) = mesh.bounds().unwrap_or_default();
+    let cell = Cell::around(lo.map(f64::from), hi.map(f64::from));
+    let diagonal = (0..3).map(|k| f64::from(hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt();
+    let tolerance = hull.tolerance.min(0.5 * cfg.tolerance / diagonal);
+    let body = Body { all: mesh.is_closed().then(|| surface.clone()), hull: HullCfg { tolerance, ..*hull } };
+    let mut pieces = vec![Piece::of(body.hull_of(surface, cell)?, 0)];
     // Pieces that no plane makes better are left as they are.
     let mut done: Vec<Piece> = Vec::new();
     while pieces.len() + done.len() < cfg.max_pieces {
@@ -83,7 +115,7 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
             break;
         };
         let piece = pieces.remove(k);
-        match piece.cut(hull) {
+        match piece.cut(&body) {
             Some(halves) => pieces.extend(halves),
             None => done.push(piece),
         }
@@ -93,23 +125,61 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
     Ok(Pieces { hulls: done.into_iter().map(|piece| piece.hull).collect(), depth })
 }
 
-/// A prism for each triangle that has an area: its front is the triangle, its back is `thickness` \[m\] behind it. Together they
-/// have the surface of the mesh, exactly, seen from outside; where the mesh is thinner than that, they reach out behind.
-pub fn prisms(mesh: &TriMesh, thickness: f64) -> Vec<TriMesh> {
-    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize].map(f64::from));
-    let prism = |triangle: Triangle| {
-        let normal = unit_normal(&triangle)?;
-        let back = triangle.map(|p| [0, 1, 2].map(|k| p[k] - thickness * normal[k]));
-        let positions = triangle.iter().chain(&back).map(|p| p.map(|x| x as f32)).collect();
-        let sides = [[0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [2, 5, 3], [2, 3, 0]];
-        let faces = [[0, 1, 2], [3, 5, 4]].into_iter().chain(sides).collect();
-        Some(TriMesh::from_triangles(positions, faces))
+/// The triangles of a mesh, counter-clockwise seen from outside where it is closed.
+pub(super) fn triangles_of(mesh: &TriMesh) -> Result<Vec<Triangle>, HullError> {
+    mesh.validate().map_err(|source| HullError::Mesh { source })?;
+    let inside_out = mesh.signed_volume() < 0.0 && mesh.is_closed();
+    let corners = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
+        if inside_out { [a, c, b] } else { [a, b, c] }
     };
-    mesh.triangles.iter().map(corners).filter_map(prism).collect()
+    Ok(mesh.triangles.iter().map(corners).collect())
+}
+
+/// What is cut.
+struct Body {
+    /// The whole surface, where it is closed.
+    all: Option<Vec<Triangle>>,
+    hull: HullCfg,
+}
+
+impl Body {
+    /// Whether a point is in the solid.
+    fn holds(&self, p: V3) -> bool {
+        self.all.as_ref().is_some_and(|all| winding(all, p) > 0.5)
+    }
+
+    /// The hull of a surface and of the corners of its cell that are in the solid. A flat part of an open surface gets its
+    /// thickness behind its front; of a solid, a flat part is none.
+    fn hull_of(&self, surface: Vec<Triangle>, cell: Cell) -> Result<Hulled, HullError> {
+        let points = distinct(surface.iter().flatten().copied().chain(cell.inside()));
+        let hull = match (convex_hull(&points, &HullCfg { min_thickness: None, ..self.hull }), self.hull.min_thickness)
+        {
+            (Err(HullError::Coplanar { .. } | HullError::TooFewPoints { .. }), Some(thickness))
+                if self.all.is_none() =>
+            {
+                let behind = surface.iter().filter_map(|t| Some((t, unit_normal(t)?)));
+                let behind = behind.flat_map(|(t, n)| t.map(|p| [0, 1, 2].map(|k| p[k] - thickness * n[k])));
+                let points = distinct(surface.iter().flatten().copied().chain(behind));
+                // A plate may be thinner than the tolerance of its size.
+                convex_hull(&points, &HullCfg { min_thickness: None, tolerance: 0.0, ..self.hull })?
+            }
+            (hull, _) => hull?,
+        };
+        Ok(Hulled { surface, cell, hull })
+    }
+}
+
+/// Points in single precision, each once.
+fn distinct(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
+    let mut points: Vec<[f32; 3]> = points.map(|p| p.map(|x| x as f32 + 0.0)).collect();
+    points.sort_by(|a, b| (0..3).fold(std::cmp::Ordering::Equal, |order, k| order.then(a[k].total_cmp(&b[k]))));
+    points.dedup();
+    points
 }
 
 impl Piece {
-    fn of(surface: Vec<Triangle>, hull: TriMesh) -> Self {
+    fn of(Hulled { surface, cell, hull }: Hulled, idle: u32) -> Self {
         let faces: Vec<(V3, f64)> = hull
             .triangles
             .iter()
@@ -123,7 +193,15 @@ impl Piece {
             let faces = faces.iter().map(|&(n, d)| (dot(n, normal), d - dot(n, p)));
             faces.filter(|(slope, _)| *slope > 1e-6).map(|(slope, gap)| gap / slope).fold(f64::INFINITY, f64::min)
         };
-        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull };
+        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull, cell, idle };
+        for p in piece.surface.iter().flatten().copied().chain(piece.cell.inside()) {
+            for &(normal, distance) in &faces {
+                let outside = dot(normal, p) - distance;
+                if outside > piece.depth {
+                    (piece.depth, piece.at, piece.normal) = (outside, p, normal);
+                }
+            }
+        }
         for triangle in &piece.surface {
             let Some(normal) = unit_normal(triangle) else { continue };
             let [a, b, c] = *triangle;
@@ -141,41 +219,54 @@ impl Piece {
 
     /// The two halves whose hulls are smallest together, of planes through where the hull is farthest from the surface and
     /// through the middle of the piece; of those that are nearly the same, halves that are as large as each other: a bowl has
-    /// to be cut twice before its hulls become smaller. `None` where no plane makes two halves that are worth it.
-    fn cut(&self, cfg: &HullCfg) -> Option<[Self; 2]> {
+    /// to be cut twice before its hulls become smaller. `None` where no plane makes two halves that are worth it, and after
+    /// some cuts in a row of which none made the hulls smaller or nearer to the surface.
+    fn cut(&self, body: &Body) -> Option<[Self; 2]> {
         /// What the larger half counts beside both.
         const LARGER: f64 = 0.05;
         /// A half that is less than this of the whole is none.
         const LEAST: f64 = 1e-4;
+        /// So many cuts in a row may be for nothing.
+        const IDLE: u32 = 4;
+        if self.idle >= IDLE {
+            return None;
+        }
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let (lo, hi) = self.hull.bounds()?;
         let middle = [0, 1, 2].map(|k| (f64::from(lo[k]) + f64::from(hi[k])) / 2.0);
         let here = axes.iter().chain([&self.normal]).map(|&n| (n, dot(n, self.at)));
         let planes = here.chain(axes.iter().map(|&n| (n, dot(n, middle))));
-        let mut best: Option<(f64, [Hulled; 2])> = None;
+        let mut best: Option<(f64, f64, [Hulled; 2])> = None;
         let size = (0..3).map(|k| f64::from(hi[k] - lo[k])).fold(0.0, f64::max);
-        let least = LEAST * self.hull.signed_volume();
+        let whole = self.hull.signed_volume();
+        let inside = |p: V3| body.holds(p);
         for (normal, distance) in planes {
             let [front, back] = halves(&self.surface, normal, distance, 1e-6 * size);
-            let (Some(front), Some(back)) = (hull_of(front, cfg), hull_of(back, cfg)) else { continue };
-            let volumes = [front.1.signed_volume(), back.1.signed_volume()];
-            let cost = volumes[0] + volumes[1] + LARGER * volumes[0].max(volumes[1]);
-            if volumes.iter().all(|volume| *volume >= least) && best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
-                best = Some((cost, [front, back]));
+            let [ahead, behind] = self.cell.halves(normal, distance, &inside);
+            let (Ok(front), Ok(back)) = (body.hull_of(front, ahead), body.hull_of(back, behind)) else { continue };
+            let volumes = [&front, &back].map(|half| half.hull.signed_volume());
+            let both = volumes[0] + volumes[1];
+            let cost = both + LARGER * volumes[0].max(volumes[1]);
+            let halved = volumes.iter().all(|volume| *volume >= LEAST * whole);
+            if halved && best.as_ref().is_none_or(|(lowest, ..)| cost < *lowest) {
+                best = Some((cost, both, [front, back]));
             }
         }
-        best.map(|(_, halves)| halves.map(|(surface, hull)| Self::of(surface, hull)))
+        let (_, both, halves) = best?;
+        let mut halves = halves.map(|half| Self::of(half, 0));
+        let deepest = halves.iter().map(|half| half.depth).fold(0.0, f64::max);
+        if both > 0.999 * whole && deepest > 0.99 * self.depth {
+            halves.iter_mut().for_each(|half| half.idle = self.idle + 1);
+        }
+        Some(halves)
     }
 }
 
-/// A surface and its hull.
-type Hulled = (Vec<Triangle>, TriMesh);
-
-/// A surface with its hull, where it has one.
-fn hull_of(surface: Vec<Triangle>, cfg: &HullCfg) -> Option<Hulled> {
-    let points: Vec<[f32; 3]> = surface.iter().flatten().map(|p| p.map(|x| x as f32)).collect();
-    let hull = convex_hull(&points, cfg).ok()?;
-    Some((surface, hull))
+/// A part of the surface, its cell, and the hull of both.
+struct Hulled {
+    surface: Vec<Triangle>,
+    cell: Cell,
+    hull: TriMesh,
 }
 
 /// What is in front of a plane, and what is behind it. Corners nearer to it than `near` \[m\] are on it.
@@ -221,7 +312,7 @@ fn clipped(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
 }
 
 /// The unit normal of a triangle; `None` where it is only an edge.
-fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
+pub(super) fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
     let (u, v) = (sub(b, a), sub(c, a));
     let normal = cross(u, v);
     let length = dot(normal, normal).sqrt();
@@ -229,10 +320,17 @@ fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
     (length > 1e-10 * (dot(u, u) + dot(v, v))).then(|| normal.map(|x| x / length))
 }
 
+/// The area of a triangle \[m²\].
+pub(super) fn area(&[a, b, c]: &Triangle) -> f64 {
+    let normal = cross(sub(b, a), sub(c, a));
+    dot(normal, normal).sqrt() / 2.0
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
+    use crate::mesh::prisms;
 
     /// A prism over an outline in x and z, counter-clockwise, which `cut` divides into triangles.
     fn along_y(outline: &[[f32; 2]], cut: &[[u32; 3]], length: f32) -> TriMesh {
@@ -346,10 +444,157 @@ mod tests {
         assert_eq!((one.hulls.len(), one.depth < 1e-3), (1, true), "{}", one.depth);
     }
 
+    /// A block of 1 x 1 x 0.2 m whose top is an egg carton of 5 mm.
+    fn carton() -> TriMesh {
+        const N: u32 = 16;
+        let height = |i: u32, j: u32| {
+            let wave = |k: u32| (std::f32::consts::TAU * 2.0 * k as f32 / N as f32).cos();
+            0.2 + 0.005 * wave(i) * wave(j)
+        };
+        let side = N + 1;
+        let grid = |f: &dyn Fn(u32, u32) -> f32| -> Vec<[f32; 3]> {
+            (0..side * side)
+                .map(|k| (k % side, k / side))
+                .map(|(i, j)| [i as f32 / N as f32, j as f32 / N as f32, f(i, j)])
+                .collect()
+        };
+        let mut positions = grid(&height);
+        positions.extend(grid(&|_, _| 0.0));
+        let at = |i: u32, j: u32| j * side + i;
+        let down = side * side;
+        let mut faces = Vec::new();
+        for (i, j) in (0..N * N).map(|k| (k % N, k / N)) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            faces.extend([[a, b, c], [a, c, d], [a + down, c + down, b + down], [a + down, d + down, c + down]]);
+        }
+        for k in 0..N {
+            let rim = [
+                (at(k, 0), at(k + 1, 0)),
+                (at(N, k), at(N, k + 1)),
+                (at(k + 1, N), at(k, N)),
+                (at(0, k + 1), at(0, k)),
+            ];
+            faces.extend(rim.iter().flat_map(|&(a, b)| [[a + down, b + down, b], [a + down, b, a]]));
+        }
+        TriMesh::from_triangles(positions, faces)
+    }
+
+    fn inside_out(mut mesh: TriMesh) -> TriMesh {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        mesh
+    }
+
+    /// A solid stays one: of points all over its inside each is in a piece, however often it was cut.
+    #[test]
+    fn pieces_keep_the_inside_of_a_solid() {
+        let mesh = carton();
+        assert!(mesh.is_closed() && (mesh.signed_volume() - 0.2).abs() < 1e-3, "{}", mesh.signed_volume());
+        // Hulls leave out what sticks out by less than half the tolerance, 1e-4 of their size, or less.
+        let near = 2e-4;
+        let covered = |hulls: &[TriMesh]| {
+            let points = (0..19 * 19 * 11).map(|k| (k % 19, k / 19 % 19, k / 361));
+            let share = |i: i32, n: i32| (f64::from(i) + 0.5) / f64::from(n);
+            let all: Vec<V3> = points.map(|(i, j, k)| [share(i, 19), share(j, 19), 0.19 * share(k, 11)]).collect();
+            let inside = all.iter().filter(|p| hulls.iter().any(|hull| within(hull, **p, near))).count();
+            (inside, all.len())
+        };
+        for cfg in [PiecesCfg { max_pieces: 24, tolerance: 1e-3 }, PiecesCfg { max_pieces: 64, tolerance: 1e-3 }] {
+            for mesh in [mesh.clone(), inside_out(mesh.clone())] {
+                let pieces = convex_pieces(&mesh, &HullCfg::default(), &cfg).unwrap();
+                assert!(pieces.hulls.len() >= 8, "{}", pieces.hulls.len());
+                let (inside, all) = covered(&pieces.hulls);
+                assert_eq!(inside, all, "{} pieces", pieces.hulls.len());
+                // Nor do they hold more than the solid and the tolerance on its top, or than that of its hull.
+                let volume: f64 = pieces.hulls.iter().map(TriMesh::signed_volume).sum();
+                assert!(volume < 0.2 + pieces.depth.max(1e-3), "{volume} {}", pieces.depth);
+            }
+        }
+        // The control: with one of its pieces left out there is a hole.
+        let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
+        let (inside, all) = covered(&pieces.hulls[1..]);
+        assert!(inside < all);
+    }
+
+    /// A cube is one piece whichever way its triangles turn, and prisms are within it.
+    #[test]
+    fn a_mesh_that_is_inside_out_is_turned() {
+        let cube = convex_hull(
+            &[0, 1, 2, 3, 4, 5, 6, 7].map(|k: u8| [k & 1, k >> 1 & 1, k >> 2].map(f32::from)),
+            &HullCfg::default(),
+        );
+        let cube = cube.unwrap();
+        for mesh in [cube.clone(), inside_out(cube)] {
+            let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
+            assert_eq!((pieces.hulls.len(), pieces.depth < 1e-6), (1, true), "{}", pieces.depth);
+            for prism in prisms(&mesh, 0.01).unwrap() {
+                assert!(prism.signed_volume() > 0.0);
+                assert!(prism.positions.iter().flatten().all(|x| (0.0..=1.0).contains(x)), "{:?}", prism.positions);
+            }
+        }
+    }
+
+    /// A flat sheet is one piece whose front is the sheet: it gets thicker behind.
+    #[test]
+    fn a_sheet_is_no_higher_than_it_is() {
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let sheet = TriMesh::from_triangles(corners, vec![[0, 1, 2], [0, 2, 3]]);
+        let cfg = PiecesCfg { tolerance: 1e-4, ..PiecesCfg::default() };
+        let pieces = convex_pieces(&sheet, &HullCfg::default(), &cfg).unwrap();
+        assert_eq!(pieces.hulls.len(), 1);
+        let (lo, hi) = pieces.hulls[0].bounds().unwrap();
+        assert!(hi[2] == 0.0 && (lo[2] + 1e-3).abs() < 1e-9 && pieces.depth < 1e-9, "{lo:?} {hi:?} {}", pieces.depth);
+        let error = convex_pieces(&sheet, &HullCfg { min_thickness: None, ..HullCfg::default() }, &cfg);
+        assert!(matches!(error, Err(HullError::Coplanar { .. })), "{error:?}");
+    }
+
+    /// A ball whose hull may have few vertices only is farther out than its hull, and the depth says so.
+    #[test]
+    fn what_sticks_out_of_a_hull_is_depth() {
+        let points: Vec<[f32; 3]> = (0..600u16)
+            .map(|k| {
+                let z = 1.0 - (2.0 * f32::from(k) + 1.0) / 600.0;
+                let (sin, cos) = (2.399_963 * f32::from(k)).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                [r * cos, r * sin, z]
+            })
+            .collect();
+        let ball = convex_hull(&points, &HullCfg { max_vertices: 600, ..HullCfg::default() }).unwrap();
+        let of = |max_vertices, max_pieces| {
+            let hull = HullCfg { max_vertices, ..HullCfg::default() };
+            convex_pieces(&ball, &hull, &PiecesCfg { max_pieces, tolerance: 1e-3 }).unwrap()
+        };
+        let (few, all) = (of(16, 1).depth, of(600, 1).depth);
+        // Sixteen points leave caps of 4π/16: 1 - cos θ = 1/8 each, if they were shared out evenly.
+        assert!(few > 0.1 && all < 1e-3, "{few} {all}");
+        assert!(of(16, 8).depth < few);
+    }
+
+    #[test]
+    fn meshes_that_cannot_be_are_named() {
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let wrong = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 9]]);
+        let flat = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 1]]);
+        let many = TriMesh::from_triangles(corners, vec![[0, 1, 2]; MAX_TRIANGLES + 1]);
+        let (hull, cfg) = (HullCfg::default(), PiecesCfg::default());
+        for (mesh, says) in [(&wrong, "vertex 9"), (&flat, "area"), (&many, "50001")] {
+            let error = convex_pieces(mesh, &hull, &cfg).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+        let fine = HullCfg { max_vertices: 5000, ..hull };
+        assert!(convex_pieces(&ell(), &fine, &cfg).unwrap_err().to_string().contains("max_vertices"));
+        assert!(prisms(&wrong, 0.01).unwrap_err().to_string().contains("vertex 9"));
+        for thickness in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(prisms(&ell(), thickness).unwrap_err().to_string().contains("thickness"));
+        }
+        // 1 mm long and 2e-10 m high: 1e-15 m³, less than MuJoCo takes.
+        let sliver = vec![[0.0; 3], [1e-3, 0.0, 0.0], [5e-4, 2e-10, 0.0]];
+        assert!(prisms(&TriMesh::from_triangles(sliver, vec![[0, 1, 2]]), 0.01).unwrap().is_empty());
+    }
+
     #[test]
     fn prisms_have_the_triangles_for_fronts() {
         let mesh = ell();
-        let prisms = prisms(&mesh, 0.01);
+        let prisms = prisms(&mesh, 0.01).unwrap();
         assert_eq!(prisms.len(), mesh.triangles.len());
         for (prism, triangle) in prisms.iter().zip(&mesh.triangles) {
             assert!(prism.is_closed());
@@ -361,7 +606,7 @@ mod tests {
             assert!((prism.signed_volume() / volume - 1.0).abs() < 1e-4, "{} {volume}", prism.signed_volume());
         }
         let edge = TriMesh::from_triangles(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);
-        assert!(super::prisms(&edge, 0.01).is_empty(), "an edge has no side");
+        assert!(crate::mesh::prisms(&edge, 0.01).unwrap().is_empty(), "an edge has no side");
     }
 
     #[test]

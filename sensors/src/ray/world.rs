@@ -59,6 +59,8 @@ pub struct RayTargets {
 struct Target {
     instance: u32,
     mask_id: i32,
+    /// Whether it can be hit: what cannot be seen keeps its place, since it may be seen in another environment.
+    visible: bool,
     solid: Solid,
     /// Middle and radius of a sphere around it; `None` for a shape without an end.
     sphere: Option<(V3, f64)>,
@@ -96,8 +98,8 @@ pub struct RayWorld {
 }
 
 impl RayTargets {
-    /// The instances of `scene` that `wanted` names, by their indices; repetitions count once, others are left out. Trees
-    /// over meshes are taken from `assets`, or built.
+    /// The instances of `scene` that `wanted` names, by their indices; repetitions count once, others are left out.
+    /// Those that are not visible are never hit. Trees over meshes are taken from `assets`, or built.
     pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssets) -> Self {
         let mut is_wanted = vec![false; scene.instances().len()];
         for index in wanted {
@@ -115,7 +117,13 @@ impl RayTargets {
                 });
                 let list = if instance.fixed { &mut out.fixed } else { &mut out.moving };
                 list.push(out.targets.len() as u32);
-                out.targets.push(Target { instance: index as u32, mask_id: instance.mask_id, solid, sphere });
+                out.targets.push(Target {
+                    instance: index as u32,
+                    mask_id: instance.mask_id,
+                    visible: instance.visible,
+                    solid,
+                    sphere,
+                });
             }
         });
         out
@@ -155,10 +163,10 @@ impl RayTargets {
         poses[self.targets[index as usize].instance as usize]
     }
 
-    /// A target at a pose; `None` where that is no pose: it cannot be hit there.
+    /// A target at a pose; `None` where that is no pose, or the target cannot be seen: it cannot be hit there.
     fn place(&self, index: u32, pose: PoseF64) -> Option<Placed> {
         let target = &self.targets[index as usize];
-        if !pose.is_finite() {
+        if !pose.is_finite() || !target.visible {
             return None;
         }
         let (middle, radius) = target.sphere.map_or(([0.0; 3], f64::INFINITY), |(m, r)| (pose.apply(m), r));

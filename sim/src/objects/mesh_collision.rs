@@ -20,13 +20,15 @@ pub enum MeshCollision {
     Hull,
     /// Convex pieces that together are nowhere higher above the surface than a tolerance; each is a hull, as
     /// [`ObjectShape::Mesh`] says it. They are kept on disk with the hulls. A diagnostic says so where there are not pieces
-    /// enough for the tolerance. Each costs time where something is near the object.
+    /// enough for the tolerance. Each costs time where something is near the object. Together they hold all that a closed
+    /// mesh encloses; of an open one, which a diagnostic names, the surface.
     Pieces(PiecesCfg),
     /// Every triangle, exactly as it stands in the file, as the front of a prism: for what stands or is moved by hand, of up
     /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it, and what comes through the
     /// front by more than that falls through. What lies is where it should be; what slides over edges between triangles is
-    /// braked, since MuJoCo does not know that they are one surface: a ball of 5 cm radius that slid along a smooth valley at
-    /// 0.5 m/s, over an edge every 5 cm on both sides, had lost a fifth of its speed after 0.6 m (MuJoCo 2.2.2).
+    /// braked, since MuJoCo does not know that they are one surface: a ball of 5 cm radius that slides along a smooth valley
+    /// at 0.5 m/s, over an edge every 5 cm on both sides, still has more than 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo
+    /// are left out, which a diagnostic says.
     Triangles {
         /// Thickness of the prisms \[m\].
         thickness: f64,
@@ -70,6 +72,17 @@ impl MeshCollision {
     ) -> Result<Vec<Arc<TriMesh>>> {
         let failed = |error: MeshError| Error::ObjectMesh { object: uid.into(), error: Box::new(error) };
         let cache = HullCache::default_location();
+        if *self != Self::Hull && !mesh.is_closed() {
+            diagnostics.push(Diagnostic::new(
+                DiagnosticKind::OpenMesh,
+                None,
+                format!(
+                    "object {uid:?}: {}: the surface is open: what collides is the surface, seen from where its triangles turn \
+                     counter-clockwise, and not all that is behind it; close the mesh, or choose MeshCollision::Hull",
+                    path.display()
+                ),
+            ));
+        }
         match self {
             Self::Hull => Ok(vec![Arc::new(cache.hull_of_file(path, scale, hull).map_err(failed)?)]),
             Self::Pieces(cfg) => {
@@ -80,7 +93,7 @@ impl MeshCollision {
                         DiagnosticKind::CoarsePieces,
                         None,
                         format!(
-                            "object {uid:?}: {}: {count} convex pieces reach {depth:.2e} m above the surface; the tolerance is \
+                            "object {uid:?}: {}: {count} convex pieces are up to {depth:.2e} m off the surface; the tolerance is \
                              {:.2e} m",
                             path.display(),
                             cfg.tolerance
@@ -90,12 +103,21 @@ impl MeshCollision {
                 Ok(pieces.hulls.into_iter().map(Arc::new).collect())
             }
             Self::Triangles { thickness } => {
-                let prisms = prisms(mesh, *thickness);
+                let prisms = prisms(mesh, *thickness)
+                    .map_err(|source| failed(MeshError::Hull { path: path.to_owned(), source }))?;
                 if prisms.is_empty() || prisms.len() > Self::MAX_TRIANGLES {
                     let value = format!("Triangles of a mesh of {} triangles with an area", prisms.len());
                     let expected =
                         "1 to 2000 triangles can be exact; choose MeshCollision::Pieces, a terrain, or a coarser mesh";
                     return Err(Error::Config { field: "mesh_collision", value, expected });
+                }
+                if prisms.len() < mesh.triangles.len() {
+                    let (left_out, path) = (mesh.triangles.len() - prisms.len(), path.display());
+                    diagnostics.push(Diagnostic::new(
+                        DiagnosticKind::CoarsePieces,
+                        None,
+                        format!("object {uid:?}: {path}: {left_out} triangles are too thin to collide, and left out"),
+                    ));
                 }
                 Ok(prisms.into_iter().map(Arc::new).collect())
             }

@@ -128,7 +128,8 @@ impl<'a> RigidObjectGroupMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite,
-    /// a quaternion of length zero; then nothing is written.
+    /// a quaternion of length zero; then nothing is written. Where MuJoCo itself refuses the pose of an object that stands, those
+    /// of objects before it in the group are written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
@@ -137,11 +138,9 @@ impl<'a> RigidObjectGroupMut<'a> {
         for k in 0..self.data.objects.len() {
             checked.push(self.body(k).check_poses(argument, poses.index_axis(Axis(1), k), env_ids)?);
         }
-        for (k, poses) in checked.iter().enumerate() {
-            self.body(k).put_poses(poses)?;
-        }
+        let written = checked.iter().enumerate().try_for_each(|(k, poses)| self.body(k).put_poses(poses));
         self.sensors.refresh(&envs, self.simulation);
-        Ok(())
+        written
     }
 
     /// Sets the velocities of the objects' frames and their angular velocities, in world axes: `[vx, vy, vz, wx, wy, wz]`

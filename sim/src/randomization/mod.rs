@@ -103,11 +103,15 @@ impl Simulation {
             })
             .collect();
         self.maker = Some(maker);
+        let mut others = Vec::new();
         for (index, own, made) in made? {
+            let before = self.own_values[index].as_deref().unwrap_or(&NOTHING);
+            let differs = |property: &Property| before[*property as usize] != own[*property as usize];
+            others.extend([Property::Size, Property::Color].iter().any(differs).then_some(index));
             self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
             self.batch.write(index, |env| made.give(env));
         }
-        self.look_anew(envs);
+        self.look_anew(&others);
         Ok(())
     }
 

@@ -8,7 +8,8 @@ use scene::Random;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What is drawn, uniformly from a range, and what it does to the nominal value, not to what was drawn before.
+/// What is drawn, uniformly from a range, and what it does to the nominal value, not to what was drawn before. Of a colour,
+/// red, green and blue are drawn; its opacity is the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Draw {
@@ -119,15 +120,17 @@ impl Resolved {
                     value.copy_from_slice(&properties.proportional_moments(element));
                 }
                 let mut random = random(*property, name);
+                // Opacity is set, not drawn: a factor of a colour is none of it.
+                let drawn = if *property == Property::Color { 3 } else { width };
                 let [low, high] = draw.range();
                 let mut next = || low + (high - low) * random.uniform();
                 match draw {
                     Draw::Scale(_) => {
                         let factor = next();
-                        value.iter_mut().for_each(|number| *number *= factor);
+                        value[..drawn].iter_mut().for_each(|number| *number *= factor);
                     }
-                    Draw::Add(_) => value.iter_mut().for_each(|number| *number += next()),
-                    Draw::Set(_) => value.iter_mut().for_each(|number| *number = next()),
+                    Draw::Add(_) => value[..drawn].iter_mut().for_each(|number| *number += next()),
+                    Draw::Set(_) => value[..drawn].iter_mut().for_each(|number| *number = next()),
                 }
                 properties.set_element(*property, element, &value);
             }

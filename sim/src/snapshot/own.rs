@@ -28,7 +28,11 @@ impl OwnProperties {
                     let difference = format!("it has {} of {name:?}, this scene has none", property.name());
                     SnapshotError::OtherScene { difference }
                 })?;
-                if let Some(expected) = property.fault(value, tables.nominal(*property, element)) {
+                let nominal = tables.nominal(*property, element);
+                let has_none = |(number, nominal): (&f64, &f64)| *nominal == 0.0 && *number != 0.0;
+                let other_shape = *property == Property::Size && value.iter().zip(nominal).any(has_none);
+                let other_shape = other_shape.then_some("numbers of a size that the shape does not have must be 0");
+                if let Some(expected) = property.fault(value, nominal).or(other_shape) {
                     let (property, name, value) = (property.name(), name.clone(), value.to_vec());
                     return Err(RandomizationError::Value { env, property, name, value, expected }.into());
                 }

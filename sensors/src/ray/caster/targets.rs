@@ -41,15 +41,15 @@ impl HitTargets {
         parent: Option<usize>,
         context: &SensorContext,
     ) -> Result<Vec<usize>, SensorError> {
-        let in_groups = |instance: &scene::Instance| {
-            instance.visible && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
-        };
+        let in_groups =
+            |instance: &scene::Instance| 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
         let named = match self {
             Self::Named(patterns) => Some(names(scene, patterns, in_groups)?),
             _ => None,
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
         let wanted = |(index, instance): &(usize, &scene::Instance)| {
+            // Not only what is nominally visible: it may be in an environment of its own looks.
             in_groups(instance)
                 && match self {
                     Self::StaticOnly => instance.fixed,

@@ -1,0 +1,123 @@
+//! The convex cells of space that planes cut a solid into.
+//!
+//! What a solid and a cell have in common has corners of three kinds: those of the surface within the cell, those where the
+//! surface crosses faces and edges of the cell, and those of the cell that are in the solid. The first two are found by
+//! cutting the triangles of the surface; the third are found here, so that the hull of a piece keeps the inside of the solid.
+
+use super::builder::{cross, dot, sub};
+
+type V3 = [f64; 3];
+
+/// A convex cell: what is behind all its planes, each a unit normal and its distance from the origin.
+#[derive(Clone, Debug)]
+pub(super) struct Cell {
+    planes: Vec<(V3, f64)>,
+    corners: Vec<Corner>,
+    /// What is nearer than this is the same place \[m\].
+    near: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    at: V3,
+    /// Whether it is in the solid.
+    inside: bool,
+}
+
+impl Cell {
+    /// A box around a solid with some room: its corners are outside.
+    pub(super) fn around(lo: V3, hi: V3) -> Self {
+        let size = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f64::max);
+        let (lo, hi) = (lo.map(|x| x - 0.01 * size), hi.map(|x| x + 0.01 * size));
+        let axis = |k: usize, sign: f64| [0, 1, 2].map(|i| if i == k { sign } else { 0.0 });
+        let planes = (0..3).flat_map(|k| [(axis(k, 1.0), hi[k]), (axis(k, -1.0), -lo[k])]).collect();
+        let corner = |c: usize| [0, 1, 2].map(|k| if c >> k & 1 == 1 { hi[k] } else { lo[k] });
+        let corners = (0..8).map(|c| Corner { at: corner(c), inside: false }).collect();
+        Self { planes, corners, near: 1e-9 * size }
+    }
+
+    /// The corners that are in the solid.
+    pub(super) fn inside(&self) -> impl Iterator<Item = V3> + '_ {
+        self.corners.iter().filter(|corner| corner.inside).map(|corner| corner.at)
+    }
+
+    /// What is in front of a plane, and what is behind it. `solid` says whether a point is in the solid.
+    pub(super) fn halves(&self, normal: V3, distance: f64, solid: &impl Fn(V3) -> bool) -> [Self; 2] {
+        let mut new: Vec<Corner> = Vec::new();
+        for (k, &first) in self.planes.iter().enumerate() {
+            for &second in &self.planes[..k] {
+                let Some(at) = meet([first, second, (normal, distance)]) else { continue };
+                let known = new.iter().any(|corner| (0..3).all(|i| (corner.at[i] - at[i]).abs() <= self.near));
+                if !known && self.planes.iter().all(|&(n, d)| dot(n, at) - d <= self.near) {
+                    new.push(Corner { at, inside: solid(at) });
+                }
+            }
+        }
+        [-1.0, 1.0].map(|sign| {
+            let behind = |corner: &&Corner| (dot(normal, corner.at) - distance) * sign < -self.near;
+            let corners: Vec<Corner> = self.corners.iter().filter(behind).chain(&new).copied().collect();
+            // Planes that only touch the cell bound it nowhere.
+            let bounds = |&&(n, d): &&(V3, f64)| {
+                corners.iter().filter(|corner| (dot(n, corner.at) - d).abs() <= 2.0 * self.near).count() >= 3
+            };
+            let mut planes: Vec<(V3, f64)> = self.planes.iter().filter(bounds).copied().collect();
+            planes.push((normal.map(|x| x * sign), distance * sign));
+            Self { planes, corners, near: self.near }
+        })
+    }
+}
+
+/// Where three planes meet (Cramer's rule); `None` where two of them are parallel, or all along a line.
+fn meet([(a, d), (b, e), (c, f)]: [(V3, f64); 3]) -> Option<V3> {
+    let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
+    let volume = dot(a, bc);
+    (volume.abs() > 1e-9).then(|| [0, 1, 2].map(|k| (d * bc[k] + e * ca[k] + f * ab[k]) / volume))
+}
+
+/// How often closed triangles wind around a point: 1 inside, 0 outside; the sum of the angles of space under which they are
+/// seen, over 4π. Source: van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
+/// Engineering 30(2), 1983.
+pub(super) fn winding(triangles: &[[V3; 3]], p: V3) -> f64 {
+    let half: f64 = triangles
+        .iter()
+        .map(|corners| {
+            let [a, b, c] = corners.map(|corner| sub(corner, p));
+            let [x, y, z] = [a, b, c].map(|v| dot(v, v).sqrt());
+            dot(a, cross(b, c)).atan2(x * y * z + dot(a, b) * z + dot(b, c) * x + dot(c, a) * y)
+        })
+        .sum();
+    half / std::f64::consts::TAU
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+
+    /// Cells of any cuts share out the box: of random points each is in one, and a cell has the corners of its hull.
+    #[test]
+    fn halves_have_the_corners_of_their_planes() {
+        let all = |_| true;
+        let cube = Cell::around([0.0; 3], [1.0; 3]);
+        let s = 0.5f64.sqrt();
+        let [front, back] = cube.halves([s, s, 0.0], s, &all);
+        // Through two opposite edges, of 1.02 m length: a prism on each side, whose four corners on the plane are inside.
+        for half in [&front, &back] {
+            assert_eq!((half.corners.len(), half.planes.len(), half.inside().count()), (6, 5, 4));
+        }
+        let [right, left] = back.halves([1.0, 0.0, 0.0], 0.25, &all);
+        assert_eq!((left.corners.len(), left.planes.len()), (8, 6));
+        assert_eq!((right.corners.len(), right.planes.len()), (6, 5));
+        let highest = left.inside().map(|p| p[1]).fold(f64::MIN, f64::max);
+        assert!((highest - 1.01).abs() < 1e-12, "the edge of the first plane: {highest}");
+    }
+
+    #[test]
+    fn a_tetrahedron_winds_around_its_inside_once() {
+        let p = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|t: [usize; 3]| t.map(|i| p[i]));
+        assert!((winding(&faces, [0.1, 0.2, 0.3]) - 1.0).abs() < 1e-12);
+        assert!(winding(&faces, [0.4, 0.4, 0.4]).abs() < 1e-12);
+        assert!((winding(&faces.map(|[a, b, c]| [a, c, b]), [0.1, 0.2, 0.3]) + 1.0).abs() < 1e-12, "inside out");
+    }
+}
