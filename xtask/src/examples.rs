@@ -124,7 +124,7 @@ const TABLE: &[Run] = &[
     ),
     // Drawers that are stuck: the control of the run above.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
-    run_of("open_drawer", &[2], "--headless --slide-friction 0"),
+    run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",
