@@ -28,10 +28,10 @@ pub mod prelude {
         ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
         Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, ExclusionCfg,
         GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg,
-        LinkId, MaskId, MeshCollision, MjcfCfg, MjcfFile, MjcfId, NameCase, NameCaseCfg, ObjectId, ObjectShape,
-        PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result, RigidObjectCfg,
-        RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError, SimulationManager,
-        SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId,
-        WrenchFrame,
+        LinkId, MaskId, MeshCollision, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase, NameCaseCfg, ObjectId, ObjectShape,
+        Observer, ObserverId, PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result,
+        RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
+        SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
+        WeldCfg, WeldId, WrenchFrame,
     };
 }

@@ -23,6 +23,9 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// An observer is not there.
+    #[error("this observer was taken away, or is being told of something right now")]
+    NoObserver,
     /// A URDF file or an assembly of them is wrong.
     #[error(transparent)]
     Urdf(#[from] UrdfError),

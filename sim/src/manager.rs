@@ -13,6 +13,7 @@ use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
 use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
+use crate::observer::{Moment, Observers};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
@@ -73,6 +74,7 @@ pub struct SimulationManager {
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
+    pub(crate) observers: Observers,
     /// How often properties were drawn for each environment.
     pub(crate) draws: Vec<u64>,
 }
@@ -105,6 +107,7 @@ impl SimulationManager {
             diagnostics: Vec::new(),
             simulation,
             sensors,
+            observers: Observers::default(),
             draws,
         })
     }
@@ -230,6 +233,7 @@ impl SimulationManager {
             let context = self.sensor_context(self.sensors.requires());
             self.sensors.rebuild(&mut self.simulation, &context);
         }
+        self.tell_all(&Moment::Compiled);
         Ok(())
     }
 
@@ -475,16 +479,23 @@ impl SimulationManager {
     }
 
     /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
-    /// Sensors tick after every step.
+    /// Sensors tick after every step; [observers](crate::Observer) are called where they are due.
     pub fn update(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
-            let block = left.min(BLOCK);
+            left -= self.step_observed(left.min(BLOCK), Self::advance);
+        }
+    }
+
+    /// Steps, and lets sensors measure.
+    fn advance(&mut self, steps: u32) {
+        let mut left = steps;
+        while left > 0 {
             left -= if self.sensors.is_empty() {
-                self.simulation.batch.step(block * self.cfg.substeps);
-                block
+                self.simulation.batch.step(left * self.cfg.substeps);
+                left
             } else {
-                self.sensors.advance(&mut self.simulation, block)
+                self.sensors.advance(&mut self.simulation, left)
             };
         }
     }
@@ -500,6 +511,8 @@ impl SimulationManager {
             let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
             self.sensors.reset(&envs, &mut self.simulation);
         }
+        let env_ids = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| EnvId(i)).collect();
+        self.tell_all(&Moment::Reset { env_ids });
         Ok(())
     }
 

@@ -9,6 +9,7 @@ use crate::manager::EnvId;
 use scene::{Marker, Pose, SceneState};
 use sensors::{Requires, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
 use std::any::Any;
+use std::collections::BTreeSet;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -75,6 +76,8 @@ pub(crate) struct SensorList {
     due: Vec<bool>,
     /// The step of every environment, [`sensors::Phases::STANDS`] for one that is put aside.
     clocks: Vec<u64>,
+    /// Environments whose state was written to since somebody asked.
+    written: BTreeSet<usize>,
     /// MuJoCo steps in a physics step.
     substeps: u32,
 }
@@ -197,6 +200,7 @@ impl SensorList {
 
     /// After somebody wrote to the state of `env_ids`.
     pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
+        self.note_written(env_ids);
         // One that is put aside keeps what was measured last.
         let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
         let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
@@ -207,6 +211,16 @@ impl SensorList {
         for slot in self.entries.iter_mut().flat_map(|entry| &mut entry.slot) {
             slot.refresh(&running, &self.state);
         }
+    }
+
+    /// Remembers that somebody wrote to the state of `env_ids`.
+    pub(crate) fn note_written(&mut self, env_ids: &[usize]) {
+        self.written.extend(env_ids);
+    }
+
+    /// The environments that were written to since this was asked last.
+    pub(crate) fn take_written(&mut self) -> Vec<EnvId> {
+        std::mem::take(&mut self.written).into_iter().map(EnvId).collect()
     }
 
     /// Gathers the state after `env_ids` were written to.

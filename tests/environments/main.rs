@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod looks;
+mod observers;
 mod randomize;
 mod rollout;
 mod shard;

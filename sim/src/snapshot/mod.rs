@@ -133,6 +133,7 @@ impl SimulationManager {
                 env.recall(&entries[source].state);
             }
         }));
+        self.sensors.note_written(&chosen);
         if !self.sensors.is_empty() {
             self.sensors.reset(&chosen, &mut self.simulation);
         }

@@ -109,6 +109,7 @@ impl SimulationManager {
                 }
             });
         }
+        self.sensors.note_written(&chosen);
         if !self.sensors.is_empty() {
             self.sensors.reset(&chosen, &mut self.simulation);
         }

@@ -1,0 +1,190 @@
+//! Those who look at a simulation while it runs, and may act on it: windows, browser views, recorders.
+
+use crate::error::{Error, Result};
+use crate::manager::{EnvId, SimulationManager};
+use std::any::Any;
+use std::fmt;
+use std::marker::PhantomData;
+
+/// Looks at a simulation between its steps, and may change it: shows it, records it, holds it while somebody presses pause.
+///
+/// The simulation calls it on the thread that steps, with nothing else running, and goes on when it returns. What takes
+/// long belongs on a thread of the observer's own, with copies of what it needs. Adding an observer changes no number: steps
+/// are cut where observers are due, and `update(n)` equals n times `update(1)`.
+pub trait Observer: Any + Send {
+    /// Physics steps from now until it is asked next, at least 1; [`u64::MAX`] for never. Asked before every block of steps.
+    fn due_in(&self, sim: &SimulationManager) -> u64;
+
+    /// Something happened. What an observer does to the simulation in here, steps too, the others are told of, and itself not.
+    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment);
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Moment {
+    /// Steps were done, and the observer is due.
+    Stepped,
+    /// Environments were reset.
+    Reset {
+        /// Which, in ascending order.
+        env_ids: Vec<EnvId>,
+    },
+    /// Somebody wrote to the state of environments since the last step: joints, poses, welds, properties that were drawn, a
+    /// snapshot. Told once, right before the next step.
+    Written {
+        /// Which, in ascending order.
+        env_ids: Vec<EnvId>,
+    },
+    /// Something was added to the simulation: the model and its arrays are other ones.
+    Compiled,
+}
+
+/// Handle of an observer; valid for the manager that made it.
+pub struct ObserverId<O> {
+    manager: u64,
+    number: u64,
+    observer: PhantomData<fn() -> O>,
+}
+
+impl<O> Clone for ObserverId<O> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<O> Copy for ObserverId<O> {}
+
+impl<O> fmt::Debug for ObserverId<O> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ObserverId({})", self.number)
+    }
+}
+
+/// The observers of a simulation.
+#[derive(Default)]
+pub(crate) struct Observers {
+    seats: Vec<Seat>,
+    next: u64,
+}
+
+struct Seat {
+    number: u64,
+    /// `None` while it is being told.
+    observer: Option<Box<dyn Observer>>,
+}
+
+impl fmt::Debug for Observers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.seats.iter().map(|seat| seat.number)).finish()
+    }
+}
+
+impl SimulationManager {
+    /// Adds an observer. It is told of what happens from now on.
+    pub fn add_observer<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
+        let number = self.observers.next;
+        self.observers.next += 1;
+        self.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });
+        ObserverId { manager: self.serial, number, observer: PhantomData }
+    }
+
+    /// Takes an observer away and gives it back.
+    ///
+    /// # Errors
+    /// It was taken away before, or is the one that is being told right now.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn remove_observer<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
+        let index = self.seat_of(id)?;
+        let seat = self.observers.seats.remove(index);
+        let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);
+        any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::NoObserver)
+    }
+
+    /// An observer, to read.
+    ///
+    /// # Errors
+    /// It was taken away, or is the one that is being told right now.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn observer<O: Observer>(&self, id: ObserverId<O>) -> Result<&O> {
+        let seat = &self.observers.seats[self.seat_of(id)?];
+        let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
+        any.and_then(|any| any.downcast_ref()).ok_or(Error::NoObserver)
+    }
+
+    /// An observer, to change.
+    ///
+    /// # Errors
+    /// As [`observer`](Self::observer).
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn observer_mut<O: Observer>(&mut self, id: ObserverId<O>) -> Result<&mut O> {
+        let index = self.seat_of(id)?;
+        let seat = &mut self.observers.seats[index];
+        let any: Option<&mut dyn Any> = seat.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);
+        any.and_then(|any| any.downcast_mut()).ok_or(Error::NoObserver)
+    }
+
+    #[track_caller]
+    fn seat_of<O>(&self, id: ObserverId<O>) -> Result<usize> {
+        assert!(id.manager == self.serial, "this handle is of another SimulationManager");
+        let place = self.observers.seats.iter().position(|seat| seat.number == id.number);
+        place.filter(|&i| self.observers.seats[i].observer.is_some()).ok_or(Error::NoObserver)
+    }
+
+    /// Steps `steps` times, or fewer until an observer is due, and tells those that are due. Gives the number of steps done.
+    pub(crate) fn step_observed(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
+        if self.observers.seats.is_empty() {
+            step(self, steps);
+            return steps;
+        }
+        self.tell_written();
+        let waits: Vec<(u64, u64)> = self
+            .observers
+            .seats
+            .iter()
+            .filter_map(|seat| Some((seat.number, seat.observer.as_ref()?.due_in(self).max(1))))
+            .collect();
+        let first = waits.iter().map(|(_, wait)| *wait).min().unwrap_or(u64::MAX);
+        let block = u32::try_from(first).unwrap_or(u32::MAX).min(steps);
+        step(self, block);
+        for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
+            self.tell(*number, &Moment::Stepped);
+        }
+        block
+    }
+
+    fn tell_written(&mut self) {
+        let written = self.sensors.take_written();
+        if !written.is_empty() {
+            self.tell_all(&Moment::Written { env_ids: written });
+        }
+    }
+
+    /// Tells all observers of something that happened.
+    pub(crate) fn tell_all(&mut self, moment: &Moment) {
+        let numbers: Vec<u64> = self.observers.seats.iter().map(|seat| seat.number).collect();
+        for number in numbers {
+            self.tell(number, moment);
+        }
+    }
+
+    fn tell(&mut self, number: u64, moment: &Moment) {
+        // One that is being told hears of nothing that happens inside.
+        let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) else { return };
+        let Some(mut observer) = seat.observer.take() else { return };
+        observer.observe(self, moment);
+        // It may have been taken away meanwhile: then it is dropped here.
+        if let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) {
+            seat.observer = Some(observer);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Observers are called where they asked to be, are told of what others do, and change no number.
+
+use kinetoscope::prelude::*;
+use std::sync::{Arc, Mutex};
+
+/// What was told, and at which step of the first environment.
+type Diary = Arc<Mutex<Vec<(u64, Moment)>>>;
+
+/// Is due at every `every`-th step of the first environment, and does something then.
+struct Watch {
+    every: u64,
+    diary: Diary,
+    act: fn(&mut SimulationManager, &Moment),
+}
+
+impl Watch {
+    fn new(every: u64, act: fn(&mut SimulationManager, &Moment)) -> (Self, Diary) {
+        let diary = Diary::default();
+        (Self { every, diary: Arc::clone(&diary), act }, diary)
+    }
+}
+
+impl Observer for Watch {
+    fn due_in(&self, sim: &SimulationManager) -> u64 {
+        self.every - steps(sim) % self.every
+    }
+
+    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
+        self.diary.lock().unwrap().push((steps(sim), moment.clone()));
+        (self.act)(sim, moment);
+    }
+}
+
+fn steps(sim: &SimulationManager) -> u64 {
+    (sim.time()[0] / sim.cfg().physics_dt).round() as u64
+}
+
+fn entries(diary: &Diary) -> Vec<(u64, Moment)> {
+    diary.lock().unwrap().clone()
+}
+
+fn every(period: u64, up_to: u64) -> Vec<(u64, Moment)> {
+    (1..=up_to / period).map(|k| (period * k, Moment::Stepped)).collect()
+}
+
+/// A tumbling box with a sensor on it.
+fn scene() -> (SimulationManager, ObjectId, SensorId<Imu>) {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let cfg = RigidObjectCfg {
+        uid: "box".into(),
+        shape: ObjectShape::Box { size: [0.1, 0.2, 0.3] },
+        mass: Some(1.0),
+        init_pose: Pose::translation(0.0, 0.0, 0.4),
+        ..Default::default()
+    };
+    let object = sim.add_rigid_object(cfg).unwrap();
+    let imu = sim.add_sensor("imu", ImuCfg { sampling: SamplingCfg::every(0.07), ..ImuCfg::on("box") }).unwrap();
+    (sim, object, imu)
+}
+
+#[test]
+fn are_called_at_their_steps_and_change_nothing() {
+    let (mut alone, object, imu) = scene();
+    alone.update(100);
+    for blocks in [vec![100], vec![1; 100], vec![33, 67]] {
+        let (mut sim, same_object, same_imu) = scene();
+        let (three, threes) = Watch::new(3, |_, _| {});
+        let (seven, sevens) = Watch::new(7, |_, _| {});
+        sim.add_observer(three);
+        sim.add_observer(seven);
+        blocks.into_iter().for_each(|block| sim.update(block));
+        assert_eq!(entries(&threes), every(3, 100));
+        assert_eq!(entries(&sevens), every(7, 100));
+        assert_eq!(sim.rigid_object(same_object).get_pose(), alone.rigid_object(object).get_pose());
+        let (here, there) = (sim.sensor(same_imu).unwrap(), alone.sensor(imu).unwrap());
+        assert_eq!(here.lin_acc_b(), there.lin_acc_b());
+        assert_eq!(here.sample_counts(), there.sample_counts());
+    }
+}
+
+#[test]
+fn are_told_of_resets_and_of_what_was_written_before_the_next_step() {
+    let (mut sim, object, _) = scene();
+    let (watch, diary) = Watch::new(1000, |_, _| {});
+    sim.add_observer(watch);
+    sim.update(2);
+    sim.reset(Some(&[EnvId(1)])).unwrap();
+    let velocities = kinetoscope::ndarray::arr2(&[[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]);
+    sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(1)])).unwrap();
+    sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(0)])).unwrap();
+    let snapshot = sim.snapshot(None).unwrap();
+    assert_eq!(entries(&diary), [(2, Moment::Reset { env_ids: vec![EnvId(1)] })]);
+    sim.update(1);
+    let written = Moment::Written { env_ids: vec![EnvId(0), EnvId(1)] };
+    assert_eq!(entries(&diary)[1..], [(2, written.clone())], "told once, before the step");
+    sim.update(1);
+    assert_eq!(entries(&diary).len(), 2, "and not again");
+    sim.restore(&snapshot, None).unwrap();
+    sim.update(1);
+    assert_eq!(entries(&diary)[2..], [(2, written)]);
+    sim.add_sensor("another", ImuCfg::on("box")).unwrap();
+    let ball = ObjectShape::Sphere { radius: 0.1 };
+    sim.add_rigid_object(RigidObjectCfg { uid: "ball".into(), shape: ball, ..Default::default() }).unwrap();
+    assert_eq!(entries(&diary)[3..], [(3, Moment::Compiled)], "a sensor changes no model");
+}
+
+#[test]
+fn hear_of_what_others_do_and_not_of_what_they_do_themselves() {
+    let (mut sim, ..) = scene();
+    let (doer, doers) = Watch::new(5, |sim, moment| {
+        if *moment == Moment::Stepped {
+            sim.reset(None).unwrap();
+            sim.update(3);
+        }
+    });
+    let (hearer, hearers) = Watch::new(1, |_, _| {});
+    let doer = sim.add_observer(doer);
+    let hearer = sim.add_observer(hearer);
+    sim.update(5);
+    assert_eq!(entries(&doers), [(5, Moment::Stepped)]);
+    let reset = (0, Moment::Reset { env_ids: vec![EnvId(0), EnvId(1)] });
+    let mut all = every(1, 4);
+    all.push(reset);
+    all.extend(every(1, 3));
+    // The fifth step itself, told after the steps that the other did when it was told.
+    all.push((3, Moment::Stepped));
+    assert_eq!(entries(&hearers), all);
+    assert_eq!(sim.observer(hearer).unwrap().every, 1);
+    sim.observer_mut(hearer).unwrap().every = 2;
+    assert_eq!(sim.remove_observer(hearer).unwrap().every, 2);
+    assert!(matches!(sim.observer(hearer), Err(Error::NoObserver)));
+    assert!(matches!(sim.remove_observer(hearer), Err(Error::NoObserver)));
+    assert_eq!(sim.remove_observer(doer).unwrap().every, 5);
+    sim.update(10);
+    assert_eq!(entries(&hearers), all, "nobody is there any more");
+}
