@@ -49,6 +49,7 @@ pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+pub use mj::staying_crew;
 pub use mjcf::document::{Cone, Integrator};
 pub use named::Named;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};

@@ -103,7 +103,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
-            crew: Crew::new(Arc::new(mj::StayingThreads::default())),
+            crew: mj::staying_crew(),
             diagnostics: Vec::new(),
             simulation,
             sensors,
