@@ -7,7 +7,7 @@
 use clap::Parser;
 use kinetoscope::assets;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::urdf::{ComponentCfg, UrdfCfg};
+use kinetoscope::sim::urdf::UrdfCfg;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -90,19 +90,8 @@ fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<()
 }
 
 fn cfg(args: &Args) -> InspectCfg {
-    let files: Vec<PathBuf> = args.files.iter().map(|file| user_or_asset(file)).collect();
-    let mut components: Vec<ComponentCfg> = Vec::new();
-    for (i, file) in files.iter().enumerate() {
-        let name = match (files.len(), i) {
-            (1, _) => "robot".to_owned(),
-            (2, 0) => "arm".to_owned(),
-            (2, _) => "hand".to_owned(),
-            _ => format!("part{}", i + 1),
-        };
-        let parent = components.last().map(|before| before.name.clone());
-        components.push(ComponentCfg { parent, ..ComponentCfg::new(name, file) });
-    }
-    let urdf = UrdfCfg { components, packages: args.package.iter().cloned().collect(), ..Default::default() };
+    let packages = args.package.iter().cloned().collect();
+    let urdf = UrdfCfg { packages, ..UrdfCfg::chain(args.files.iter().map(|file| user_or_asset(file))) };
     InspectCfg { urdf, floating_base: args.floating_base, qpos: args.qpos.clone() }
 }
 
