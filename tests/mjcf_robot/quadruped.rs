@@ -108,7 +108,7 @@ fn it_stands() {
     let level = |stand: &Stand| stand.height + stand.depth + stand.sinks * TIME;
     let apart = (level(&urdf) - level(&xml)).abs();
     let allowed = 0.5 * urdf.sinks.max(xml.sinks);
-    println!("{apart:e} {allowed:e} {} {} {}", urdf.depth, xml.depth, urdf.height - xml.height);
+    println!("levels {apart:.1e} m apart, of {allowed:.1e} m; depths {:.3e} m and {:.3e} m", urdf.depth, xml.depth);
     assert!(apart < allowed && urdf.height > 0.4, "{apart} m of {allowed} m");
     // The controls: without the depths, or without what creeps, they would not.
     assert!((urdf.depth - xml.depth).abs() > 5.0 * allowed && (urdf.sinks - xml.sinks).abs() * TIME > 2.0 * allowed);
