@@ -22,11 +22,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let mut out = std::io::stdout().lock();
-    let urdf = match args.model.files()? {
-        Files::Urdf(urdf) => urdf,
-        Files::Mjcf(_) => return check_mjcf(args, &mut out),
-    };
-    let cfg = InspectCfg { urdf, floating_base: args.model.floating_base, qpos: args.qpos.clone() };
+    let mut cfg = InspectCfg { floating_base: args.model.floating_base, qpos: args.qpos.clone(), ..Default::default() };
+    match args.model.files()? {
+        Files::Urdf(urdf) => cfg.urdf = urdf,
+        Files::Mjcf(path) => cfg.mjcf = Some(MjcfFile::new(path)),
+    }
     let report = inspect(&cfg)?;
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&report)? + "\n";
@@ -39,24 +39,6 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let (sim, _) = args.model.simulation(SimulationManagerCfg { num_envs: 1, ..Default::default() })?;
     let warned = excerpt::print_warnings(sim.diagnostics());
     Ok(if warned || !report.warnings.is_empty() { Ending::Warned } else { Ending::Done })
-}
-
-/// A robot that is an MJCF file: MuJoCo compiles it, and what it made of it is listed.
-fn check_mjcf(args: &Args, out: &mut impl Write) -> Result<Ending> {
-    if !args.qpos.is_empty() || args.json.is_some() {
-        return Err("--qpos and --json are for URDF files: an MJCF file is checked as it stands".into());
-    }
-    let (sim, id) = args.model.simulation(SimulationManagerCfg { num_envs: 1, ..Default::default() })?;
-    let robot = sim.robot(id);
-    let limits = robot.qpos_limits();
-    let _ = writeln!(out, "{} links, {} joints\n", robot.link_names().len(), robot.joint_names().len());
-    let width = robot.joint_names().iter().map(String::len).max().unwrap_or(0).max("joint".len());
-    let _ = writeln!(out, "{:width$}  {:>12}  {:>12}", "joint", "lower", "upper");
-    for (j, name) in robot.joint_names().iter().enumerate() {
-        let _ = writeln!(out, "{name:width$}  {:>12.6}  {:>12.6}", limits[(0, j, 0)], limits[(0, j, 1)]);
-    }
-    let _ = out.flush();
-    Ok(if excerpt::print_warnings(sim.diagnostics()) { Ending::Warned } else { Ending::Done })
 }
 
 fn position(text: &str) -> std::result::Result<(String, f64), String> {

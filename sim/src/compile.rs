@@ -593,7 +593,9 @@ impl Simulation {
         let visible =
             Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements).with_own_headlight());
         self.visible = Some(Arc::clone(&visible));
-        self.look_anew(&(0..cfg.num_envs).collect::<Vec<_>>());
+        for (env, error) in self.look_anew() {
+            cache.say_look(env, &error);
+        }
         visible
     }
 

@@ -116,10 +116,10 @@ pub enum Error {
         error: Box<CompileError>,
     },
     /// An MJCF file is no robot.
-    #[error("robot {robot:?}: {file}: {error}")]
+    #[error("{robot}: {file}: {error}")]
     RobotFile {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The file.
         file: String,
         /// What is wrong.

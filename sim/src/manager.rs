@@ -312,6 +312,7 @@ impl SimulationManager {
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
         let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
         let scene = sees.then(|| Arc::clone(self.visible().scene()));
+        let own_scenes = if sees { self.simulation.own_scenes.clone() } else { Vec::new() };
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
@@ -325,6 +326,7 @@ impl SimulationManager {
             actuators: self.contents.actuator_names(),
             engine_sensors: self.contents.engine_sensors(),
             scene,
+            own_scenes,
             ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
             crew: self.crew.clone(),

@@ -42,6 +42,13 @@ const TABLE: &[Run] = &[
         "--headless --num-envs 2 --steps 400 --arm-urdf {robots}/rokae_description/urdf/SR5.urdf \
          --hand-urdf {robots}/inspire_hand/DFQ_left_hand.urdf --arm-joints joint[1-6] --hand-joints L_.*",
     ),
+    run_of(
+        "create_robot",
+        &[0],
+        "--headless --num-envs 2 --steps 400 --robot quadruped/quadruped.xml --arm-joints [LR]F_.* --hand-joints [LR]H_.*",
+    ),
+    run_of("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
+    run_of("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
     run_of(
@@ -139,6 +146,8 @@ const TABLE: &[Run] = &[
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --eye 1,1,1 --target 1,1,1"),
     run_of("inspect_robot", &[0, 1], "assets/sr5/SR5.urdf"),
     run_of("inspect_robot", &[1], "{robots}/anymal_c_simple_description/urdf/anymal.urdf"),
+    run_of("inspect_robot", &[0, 1], "assets/quadruped/quadruped.xml --floating-base --qpos LF_HFE=0.4"),
+    run_of("inspect_robot", &[2], "assets/quadruped/quadruped.xml assets/sr5/SR5.urdf"),
     run_of("inspect_robot", &[2], "{out}/malformed.urdf"),
     run_of("inspect_robot", &[2], "{out}/there_is_no_such_file.urdf"),
 ];
