@@ -3,7 +3,8 @@
 use super::channel::{Channels, Pictures};
 use super::error::CameraError;
 use super::extrinsics::Extrinsics;
-use super::intrinsics::Intrinsics;
+use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::lens::{self, RaysOfRows};
 use super::rasterizer::RasterCfg;
 use super::renderer::Renderer;
 use super::sensor::{Camera, Lens};
@@ -56,11 +57,14 @@ pub struct CameraCfg {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// The lens.
+    /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// Nothing nearer is seen: smallest depth along the optical axis \[m\].
+    /// The lens: which way the rays of pixels go. Lenses other than a pinhole need a renderer that follows rays.
+    pub lens: lens::Lens,
+    /// Nothing nearer is seen: smallest depth along the optical axis \[m\], or along the ray where rays of the lens do not all
+    /// go forward ([`Lens::is_forward`](lens::Lens::is_forward)).
     pub near: f64,
-    /// Nothing farther is seen: largest depth along the optical axis \[m\].
+    /// Nothing farther is seen: largest depth along the optical axis \[m\], or along the ray, as [`near`](Self::near).
     pub far: f64,
     /// Where it is.
     pub extrinsics: Extrinsics,
@@ -94,6 +98,7 @@ impl Default for CameraCfg {
             width: 640,
             height: 480,
             intrinsics: Intrinsics::Pixels { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 },
+            lens: lens::Lens::default(),
             near: 0.005,
             far: 100.0,
             extrinsics: Extrinsics::default(),
@@ -143,13 +148,25 @@ impl SensorCfg for CameraCfg {
         let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
         check_env_ids(&env_ids, context.num_envs)?;
         self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len())?;
+        let rays = self.lens_rays(&pixels, env_ids.len())?;
         let mount = self.extrinsics.parent_from_camera()?;
         let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
-        Ok(Camera::new(self, context, scene, schedule, parent, (lens, pixels, mount), env_ids, pictures))
+        Ok(Camera::new(self, context, scene, schedule, parent, (lens, pixels, mount), rays, env_ids, pictures))
     }
 }
 
 impl CameraCfg {
+    /// The rays of the lens in every row.
+    fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
+        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays() {
+            let (lens, renderer) = (self.lens.name(), self.renderer.name());
+            return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
+        }
+        // Paths have rays of their own; only colours without them have more samples than a pixel's centre.
+        let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
+        RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)
+    }
+
     /// Refuses what would end the process: an allocation that fails.
     fn check_memory(&self, views: usize, instances: usize, lamps: usize) -> Result<(), CameraError> {
         let bytes_per_pixel = self.channels.bytes_per_pixel();

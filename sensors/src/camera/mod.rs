@@ -1,5 +1,6 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+pub mod calibration;
 pub mod cfg;
 pub mod channel;
 pub mod colormap;
@@ -8,6 +9,7 @@ mod exposure;
 pub mod extrinsics;
 pub(crate) mod frustum;
 pub mod intrinsics;
+pub mod lens;
 pub(crate) mod mounts;
 pub mod parallel;
 pub mod point_cloud;
@@ -18,11 +20,13 @@ pub mod sensor;
 #[cfg(test)]
 mod tests;
 
+pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
 pub use cfg::{CameraCfg, DepthMiss};
 pub use channel::{Channel, Channels, Frame, FrameMut, Pictures};
 pub use error::CameraError;
 pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pose};
 pub use intrinsics::{Intrinsics, PixelIntrinsics};
+pub use lens::{Lens, LensModel, LensRays, Optics};
 pub use parallel::ParallelRasterizer;
 pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};

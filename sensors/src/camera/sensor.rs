@@ -6,6 +6,7 @@ use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
 use super::frustum::frustum;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::lens::{self, Optics, RaysOfRows};
 use super::mounts::{Mount, Mounts, chosen_rows};
 use super::parallel::{Job, ParallelRasterizer};
 use super::rasterizer::Shot;
@@ -41,6 +42,7 @@ pub struct Camera {
     /// Index of the body it hangs on.
     parent: Option<usize>,
     mounts: Mounts,
+    rays: RaysOfRows,
     channels: Channels,
     depth_miss: DepthMiss,
     lazy: bool,
@@ -162,8 +164,8 @@ impl Sensor for Camera {
     /// environment that it does not look into.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let row = self.row_of_env.get(env).copied().flatten();
-        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.mounts.row(row).pixels)));
-        placed.map_or_else(Vec::new, |(pose, lens)| frustum(&pose, &lens, self.image_shape()))
+        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
+        placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, self.image_shape()))
     }
 }
 
@@ -180,6 +182,7 @@ impl Camera {
         schedule: Schedule,
         parent: Option<usize>,
         (lens, pixels, parent_from_camera): (Lens, PixelIntrinsics, Pose),
+        rays: RaysOfRows,
         env_ids: Vec<usize>,
         pictures: Pictures,
     ) -> Self {
@@ -206,6 +209,7 @@ impl Camera {
             num_bodies: context.bodies.len(),
             parent,
             mounts: Mounts::new(Mount { parent_from_camera, pixels }, rows),
+            rays,
             channels: cfg.channels,
             depth_miss: cfg.depth_miss,
             lazy: cfg.lazy,
@@ -296,6 +300,26 @@ impl Camera {
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts.row(row).pixels.matrix()[(i, j)])
+    }
+
+    /// The lens, the same in all environments.
+    pub fn lens(&self) -> lens::Lens {
+        self.rays.lens()
+    }
+
+    /// The lens of environment `env` in front of its pixels: from directions to pixels and back.
+    ///
+    /// # Errors
+    ///
+    /// An environment that the camera does not see.
+    pub fn optics(&self, env: usize) -> Result<Optics, SensorError> {
+        let pixels = self.mounts.row(self.row(env)?).pixels;
+        Ok(Optics::new(self.rays.lens(), pixels)?)
+    }
+
+    /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
+    pub fn lens_bytes(&self) -> usize {
+        self.rays.bytes()
     }
 
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
@@ -396,13 +420,23 @@ impl Camera {
     /// # Errors
     ///
     /// [`CameraError::Lens`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
-    /// or that is named twice; nothing is changed then.
+    /// or that is named twice; of a camera with a lens also [`CameraError::LensFolds`], [`CameraError::LensBlind`] and
+    /// [`CameraError::LensMemory`]. Nothing is changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, lens, .. } = self;
+        let Self { mounts, lens, rays, .. } = self;
+        let made = match rays.lens().is_pinhole() {
+            true => Vec::new(),
+            false => {
+                let pixels: Result<Vec<_>, _> =
+                    intrinsics.iter().map(|i| i.to_pixels(lens.width, lens.height)).collect();
+                rays.make(&pixels?)?
+            }
+        };
         mounts.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
             lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
         })?;
+        rays.set(made, &rows, |row| mounts.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -414,7 +448,9 @@ impl Camera {
     /// An environment that the camera does not see or that is named twice; nothing is changed then.
     pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        self.mounts.restore(&rows);
+        let Self { mounts, rays, .. } = self;
+        mounts.restore(&rows);
+        rays.set(Vec::new(), &rows, |row| mounts.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -448,6 +484,19 @@ impl Camera {
             DepthMiss::Far => depth < self.lens.far,
             DepthMiss::Zero => depth > 0.0,
         }
+    }
+
+    /// The lens of a row, in front of its pixels.
+    fn optics_of(&self, row: usize) -> Option<Optics> {
+        match self.rays.row(row) {
+            Some(rays) => Some(*rays.optics()),
+            None => Optics::new(lens::Lens::default(), self.mounts.row(row).pixels).ok(),
+        }
+    }
+
+    /// The rays of a row; none for a pinhole.
+    pub(super) fn rays_of(&self, row: usize) -> Option<&lens::LensRays> {
+        self.rays.row(row)
     }
 
     /// Where the optical frame is at the captured instant.
@@ -543,7 +592,7 @@ impl Camera {
             let poses = row_of(&self.captures.poses, row);
             let lights = Some(row_of(&self.captures.lights, row));
             let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
-            jobs.push((Shot { scene, poses, view, lights }, frame));
+            jobs.push((Shot { scene, poses, view, lights, lens: self.rays.row(row) }, frame));
         }
         let result = desk.rasterizer.render(&mut jobs);
         let miss = match self.depth_miss {

@@ -1,11 +1,14 @@
 //! Pictures held against independent judges.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod calibration;
 mod degenerate;
 mod detail;
 mod determinism;
 mod floors_and_lamps;
 mod golden;
+mod lens_pictures;
+mod lenses;
 mod pictures;
 mod reference;
 mod robots;
