@@ -6,6 +6,8 @@ mod detail;
 mod determinism;
 mod floors_and_lamps;
 mod golden;
+mod late;
+mod noisy;
 mod pictures;
 mod reference;
 mod robots;
