@@ -26,6 +26,7 @@ pub mod joint_wrench;
 pub(crate) mod lanes;
 pub mod mujoco_sensor;
 pub mod noise;
+mod philox;
 pub mod ray;
 pub mod resolve;
 pub mod sampling;

@@ -150,6 +150,21 @@ pub enum CameraError {
         /// The most that is allowed.
         limit: u64,
     },
+    /// History and latency need more memory than can be given.
+    #[error(
+        "{pictures} past pictures and {captures} captures on their way, in each of {views} environments, do not fit into \
+         memory (at most {limit} bytes); make history_length or latency_steps smaller"
+    )]
+    Past {
+        /// Pictures of the history.
+        pictures: usize,
+        /// Captures on their way.
+        captures: usize,
+        /// How many environments.
+        views: usize,
+        /// The most that is allowed.
+        limit: u64,
+    },
     /// There is no scene to look at.
     #[error("the camera was built without a scene to look at")]
     NoScene,

@@ -44,6 +44,12 @@ impl RaysOfRows {
         self.rows[row].as_deref()
     }
 
+    /// The rays of a row, to keep.
+    #[track_caller]
+    pub(crate) fn shared(&self, row: usize) -> Option<&Arc<LensRays>> {
+        self.rows[row].as_ref()
+    }
+
     /// The rays of some pixels, those of the same ones once; none for a pinhole.
     pub(crate) fn make(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, CameraError> {
         if self.lens.is_pinhole() {
