@@ -7,6 +7,8 @@ mod npy;
 mod objects;
 mod overview;
 mod placement;
+mod ply;
 mod rays;
 mod renderers;
 mod schedule;
+mod stereo;

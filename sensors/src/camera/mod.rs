@@ -14,6 +14,7 @@ pub mod point_cloud;
 pub mod rasterizer;
 pub mod renderer;
 pub mod sensor;
+pub mod stereo;
 
 #[cfg(test)]
 mod tests;
@@ -28,3 +29,4 @@ pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
 pub use sensor::Camera;
+pub use stereo::{StereoCamera, StereoCameraCfg, StereoOrigin};

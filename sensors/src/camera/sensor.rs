@@ -40,7 +40,7 @@ pub struct Camera {
     num_bodies: usize,
     /// Index of the body it hangs on.
     parent: Option<usize>,
-    mounts: Mounts,
+    pub(super) mounts: Mounts,
     channels: Channels,
     depth_miss: DepthMiss,
     lazy: bool,

@@ -14,5 +14,6 @@ mod sensor;
 mod sensor_mistakes;
 mod sensor_values;
 mod stage;
+mod stereo;
 mod traced;
 mod watertight;
