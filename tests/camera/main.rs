@@ -11,4 +11,5 @@ mod ply;
 mod rays;
 mod renderers;
 mod schedule;
+mod segments;
 mod stereo;

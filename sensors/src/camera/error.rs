@@ -107,6 +107,14 @@ pub enum CameraError {
         /// What it would be in a rectified pair.
         expected: String,
     },
+    /// A mask id that no thing can have.
+    #[error("mask id {id} {problem}")]
+    MaskId {
+        /// The id.
+        id: i32,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
     /// The pictures of all environments do not fit into memory.
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \

@@ -13,6 +13,7 @@ pub mod parallel;
 pub mod point_cloud;
 pub mod rasterizer;
 pub mod renderer;
+pub mod segmentation;
 pub mod sensor;
 pub mod stereo;
 
@@ -28,5 +29,6 @@ pub use parallel::ParallelRasterizer;
 pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
+pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;
 pub use stereo::{StereoCamera, StereoCameraCfg, StereoOrigin};
