@@ -1,5 +1,6 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+pub mod boxes;
 pub mod cfg;
 pub mod channel;
 pub mod colormap;
@@ -20,6 +21,7 @@ pub mod stereo;
 #[cfg(test)]
 mod tests;
 
+pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
 pub use cfg::{CameraCfg, DepthMiss};
 pub use channel::{Channel, Channels, Frame, FrameMut, Pictures};
 pub use error::CameraError;

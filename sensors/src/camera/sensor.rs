@@ -567,6 +567,15 @@ impl Camera {
         canvas
     }
 
+    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
+    pub(super) fn shot_of<T>(&self, row: usize, act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T) -> T {
+        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let view = &self.view_of(row);
+        let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
+        let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights })
+    }
+
     /// The view of a row that was captured.
     pub(super) fn view_of(&self, row: usize) -> View {
         let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
