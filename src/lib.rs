@@ -14,7 +14,7 @@ pub mod prelude {
     pub use scene::Pose;
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Placement,
-        RasterCfg, Renderer,
+        RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, StereoCamera, StereoCameraCfg, StereoOrigin,
     };
     pub use sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,

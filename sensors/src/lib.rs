@@ -38,7 +38,7 @@ mod summary;
 pub mod visibility;
 
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
-pub use camera::{Camera, CameraCfg, CameraError};
+pub use camera::{Camera, CameraCfg, CameraError, StereoCamera, StereoCameraCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use crew::{Crew, ScopedThreads, Threads};
 pub use error::SensorError;

@@ -19,6 +19,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::{Marker, OwnScene};
 use ndarray::Array2;
+use sensors::camera::{Segmentation, SegmentationCfg, Thing};
 use sensors::ray::RayAssets;
 use sensors::{Crew, Requires, Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
@@ -351,6 +352,16 @@ impl SimulationManager {
     /// is added.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.simulation.mask_ids()
+    }
+
+    /// What each number of the mask channel is, by instance, link and semantic class, with labels by pattern: turns masks into
+    /// segmented pictures, and finds boxes around things. Make it anew when something was added.
+    ///
+    /// # Errors
+    /// A pattern that is no regular expression or matches nothing, and something that two patterns match.
+    pub fn segmentation(&self, cfg: &SegmentationCfg) -> Result<Segmentation> {
+        let things = self.mask_ids().iter().map(Thing::from);
+        Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
     }
 
     /// A robot, to read.

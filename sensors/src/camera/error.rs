@@ -133,6 +133,24 @@ pub enum CameraError {
         /// Those it measures.
         enabled: Vec<&'static str>,
     },
+    /// A disparity was asked of eyes that are not parallel, not side by side, or have different lenses.
+    #[error("disparity is defined for a rectified pair of eyes: {what} is {value}, it must be {expected}")]
+    NotRectified {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What it would be in a rectified pair.
+        expected: String,
+    },
+    /// A mask id that no thing can have.
+    #[error("mask id {id} {problem}")]
+    MaskId {
+        /// The id.
+        id: i32,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
     /// The pictures of all environments do not fit into memory.
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \

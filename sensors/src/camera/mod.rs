@@ -1,5 +1,6 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+pub mod boxes;
 pub mod calibration;
 mod captures;
 pub mod cfg;
@@ -21,12 +22,15 @@ mod picture_noise;
 pub mod point_cloud;
 pub mod rasterizer;
 pub mod renderer;
+pub mod segmentation;
 pub mod sensor;
+pub mod stereo;
 pub(crate) mod ticket;
 
 #[cfg(test)]
 mod tests;
 
+pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
 pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
 pub use cfg::{CameraCfg, DepthMiss};
 pub use channel::{Channel, Channels, Frame, FrameMut, Pictures};
@@ -40,4 +44,6 @@ pub use past::HistoryView;
 pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
+pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;
+pub use stereo::{StereoCamera, StereoCameraCfg, StereoOrigin};

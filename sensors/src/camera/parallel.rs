@@ -63,6 +63,11 @@ impl ParallelRasterizer {
         }
     }
 
+    /// The geom groups that are drawn: bit k is group k.
+    pub(crate) fn groups(&self) -> u32 {
+        self.rasterizers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
+    }
+
     /// Takes trees over meshes from there, and keeps new ones there.
     pub(crate) fn share_assets(&mut self, assets: &RayAssets) {
         for rasterizer in &mut self.rasterizers {

@@ -50,7 +50,7 @@ pub struct Camera {
     num_bodies: usize,
     /// Index of the body it hangs on.
     parent: Option<usize>,
-    mounts: Mounts,
+    pub(super) mounts: Mounts,
     rays: RaysOfRows,
     channels: Channels,
     depth_miss: DepthMiss,
@@ -713,6 +713,21 @@ impl Camera {
         self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
         *kept = emptied(jobs);
         result
+    }
+
+    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
+    pub(super) fn shot_of<T>(&self, row: usize, act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T) -> T {
+        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let view = &self.view_of(row);
+        let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
+        let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row) })
+    }
+
+    /// The view of a row that was captured.
+    pub(super) fn view_of(&self, row: usize) -> View {
+        let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
+        self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose))
     }
 }
 

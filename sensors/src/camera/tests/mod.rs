@@ -1,6 +1,7 @@
 //! Pictures held against independent judges.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod boxes;
 mod calibration;
 mod degenerate;
 mod detail;
@@ -19,5 +20,6 @@ mod sensor;
 mod sensor_mistakes;
 mod sensor_values;
 mod stage;
+mod stereo;
 mod traced;
 mod watertight;
