@@ -225,11 +225,14 @@ fn distances_alone_are_spoilt_alike() {
     assert!(expected.iter().any(|depth| depth.is_infinite()), "there are holes");
 }
 
+/// The standard deviation of depth, as a function of depth \[m\].
+type Law = fn(f64) -> f64;
+
 /// Deviations scatter by sqrt(1 / 2n) of themselves, means by sigma / sqrt(n): six times that.
 #[test]
 fn depth_noise_grows_with_the_square_of_the_depth() {
     let (view, n) = (view([SIDE; 2], 150.0), (SIDE * SIDE) as f64);
-    let laws: [(DepthNoise, fn(f64) -> f64); 2] = [
+    let laws: [(DepthNoise, Law); 2] = [
         (DepthNoise::KHOSHELHAM, |z| 2.85e-5 * 100.0 * z * z * 0.5),
         (DepthNoise::NGUYEN, |z| 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4)),
     ];
