@@ -28,15 +28,7 @@ fn scene() -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-const FOUR: Channels = Channels {
-    color: true,
-    depth: true,
-    mask: true,
-    normal: true,
-    distance: false,
-    shading_normal: false,
-    position: false,
-};
+const FOUR: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::NONE };
 
 fn view(size: [usize; 2]) -> View {
     View::look_at(size, 0.9, [2.2, -1.4, 1.2], [0., 0., 0.], [0., 0., 1.]).expect("a good view")

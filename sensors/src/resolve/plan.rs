@@ -151,13 +151,13 @@ impl Plan {
         (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
 
-    /// What all pixels need; `detail` says whether channels of that stage are wanted.
+    /// What all pixels need; `detail` and `albedo` say whether channels of these stages are wanted.
     pub(crate) fn context<'a>(
         &'a self,
         shot: &Shot<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut Stack>,
-        detail: bool,
+        [detail, albedo]: [bool; 2],
     ) -> Context<'a> {
         Context {
             shadow_rays: self.shadow_rays.then_some(ShadowRays { tracer: &self.tracer, stack }),
@@ -169,6 +169,7 @@ impl Plan {
             shadows: &self.shadows[..self.maps],
             pixel: 1.0 / projection.fx.min(projection.fy),
             detail,
+            albedo,
         }
     }
 }

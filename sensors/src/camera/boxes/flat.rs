@@ -99,9 +99,9 @@ impl<'a> Boxes<'a> {
     fn see(&mut self, mask_id: i32, at: [usize; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         growing.pixels += 1;
-        for axis in 0..2 {
-            growing.seen[0][axis] = growing.seen[0][axis].min(at[axis]);
-            growing.seen[1][axis] = growing.seen[1][axis].max(at[axis] + 1);
+        for (axis, x) in at.into_iter().enumerate() {
+            growing.seen[0][axis] = growing.seen[0][axis].min(x);
+            growing.seen[1][axis] = growing.seen[1][axis].max(x + 1);
         }
     }
 

@@ -14,6 +14,8 @@ const LANES: usize = 16;
 pub struct PixelGroup {
     /// Linear or final, as the stage says: final bytes.
     pub color: [[u8; 4]; LANES],
+    /// Colour of the surface itself, final bytes; 0 on a miss.
+    pub albedo: [[u8; 4]; LANES],
     /// Depth along the optical axis \[m\]; +inf on a miss.
     pub depth: [f32; LANES],
     /// Distance from the camera \[m\]; +inf on a miss.
@@ -33,6 +35,7 @@ impl Default for PixelGroup {
         let v = [[0.0; LANES]; 3];
         Self {
             color: [[0; 4]; LANES],
+            albedo: [[0; 4]; LANES],
             depth: [0.0; LANES],
             distance: [0.0; LANES],
             mask: [0; LANES],
@@ -50,6 +53,8 @@ pub enum Stage {
     Geometry,
     /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
     Detail,
+    /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
+    Albedo,
     /// After light, transparency and multisampling.
     Color,
 }
@@ -131,6 +136,8 @@ macro_rules! channels {
         impl Channels {
             /// All of them.
             pub const ALL: Self = Self { $($field: true,)* };
+            /// None of them.
+            pub const NONE: Self = Self { $($field: false,)* };
             /// Their names.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
@@ -356,4 +363,6 @@ channels! {
     shading_normal::ShadingNormal,
     /// Where the surface is, world frame \[m\], f32, 3 per pixel; 0 where nothing was hit.
     position::Position,
+    /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+    albedo::Albedo,
 }

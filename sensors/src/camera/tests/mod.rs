@@ -1,6 +1,7 @@
 //! Pictures held against independent judges.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod albedo;
 mod boxes;
 mod degenerate;
 mod detail;

@@ -13,15 +13,7 @@ pub(super) fn folder() -> Option<PathBuf> {
     std::env::var_os("KINETOSCOPE_PICTURES").map(PathBuf::from)
 }
 
-pub(super) const FOUR: Channels = Channels {
-    color: true,
-    depth: true,
-    mask: true,
-    normal: true,
-    distance: false,
-    shading_normal: false,
-    position: false,
-};
+pub(super) const FOUR: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::NONE };
 
 /// Draws and, where a folder is named, writes the colour, depth, mask and normals as PNG.
 pub(super) fn save(name: &str, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
