@@ -3,7 +3,7 @@
 use scene::mesh::TriMesh;
 use scene::shape::{Capsule, Mesh, Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
+use sensors::camera::{Before, Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
 use sensors::visibility::View;
 use sensors::{Crew, ScopedThreads, Threads};
 use std::sync::Arc;
@@ -72,6 +72,25 @@ fn pictures_by_rays_allocate_nothing() {
     }
 }
 
+/// Every channel there is, of things that moved since the picture before.
+#[test]
+fn albedo_and_flow_allocate_nothing() {
+    let (scene, poses) = scene();
+    let view = view([96, 64]);
+    let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
+    let before = Some(Before { poses: &moved, view: &view });
+    for renderer in [Renderer::Raster, Renderer::FastRayTraced] {
+        let mut frame = Frame::new(view.width, view.height, Channels::ALL);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.renderer = renderer;
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, before };
+        let mut draw = || rasterizer.render_shot(&shot, &mut frame.as_mut()).expect("a good frame");
+        draw();
+        let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
+        assert_eq!(allocations, 0, "{renderer:?}");
+    }
+}
+
 /// Things come into the light and into the picture, come near and go apart: nothing of that takes memory.
 #[test]
 fn moving_things_allocate_nothing() {
@@ -127,7 +146,7 @@ fn batches_allocate_nothing_on_any_thread() {
         let crew = Crew::new(Arc::<Counting>::clone(&counting));
         let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(crew);
         let mut frames = vec![Frame::new(view.width, view.height, FOUR); frames];
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None };
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, before: None };
         let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
         let mut draw = || {
             rasterizer.render(&mut jobs).expect("good frames");

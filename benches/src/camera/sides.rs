@@ -94,6 +94,7 @@ impl<'s> Ours<'s> {
             poses: &poses[i * things..(i + 1) * things],
             view,
             lights: Some(&lights[i * lamps..(i + 1) * lamps]),
+            before: None,
         };
         let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())

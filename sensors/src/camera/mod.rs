@@ -4,6 +4,7 @@ pub mod boxes;
 pub mod cfg;
 pub mod channel;
 pub mod colormap;
+mod earlier;
 pub mod error;
 mod exposure;
 pub mod extrinsics;
@@ -29,7 +30,7 @@ pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pos
 pub use intrinsics::{Intrinsics, PixelIntrinsics};
 pub use parallel::ParallelRasterizer;
 pub use point_cloud::PointFrame;
-pub use rasterizer::{RasterCfg, Rasterizer, Shot};
+pub use rasterizer::{Before, RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;

@@ -71,6 +71,17 @@ pub struct Shot<'a> {
     pub view: &'a View,
     /// Lamps instead of the scene's, for those that move.
     pub lights: Option<&'a [Light]>,
+    /// What the picture before showed, for [`Flow`](super::channel::Flow); nothing else looks at it.
+    pub before: Option<Before<'a>>,
+}
+
+/// What the picture before showed.
+#[derive(Clone, Copy, Debug)]
+pub struct Before<'a> {
+    /// Where each instance was: world from instance.
+    pub poses: &'a [PoseF32],
+    /// The camera.
+    pub view: &'a View,
 }
 
 /// Draws frames, one at a time; keeps its scratch memory. Use one per thread.
@@ -145,7 +156,7 @@ impl Rasterizer {
         view: &View,
         frame: &mut Frame,
     ) -> Result<(), RenderError> {
-        self.render_shot(&Shot { scene, poses, view, lights: None }, &mut frame.as_mut())
+        self.render_shot(&Shot { scene, poses, view, lights: None, before: None }, &mut frame.as_mut())
     }
 
     /// Draws the channels that `frame` has, into borrowed memory.

@@ -2,6 +2,7 @@
 
 use super::cfg::{CameraCfg, DepthMiss};
 use super::channel::{Channels, Listed, PictureView, Pictures};
+use super::earlier::Earlier;
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
 use super::frustum::frustum;
@@ -48,6 +49,8 @@ pub struct Camera {
     /// Physics step \[s\].
     dt: f64,
     captures: Captures,
+    /// Where flow is measured.
+    earlier: Option<Earlier>,
     frame_counts: Array1<u64>,
     /// Rows that are due, between updates without meaning: its memory is kept.
     due: Vec<usize>,
@@ -131,6 +134,7 @@ impl Sensor for Camera {
         for &row in &due {
             self.frame_counts[row] += 1;
         }
+        self.keep_earlier(&due);
         self.capture(&due, state);
         self.due = due;
         Ok(())
@@ -142,6 +146,7 @@ impl Sensor for Camera {
         for &row in &rows {
             self.phases.reset(row, state.step[self.env_ids[row]]);
             self.frame_counts[row] = 0;
+            self.earlier.iter_mut().for_each(|earlier| earlier.forget(row));
         }
         self.capture(&rows, state);
         Ok(())
@@ -195,6 +200,7 @@ impl Camera {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
         };
+        let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.share_assets(&context.ray_assets);
@@ -212,6 +218,7 @@ impl Camera {
             phases: schedule.phases(rows),
             dt: context.dt,
             captures,
+            earlier,
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
@@ -489,6 +496,16 @@ impl Camera {
         }
     }
 
+    /// What some rows show now is what the pictures before showed, from now on.
+    fn keep_earlier(&mut self, rows: &[usize]) {
+        // It is not there while it is written to.
+        let Some(mut earlier) = self.earlier.take() else { return };
+        for &row in rows.iter().filter(|&&row| self.captures.world_from_parent[row].is_some()) {
+            earlier.keep(row, &self.captures.poses, self.view_of(row));
+        }
+        self.earlier = Some(earlier);
+    }
+
     /// Keeps what there is to see in some environments; the state was checked.
     fn capture(&mut self, rows: &[usize], state: &SceneState) {
         let Some(visible) = &state.visible else { return };
@@ -543,7 +560,8 @@ impl Camera {
             let poses = row_of(&self.captures.poses, row);
             let lights = Some(row_of(&self.captures.lights, row));
             let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
-            jobs.push((Shot { scene, poses, view, lights }, frame));
+            let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
+            jobs.push((Shot { scene, poses, view, lights, before }, frame));
         }
         let result = desk.rasterizer.render(&mut jobs);
         let miss = match self.depth_miss {
@@ -573,7 +591,7 @@ impl Camera {
         let view = &self.view_of(row);
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights })
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, before: None })
     }
 
     /// The view of a row that was captured.

@@ -1,5 +1,6 @@
 //! Sixteen samples: which instances they see, and what each channel makes of it.
 
+use super::moves::Moves;
 use super::shade::{Lighting, albedo, shade, sky};
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
@@ -31,6 +32,8 @@ pub(crate) struct Context<'a> {
     pub(crate) detail: bool,
     /// Whether channels of [`Stage::Albedo`](crate::camera::channel::Stage::Albedo) are wanted.
     pub(crate) albedo: bool,
+    /// Where channels of [`Stage::Flow`](crate::camera::channel::Stage::Flow) are wanted.
+    pub(crate) moves: Option<&'a Moves>,
 }
 
 impl<'a> Context<'a> {
@@ -125,6 +128,9 @@ fn resolve_lanes<S: Simd>(
     if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
         pixels.albedo = [[0; 4]; LANES];
     }
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.moves.is_some()) {
+        pixels.flow = [[f32::INFINITY; LANES]; 2];
+    }
     let list: [u32; LANES] = ids.array();
     let mut left = (!missed).to_bitmask();
     let mut last = 0;
@@ -145,6 +151,11 @@ fn resolve_lanes<S: Simd>(
                 shading = V3::select(here, at.shading, shading);
                 position = V3::select(here, at.position, position);
             }
+        }
+        if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
+            let [right, down] = moves.of(s, last, at.local, [u, v]);
+            store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
+            store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
         }
         if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
             let base = albedo(s, &source, &at, view, context.pixel, here);

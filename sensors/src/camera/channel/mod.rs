@@ -28,6 +28,8 @@ pub struct PixelGroup {
     pub shading_normal: [[f32; LANES]; 3],
     /// Where the surface is, world frame \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
+    /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
+    pub flow: [[f32; LANES]; 2],
 }
 
 impl Default for PixelGroup {
@@ -42,6 +44,7 @@ impl Default for PixelGroup {
             normal: v,
             shading_normal: v,
             position: v,
+            flow: [[0.0; LANES]; 2],
         }
     }
 }
@@ -55,6 +58,8 @@ pub enum Stage {
     Detail,
     /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
     Albedo,
+    /// As [`Detail`](Self::Detail), for what needs the picture before.
+    Flow,
     /// After light, transparency and multisampling.
     Color,
 }
@@ -365,4 +370,7 @@ channels! {
     position::Position,
     /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
     albedo::Albedo,
+    /// How far what is seen has moved since the picture before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
+    /// was hit and in the first picture.
+    flow::Flow,
 }

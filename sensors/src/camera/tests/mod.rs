@@ -7,6 +7,7 @@ mod degenerate;
 mod detail;
 mod determinism;
 mod floors_and_lamps;
+mod flow;
 mod golden;
 mod pictures;
 mod reference;

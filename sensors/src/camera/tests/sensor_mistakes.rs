@@ -65,7 +65,7 @@ fn configurations_are_checked() {
 fn pictures_that_do_not_fit_into_memory_are_refused() {
     let cfg = CameraCfg { width: 8000, height: 8000, ..cfg() };
     let error = cfg.build(&context(100)).unwrap_err();
-    let text = "pictures of 100 environments with 8000 x 8000 pixels of 56 bytes do not fit into memory";
+    let text = "pictures of 100 environments with 8000 x 8000 pixels of 64 bytes do not fit into memory";
     assert!(error.to_string().starts_with(text), "{error}");
 }
 
