@@ -14,12 +14,16 @@ pub(crate) mod trial;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Speed, Viewer, Viewing, Wants};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+
+/// Lets a simulation go on that somebody paused.
+static KEY: OnceLock<Viewer> = OnceLock::new();
 
 /// Errors end an example with a message and exit code 2.
 pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -36,6 +40,10 @@ pub(crate) struct Launcher {
     /// Run without a window
     #[arg(long)]
     pub(crate) headless: bool,
+    /// Show the simulation in browsers, in real time until a viewer says otherwise; at 127.0.0.1:8080 where no address is
+    /// given. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
+    pub(crate) serve: Option<String>,
     /// Where physics runs
     #[arg(long, value_enum, default_value_t = Device::Cpu)]
     pub(crate) device: Device,
@@ -157,8 +165,8 @@ impl Launcher {
                         and --threads to choose how many cores"
                 .into());
         }
-        if !self.headless {
-            println!("There is no window yet: going on headless.");
+        if !self.headless && self.serve.is_none() {
+            println!("There is no window yet: going on headless, or with --serve in a browser.");
         }
         Ok(SimulationManagerCfg {
             num_envs: self.num_envs,
@@ -166,6 +174,20 @@ impl Launcher {
             threads: self.threads,
             ..Default::default()
         })
+    }
+
+    /// Shows the simulation in browsers where `--serve` asks for it.
+    ///
+    /// # Errors
+    /// The address is none, or in use.
+    pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
+        let Some(address) = &self.serve else { return Ok(()) };
+        let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
+        let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
+        println!("Open {} in a browser", served.url());
+        // Nobody else serves it meanwhile.
+        let _ = KEY.set(sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
+        Ok(())
     }
 
     /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.
@@ -270,6 +292,11 @@ impl Progress {
         let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
+            // A viewer that holds the simulation does not hold the program.
+            if let Some(key) = KEY.get() {
+                key.send(Command::Resume);
+                key.send(Command::SetSpeed(Speed::Free));
+            }
             if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }
