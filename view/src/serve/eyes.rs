@@ -146,13 +146,14 @@ impl OwnEyes {
         }
     }
 
-    fn move_eye(&mut self, by: impl FnOnce(&mut Eye)) {
+    fn move_eye(&mut self, by: impl FnOnce(&mut Eye)) -> Result<(), String> {
         let eye = self.eye.or_else(|| self.with_newest(|own, snapshot| own.home(snapshot)));
         self.eye = eye.map(|mut eye| {
             by(&mut eye);
             eye
         });
         self.looks += 1;
+        Ok(())
     }
 
     fn choose(&mut self, env: Option<usize>) -> Result<(), String> {
@@ -296,9 +297,9 @@ impl Eyes for OwnEyes {
         match command {
             Command::Seen { .. } => Ok(()),
             Command::Size { width, height } => self.resize(width, height),
-            Command::Orbit { dx, dy } => Ok(self.move_eye(|eye| eye.orbit(pixels([dx, dy]), height))),
-            Command::Pan { dx, dy } => Ok(self.move_eye(|eye| eye.pan(pixels([dx, dy]), height))),
-            Command::Zoom { by } => Ok(self.move_eye(|eye| eye.zoom(by))),
+            Command::Orbit { dx, dy } => self.move_eye(|eye| eye.orbit(pixels([dx, dy]), height)),
+            Command::Pan { dx, dy } => self.move_eye(|eye| eye.pan(pixels([dx, dy]), height)),
+            Command::Zoom { by } => self.move_eye(|eye| eye.zoom(by)),
             Command::Home => {
                 (self.eye, self.looks) = (None, self.looks + 1);
                 Ok(())
