@@ -7,6 +7,7 @@ pub use ndarray;
 pub use scene;
 pub use sensors;
 pub use sim;
+pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
@@ -34,4 +35,5 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
+    pub use view::{OpenWindow, Viewing, Window, WindowCfg, WindowError};
 }

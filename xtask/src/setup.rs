@@ -103,6 +103,7 @@ pub(crate) enum Need {
     Pip,
     Venv,
     OsMesa,
+    Xvfb,
 }
 
 impl Need {
@@ -115,6 +116,7 @@ impl Need {
             Self::Pip => &["python3-pip"],
             Self::Venv => &["python3-venv"],
             Self::OsMesa => &["libosmesa6"],
+            Self::Xvfb => &["xvfb"],
         }
     }
 
@@ -132,6 +134,7 @@ impl Need {
             Self::OsMesa => {
                 "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
             }
+            Self::Xvfb => "Xvfb, an X server without a screen (the window is tested on it)",
         }
     }
 }
@@ -168,6 +171,7 @@ impl Machine {
                 self.header("mujoco/mujoco.h").is_some()
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
+            Need::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
             Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Need::Pip | Need::Venv => (self.python_has)(need),
             Need::OsMesa => {
@@ -378,6 +382,14 @@ mod tests {
         let library = format!("usr/lib/{}-linux-gnu/libOSMesa.so.8", env::consts::ARCH);
         assert!(machine(&[&library]).1.has(Need::OsMesa));
         assert_eq!(packages(&[Need::OsMesa]), ["libosmesa6"]);
+    }
+
+    #[test]
+    fn xvfb_is_a_program() {
+        assert!(!machine(&["usr/share/doc/xvfb/copyright"]).1.has(Need::Xvfb));
+        let (_dir, with) = machine(&["usr/bin/Xvfb"]);
+        assert!(with.has(Need::Xvfb));
+        assert_eq!(packages(&[Need::Xvfb]), ["xvfb"]);
     }
 
     #[test]
