@@ -35,5 +35,7 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
-    pub use view::{Serve, ServeCfg, ServeError, Served, Viewing};
+    pub use view::{
+        OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
+    };
 }

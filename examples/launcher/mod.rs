@@ -165,9 +165,6 @@ impl Launcher {
                         and --threads to choose how many cores"
                 .into());
         }
-        if !self.headless && self.serve.is_none() {
-            println!("There is no window yet: going on headless, or with --serve in a browser.");
-        }
         Ok(SimulationManagerCfg {
             num_envs: self.num_envs,
             seed: self.seed,
@@ -188,6 +185,18 @@ impl Launcher {
         // Nobody else serves it meanwhile.
         let _ = KEY.set(sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
         Ok(())
+    }
+
+    /// Opens a window onto the simulation, unless `--headless` says otherwise. Where there is no display, that is said, and
+    /// the example goes on without.
+    pub(crate) fn open_window(&self, sim: &mut SimulationManager) {
+        if self.headless {
+            return;
+        }
+        match sim.open_window() {
+            Ok(_) => println!("A window is open, in real time: H in it shows the keys."),
+            Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
+        }
     }
 
     /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.

@@ -104,6 +104,7 @@ pub(crate) enum Need {
     Venv,
     OsMesa,
     Chromium,
+    Xvfb,
 }
 
 impl Need {
@@ -117,6 +118,7 @@ impl Need {
             Self::Venv => &["python3-venv"],
             Self::OsMesa => &["libosmesa6"],
             Self::Chromium => &["chromium"],
+            Self::Xvfb => &["xvfb"],
         }
     }
 
@@ -135,6 +137,7 @@ impl Need {
                 "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
             }
             Self::Chromium => "Chromium (the page of the browser view is tested in it)",
+            Self::Xvfb => "Xvfb, an X server without a screen (the window is tested on it)",
         }
     }
 }
@@ -171,6 +174,7 @@ impl Machine {
                 self.header("mujoco/mujoco.h").is_some()
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
+            Need::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
             Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Need::Pip | Need::Venv => (self.python_has)(need),
             Need::OsMesa => {
@@ -394,6 +398,14 @@ mod tests {
         assert!(machine(&["usr/bin/chromium"]).1.has(Need::Chromium));
         assert!(machine(&["usr/bin/google-chrome"]).1.has(Need::Chromium));
         assert_eq!(packages(&[Need::Chromium]), ["chromium"]);
+    }
+
+    #[test]
+    fn xvfb_is_a_program() {
+        assert!(!machine(&["usr/share/doc/xvfb/copyright"]).1.has(Need::Xvfb));
+        let (_dir, with) = machine(&["usr/bin/Xvfb"]);
+        assert!(with.has(Need::Xvfb));
+        assert_eq!(packages(&[Need::Xvfb]), ["xvfb"]);
     }
 
     #[test]

@@ -105,6 +105,10 @@ impl Conductor {
         let steps = sim.steps();
         match command {
             Command::Pause => self.hold_at = self.hold_at.map(|step| step.min(steps)).or(Some(steps)),
+            Command::TogglePause => {
+                let next = if self.hold_at.is_some() { Command::Resume } else { Command::Pause };
+                return self.act(sim, viewer, next);
+            }
             Command::Resume => {
                 self.hold_at = None;
                 self.restart(steps);
@@ -225,7 +229,9 @@ impl Observer for Conductor {
                 self.pool.forget_names();
                 // Bodies have other numbers now; whoever drags will drag again.
                 self.springs.clear();
-                self.publish(sim);
+                if self.hub.viewers() > 0 {
+                    self.publish(sim);
+                }
             }
             _ => {
                 self.dirty = true;

@@ -21,6 +21,8 @@ pub enum Command {
     Pause,
     /// Go on.
     Resume,
+    /// Hold a simulation that runs, let go on one that is held.
+    TogglePause,
     /// Do this many steps, then hold again. They are steps that the program asked for: `update(n)` still does n.
     Step(u32),
     /// How fast simulated time passes from now on.

@@ -70,6 +70,15 @@ fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
     panic!("no such snapshot; the newest is {:?}", viewer.newest().map(|s| s.run.clone()));
 }
 
+/// Steps until something is so. Commands are obeyed some milliseconds later, whatever number of steps that is.
+fn step_until(sim: &mut SimulationManager, is: impl Fn(&SimulationManager) -> bool) {
+    let start = Instant::now();
+    while !is(sim) {
+        assert!(start.elapsed() < LONG, "it never comes");
+        sim.update(1);
+    }
+}
+
 #[test]
 fn a_pause_holds_and_steps_are_counted() {
     let mut sim = sample(2).sim;
@@ -135,10 +144,9 @@ fn a_slider_moves_its_joint_and_a_reset_puts_it_back() {
     assert!((q[(1, 0)] - 0.8).abs() < 1e-6, "{q}");
     assert_eq!(q[(0, 0)], 0.0, "the other environment was not asked");
     viewer.send(Command::Reset(Some(EnvId(1))));
-    sim.update(1);
-    let snapshot = wait_for(&viewer, |s| s.run.steps == 301 || s.envs[1].look.time < 1.0);
-    assert!(snapshot.envs[0].look.time > 2.9, "only one was put back");
-    assert!(sim.time()[1] <= 0.02 && sim.robot(robot).get_qpos()[(1, 0)].abs() < 1e-9);
+    step_until(&mut sim, |sim| sim.time()[1] < 1.0);
+    assert!(sim.time()[0] > 2.9, "only one was put back");
+    assert!(sim.robot(robot).get_qpos()[(1, 0)].abs() < 1e-9);
 }
 
 #[test]
@@ -182,14 +190,16 @@ fn real_time_is_not_overtaken() {
     let start = Instant::now();
     sim.update(40);
     let free = start.elapsed();
-    viewer.send(Command::SetSpeed(Speed::REAL));
-    sim.update(1);
+    let set = |sim: &mut SimulationManager, speed| {
+        viewer.send(Command::SetSpeed(speed));
+        step_until(sim, |_| viewer.newest().is_some_and(|snapshot| snapshot.run.speed == speed));
+    };
+    set(&mut sim, Speed::REAL);
     let start = Instant::now();
     sim.update(40);
     let real = start.elapsed();
     assert!(real >= Duration::from_millis(380), "{real:?}");
-    viewer.send(Command::SetSpeed(Speed::Times(4.0)));
-    sim.update(1);
+    set(&mut sim, Speed::Times(4.0));
     let start = Instant::now();
     sim.update(40);
     let fast = start.elapsed();
@@ -245,14 +255,14 @@ fn a_dragged_body_follows_as_the_closed_form_says() {
     assert_eq!(v, after, "let go, it flies on as it was");
     // A viewer that goes lets go as well.
     viewer.send(Command::Drag { env: EnvId(0), body: 0, hold: [0.0; 3], target: [9.0, 0.0, 0.0] });
-    sim.update(2);
-    let pulled = sim.rigid_object(id).get_velocity()[(0, 0)];
-    assert!(pulled > after);
+    let speed = |sim: &SimulationManager| sim.rigid_object(id).get_velocity()[(0, 0)];
+    step_until(&mut sim, |sim| speed(sim) > after);
     drop(viewer);
+    // While it is pulled it is looked after every step.
     sim.update(2);
-    let v = sim.rigid_object(id).get_velocity()[(0, 0)];
+    let v = speed(&sim);
     sim.update(50);
-    assert_eq!(v, sim.rigid_object(id).get_velocity()[(0, 0)]);
+    assert_eq!(v, speed(&sim));
 }
 
 /// Watching, with everything that can be wanted, changes no bit; nor does a viewer that never looks and lets nothing go.

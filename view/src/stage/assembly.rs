@@ -4,6 +4,9 @@ use super::snapshot::{EnvStage, Shown, Snapshot};
 use scene::{Instance, Marker, PoseF32, RenderScene};
 use std::sync::Arc;
 
+/// The geom group of markers: MuJoCo's are 0 to 5.
+pub(super) const MARKERS: u8 = 31;
+
 /// What is drawn, and whose it is.
 #[derive(Debug, Default)]
 pub(super) struct Assembly {
@@ -57,7 +60,7 @@ impl Assembly {
         for (env, marker) in markers {
             let Some(origin) = snapshot.envs.get(*env).map(|env| env.origin) else { continue };
             for (instance, pose) in marker.instances() {
-                instances.push(instance);
+                instances.push(Instance { group: MARKERS, ..instance });
                 self.poses.push(moved(&pose, origin));
             }
         }

@@ -1,6 +1,6 @@
 //! Draws a snapshot, on the thread of whoever looks.
 
-use super::assembly::{Assembly, chosen};
+use super::assembly::{Assembly, MARKERS, chosen};
 use super::canvas::Canvas;
 use super::color;
 use super::overlay::Overlays;
@@ -70,7 +70,8 @@ impl Painter {
         self.assembly.set(snapshot, look.shown, &markers);
         let lights = chosen(snapshot, look.shown).next().map(|(_, env)| env.look.lights.as_slice());
         if let Some(scene) = &self.assembly.scene {
-            self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.groups(), ..self.cfg });
+            let groups = look.overlays.groups() | 1 << MARKERS;
+            self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });
             let shot = Shot { scene, poses: &self.assembly.poses, view, lights };
             let frame = FrameMut { color: Some(canvas.bytes_mut()), ..FrameMut::default() };
             self.rasterizer.render(&mut [(shot, frame)]).map_err(|(_, error)| error)?;

@@ -103,7 +103,8 @@ fn all_environments_stand_in_their_grid_or_one_is_shown() {
 fn every_overlay_changes_the_picture_and_goes_again() {
     let (mut sample, snapshot) = stage(2);
     let mut painter = Painter::new(1);
-    let view = Eye { distance: 4.0, ..Eye::default() }.view(200, 150);
+    let [x, y, _] = snapshot.envs[0].origin;
+    let view = Eye { target: [x + 0.5, y, 0.3], distance: 1.5, ..Eye::default() }.view(200, 150);
     let mut draw = |snapshot: &Snapshot, overlays: Overlays, trails: Option<&Trails>| {
         let mut canvas = Canvas::default();
         painter.draw(snapshot, &view, &Look { overlays, trails, ..Look::default() }, &mut canvas).unwrap();
