@@ -1,4 +1,4 @@
-//! An arm and a hand from two URDF files, driven through a cycle of four phases in N environments.
+//! An arm and a hand from two URDF files, or from one URDF or MJCF file, driven through a cycle of four phases in N environments.
 //!
 //! ```text
 //! cargo run --release --example create_robot -- --headless --num-envs 4 --steps 4000

@@ -17,8 +17,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sim::Cone;
 use launcher::motion::Motion;
-use launcher::trial::{self, Album};
-use launcher::{Launcher, Progress, grip, stage};
+use launcher::trial::{self, Album, Count};
+use launcher::{Launcher, Progress, grip};
 use nalgebra::Vector3;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
@@ -94,11 +94,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     let cubes = scatter(&mut sim, cube)?;
     let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).get_pose());
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
@@ -176,26 +172,15 @@ fn run(args: &Args) -> launcher::Result<bool> {
             trial::word(let_go),
         );
     }
-    let successes = table.iter().filter(|row| row["success"] == true).count();
-    let needed = trial::needed(sim.num_envs());
-    println!("\n{successes} of {} cubes were lifted, held and put down; {needed} are enough", sim.num_envs());
-    println!("{steps} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
-    if let Some(out) = &args.launcher.out {
-        stage::write(&mut sim, &[], [4.2, -4.8, 3.6], [0.4, 0.1, 0.0], &out.join("grasp_all.png"))?;
-    }
-    args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
-        "num_envs": sim.num_envs(),
-        "steps": steps,
-        "friction": args.friction,
-        "successes": successes,
-        "needed": needed,
-        "success_rate": successes as f64 / sim.num_envs() as f64,
-        "environments": table,
-        "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
-    }))?;
-    Ok(successes >= needed)
+    let count = Count {
+        what: "cubes were lifted, held and put down",
+        friction: ("friction", args.friction),
+        table,
+        steps,
+        rate,
+        overview: ("grasp_all.png", [4.2, -4.8, 3.6], [0.4, 0.1, 0.0]),
+    };
+    trial::conclude(&args.launcher, &mut sim, count)
 }
 
 /// How to hold a cube: from that of its four sides that looks most to the arm.

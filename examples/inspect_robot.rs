@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! cargo run --release --example inspect_robot -- sr5/SR5.urdf revo1_left/revo1_left.urdf --qpos JOINT2=0.5
+//! cargo run --release --example inspect_robot -- quadruped/quadruped.xml --floating-base
 //! ```
 
 use clap::Parser;
 use kinetoscope::assets;
+use kinetoscope::prelude::MjcfFile;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::urdf::{ComponentCfg, UrdfCfg};
+use kinetoscope::sim::urdf::UrdfCfg;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,8 +19,8 @@ use std::process::ExitCode;
 #[derive(Debug, Parser)]
 #[command(name = "inspect_robot", after_help = HELP)]
 struct Args {
-    /// URDF files; each further one hangs from the tip of the one before
-    #[arg(required = true, value_name = "FILE.urdf")]
+    /// URDF files, each further one hangs from the tip of the one before; or one MJCF file (.xml)
+    #[arg(required = true, value_name = "FILE.urdf|FILE.xml")]
     files: Vec<PathBuf>,
     /// Let the root move freely: six more rows of the dynamics, ahead of the joints
     #[arg(long, alias = "floating_base")]
@@ -26,7 +28,7 @@ struct Args {
     /// Folder of a package of package:// addresses; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
-    /// Joint positions [rad or m], 0 where not given; mimic joints follow their driver
+    /// Joint positions [rad or m], where not given 0 or an MJCF file's own; mimic joints follow their driver
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position)]
     qpos: Vec<(String, f64)>,
     /// Write the report to a file as JSON; `-` writes JSON to the terminal instead of the tables
@@ -37,7 +39,7 @@ struct Args {
 const HELP: &str = "\
 Several files: two are the components `arm` and `hand`, more are `part1`, `part2` and so on; fixed joints such as
 `arm_TO_hand_CONNECTOR` hang each from the tip of the one before. A relative FILE that does not exist is looked for
-among the assets of this crate.
+among the assets of this crate. MuJoCo compiles an MJCF file; what it made of it is reported.
 
 JSON: SI units, quaternions w x y z, gravity (0, 0, -9.81). `links` and `joints` have fixed ones too; `pose` is
 x y z qw qx qy qz in the world; `com` of a link is in its frame, `inertia` about the centre of mass in link axes, `axis` in
@@ -65,7 +67,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>, out: &mut dyn Write,
             return if error.use_stderr() { REFUSED } else { LOADED };
         }
     };
-    let report = inspect(&cfg(&args)).map_err(|e| e.to_string());
+    let report = cfg(&args).and_then(|cfg| inspect(&cfg).map_err(|e| e.to_string()));
     match report.and_then(|report| print(&report, args.json.as_deref(), out).map(|()| report)) {
         Ok(report) if report.warnings.is_empty() => LOADED,
         Ok(_) => REPAIRED,
@@ -89,21 +91,22 @@ fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<()
     Ok(())
 }
 
-fn cfg(args: &Args) -> InspectCfg {
+fn cfg(args: &Args) -> Result<InspectCfg, String> {
     let files: Vec<PathBuf> = args.files.iter().map(|file| user_or_asset(file)).collect();
-    let mut components: Vec<ComponentCfg> = Vec::new();
-    for (i, file) in files.iter().enumerate() {
-        let name = match (files.len(), i) {
-            (1, _) => "robot".to_owned(),
-            (2, 0) => "arm".to_owned(),
-            (2, _) => "hand".to_owned(),
-            _ => format!("part{}", i + 1),
-        };
-        let parent = components.last().map(|before| before.name.clone());
-        components.push(ComponentCfg { parent, ..ComponentCfg::new(name, file) });
+    let (floating_base, qpos) = (args.floating_base, args.qpos.clone());
+    if let Some(mjcf) = files.iter().find(|file| is_mjcf(file)) {
+        if files.len() > 1 {
+            return Err(format!("{} is a whole robot: an MJCF file stands alone", mjcf.display()));
+        }
+        let mjcf = Some(MjcfFile::new(mjcf));
+        return Ok(InspectCfg { mjcf, floating_base, qpos, ..Default::default() });
     }
-    let urdf = UrdfCfg { components, packages: args.package.iter().cloned().collect(), ..Default::default() };
-    InspectCfg { urdf, floating_base: args.floating_base, qpos: args.qpos.clone() }
+    let urdf = UrdfCfg { packages: args.package.iter().cloned().collect(), ..UrdfCfg::chain(files) };
+    Ok(InspectCfg { urdf, floating_base, qpos, ..Default::default() })
+}
+
+fn is_mjcf(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension == "xml")
 }
 
 /// A file of the user, else an asset, else the path as it is: the loader says that there is none.

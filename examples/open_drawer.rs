@@ -16,8 +16,8 @@ use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use launcher::motion::Motion;
-use launcher::trial::{self, Album};
-use launcher::{Launcher, Progress, grip, stage, user_or_asset};
+use launcher::trial::{self, Album, Count};
+use launcher::{Launcher, Progress, grip, user_or_asset};
 use nalgebra::Vector3;
 use serde_json::json;
 use std::f64::consts::PI;
@@ -101,11 +101,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    if let Some(dir) = &args.launcher.dump {
-        for left_out in sim.dump(dir)? {
-            eprintln!("warning: {left_out}");
-        }
-    }
+    args.launcher.write_dump(&sim)?;
     let stands = scatter(&mut sim, cabinet)?;
 
     args.launcher.serve(&mut sim)?;
@@ -160,26 +156,15 @@ fn run(args: &Args) -> launcher::Result<bool> {
             if stays { "it stood" } else { "too far" },
         );
     }
-    let successes = table.iter().filter(|row| row["success"] == true).count();
-    let needed = trial::needed(sim.num_envs());
-    println!("\n{successes} of {} drawers were opened; {needed} are enough", sim.num_envs());
-    println!("{steps} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
-    if let Some(out) = &args.launcher.out {
-        stage::write(&mut sim, &[], [4.2, -5.2, 3.6], [0.4, 0.0, 0.0], &out.join("open_drawer_all.png"))?;
-    }
-    args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
-        "num_envs": sim.num_envs(),
-        "steps": steps,
-        "slide_friction": args.slide_friction,
-        "successes": successes,
-        "needed": needed,
-        "success_rate": successes as f64 / sim.num_envs() as f64,
-        "environments": table,
-        "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
-    }))?;
-    Ok(successes >= needed)
+    let count = Count {
+        what: "drawers were opened",
+        friction: ("slide_friction", args.slide_friction),
+        table,
+        steps,
+        rate,
+        overview: ("open_drawer_all.png", [4.2, -5.2, 3.6], [0.4, 0.0, 0.0]),
+    };
+    trial::conclude(&args.launcher, &mut sim, count)
 }
 
 /// Puts each cabinet elsewhere on the floor; where they are then.

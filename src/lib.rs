@@ -14,8 +14,8 @@ pub mod prelude {
     pub use crate::assets;
     pub use scene::Pose;
     pub use sensors::camera::{
-        Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,
-        Renderer,
+        Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Placement,
+        RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, StereoCamera, StereoCameraCfg, StereoOrigin,
     };
     pub use sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,

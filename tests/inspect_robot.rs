@@ -443,6 +443,55 @@ fn people_see_a_tree_tables_and_warnings() {
     assert_eq!(written["robot"], "SR5_revo1_left");
 }
 
+/// Two joints in one body, a spring-less pendulum that starts at 30 degrees, a follower by a line and one by a curve.
+const MJCF: &str = r#"<mujoco><compiler angle="degree" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="2"/>
+  <body name="bar" pos="0 0 1"><joint name="turn" axis="0 0 1"/><joint name="swing" axis="0 1 0" ref="30" range="-90 90"/>
+    <inertial pos="0.5 0 0" mass="3" diaginertia="0.01 0.02 0.02"/></body>
+  <body name="line"><joint name="line" axis="0 0 1"/><inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body>
+  <body name="curve"><joint name="curve" axis="0 0 1"/><inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body>
+  </body></worldbody><equality><joint joint1="line" joint2="turn" polycoef="0.1 2 0 0 0"/>
+  <joint joint1="curve" joint2="turn" polycoef="0.1 0 3 0 0"/></equality></mujoco>"#;
+
+/// MuJoCo with the file alone says what masses do: the matrix of `mj_fullM`, and `qfrc_bias` at rest.
+#[test]
+fn robots_of_mjcf_files() {
+    use kinetoscope::sim::mj::{Data, compile};
+    let folder = Folder::new();
+    let file = folder.write("robot.xml", MJCF);
+    let (code, json) = report(&[&file, "--qpos", "turn=0.4"]);
+    assert_eq!(code, 1, "the equality that is no mimic is said");
+    assert_eq!(names(&json["joint_names"]), ["turn", "swing", "line", "curve"]);
+    let qpos = [0.4, 30f64.to_radians(), 0.1 + 2.0 * 0.4, 0.1 + 3.0 * 0.16];
+    assert!(close(&numbers(&json["qpos"]), &qpos, 1e-12), "{}", json["qpos"]);
+    assert!(json["files"][0].as_str().unwrap().ends_with("robot.xml"));
+    let mut data = Data::new(&compile(MJCF, &[]).unwrap().into_model()).unwrap();
+    data.qpos_mut().copy_from_slice(&qpos);
+    data.forward().unwrap();
+    let matrix = data.mass_matrix().unwrap();
+    for (row, theirs) in json["mass_matrix"].as_array().unwrap().iter().zip(matrix.chunks(4)) {
+        assert!(close(&numbers(row), theirs, 1e-12), "{row} {theirs:?}");
+    }
+    assert!(close(&numbers(&json["gravity_torque"]), data.qfrc_bias(), 1e-12), "{}", json["gravity_torque"]);
+    assert!(data.qfrc_bias()[1].abs() > 10.0 && json["total_mass"].as_f64().unwrap() == 6.0);
+    // Followers cannot be put elsewhere.
+    let (_, json) = report(&[&file, "--qpos", "turn=0.4,curve=0.2"]);
+    assert!(close(&numbers(&json["qpos"]), &qpos, 1e-12));
+    assert!(warnings(&json).iter().any(|w| w.ends_with("mimic-position-ignored")), "{:?}", warnings(&json));
+    // The bundled quadruped, floating, and what cannot be.
+    let (_, json) = report(&["quadruped/quadruped.xml", "--floating-base"]);
+    assert!((json["total_mass"].as_f64().unwrap() - 52.135).abs() < 1e-3);
+    assert_eq!(json["columns"].as_array().unwrap().len(), 6 + 12);
+    assert!(run(&["quadruped/quadruped.xml"]).out.contains("LF_KFE"));
+    for (args, says) in [
+        (vec![file.as_str(), SR5], "stands alone"),
+        (vec!["no_such_file.xml"], "no_such_file.xml"),
+        (vec![&folder.write("torn.xml", "<mujoco><worldbody>"), "--floating-base"], "torn.xml"),
+    ] {
+        let run = run(&args);
+        assert!(run.code == 2 && run.err.contains(says) && run.out.is_empty(), "{args:?}: {}{}", run.out, run.err);
+    }
+}
+
 #[test]
 fn robots_of_vendors() {
     let Some(anymal) = vendor(ANYMAL) else { return };

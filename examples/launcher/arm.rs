@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 /// Which arm and which hand.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ArmWithHand {
+    /// One URDF or MJCF (.xml) file with both, instead of --arm-urdf and --hand-urdf
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["arm_urdf", "hand_urdf"])]
+    robot: Option<PathBuf>,
     /// URDF of the arm
     #[arg(long, alias = "arm_urdf", default_value = "sr5/SR5.urdf")]
     arm_urdf: PathBuf,
@@ -26,11 +29,20 @@ pub(crate) struct ArmWithHand {
 }
 
 impl ArmWithHand {
-    /// The two merged, the hand turned and moved onto the flange, with the tutorial's gains.
+    /// The two merged, the hand turned and moved onto the flange, or the one file; with the tutorial's gains.
     ///
     /// # Errors
     /// A file is neither there nor an asset.
     pub(crate) fn cfg(&self) -> Result<RobotCfg> {
+        if let Some(file) = &self.robot {
+            let file = user_or_asset(file)?;
+            let cfg = driven(&self.arm_joints, &self.hand_joints);
+            return Ok(if file.extension().is_some_and(|extension| extension == "xml") {
+                RobotCfg { mjcf: Some(MjcfFile::new(file)), ..cfg }
+            } else {
+                RobotCfg { urdf: UrdfCfg::single(file), ..cfg }
+            });
+        }
         merged(&self.arm_urdf, &self.hand_urdf, &self.arm_joints, &self.hand_joints)
     }
 }
@@ -48,12 +60,14 @@ fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str
         transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
         ..ComponentCfg::new("hand", user_or_asset(hand_urdf)?)
     };
-    Ok(RobotCfg {
+    let components = vec![ComponentCfg::new("arm", user_or_asset(arm_urdf)?), hand];
+    Ok(RobotCfg { urdf: UrdfCfg { components, ..Default::default() }, ..driven(arm_joints, hand_joints) })
+}
+
+/// The parts `arm` and `hand` with the tutorial's gains.
+fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
+    RobotCfg {
         uid: "sr5".into(),
-        urdf: UrdfCfg {
-            components: vec![ComponentCfg::new("arm", user_or_asset(arm_urdf)?), hand],
-            ..Default::default()
-        },
         control_parts: vec![("arm".into(), vec![arm_joints.into()]), ("hand".into(), vec![hand_joints.into()])],
         drive: DriveCfg {
             stiffness: [(arm_joints, 1e4), (hand_joints, 1e3)].into(),
@@ -61,7 +75,7 @@ fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str
             ..Default::default()
         },
         ..Default::default()
-    })
+    }
 }
 
 /// The link that the hand hangs on, as `uid/link`.

@@ -25,6 +25,12 @@ use std::time::{Duration, Instant};
 /// Lets a simulation go on that somebody paused.
 static KEY: OnceLock<Viewer> = OnceLock::new();
 
+/// Ctrl+C ends an example also while somebody holds it, in a window or in a browser.
+fn keep_key(sim: &mut SimulationManager) {
+    // One is enough for both.
+    KEY.get_or_init(|| sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
+}
+
 /// Errors end an example with a message and exit code 2.
 pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -182,8 +188,7 @@ impl Launcher {
         let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
         let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
         println!("Open {} in a browser", served.url());
-        // Nobody else serves it meanwhile.
-        let _ = KEY.set(sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
+        keep_key(sim);
         Ok(())
     }
 
@@ -194,7 +199,10 @@ impl Launcher {
             return;
         }
         match sim.open_window() {
-            Ok(_) => println!("A window is open, in real time: H in it shows the keys."),
+            Ok(_) => {
+                println!("A window is open, in real time: H in it shows the keys.");
+                keep_key(sim);
+            }
             Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
         }
     }

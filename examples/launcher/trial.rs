@@ -1,10 +1,11 @@
 //! Examples that try something in many environments and count: 16 of them, and what counts as enough.
 
-use super::{Result, picture};
+use super::{Launcher, Result, picture, stage};
 use clap::Parser;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -38,6 +39,51 @@ pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
         reasons[env.0] = Some(reason);
     }
     reasons
+}
+
+/// What an example counted.
+#[derive(Debug)]
+pub(crate) struct Count<'a> {
+    /// What a success is, behind their number and "of 16".
+    pub(crate) what: &'a str,
+    /// The friction of the run, as its report calls it \[N, or without unit\].
+    pub(crate) friction: (&'a str, f64),
+    /// A row for each environment, with `success`.
+    pub(crate) table: Vec<Value>,
+    pub(crate) steps: u64,
+    /// Environment steps per second.
+    pub(crate) rate: f64,
+    /// The picture of all environments: its name, from where and to where it is seen.
+    pub(crate) overview: (&'a str, [f64; 3], [f64; 3]),
+}
+
+/// Prints what was counted, draws all environments and writes the report; gives whether enough succeeded.
+///
+/// # Errors
+/// A file cannot be written.
+pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: Count<'_>) -> Result<bool> {
+    let Count { what, friction, table, steps, rate, overview } = count;
+    let successes = table.iter().filter(|row| row["success"] == true).count();
+    let needed = needed(sim.num_envs());
+    println!("\n{successes} of {} {what}; {needed} are enough", sim.num_envs());
+    println!("{steps} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
+    if let Some(out) = &launcher.out {
+        let (name, eye, target) = overview;
+        stage::write(sim, &[], eye, target, &out.join(name))?;
+    }
+    launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": sim.num_envs(),
+        "steps": steps,
+        (friction.0): friction.1,
+        "successes": successes,
+        "needed": needed,
+        "success_rate": successes as f64 / sim.num_envs() as f64,
+        "environments": table,
+        "env_steps_per_second": rate,
+        "warnings": sim.warning_counts(),
+    }))?;
+    Ok(successes >= needed)
 }
 
 /// `yes` or `no`.

@@ -1,5 +1,6 @@
 //! Everything that can be seen, without the poses.
 
+use crate::Pose;
 use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
 use crate::material::{Material, TextureKind};
 use crate::shape::Shape;
@@ -25,13 +26,25 @@ pub struct Instance {
     pub body: Option<u32>,
     /// Whether it is welded to the world: it never moves but by a write to the state.
     pub fixed: bool,
+    /// Where it is in the frame of what it belongs to: the link, the object; the identity for a geom of the world.
+    pub frame_from_instance: Pose,
 }
 
 impl Instance {
     /// A visible instance in group 0, without a name, that may move.
     pub fn new(shape: impl Into<Shape>, material: Material, mask_id: i32) -> Self {
         let name = Arc::from("");
-        Self { shape: shape.into(), material, mask_id, group: 0, visible: true, name, body: None, fixed: false }
+        Self {
+            shape: shape.into(),
+            material,
+            mask_id,
+            group: 0,
+            visible: true,
+            name,
+            body: None,
+            fixed: false,
+            frame_from_instance: Pose::identity(),
+        }
     }
 
     /// The same instance with a name.

@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, select};
+use crate::select::{at_least_one, read_columns, select_or_all};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView2, ArrayView3};
@@ -47,10 +47,7 @@ impl SensorCfg for ActuatorStateCfg {
     /// A pattern that matches nothing or an actuator that two match, no actuator at all, and what is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<ActuatorState, SensorError> {
         let all = &context.actuators;
-        let actuators = match &self.actuators {
-            Some(patterns) => select(patterns, all, "actuator")?,
-            None => (0..all.len()).collect(),
-        };
+        let actuators = select_or_all(self.actuators.as_deref(), all, "actuator")?;
         at_least_one(actuators.len(), ("actuator state", "actuators", "actuator"), all)?;
         let channels = ["controls", "forces", "activations"].map(|name| Channel::new(name, actuators.len()));
         Ok(ActuatorState {
@@ -64,8 +61,7 @@ impl SensorCfg for ActuatorStateCfg {
 /// Writes what the sensor measures in environment `env` to `row`.
 fn read(actuators: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
     let fields = [&state.actuator_controls, &state.actuator_forces, &state.actuator_activations];
-    let numbers = fields.into_iter().flatten().flat_map(|field| actuators.iter().map(move |&k| field[(env, k)]));
-    row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
+    read_columns(fields, actuators, env, row);
 }
 
 impl Sensor for ActuatorState {

@@ -1,6 +1,6 @@
 //! What can be wrong with a sensor.
 
-use crate::camera::CameraError;
+use crate::camera::{CalibrationError, CameraError};
 use crate::ray::RayError;
 use crate::sensor::Requires;
 
@@ -167,6 +167,9 @@ pub enum SensorError {
     /// Something is wrong with a camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// Something is wrong with a calibration.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// Something is wrong with a ray caster.
     #[error(transparent)]
     Ray(#[from] RayError),

@@ -6,7 +6,7 @@
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, select};
+use crate::select::{at_least_one, read_columns, select_or_all};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
@@ -50,10 +50,7 @@ impl SensorCfg for JointStateCfg {
     /// A pattern that matches nothing or a joint that two match, an empty list of them, and what is wrong with the sampling.
     /// All joints of a scene without any are none.
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
-        let joints = match &self.joints {
-            Some(patterns) => select(patterns, &context.joints, "joint")?,
-            None => (0..context.joints.len()).collect(),
-        };
+        let joints = select_or_all(self.joints.as_deref(), &context.joints, "joint")?;
         if self.joints.is_some() {
             at_least_one(joints.len(), ("joint state", "joints", "joint"), &context.joints)?;
         }
@@ -69,8 +66,7 @@ impl SensorCfg for JointStateCfg {
 /// Writes what the sensor measures in environment `env` to `row`.
 fn read(joints: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
     let fields = [&state.joint_positions, &state.joint_velocities, &state.joint_efforts];
-    let values = fields.into_iter().flatten().flat_map(|field| joints.iter().map(move |&joint| field[(env, joint)]));
-    row.iter_mut().zip(values).for_each(|(number, value)| *number = value);
+    read_columns(fields, joints, env, row);
 }
 
 impl Sensor for JointState {

@@ -26,6 +26,7 @@ pub mod joint_wrench;
 pub(crate) mod lanes;
 pub mod mujoco_sensor;
 pub mod noise;
+mod philox;
 pub mod ray;
 pub mod resolve;
 pub mod sampling;
@@ -37,7 +38,7 @@ mod summary;
 pub mod visibility;
 
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
-pub use camera::{Camera, CameraCfg, CameraError};
+pub use camera::{Camera, CameraCfg, CameraError, StereoCamera, StereoCameraCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use crew::{Crew, ScopedThreads, Threads};
 pub use error::SensorError;

@@ -33,11 +33,48 @@ impl NoiseCfg {
     pub fn white(std: f64) -> Self {
         Self { std, ..Self::default() }
     }
+
+    /// Rounds a value that has its errors already, and holds it between the least and the most that can be measured.
+    pub(crate) fn settle(&self, value: f64, [least, most]: [f64; 2]) -> f64 {
+        let steps = value / self.resolution;
+        // Steps that are finer than the value's own digits round nothing.
+        let rounded = if self.resolution > 0.0 && steps.is_finite() { steps.round() * self.resolution } else { value };
+        rounded.max(least).min(most)
+    }
+}
+
+/// Which channels have noise, and whether `dropout` and all their numbers are good.
+pub(crate) fn check<'a>(
+    dropout: f64,
+    noise: impl IntoIterator<Item = (&'a str, &'a NoiseCfg)>,
+    channels: &[Channel],
+) -> Result<Vec<Noisy>, SensorError> {
+    if !(0.0..=1.0).contains(&dropout) {
+        let expected = "it must be a probability, 0 to 1";
+        return Err(SensorError::OutOfRange { field: "dropout".into(), value: dropout, expected });
+    }
+    let mut wanted = Vec::new();
+    for (name, noise) in noise {
+        let (columns, range) = columns(name, channels)?;
+        wanted.push(Noisy { columns, range, noise: *noise });
+        for (field, value) in [
+            ("std", noise.std),
+            ("bias_std", noise.bias_std),
+            ("bias_walk", noise.bias_walk),
+            ("resolution", noise.resolution),
+        ] {
+            if !(0.0..=MAX_NOISE).contains(&value) {
+                let (field, expected) = (format!("{field} of the noise of {name:?}"), "it must be 0 to 1e100");
+                return Err(SensorError::OutOfRange { field, value, expected });
+            }
+        }
+    }
+    Ok(wanted)
 }
 
 /// The noise of a channel.
 #[derive(Clone, Debug)]
-struct Noisy {
+pub(crate) struct Noisy {
     columns: Range<usize>,
     /// Smallest and largest value.
     range: [f64; 2],
@@ -64,26 +101,7 @@ impl Noise {
         period: f64,
         channels: &[Channel],
     ) -> Result<Option<Self>, SensorError> {
-        if !(0.0..=1.0).contains(&cfg.dropout) {
-            let expected = "it must be a probability, 0 to 1";
-            return Err(SensorError::OutOfRange { field: "dropout".into(), value: cfg.dropout, expected });
-        }
-        let mut wanted = Vec::new();
-        for (name, noise) in &cfg.noise {
-            let (columns, range) = columns(name, channels)?;
-            wanted.push(Noisy { columns, range, noise: *noise });
-            for (field, value) in [
-                ("std", noise.std),
-                ("bias_std", noise.bias_std),
-                ("bias_walk", noise.bias_walk),
-                ("resolution", noise.resolution),
-            ] {
-                if !(0.0..=MAX_NOISE).contains(&value) {
-                    let (field, expected) = (format!("{field} of the noise of {name:?}"), "it must be 0 to 1e100");
-                    return Err(SensorError::OutOfRange { field, value, expected });
-                }
-            }
-        }
+        let wanted = check(cfg.dropout, cfg.noise.iter().map(|(name, noise)| (name.as_str(), noise)), channels)?;
         if wanted.is_empty() && cfg.dropout == 0.0 {
             return Ok(None);
         }
@@ -124,7 +142,7 @@ impl Noise {
     /// Adds the noise of environment `env` to true values; biases stay where they are.
     pub(crate) fn disturb(&mut self, env: usize, row: &mut [f64]) {
         let biases = self.biases.index_axis(Axis(0), env);
-        for Noisy { columns, range: [least, most], noise } in &self.channels {
+        for Noisy { columns, range, noise } in &self.channels {
             for column in columns.clone() {
                 let normal = if noise.std > 0.0 { self.randoms[env].normal() } else { 0.0 };
                 let value = &mut row[column];
@@ -132,14 +150,7 @@ impl Noise {
                 if !value.is_finite() {
                     continue;
                 }
-                *value += biases[column];
-                *value += noise.std * normal;
-                let steps = *value / noise.resolution;
-                // Steps that are finer than the value's own digits round nothing.
-                if noise.resolution > 0.0 && steps.is_finite() {
-                    *value = steps.round() * noise.resolution;
-                }
-                *value = value.max(*least).min(*most);
+                *value = noise.settle(*value + biases[column] + noise.std * normal, *range);
             }
         }
     }

@@ -3,7 +3,7 @@
 //! A sensor says which [`Channel`]s it has and how to read the true values of one environment; the [`Sampler`] does the
 //! rest. [`crate::joint_state`] is the model to follow.
 
-use crate::delay::Delay;
+use crate::delay::{Delay, Queues};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::history::History;
@@ -141,7 +141,7 @@ impl Sampler {
         let n = context.num_envs;
         let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
-        let rows = Delay::capacity(latency, period).saturating_add(cfg.history_length);
+        let rows = Queues::capacity(latency, period).saturating_add(cfg.history_length);
         let numbers = rows.saturating_mul(n).saturating_mul(width);
         if numbers > MAX_NUMBERS {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });

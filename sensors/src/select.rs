@@ -1,6 +1,7 @@
 //! Bodies and joints by name patterns.
 
 use crate::error::SensorError;
+use ndarray::Array2;
 use scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
 
 /// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
@@ -25,6 +26,26 @@ pub fn select<P: AsRef<str>>(patterns: &[P], names: &[String], what: &'static st
         }
     }
     Ok(selected)
+}
+
+/// As [`select`]; all of the names where there are no patterns.
+///
+/// # Errors
+///
+/// As [`select`].
+pub(crate) fn select_or_all(
+    patterns: Option<&[String]>,
+    names: &[String],
+    what: &'static str,
+) -> Result<Vec<usize>, SensorError> {
+    patterns.map_or_else(|| Ok((0..names.len()).collect()), |patterns| select(patterns, names, what))
+}
+
+/// Writes what `fields` have of environment `env` in these columns to `row`, one field after the other.
+pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize], env: usize, row: &mut [f64]) {
+    let numbers =
+        fields.into_iter().flatten().flat_map(|field| columns.iter().map(move |&column| field[(env, column)]));
+    row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
 }
 
 /// Refuses to choose nothing: `field` of the kind of sensor called `sensor` chose `count` of `names`.

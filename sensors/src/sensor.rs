@@ -6,7 +6,7 @@ use crate::ray::RayAssets;
 use crate::schedule::Schedule;
 use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
-use scene::{Marker, Pose, RenderScene, SceneState};
+use scene::{Marker, OwnScene, Pose, RenderScene, SceneState};
 use std::any::Any;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -130,6 +130,8 @@ pub struct SensorContext {
     pub engine_sensors: Arc<[EngineSensor]>,
     /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
+    /// What environments see whose looks are their own, where there are any; there for the same sensors.
+    pub own_scenes: Vec<OwnScene>,
     /// What ray casters have built for the assets of the scene, shared by all of them.
     pub ray_assets: RayAssets,
     /// How many threads a sensor may use; 0 counts as 1.

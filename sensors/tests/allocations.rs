@@ -3,7 +3,8 @@
 use scene::mesh::TriMesh;
 use scene::shape::{Capsule, Mesh, Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
+use sensors::camera::lens::Equidistant;
+use sensors::camera::{Channels, Frame, LensRays, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
 use sensors::visibility::View;
 use sensors::{Crew, ScopedThreads, Threads};
 use std::sync::Arc;
@@ -111,6 +112,30 @@ fn moving_things_allocate_nothing() {
     }
 }
 
+/// The rays of a lens are there before the first picture.
+#[test]
+fn frames_through_a_lens_allocate_nothing() {
+    let (scene, poses) = scene();
+    let (size, view) = ([320, 240], view([320, 240]));
+    let pixels = sensors::camera::PixelIntrinsics { fx: 90.0, fy: 90.0, cx: 160.0, cy: 120.0 };
+    let optics = Optics::new(Equidistant { max_angle: 1.9 }.into(), pixels).expect("a good lens");
+    let rays = LensRays::new(&optics, size, 4).expect("good rays");
+    // A cone of less than 80 bytes for each block of 64 pixels, and five samples of 12 bytes.
+    assert!(rays.bytes() < 320 * 240 * (60 + 2), "{}", rays.bytes());
+    for renderer in
+        [Renderer::FastRayTraced, Renderer::RayTraced { samples: 2, max_bounces: 1, denoise: true, seed: 0 }]
+    {
+        let mut frame = Frame::new(size[0], size[1], FOUR);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.renderer = renderer;
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: Some(&rays) };
+        let mut draw = || rasterizer.render_shot(&shot, &mut frame.as_mut()).expect("a good frame");
+        draw();
+        let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
+        assert_eq!(allocations, 0, "{renderer:?}");
+    }
+}
+
 /// Threads that count what is allocated at the desks of others than the caller.
 #[derive(Debug, Default)]
 struct Counting(AtomicU64);
@@ -135,7 +160,7 @@ fn batches_allocate_nothing_on_any_thread() {
         let crew = Crew::new(Arc::<Counting>::clone(&counting));
         let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(crew);
         let mut frames = vec![Frame::new(view.width, view.height, FOUR); frames];
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None };
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None };
         let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
         let mut draw = || {
             rasterizer.render(&mut jobs).expect("good frames");

@@ -590,10 +590,13 @@ impl Simulation {
                 replacements.insert(geom, cache.object_parts(object));
             }
         }
-        let visible =
-            Arc::new(Visible::extract(self.batch.model(), &self.identities, &replacements).with_own_headlight());
+        let visible = Visible::extract(self.batch.model(), &self.identities, &replacements, self.plan.bodies())
+            .with_own_headlight();
+        let visible = Arc::new(visible);
         self.visible = Some(Arc::clone(&visible));
-        self.look_anew(&(0..cfg.num_envs).collect::<Vec<_>>());
+        for (env, error) in self.look_anew() {
+            cache.say_look(env, &error);
+        }
         visible
     }
 

@@ -196,8 +196,30 @@ pub enum FileDrive {
         /// Damping \[N m s/rad or N s/m\].
         damping: f64,
     },
-    /// A coupling that no mimic says decides where it is: nothing may drive it.
-    Coupled,
+    /// A coupling that no mimic says decides where it is: nothing may drive it. `None` where no curve says where that is, since
+    /// several couplings do, or they go in a circle.
+    Coupled(Option<Curve>),
+}
+
+/// `position = start + Σ coefficients[k] (position(joint) - at)ᵏ`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curve {
+    /// The joint that is followed; `None` where the position is `start + coefficients[0]`.
+    pub joint: Option<JointId>,
+    /// Where the followed joint is at the start \[rad or m\].
+    pub at: f64,
+    /// Where the follower is at the start \[rad or m\].
+    pub start: f64,
+    /// Coefficients, the constant first.
+    pub coefficients: [f64; 5],
+}
+
+impl Curve {
+    /// The position \[rad or m\] where the followed joint is at `driver`.
+    pub fn position(&self, driver: f64) -> f64 {
+        let by = driver - self.at;
+        self.start + self.coefficients.iter().rev().fold(0.0, |sum, c| sum * by + c)
+    }
 }
 
 /// Joint types of URDF.
@@ -264,6 +286,23 @@ pub struct Mimic {
     pub offset: f64,
 }
 
+impl Link {
+    /// A link that has nothing yet.
+    pub(crate) fn new(name: String, source: Source, component: String) -> Self {
+        Self {
+            name,
+            source,
+            component,
+            inertial: None,
+            visuals: Vec::new(),
+            collisions: Vec::new(),
+            parent_joint: None,
+            child_joints: Vec::new(),
+            between_joints: false,
+        }
+    }
+}
+
 impl RobotDescription {
     /// The links that a user knows, indexed by [`LinkId`]: all but the frames between joints of one body.
     pub fn named_links(&self) -> &[Link] {
@@ -304,7 +343,7 @@ impl RobotDescription {
     /// The joint at the end of a chain of mimic joints, with the composed ratio and offset:
     /// `position(id) = multiplier * position(driver) + offset`. For a joint that follows none: itself, 1, 0.
     ///
-    /// Mimic chains are free of cycles by construction (`urdf::merge` refuses them).
+    /// Mimic chains are free of cycles by construction (`urdf::merge` refuses them, and `mjcf::robot_file` makes none).
     pub fn mimic_driver(&self, id: JointId) -> (JointId, f64, f64) {
         let (mut driver, mut multiplier, mut offset) = (id, 1.0, 0.0);
         while let Some(mimic) = &self.joint(driver).mimic {

@@ -22,6 +22,8 @@ pub enum DiagnosticKind {
     VisualMeshMissing,
     /// A visual mesh could not be read: the visual is left out.
     VisualMeshInvalid,
+    /// The own sizes and colours of an environment cannot be drawn: it looks as nominally.
+    LookInvalid,
     /// A name was used by two components and got a prefix or suffix.
     NameClash,
     /// A material is referenced but defined nowhere.
@@ -67,6 +69,7 @@ impl DiagnosticKind {
             Self::MimicRangeClipped => "mimic-range-clipped",
             Self::VisualMeshMissing => "visual-mesh-missing",
             Self::VisualMeshInvalid => "visual-mesh-invalid",
+            Self::LookInvalid => "look-invalid",
             Self::NameClash => "name-clash",
             Self::MaterialUndefined => "material-undefined",
             Self::TextureMissing => "texture-missing",

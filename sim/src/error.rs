@@ -116,10 +116,10 @@ pub enum Error {
         error: Box<CompileError>,
     },
     /// An MJCF file is no robot.
-    #[error("robot {robot:?}: {file}: {error}")]
+    #[error("{robot}: {file}: {error}")]
     RobotFile {
-        /// The robot.
-        robot: String,
+        /// The robot or articulation.
+        robot: Named,
         /// The file.
         file: String,
         /// What is wrong.
@@ -407,6 +407,9 @@ pub enum Error {
         #[source]
         error: Box<sensors::SensorError>,
     },
+    /// Labels of a segmentation name what is not there, or one thing twice.
+    #[error("labels: {0}")]
+    Labels(#[source] Box<sensors::SensorError>),
     /// A sensor needs a quantity that is not gathered.
     #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
     SensorRequires {

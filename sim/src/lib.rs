@@ -51,6 +51,7 @@ pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveSce
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
 pub use look::{BodyMotion, JointAxis, Look};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+pub use mj::staying_crew;
 pub use mjcf::document::{Cone, Integrator};
 pub use named::Named;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};

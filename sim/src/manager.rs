@@ -19,6 +19,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::{Marker, OwnScene};
 use ndarray::Array2;
+use sensors::camera::{Segmentation, SegmentationCfg, Thing};
 use sensors::ray::RayAssets;
 use sensors::{Crew, Requires, Sensor, SensorCfg, SensorContext};
 use std::collections::BTreeMap;
@@ -103,7 +104,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
-            crew: Crew::new(Arc::new(mj::StayingThreads::default())),
+            crew: mj::staying_crew(),
             diagnostics: Vec::new(),
             simulation,
             sensors,
@@ -317,6 +318,7 @@ impl SimulationManager {
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
         let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
         let scene = sees.then(|| Arc::clone(self.visible().scene()));
+        let own_scenes = if sees { self.simulation.own_scenes.clone() } else { Vec::new() };
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
@@ -330,6 +332,7 @@ impl SimulationManager {
             actuators: self.contents.actuator_names(),
             engine_sensors: self.contents.engine_sensors(),
             scene,
+            own_scenes,
             ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
             crew: self.crew.clone(),
@@ -354,6 +357,16 @@ impl SimulationManager {
     /// is added.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.simulation.mask_ids()
+    }
+
+    /// What each number of the mask channel is, by instance, link and semantic class, with labels by pattern: turns masks into
+    /// segmented pictures, and finds boxes around things. Make it anew when something was added.
+    ///
+    /// # Errors
+    /// A pattern that is no regular expression or matches nothing, and something that two patterns match.
+    pub fn segmentation(&self, cfg: &SegmentationCfg) -> Result<Segmentation> {
+        let things = self.mask_ids().iter().map(Thing::from);
+        Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
     }
 
     /// A robot, to read.

@@ -434,3 +434,41 @@ fn sizes_and_colours_that_cannot_be_are_named() {
     assert!(fault(Property::Color, "ground", &[0.1; 4]).contains("body or terrain"));
     assert!((0..3).all(|env| sim.property_bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
 }
+
+/// A pattern for nothing that can be seen is a mistake: draws of colours leave opacities, and rays pass what is invisible.
+/// Once an environment shows it, rays hit it there.
+#[test]
+fn patterns_for_what_nobody_sees_are_refused() {
+    let mut sim = world(NOMINAL);
+    let ghost = object("ghost", ObjectShape::cube(0.3), [-0.6, 0.6, 0.8]);
+    sim.add_rigid_object(RigidObjectCfg { rgba: [1.0, 1.0, 1.0, 0.0], ..ghost }).unwrap();
+    let draw = |pattern: &str| Randomization::new().with(Property::Color, pattern, Draw::Set([0.2, 0.8]));
+    let said = sim.randomize(&draw("ghost"), ALL).unwrap_err();
+    assert!(matches!(&said, Error::Randomization(RandomizationError::Pattern { property: "color", .. })), "{said}");
+    assert!(said.to_string().contains("\"ghost\"") && said.to_string().contains("\"post\""), "{said}");
+    let rays = |name: &str| RayCasterCfg {
+        pattern: Grid { resolution: 0.1, size: [0.2, 0.2], ..Grid::default() }.into(),
+        offset: Pose::translation(-0.587, 0.613, 2.0),
+        targets: HitTargets::Named(vec![name.into()]),
+        ..Default::default()
+    };
+    let said = sim.add_sensor("nothing", rays("ghost")).unwrap_err().to_string();
+    assert!(said.contains("ghost") && said.contains("post"), "{said}");
+    // Controls: with something that is seen, the pattern is right, and the ghost stays one.
+    sim.randomize(&draw("ghost|cube"), ALL).unwrap();
+    let both = sim.add_sensor("both", rays("ghost|cube")).unwrap();
+    assert_eq!(sim.properties(EnvId(1)).unwrap().get(Property::Color, "ghost").unwrap()[3], 0.0);
+    let show = |sim: &mut SimulationManager| {
+        let color = [0.5, 0.5, 0.5, 1.0];
+        sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "ghost", &color)).unwrap();
+    };
+    show(&mut sim);
+    let ghost = sim.add_sensor("ghost_rays", rays("ghost")).unwrap();
+    let hit = |sim: &SimulationManager, id: SensorId<RayCaster>| {
+        let distances = sim.sensor(id).unwrap().distances().to_owned();
+        [0, 1, 2].map(|env| distances.row(env).iter().filter(|d| d.is_finite()).count())
+    };
+    assert_eq!(hit(&sim, ghost), [0, 9, 0]);
+    // What the pattern of two named from the start is only what could be seen then.
+    assert_eq!(hit(&sim, both), [0, 0, 0]);
+}

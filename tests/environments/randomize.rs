@@ -239,6 +239,57 @@ fn drawn_gains_outlive_what_is_restored() {
     }
 }
 
+/// What is drawn is drawn, also where it is what was below it: it stays when a plain state is restored, before and after it was
+/// itself restored. One that is set is not, also where it is set to what was drawn.
+#[test]
+fn a_drawn_gain_that_is_what_was_below_it_is_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(2, 1) }).unwrap();
+    let id = sim.add_robot(lever(dir.path())).unwrap();
+    let start = sim.snapshot(ALL).unwrap();
+    let [stiffness, damping, effort] = [200.0, 40.0, 30.0];
+    let gains = |sim: &SimulationManager, env: usize| {
+        let robot = sim.robot(id);
+        [robot.get_stiffness()[(env, 0)], robot.get_damping()[(env, 0)], robot.qf_limits()[(env, 0)]]
+    };
+    let set_all = |sim: &mut SimulationManager| {
+        let mut robot = sim.robot_mut(id);
+        robot.set_stiffness(&array![[stiffness]], None, ALL).unwrap();
+        robot.set_damping(&array![[damping]], None, ALL).unwrap();
+        robot.set_qf_limits(&array![[effort]], None, ALL).unwrap();
+    };
+    let draw = |property, value| Randomization::new().with(property, "lever/hinge", Draw::Set([value; 2]));
+    let draw_all = |sim: &mut SimulationManager| {
+        let all = [(Property::Stiffness, stiffness), (Property::DriveDamping, damping), (Property::MaxEffort, effort)];
+        for (property, value) in all {
+            sim.randomize(&draw(property, value), Some(&[EnvId(1)])).unwrap();
+        }
+    };
+    let (nominal, drawn) = ([500.0, 100.0, 100.0], [stiffness, damping, effort]);
+    // Set in both, then drawn to the same in one.
+    set_all(&mut sim);
+    draw_all(&mut sim);
+    let both = sim.snapshot(ALL).unwrap();
+    sim.restore(&start, ALL).unwrap();
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn");
+    // The other way: drawn first, and a state that has the same below it is restored.
+    sim.reset_properties(ALL).unwrap();
+    draw_all(&mut sim);
+    sim.restore(&both, ALL).unwrap();
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
+    // Restored with the properties of then, it is drawn still.
+    sim.reset_properties(ALL).unwrap();
+    sim.restore_with_properties(&both, ALL).unwrap();
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
+    sim.restore(&start, ALL).unwrap();
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn when the snapshot was taken");
+    // Control: set to the very same, it is drawn no longer.
+    set_all(&mut sim);
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
+    sim.restore(&start, ALL).unwrap();
+    assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, nominal));
+}
+
 /// Everything at once.
 fn all_properties() -> Randomization {
     Randomization::new()

@@ -183,6 +183,11 @@ fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
     sim.update(5);
     let reason = sim.diverged();
     assert_eq!(reason.len(), 1);
+    // MuJoCo's own warnings are those of this environment alone.
+    let counts = [0, 1, 2].map(|env| sim.env_warning_counts(EnvId(env)).unwrap());
+    assert!(counts[0].is_empty() && !counts[1].is_empty() && counts[2].is_empty(), "{counts:?}");
+    assert!(counts[1].iter().all(|(name, count)| sim.warning_counts()[*name] == *count), "{counts:?}");
+    assert!(matches!(sim.env_warning_counts(EnvId(3)), Err(Error::UnknownIndex { index: 3, .. })));
     let bad = sim.snapshot(ALL).unwrap();
     bad.save(dir.path().join("bad")).unwrap();
     sim.restore(&good, ALL).unwrap();

@@ -7,6 +7,7 @@ mod forward;
 mod jacobian;
 mod limits;
 mod mistakes;
+mod mujocos_reader;
 mod planar;
 mod posture;
 mod robots;

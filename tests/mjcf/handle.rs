@@ -3,6 +3,7 @@
 use super::{empty, machine};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::mj::ObjectKind;
 
 #[test]
 fn positions_velocities_and_controls_are_per_environment() {
@@ -11,6 +12,9 @@ fn positions_velocities_and_controls_are_per_environment() {
     let read = sim.mjcf_part(part);
     assert_eq!(read.joint_names()[..4], ["shoulder", "wrist", "rail", "free"]);
     assert_eq!(read.actuator_names(), ["servo", "pull", "push"]);
+    let model = super::alone(&machine());
+    let sites = (0..model.nsite()).map(|site| model.name(ObjectKind::Site, site).unwrap());
+    assert_eq!(read.site_names().to_vec(), sites.collect::<Vec<_>>());
     assert_eq!(read.qpos_columns(&["free", "shoulder"]).unwrap(), [6..13, 0..1]);
     assert_eq!(read.qvel_columns(&["free", "wrist"]).unwrap(), [5..11, 1..4]);
     assert_eq!(read.actuator_ids(&["pu.*"]).unwrap(), [ActuatorIndex(1), ActuatorIndex(2)]);

@@ -3,6 +3,7 @@
 
 mod carry_over;
 mod dump;
+mod empty;
 mod frames;
 mod handle;
 mod meshes;
@@ -14,21 +15,8 @@ mod twins;
 mod visible;
 mod wrench;
 
-use kinetoscope::prelude::*;
+use empty::empty;
 use kinetoscope::sim::mj::{self, Model};
-
-/// A scene with nothing in it but what is added.
-fn empty(num_envs: usize) -> SimulationManager {
-    let cfg = SimulationManagerCfg {
-        num_envs,
-        physics_dt: 0.002,
-        threads: Some(2),
-        ground: None,
-        lights: vec![],
-        ..Default::default()
-    };
-    SimulationManager::new(cfg).unwrap()
-}
 
 /// A text alone, as MuJoCo compiles it.
 fn alone(text: &str) -> Model {

@@ -13,7 +13,7 @@ fn is_said(sim: &SimulationManager, words: &[&str]) -> bool {
 }
 
 /// `a` follows `b` by -0.5 and `c` follows `a` by 3; the actuators are at the ends of the chain.
-const CHAIN: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 0"/>
+pub(super) const CHAIN: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 0"/>
   <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="base"><geom size="0.1" mass="1"/>
     <body name="a"><joint name="a" axis="0 0 1"/><geom size="0.01" mass="0.01"/></body>
     <body name="b"><joint name="b" axis="0 0 1" stiffness="61.25"/><geom size="0.05" mass="1"/></body>
@@ -47,7 +47,7 @@ fn an_actuator_of_a_follower_drives_what_it_follows() {
 }
 
 /// Two fingers on one tendon, the pattern of parallel grippers; `%` is the polynomial of the second.
-const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option timestep="0.0001" gravity="0 0 0"/>
+pub(super) const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option timestep="0.0001" gravity="0 0 0"/>
   <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="palm"><geom size="0.03" mass="1"/>
     <body name="left"><joint name="left" type="slide" axis="0 1 0" range="0 0.04"/><geom size="0.01" mass="0.5"/></body>
     <body name="right"><joint name="right" type="slide" axis="0 -1 0" range="0 0.04"/><geom size="0.01" mass="0.5"/></body>

@@ -94,3 +94,55 @@ fn other_equalities_hold_and_nothing_drives_against_them() {
         assert!(matches!(&error, Error::NotDriven { joint, .. } if joint == "left"), "{error}");
     }
 }
+
+/// Followers by curves start on them, for wherever what they follow starts, also through mimics and other curves: MuJoCo's
+/// equalities pull with nothing, since nothing is loaded, and nothing moves. Positions are right up to rounding, 1e-15 of 1; a
+/// coupling is as stiff as 1 / (0.02 s)² on 1e-4 kg m², so that such an error pulls with 1e-15 N m.
+#[test]
+fn followers_by_curves_start_on_them() {
+    let parabola = r#"<joint joint1="left" joint2="crank" polycoef="0.02 0.5 0.8 -0.3 0.1"/>"#;
+    let at = |x: f64| -0.2 + 0.02 + 0.5 * x + 0.8 * x * x - 0.3 * x * x * x + 0.1 * x * x * x * x;
+    let chain = format!("{parabola}<joint joint1=\"right\" joint2=\"left\" polycoef=\"0 0.1 0.2 0 0\"/>");
+    let of_mimic = format!("{parabola}<joint joint1=\"right\" joint2=\"left\" polycoef=\"0 0.1 0 0 0\"/>");
+    let behind = |x: f64, square: f64| 0.1 * (at(x) + 0.2) + square * (at(x) + 0.2).powi(2);
+    let constant = r#"<joint joint1="left" polycoef="0.3 0 0 0 0"/>"#;
+    for (equalities, crank, left, right) in [
+        (parabola, 0.5, at(0.4), 0.0),
+        // What nobody asks for starts where the file does.
+        (parabola, 0.1, at(0.0), 0.0),
+        (chain.as_str(), -0.4, at(-0.5), behind(-0.5, 0.2)),
+        (of_mimic.as_str(), -0.4, at(-0.5), behind(-0.5, 0.0)),
+        (constant, 0.5, -0.2 + 0.3, 0.0),
+    ] {
+        let mut sim = empty(2);
+        // What is said of the follower itself holds no more than of a mimic.
+        let mut init_qpos = vec![("left".to_string(), 1.5)];
+        if crank != 0.1 {
+            init_qpos.push(("crank".into(), crank));
+        }
+        let id = sim.add_robot(RobotCfg { init_qpos, ..robot("hand", &HAND.replace('%', equalities)) }).unwrap();
+        let expected = array![crank, left, right, 0.0];
+        for when in ["at first", "after a reset"] {
+            let qpos = sim.robot(id).get_qpos();
+            assert!((&qpos.row(1) - &expected).iter().all(|d| d.abs() < 1e-14), "{when}: {qpos}, not {expected}");
+            assert_eq!(sim.robot(id).get_default_qpos().row(0), qpos.row(0));
+            let pulls = sim.batch().read(0, |env| env.data().efc_force()[..env.data().ne()].to_vec());
+            assert!(!pulls.is_empty() && pulls.iter().all(|pull| pull.abs() < 1e-12), "{when}: {pulls:?}");
+            sim.update(50);
+            let moved = (sim.robot(id).get_qpos() - &expected).iter().fold(0.0f64, |far, d| far.max(d.abs()));
+            assert!(moved < 1e-9, "{when}: {moved}");
+            sim.reset(None).unwrap();
+        }
+        let clamped = sim.diagnostics().iter().filter(|d| d.message.contains("the start position"));
+        assert_eq!(clamped.count(), 0, "{:?}", sim.diagnostics());
+    }
+    // A circle of curves, and two for one joint, say no place: the file's own.
+    let circle = format!("{parabola}<joint joint1=\"crank\" joint2=\"left\" polycoef=\"0 0 1 0 0\"/>");
+    let twice = format!("{parabola}{constant}");
+    for (equalities, starts) in [(circle, [0.1, at(0.0)]), (twice, [0.1, -0.2])] {
+        let mut sim = empty(1);
+        let id = sim.add_robot(robot("hand", &HAND.replace('%', &equalities))).unwrap();
+        let qpos = sim.robot(id).get_qpos();
+        assert!((qpos[(0, 0)] - starts[0]).abs() + (qpos[(0, 1)] - starts[1]).abs() < 1e-14, "{equalities}: {qpos}");
+    }
+}

@@ -6,10 +6,13 @@ mod bases;
 mod contacts;
 mod coupled_drives;
 mod couplings;
+#[path = "../mjcf/empty.rs"]
+mod empty;
 mod file_drives;
 mod kinematics;
 mod named;
 mod newer;
+mod properties;
 mod quadruped;
 mod refused;
 mod samples;
@@ -17,22 +20,10 @@ mod scene;
 mod seen;
 mod twin;
 
+use empty::empty;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-
-/// 500 steps a second, nothing in the scene.
-fn empty(num_envs: usize) -> SimulationManager {
-    let cfg = SimulationManagerCfg {
-        num_envs,
-        physics_dt: 0.002,
-        threads: Some(2),
-        ground: None,
-        lights: vec![],
-        ..Default::default()
-    };
-    SimulationManager::new(cfg).unwrap()
-}
 
 /// A robot from MJCF text.
 fn robot(uid: &str, text: &str) -> RobotCfg {

@@ -124,6 +124,20 @@ impl Lab {
         self.assert_well();
     }
 
+    /// Period \[s\] in which the only joint of a robot swings through 0, from where it stands to five passages, two in a
+    /// period, within `steps` steps. Passages are read off straight lines between steps.
+    pub(crate) fn period(&mut self, robot: RobotId, steps: u32) -> f64 {
+        let (mut before, mut times) = ([0.0, self.q(robot)[0]], Vec::new());
+        self.watch(steps, |t, sim| {
+            let q = sim.robot(robot).get_qpos()[(0, 0)];
+            if q * before[1] < 0.0 {
+                times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
+            }
+            before = [t, q];
+        });
+        (times[4] - times[0]) / 2.0
+    }
+
     /// No environment diverged, and MuJoCo warned of nothing.
     #[track_caller]
     pub(crate) fn assert_well(&self) {

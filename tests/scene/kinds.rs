@@ -173,6 +173,25 @@ fn sensors_have_all_their_fields() {
         ..Default::default()
     };
     assert_eq!(*only::<CameraCfg>(&scene), expected);
+
+    let scene = read(
+        "[entities.s]\ntype = \"stereo_camera\"\nleft_to_right_pos = [0.1, 0, 0]\norigin = \"left\"\n\
+         left_to_right_rot = { rpy_deg = [0, 0, 90] }\nintrinsics_right.fovy.radians = 0.9\n\
+         channels_right = [\"mask\"]\n[entities.s.camera]\nwidth = 320\nchannels = [\"rgb\", \"depth\"]",
+    );
+    let expected = StereoCameraCfg {
+        camera: CameraCfg {
+            width: 320,
+            channels: Channels { color: true, depth: true, ..Default::default() },
+            ..Default::default()
+        },
+        intrinsics_right: Some(Intrinsics::Fovy { radians: 0.9 }),
+        channels_right: Some(Channels { mask: true, ..Default::default() }),
+        left_to_right_pos: [0.1, 0.0, 0.0],
+        left_to_right_rot: nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, 90f64.to_radians()),
+        origin: StereoOrigin::Left,
+    };
+    assert_eq!(*only::<StereoCameraCfg>(&scene), expected);
 }
 
 /// A sensor that the library has never heard of: how high bodies are above a level.

@@ -29,7 +29,7 @@ pub(crate) struct Running {
     now: Arc<Mutex<Now>>,
     stop: Arc<AtomicBool>,
     /// Lets it go on where somebody paused it.
-    key: Viewer,
+    pub(crate) key: Viewer,
     thread: Option<JoinHandle<()>>,
 }
 

@@ -3,6 +3,7 @@
 use crate::running::{Running, wait_until};
 use crate::visitor::{Visitor, connect};
 use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Speed};
 use serde_json::json;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -93,6 +94,28 @@ fn who_pauses_and_leaves_does_not_hold_the_simulation_for_ever() {
     let held = running.now().steps;
     drop(again);
     running.wait_until("it goes on by itself", |now| now.steps > held + 20);
+}
+
+#[test]
+fn a_pause_that_no_browser_made_stays_when_the_browsers_leave() {
+    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { speed: Speed::Times(3.0), ..ServeCfg::default() });
+    let run = || running.key.newest().unwrap().run.clone();
+    // As a window does it.
+    running.key.send(Command::Pause);
+    wait_until("it is held", || run().paused);
+    let mut visitor = Visitor::enter(&running);
+    visitor.ask(json!({"do": "speed", "factor": 0.5}));
+    visitor.wait_state("slower", |state| state["speed"] == 0.5);
+    visitor.ask(json!({"do": "step"}));
+    let steps = run().steps;
+    visitor.wait_state("a step", |state| state["steps"].as_u64() > Some(steps) && state["paused"] == true);
+    let held = steps + 1;
+    drop(visitor);
+    wait_until("what the browser did is undone", || run().speed == Speed::Times(3.0));
+    assert!(run().paused && run().steps == held, "{:?}", run());
+    running.key.send(Command::Resume);
+    let before = running.now().steps;
+    running.wait_until("it goes on", |now| now.steps > before + 20);
 }
 
 #[test]

@@ -42,6 +42,13 @@ const TABLE: &[Run] = &[
         "--headless --num-envs 2 --steps 400 --arm-urdf {robots}/rokae_description/urdf/SR5.urdf \
          --hand-urdf {robots}/inspire_hand/DFQ_left_hand.urdf --arm-joints joint[1-6] --hand-joints L_.*",
     ),
+    run_of(
+        "create_robot",
+        &[0],
+        "--headless --num-envs 2 --steps 400 --robot quadruped/quadruped.xml --arm-joints [LR]F_.* --hand-joints [LR]H_.*",
+    ),
+    run_of("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
+    run_of("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
     run_of(
@@ -110,6 +117,23 @@ const TABLE: &[Run] = &[
     ),
     run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
     run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
+    trial_of(
+        "stereo",
+        &[0],
+        "--headless --num-envs 2 --steps 100 --camera-id 1 --width 320 --height 240 --out {out}/stereo \
+         --report {out}/stereo.json",
+        disparity_leads_to_the_points,
+    ),
+    trial_of(
+        "stereo",
+        &[0],
+        "--headless --steps 20 --renderer fast-rt --baseline 0.3 --width 160 --height 120 --out {out}/stereo_rays \
+         --report {out}/stereo_rays.json",
+        disparity_leads_to_the_points,
+    ),
+    run_of("stereo", &[2], "--headless --steps 1 --baseline 0 --out {out}/none"),
+    run_of("stereo", &[2], "--headless --steps 1 --toe-in-deg 3 --out {out}/none"),
+    run_of("stereo", &[2], "--headless --steps 1 --camera-id 1 --out {out}/none"),
     trial_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json", enough_succeeded),
     // Two cubes that are taken from another side than their first, and arrive turned.
     trial_of("grasp", &[0], "--headless --seed 5 --report {out}/grasp_turned.json", enough_succeeded),
@@ -137,8 +161,17 @@ const TABLE: &[Run] = &[
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --camera nobody"),
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --msaa 3"),
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --eye 1,1,1 --target 1,1,1"),
+    run_of("fisheye", &[0], "--headless --out {out}/fisheye --report {out}/fisheye.json"),
+    run_of("fisheye", &[0], "--headless --lens panorama --lens ftheta --width 200 --height 100 --out {out}/panorama"),
+    run_of("fisheye", &[0], "--headless --camera-info {out}/fisheye/opencv.yaml --out {out}/twin"),
+    run_of("fisheye", &[2], "--headless --lens no_such_lens --out {out}/none"),
+    run_of("fisheye", &[2], "--headless --lens opencv --renderer raster --out {out}/none"),
+    run_of("fisheye", &[2], "--headless --camera-info {out}/malformed.urdf --out {out}/none"),
+    run_of("fisheye", &[2], "--headless --camera-info {out}/there_is_no_such_file.yaml --out {out}/none"),
     run_of("inspect_robot", &[0, 1], "assets/sr5/SR5.urdf"),
     run_of("inspect_robot", &[1], "{robots}/anymal_c_simple_description/urdf/anymal.urdf"),
+    run_of("inspect_robot", &[0, 1], "assets/quadruped/quadruped.xml --floating-base --qpos LF_HFE=0.4"),
+    run_of("inspect_robot", &[2], "assets/quadruped/quadruped.xml assets/sr5/SR5.urdf"),
     run_of("inspect_robot", &[2], "{out}/malformed.urdf"),
     run_of("inspect_robot", &[2], "{out}/there_is_no_such_file.urdf"),
 ];
@@ -206,6 +239,21 @@ fn check_report(path: &Path, required: Requirement) -> Result<(), String> {
 }
 
 fn anything(_: &Value) -> Result<(), String> {
+    Ok(())
+}
+
+/// Points that were computed of disparities are seen by the right eye where it should see them: to a hundredth of a pixel,
+/// which is what single precision leaves of some hundred pixels and metres.
+fn disparity_leads_to_the_points(report: &Value) -> Result<(), String> {
+    let pixels = number(report, "width")? * number(report, "height")?;
+    let (points, error) = (number(report, "points")?, number(report, "reprojection_error_pixels")?);
+    let (low, high) = (number(report, "disparity_min")?, number(report, "disparity_max")?);
+    if !(0.0 < low && low < high) || points < 0.25 * pixels {
+        return Err(format!("{points} points of {pixels} pixels, disparities from {low} to {high}"));
+    }
+    if error > 0.01 {
+        return Err(format!("points are {error} pixels from where the right eye should see them"));
+    }
     Ok(())
 }
 
@@ -340,6 +388,20 @@ mod tests {
         fs::write(&path, "{\"steps\": 400}").expect("writable");
         assert!(check_report(&path, anything).is_ok());
     }
+
+    #[test]
+    fn disparities_have_to_lead_to_points() {
+        let report = |points: f64, low: f64, error: f64| {
+            json!({ "width": 20, "height": 10, "points": points, "disparity_min": low, "disparity_max": 9.0,
+                    "reprojection_error_pixels": error })
+        };
+        assert_eq!(disparity_leads_to_the_points(&report(100.0, 1.0, 1e-4)), Ok(()));
+        assert!(disparity_leads_to_the_points(&report(10.0, 1.0, 1e-4)).is_err(), "few points");
+        assert!(disparity_leads_to_the_points(&report(100.0, 0.0, 1e-4)).is_err(), "infinitely far points");
+        assert!(disparity_leads_to_the_points(&report(100.0, 1.0, 0.1)).is_err(), "elsewhere");
+        assert!(disparity_leads_to_the_points(&json!({})).is_err());
+    }
+
     /// A report of 16 environments, the first of which is `odd` and the others `rest`.
     fn trial(successes: u64, odd: &Value, rest: &Value) -> Value {
         let environments: Vec<&Value> = std::iter::once(odd).chain(std::iter::repeat_n(rest, 15)).collect();

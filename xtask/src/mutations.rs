@@ -211,7 +211,10 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
     physics(
         "an update is a step too short",
         "sim/src/manager.rs",
-        ["let mut left = steps;", "let mut left = steps.saturating_sub(u32::from(steps > 1));"],
+        [
+            "fn advance(&mut self, steps: u32) {\n        let mut left = steps;",
+            "fn advance(&mut self, steps: u32) {\n        let mut left = steps.saturating_sub(u32::from(steps > 1));",
+        ],
         &["free_fall", "parts_of_an_update"],
     ),
     physics(

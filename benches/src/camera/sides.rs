@@ -9,6 +9,7 @@ use kinetoscope::sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCf
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
+use kinetoscope::sim::staying_crew;
 use serde_json::json;
 use std::ffi::OsString;
 use std::sync::Arc;
@@ -70,7 +71,7 @@ impl<'s> Ours<'s> {
         let mut ours = Self {
             scene,
             batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads)?,
-            rasterizer: ParallelRasterizer::new(cfg, threads),
+            rasterizer: ParallelRasterizer::new(cfg, threads).with_crew(staying_crew()),
             view: scene.view(work.size)?,
             physics: work.physics,
             poses: vec![PoseF32::IDENTITY; work.envs * seen.instances().len()],
@@ -94,6 +95,7 @@ impl<'s> Ours<'s> {
             poses: &poses[i * things..(i + 1) * things],
             view,
             lights: Some(&lights[i * lamps..(i + 1) * lamps]),
+            lens: None,
         };
         let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())

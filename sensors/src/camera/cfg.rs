@@ -3,19 +3,27 @@
 use super::channel::{Channels, Pictures};
 use super::error::CameraError;
 use super::extrinsics::Extrinsics;
-use super::intrinsics::Intrinsics;
+use super::faults::Faults;
+use super::imperfection::Imperfections;
+use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::lens::{self, RaysOfRows};
+use super::memory::Memory;
 use super::rasterizer::RasterCfg;
 use super::renderer::Renderer;
 use super::sensor::{Camera, Lens};
 use crate::error::SensorError;
+use crate::noise::NoiseCfg;
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use crate::visibility::RenderError;
 use scene::{Light, PoseF32};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The most memory that the pictures of a camera may take \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
+/// What a capture takes besides poses and lamps, at most \[bytes\]: its place, its lens, its stamp, its ticket.
+const CAPTURE: usize = 512;
 
 /// What depth and distance say where nothing is hit between the near and the far plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -56,11 +64,14 @@ pub struct CameraCfg {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// The lens.
+    /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// Nothing nearer is seen: smallest depth along the optical axis \[m\].
+    /// The lens: which way the rays of pixels go. Lenses other than a pinhole need a renderer that follows rays.
+    pub lens: lens::Lens,
+    /// Nothing nearer is seen: smallest depth along the optical axis \[m\], or along the ray where rays of the lens do not all
+    /// go forward ([`Lens::is_forward`](lens::Lens::is_forward)).
     pub near: f64,
-    /// Nothing farther is seen: largest depth along the optical axis \[m\].
+    /// Nothing farther is seen: largest depth along the optical axis \[m\], or along the ray, as [`near`](Self::near).
     pub far: f64,
     /// Where it is.
     pub extrinsics: Extrinsics,
@@ -81,6 +92,26 @@ pub struct CameraCfg {
     /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
     /// to see is kept when it is due.
     pub lazy: bool,
+    /// Pictures to remember, the newest included: see [`Camera::history`]. Those of a lazy camera are drawn when somebody
+    /// looks at the history.
+    pub history_length: usize,
+    /// Physics steps from the capture of a picture until it can be read. It keeps the stamp of its capture. What somebody
+    /// writes to the state of an environment is seen at once there, by every sensor: nothing stale is ever read.
+    pub latency_steps: u32,
+    /// Probability that a picture is lost on the way, 0 to 1: the one before stays.
+    pub dropout: f64,
+    /// Noise of numbers by the name of the channel, at every pixel by itself: of `depth` and `distance` \[m\], which is from
+    /// `near` to `far` with it too (distance from `near` on) and leaves misses what they are, and of `color` in steps of its
+    /// 8 bits, red, green and blue each by itself; results are rounded to bytes.
+    ///
+    /// The numbers depend on the seed of the simulation, the environment, the name of the camera, which picture it is and which
+    /// pixel, and on nothing else. They are looked up: whether a camera is lazy, when somebody reads, and how many threads
+    /// there are change nothing. A picture that is drawn again after a setter has the same noise again. Looking up where
+    /// `bias_walk` has come to takes longer, the longer it walks: as many numbers as twice the binary digits of
+    /// the count of pictures since the reset.
+    pub noise: BTreeMap<String, NoiseCfg>,
+    /// What is not perfect about the camera itself; it comes before [`noise`](Self::noise).
+    pub imperfections: Imperfections,
     /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
@@ -94,6 +125,7 @@ impl Default for CameraCfg {
             width: 640,
             height: 480,
             intrinsics: Intrinsics::Pixels { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 },
+            lens: lens::Lens::default(),
             near: 0.005,
             far: 100.0,
             extrinsics: Extrinsics::default(),
@@ -105,6 +137,11 @@ impl Default for CameraCfg {
             raster: RasterCfg::of_cameras(),
             env_ids: None,
             lazy: true,
+            history_length: 0,
+            latency_steps: 0,
+            dropout: 0.0,
+            noise: BTreeMap::new(),
+            imperfections: Imperfections::default(),
             debug_vis: false,
         }
     }
@@ -125,7 +162,9 @@ impl SensorCfg for CameraCfg {
     /// # Errors
     ///
     /// Sizes, lens, depth range or placement that are no good, an unknown parent, environments that do not exist or are
-    /// named twice, a period that is no whole number of steps, pictures that do not fit into memory.
+    /// named twice, a period that is no whole number of steps, a dropout that is no probability, noise of a channel that is not
+    /// there or has none, numbers of noise or of imperfections that are no good, pictures, history or latency that do not fit into
+    /// memory.
     fn build(&self, context: &SensorContext) -> Result<Camera, SensorError> {
         let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
         let scene = context.scene.clone().ok_or(CameraError::NoScene)?;
@@ -142,32 +181,59 @@ impl SensorCfg for CameraCfg {
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
         let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
         check_env_ids(&env_ids, context.num_envs)?;
-        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len())?;
+        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len(), schedule)?;
+        let rays = self.lens_rays(&pixels, env_ids.len())?;
+        let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
         let mount = self.extrinsics.parent_from_camera()?;
         let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
-        Ok(Camera::new(self, context, scene, schedule, parent, (lens, pixels, mount), env_ids, pictures))
+        let optics = (lens, pixels, mount);
+        Ok(Camera::new(self, context, scene, schedule, parent, optics, rays, env_ids, (pictures, faults)))
     }
 }
 
 impl CameraCfg {
+    /// The rays of the lens in every row.
+    fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
+        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays() {
+            let (lens, renderer) = (self.lens.name(), self.renderer.name());
+            return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
+        }
+        // Paths have rays of their own; only colours without them have more samples than a pixel's centre.
+        let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
+        RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)
+    }
+
     /// Refuses what would end the process: an allocation that fails.
-    fn check_memory(&self, views: usize, instances: usize, lamps: usize) -> Result<(), CameraError> {
+    fn check_memory(
+        &self,
+        views: usize,
+        instances: usize,
+        lamps: usize,
+        schedule: Schedule,
+    ) -> Result<(), CameraError> {
         let bytes_per_pixel = self.channels.bytes_per_pixel();
         let capture = instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
-        let bytes = self
-            .width
-            .checked_mul(self.height)
-            .and_then(|pixels| pixels.checked_mul(bytes_per_pixel))
-            .and_then(|bytes| bytes.checked_add(capture))
-            .and_then(|bytes| bytes.checked_mul(views))
-            .filter(|&bytes| bytes as u64 <= MAX_BYTES);
-        // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
-        let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-        if granted {
-            return Ok(());
+        let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
+        let fits = |pictures: usize, captures: usize| {
+            let captures = captures.checked_mul(capture.saturating_add(CAPTURE));
+            let pictures = picture.and_then(|bytes| bytes.checked_mul(pictures));
+            let bytes = pictures
+                .zip(captures)
+                .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views))
+                .filter(|&bytes| bytes as u64 <= MAX_BYTES);
+            // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
+            bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+        };
+        if !fits(1, 1) {
+            let (width, height) = (self.width, self.height);
+            return Err(CameraError::Memory { views, width, height, bytes_per_pixel, limit: MAX_BYTES });
         }
-        let (width, height) = (self.width, self.height);
-        Err(CameraError::Memory { views, width, height, bytes_per_pixel, limit: MAX_BYTES })
+        let (pictures, captures) = (self.history_length, Memory::waiting(self, schedule));
+        let all = pictures.saturating_add(captures).saturating_add(1);
+        if !fits(pictures.saturating_add(1), all) {
+            return Err(CameraError::Past { pictures, captures, views, limit: MAX_BYTES });
+        }
+        Ok(())
     }
 }
 

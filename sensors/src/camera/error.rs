@@ -27,6 +27,42 @@ pub enum CameraError {
         /// What is possible.
         allowed: &'static str,
     },
+    /// The mapping of a lens folds back on itself before where the lens is to see: there are two directions for a pixel.
+    #[error(
+        "the mapping of the {lens} lens cannot be inverted: it folds back {:.2} degrees from the optical axis, at radius \
+         {radius:.4} of the normalised picture (times fx: in pixels), and {wanted}; check the coefficients, make the picture \
+         smaller, or end the lens before with max_angle",
+        .angle.to_degrees()
+    )]
+    LensFolds {
+        /// The lens.
+        lens: &'static str,
+        /// The angle with the optical axis where it folds back, in the first direction in which it does \[rad\].
+        angle: f64,
+        /// How far from the principal point that is, in the normalised picture (times fx: in pixels).
+        radius: f64,
+        /// What needs more.
+        wanted: String,
+    },
+    /// Nothing at all is seen through a lens.
+    #[error("no pixel of the picture is within what the {lens} lens sees; check the intrinsics and max_angle")]
+    LensBlind {
+        /// The lens.
+        lens: &'static str,
+    },
+    /// The rays of all kinds of pixels behind a lens do not fit into memory.
+    #[error(
+        "{tables} different intrinsics behind a lens need {bytes} bytes of rays, which do not fit into memory (at most {limit} \
+         bytes)"
+    )]
+    LensMemory {
+        /// How many different intrinsics there are.
+        tables: usize,
+        /// What they need \[bytes\].
+        bytes: usize,
+        /// The most that is allowed.
+        limit: usize,
+    },
     /// A matrix that is not that of a pinhole camera.
     #[error("an intrinsic matrix is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; row {row}, column {column} is {value}")]
     IntrinsicMatrix {
@@ -97,6 +133,24 @@ pub enum CameraError {
         /// Those it measures.
         enabled: Vec<&'static str>,
     },
+    /// A disparity was asked of eyes that are not parallel, not side by side, or have different lenses.
+    #[error("disparity is defined for a rectified pair of eyes: {what} is {value}, it must be {expected}")]
+    NotRectified {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What it would be in a rectified pair.
+        expected: String,
+    },
+    /// A mask id that no thing can have.
+    #[error("mask id {id} {problem}")]
+    MaskId {
+        /// The id.
+        id: i32,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
     /// The pictures of all environments do not fit into memory.
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \
@@ -111,6 +165,21 @@ pub enum CameraError {
         height: usize,
         /// Memory of a pixel.
         bytes_per_pixel: usize,
+        /// The most that is allowed.
+        limit: u64,
+    },
+    /// History and latency need more memory than can be given.
+    #[error(
+        "{pictures} past pictures and {captures} captures on their way, in each of {views} environments, do not fit into \
+         memory (at most {limit} bytes); make history_length or latency_steps smaller"
+    )]
+    Past {
+        /// Pictures of the history.
+        pictures: usize,
+        /// Captures on their way.
+        captures: usize,
+        /// How many environments.
+        views: usize,
         /// The most that is allowed.
         limit: u64,
     },

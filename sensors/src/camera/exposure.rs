@@ -1,6 +1,7 @@
 //! Pictures by path tracing: threads share the rows of one picture at a time.
 
 use super::channel::FrameMut;
+use super::lens::LensRays;
 use super::rasterizer::{Rasterizer, Shot};
 use super::renderer::Renderer;
 use crate::crew::Crew;
@@ -59,10 +60,13 @@ fn draw(
     }
     let Some(color) = color else { return };
     film.resize([width, height], denoise);
-    film.lamps.prepare(shot.scene, shot.lights.unwrap_or(&shot.scene.lights), cfg.shadows, projection);
+    let forward = shot.lens.is_none_or(LensRays::is_forward);
+    let lights = shot.lights.unwrap_or(&shot.scene.lights);
+    film.lamps.prepare(shot.scene, lights, cfg.shadows, (projection, forward));
     let (lamps, rows) = film.rows(ROWS);
     let (scene, poses, tracer) = (shot.scene, shot.poses, &plan.tracer);
-    let paths = Paths { scene, poses, tracer, projection, samples, max_bounces, seed, lamps };
+    let lens = shot.lens;
+    let paths = Paths { scene, poses, tracer, projection, lens, samples, max_bounces, seed, lamps };
     crew.share(rasterizers, rows, |rasterizer, mut rows| {
         rows.expose(&paths, denoise, rasterizer.brush.stack());
     });

@@ -1,6 +1,6 @@
 //! What a camera shows of itself.
 
-use super::PixelIntrinsics;
+use super::Optics;
 use nalgebra::Vector3;
 use scene::{Marker, Pose};
 
@@ -11,16 +11,12 @@ const AXES: f32 = 0.1;
 const COLOR: [f32; 4] = [0.95, 0.8, 0.1, 1.0];
 
 /// The optical frame (blue is where it looks), and arrows from the eye along the four edges of what the picture shows, to a
-/// depth of 0.3 m.
-pub(crate) fn frustum(
-    world_from_camera: &Pose,
-    lens: &PixelIntrinsics,
-    (height, width): (usize, usize),
-) -> Vec<Marker> {
+/// depth of 0.3 m, or as long where rays go aside or back. Corners that show nothing have none.
+pub(crate) fn frustum(world_from_camera: &Pose, optics: &Optics, (height, width): (usize, usize)) -> Vec<Marker> {
     let (w, h) = (width as f64, height as f64);
     let eye = world_from_camera.translation.vector;
-    let edge = |[u, v]: [f64; 2]| {
-        let ray = Vector3::new((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0) * DEPTH;
+    let edge = |corner: [f64; 2]| {
+        let ray = Vector3::from(optics.ray(corner)?) * DEPTH;
         Marker::arrow(eye.into(), (world_from_camera.rotation * ray).into(), COLOR)
     };
     let edges = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].into_iter().filter_map(edge);

@@ -1,30 +1,49 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+pub mod boxes;
+pub mod calibration;
+mod captures;
 pub mod cfg;
 pub mod channel;
 pub mod colormap;
 pub mod error;
 mod exposure;
 pub mod extrinsics;
+mod faults;
 pub(crate) mod frustum;
+pub mod imperfection;
 pub mod intrinsics;
+pub mod lens;
+mod memory;
 pub(crate) mod mounts;
 pub mod parallel;
+mod past;
+mod picture_noise;
 pub mod point_cloud;
 pub mod rasterizer;
 pub mod renderer;
+pub mod segmentation;
 pub mod sensor;
+pub mod stereo;
+pub(crate) mod ticket;
 
 #[cfg(test)]
 mod tests;
 
+pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
+pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
 pub use cfg::{CameraCfg, DepthMiss};
 pub use channel::{Channel, Channels, Frame, FrameMut, Pictures};
 pub use error::CameraError;
 pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pose};
+pub use imperfection::Imperfections;
 pub use intrinsics::{Intrinsics, PixelIntrinsics};
+pub use lens::{Lens, LensModel, LensRays, Optics};
 pub use parallel::ParallelRasterizer;
+pub use past::HistoryView;
 pub use point_cloud::PointFrame;
 pub use rasterizer::{RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
+pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;
+pub use stereo::{StereoCamera, StereoCameraCfg, StereoOrigin};

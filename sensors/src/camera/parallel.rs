@@ -63,6 +63,11 @@ impl ParallelRasterizer {
         }
     }
 
+    /// The geom groups that are drawn: bit k is group k.
+    pub(crate) fn groups(&self) -> u32 {
+        self.rasterizers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
+    }
+
     /// Takes trees over meshes from there, and keeps new ones there.
     pub(crate) fn share_assets(&mut self, assets: &RayAssets) {
         for rasterizer in &mut self.rasterizers {
@@ -204,7 +209,7 @@ mod tests {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
         let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
         let mut frame = Frame::new(32, 32, Channels::ALL);
-        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None };
+        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None };
         let jobs = [(shot, frame.as_mut())];
         // Without shadow maps, whose cost is that of many more pixels.
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };

@@ -1,6 +1,6 @@
 //! Depth pictures, turned back into points.
 
-use super::channel::Depth;
+use super::channel::{Depth, Distance};
 use super::intrinsics::PixelIntrinsics;
 use super::sensor::Camera;
 use crate::error::SensorError;
@@ -19,22 +19,31 @@ pub enum PointFrame {
 
 impl Camera {
     /// The point at every pixel of environment `env` \[m\], shape (H, W, 3): the depth along the ray through the pixel's
-    /// centre. (+inf, +inf, +inf) where nothing was hit.
+    /// centre, or the distance, of a lens whose rays do not all go forward ([`Lens::is_forward`](super::Lens::is_forward)).
+    /// (+inf, +inf, +inf) where nothing was hit.
     ///
     /// # Errors
     ///
-    /// As [`channel`](Self::channel) of [`Depth`], and an environment that the camera does not see.
+    /// As [`channel`](Self::channel) of [`Depth`], or of [`Distance`] where distances are needed, and an environment that the
+    /// camera does not see.
     pub fn point_map(&self, env: usize, frame: PointFrame) -> Result<Array3<f32>, SensorError> {
         let (row, (height, width)) = (self.row(env)?, self.image_shape());
-        let depth = self.channel::<Depth>()?;
-        let depth = depth.index_axis(Axis(0), row);
+        let rays = self.rays_of(row);
+        let along = match rays {
+            Some(rays) if !rays.is_forward() => self.channel::<Distance>()?,
+            _ => self.channel::<Depth>()?,
+        };
+        let along = along.index_axis(Axis(0), row);
         let view = self.view(env)?;
         let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
         let pose = self.world_from_camera(row).filter(|_| frame == PointFrame::World).unwrap_or_default();
         let mut points = Array3::from_elem((height, width, 3), f32::INFINITY);
         if let Some(points) = points.as_slice_mut() {
-            let depths = depth.iter().map(|&depth| self.is_hit(depth).then_some(depth));
-            unproject(&PixelIntrinsics { fx, fy, cx, cy }, &pose, width, depths, points);
+            let along = along.iter().map(|&along| self.is_hit(along).then_some(along));
+            match rays {
+                Some(rays) => follow(|at| rays.direction(0, at).map(f64::from), &pose, width, along, points),
+                None => unproject(&PixelIntrinsics { fx, fy, cx, cy }, &pose, width, along, points),
+            }
         }
         Ok(points)
     }
@@ -60,11 +69,25 @@ pub(crate) fn unproject(
     depths: impl Iterator<Item = Option<f32>>,
     points: &mut [f32],
 ) {
-    for (k, (depth, point)) in depths.zip(points.chunks_exact_mut(3)).enumerate() {
-        let Some(depth) = depth else { continue };
-        let (u, v, z) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5, f64::from(depth));
-        let (x, y) = ((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy);
-        let at = pose * nalgebra::Point3::new(x * z, y * z, z);
+    let ray = |[x, y]: [usize; 2]| {
+        let (u, v) = (x as f64 + 0.5, y as f64 + 0.5);
+        [(u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0]
+    };
+    follow(ray, pose, width, depths, points);
+}
+
+/// As [`unproject`], along rays in the optical frame, in lengths of each.
+fn follow(
+    ray: impl Fn([usize; 2]) -> [f64; 3],
+    pose: &Pose,
+    width: usize,
+    along: impl Iterator<Item = Option<f32>>,
+    points: &mut [f32],
+) {
+    for (k, (along, point)) in along.zip(points.chunks_exact_mut(3)).enumerate() {
+        let Some(along) = along.map(f64::from) else { continue };
+        let [x, y, z] = ray([k % width, k / width]);
+        let at = pose * nalgebra::Point3::new(x * along, y * along, z * along);
         for (to, from) in point.iter_mut().zip(at.iter()) {
             *to = *from as f32;
         }

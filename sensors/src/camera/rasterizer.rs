@@ -2,6 +2,7 @@
 
 use super::channel::{Frame, FrameMut};
 use super::exposure::expose;
+use super::lens::LensRays;
 use super::renderer::Renderer;
 use crate::crew::Crew;
 use crate::lanes::Level;
@@ -71,6 +72,8 @@ pub struct Shot<'a> {
     pub view: &'a View,
     /// Lamps instead of the scene's, for those that move.
     pub lights: Option<&'a [Light]>,
+    /// The rays of a lens, instead of the view's focal lengths and principal point; `None` is a pinhole.
+    pub lens: Option<&'a LensRays>,
 }
 
 /// Draws frames, one at a time; keeps its scratch memory. Use one per thread.
@@ -145,7 +148,7 @@ impl Rasterizer {
         view: &View,
         frame: &mut Frame,
     ) -> Result<(), RenderError> {
-        self.render_shot(&Shot { scene, poses, view, lights: None }, &mut frame.as_mut())
+        self.render_shot(&Shot { scene, poses, view, lights: None, lens: None }, &mut frame.as_mut())
     }
 
     /// Draws the channels that `frame` has, into borrowed memory.

@@ -81,6 +81,16 @@ impl Renderer {
         Ok(())
     }
 
+    /// Its name in files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::FastRayTraced => "fast_ray_traced",
+            Self::Hybrid => "hybrid",
+            Self::RayTraced { .. } => "ray_traced",
+        }
+    }
+
     /// Whether what is seen at a pixel is found by rays.
     pub(crate) fn sees_by_rays(self) -> bool {
         matches!(self, Self::FastRayTraced | Self::RayTraced { .. })

@@ -1,21 +1,26 @@
 //! The camera: captures what there is to see, draws when somebody looks.
 
+use super::captures::Captures;
 use super::cfg::{CameraCfg, DepthMiss};
-use super::channel::{Channels, Listed, PictureView, Pictures};
+use super::channel::{Channels, FrameMut, Listed, PictureView, Pictures};
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
+use super::faults::Faults;
 use super::frustum::frustum;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::lens::{self, LensRays, Optics, RaysOfRows};
+use super::memory::{Memory, Past};
 use super::mounts::{Mount, Mounts, chosen_rows};
 use super::parallel::{Job, ParallelRasterizer};
 use super::rasterizer::Shot;
+use super::ticket::Ticket;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor, SensorContext};
 use crate::visibility::{RenderError, View};
-use ndarray::{Array1, Array2, Array3, ArrayView1, Axis};
-use scene::pose::{from_row, to_row};
-use scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState, VisibleState};
+use ndarray::{Array1, Array2, Array3, ArrayView1};
+use scene::pose::to_row;
+use scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -27,6 +32,11 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// of [`stamps`](Self::stamps), however late it comes. After a setter ([`set_local_pose`](Self::set_local_pose),
 /// [`look_at`](Self::look_at), [`set_intrinsics`](Self::set_intrinsics)...) the next reading shows the same instant from
 /// the new place. Places and lenses set that way stay over a reset, until [`restore`](Self::restore).
+///
+/// A camera is perfect unless it is told otherwise: it may have a [`history`](Self::history), pictures may come late or get
+/// lost, and be noisy or spoilt as those of real cameras ([`CameraCfg::imperfections`]). Then it is lazy still, and
+/// shows the same bits: each capture is kept until it arrives, or until somebody looks. Setters act on what is shown and on
+/// what is on its way; the history stays as it was seen.
 ///
 /// Views that were read borrow the camera: nothing draws over them. The first axis of everything is the camera's own
 /// environments, [`env_ids`](Self::env_ids); the frame is that of the environment, units are metres. An environment whose
@@ -40,7 +50,8 @@ pub struct Camera {
     num_bodies: usize,
     /// Index of the body it hangs on.
     parent: Option<usize>,
-    mounts: Mounts,
+    pub(super) mounts: Mounts,
+    rays: RaysOfRows,
     channels: Channels,
     depth_miss: DepthMiss,
     lazy: bool,
@@ -48,6 +59,10 @@ pub struct Camera {
     /// Physics step \[s\].
     dt: f64,
     captures: Captures,
+    /// Those of the newest captures.
+    tickets: Vec<Ticket>,
+    /// What is late, and what was; `None` for a camera that has none of it.
+    memory: Option<Box<Memory>>,
     frame_counts: Array1<u64>,
     /// Rows that are due, between updates without meaning: its memory is kept.
     due: Vec<usize>,
@@ -64,20 +79,6 @@ pub(super) struct Lens {
     height: usize,
     near: f32,
     far: f32,
-}
-
-/// What there was to see.
-#[derive(Clone, Debug)]
-struct Captures {
-    /// World from instance, shape \[rows, instances\].
-    poses: Array2<PoseF32>,
-    /// Shape \[rows, lamps\].
-    lights: Array2<Light>,
-    /// What there is instead of the scene of all, row by row.
-    scenes: Vec<OwnScene>,
-    /// Where the parent was; the identity for a free camera, `None` before the first capture.
-    world_from_parent: Vec<Option<Pose>>,
-    stamps: Array1<f64>,
 }
 
 /// Pictures, and which of them are not of what was captured last.
@@ -97,6 +98,9 @@ struct Desk {
     /// Lists that are empty between drawings: their memory is kept.
     views: Vec<View>,
     jobs: Vec<Job<'static>>,
+    tickets: Vec<Ticket>,
+    /// What happens to pictures after they were drawn.
+    faults: Option<Faults>,
 }
 
 impl Lens {
@@ -129,9 +133,23 @@ impl Sensor for Camera {
         due.clear();
         due.extend((0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])));
         for &row in &due {
-            self.frame_counts[row] += 1;
+            self.tickets[row].due();
         }
-        self.capture(&due, state);
+        match self.memory.take() {
+            None => {
+                for &row in &due {
+                    self.frame_counts[row] += 1;
+                }
+                self.capture(&due, state);
+            }
+            Some(mut memory) => {
+                self.send(&due, state, &mut memory);
+                due.clear();
+                self.receive(state, &mut memory, &mut due);
+                self.memory = Some(memory);
+                self.draw_if_eager();
+            }
+        }
         self.due = due;
         Ok(())
     }
@@ -142,6 +160,10 @@ impl Sensor for Camera {
         for &row in &rows {
             self.phases.reset(row, state.step[self.env_ids[row]]);
             self.frame_counts[row] = 0;
+            self.tickets[row].reset();
+            if let Some(memory) = &mut self.memory {
+                memory.reset(row);
+            }
         }
         self.capture(&rows, state);
         Ok(())
@@ -150,20 +172,25 @@ impl Sensor for Camera {
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
         let rows = self.seen_rows(env_ids)?;
+        for &row in &rows {
+            self.tickets[row].refresh();
+        }
         self.capture(&rows, state);
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        self.phases.due_in(self.env_ids.iter().map(|&env| step[env]))
+        let steps = || self.env_ids.iter().map(|&env| step[env]);
+        let due = self.phases.due_in(steps());
+        self.memory.as_ref().and_then(|memory| memory.due_in(steps())).map_or(due, |arrival| arrival.min(due))
     }
 
     /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
     /// environment that it does not look into.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let row = self.row_of_env.get(env).copied().flatten();
-        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.mounts.row(row).pixels)));
-        placed.map_or_else(Vec::new, |(pose, lens)| frustum(&pose, &lens, self.image_shape()))
+        let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
+        placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, self.image_shape()))
     }
 }
 
@@ -180,21 +207,20 @@ impl Camera {
         schedule: Schedule,
         parent: Option<usize>,
         (lens, pixels, parent_from_camera): (Lens, PixelIntrinsics, Pose),
+        rays: RaysOfRows,
         env_ids: Vec<usize>,
-        pictures: Pictures,
+        (pictures, faults): (Pictures, Option<Faults>),
     ) -> Self {
         let rows = env_ids.len();
         let mut row_of_env = vec![None; context.num_envs];
         for (row, &env) in env_ids.iter().enumerate() {
             row_of_env[env] = Some(row);
         }
-        let captures = Captures {
-            poses: Array2::from_elem((rows, scene.instances().len()), PoseF32::IDENTITY),
-            lights: Array2::from_elem((rows, scene.lights.len()), Light::default()),
-            scenes: vec![OwnScene::default(); rows],
-            world_from_parent: vec![None; rows],
-            stamps: Array1::zeros(rows),
-        };
+        let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
+        let tickets: Vec<Ticket> = env_ids.iter().map(key).collect();
+        let mount = Mount { parent_from_camera, pixels };
+        let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
+        let captures = Captures::new(rows, &scene, tickets[0]);
         let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.share_assets(&context.ray_assets);
@@ -205,17 +231,27 @@ impl Camera {
             row_of_env,
             num_bodies: context.bodies.len(),
             parent,
-            mounts: Mounts::new(Mount { parent_from_camera, pixels }, rows),
+            mounts: Mounts::new(mount, rows),
+            rays,
             channels: cfg.channels,
             depth_miss: cfg.depth_miss,
             lazy: cfg.lazy,
             phases: schedule.phases(rows),
             dt: context.dt,
             captures,
+            tickets,
+            memory,
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
-            desk: Mutex::new(Desk { rasterizer, canvas, views: Vec::new(), jobs: Vec::new() }),
+            desk: Mutex::new(Desk {
+                rasterizer,
+                canvas,
+                views: Vec::new(),
+                jobs: Vec::new(),
+                tickets: Vec::new(),
+                faults,
+            }),
             draws: AtomicU64::new(0),
             env_ids,
         }
@@ -251,8 +287,8 @@ impl Camera {
         self.captures.stamps.view()
     }
 
-    /// Pictures since the last reset, shape (N): those that were due, whether somebody looked or not. The refresh of a
-    /// reset is none.
+    /// Pictures since the last reset, shape (N): those that were due and have arrived, whether somebody looked or not. The
+    /// refresh of a reset is none.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.frame_counts.view()
     }
@@ -296,6 +332,26 @@ impl Camera {
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts.row(row).pixels.matrix()[(i, j)])
+    }
+
+    /// The lens, the same in all environments.
+    pub fn lens(&self) -> lens::Lens {
+        self.rays.lens()
+    }
+
+    /// The lens of environment `env` in front of its pixels: from directions to pixels and back.
+    ///
+    /// # Errors
+    ///
+    /// An environment that the camera does not see.
+    pub fn optics(&self, env: usize) -> Result<Optics, SensorError> {
+        let pixels = self.mounts.row(self.row(env)?).pixels;
+        Ok(Optics::new(self.rays.lens(), pixels)?)
+    }
+
+    /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
+    pub fn lens_bytes(&self) -> usize {
+        self.rays.bytes()
     }
 
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
@@ -396,13 +452,23 @@ impl Camera {
     /// # Errors
     ///
     /// [`CameraError::Lens`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
-    /// or that is named twice; nothing is changed then.
+    /// or that is named twice; of a camera with a lens also [`CameraError::LensFolds`], [`CameraError::LensBlind`] and
+    /// [`CameraError::LensMemory`]. Nothing is changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, lens, .. } = self;
+        let Self { mounts, lens, rays, .. } = self;
+        let made = match rays.lens().is_pinhole() {
+            true => Vec::new(),
+            false => {
+                let pixels: Result<Vec<_>, _> =
+                    intrinsics.iter().map(|i| i.to_pixels(lens.width, lens.height)).collect();
+                rays.make(&pixels?)?
+            }
+        };
         mounts.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
             lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
         })?;
+        rays.set(made, &rows, |row| mounts.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -414,7 +480,9 @@ impl Camera {
     /// An environment that the camera does not see or that is named twice; nothing is changed then.
     pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        self.mounts.restore(&rows);
+        let Self { mounts, rays, .. } = self;
+        mounts.restore(&rows);
+        rays.set(Vec::new(), &rows, |row| mounts.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -450,13 +518,36 @@ impl Camera {
         }
     }
 
+    /// The lens of a row, in front of its pixels.
+    fn optics_of(&self, row: usize) -> Option<Optics> {
+        match self.rays.row(row) {
+            Some(rays) => Some(*rays.optics()),
+            None => Optics::new(lens::Lens::default(), self.mounts.row(row).pixels).ok(),
+        }
+    }
+
+    /// The rays of a row; none for a pinhole.
+    pub(super) fn rays_of(&self, row: usize) -> Option<&LensRays> {
+        self.rays.row(row)
+    }
+
     /// Where the optical frame is at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
-        let local = self.mounts.row(row).parent_from_camera;
+        self.world_from(self.mounts.row(row), self.captures.world_from_parent[row])
+    }
+
+    /// Where the optical frame of a mount is.
+    fn world_from(&self, mount: &Mount, world_from_parent: Option<Pose>) -> Option<Pose> {
+        let local = mount.parent_from_camera;
         match self.parent {
             None => Some(local),
-            Some(_) => self.captures.world_from_parent[row].map(|world_from_parent| world_from_parent * local),
+            Some(_) => world_from_parent.map(|world_from_parent| world_from_parent * local),
         }
+    }
+
+    /// The history, of a camera that has a memory.
+    pub(super) fn past(&self) -> Option<&Past> {
+        self.memory.as_ref().map(|memory| &memory.past)
     }
 
     /// Whether the state is of the scene that the camera was built for.
@@ -489,25 +580,54 @@ impl Camera {
         }
     }
 
-    /// Keeps what there is to see in some environments; the state was checked.
+    /// Shows what there is to see in some environments; the state was checked.
     fn capture(&mut self, rows: &[usize], state: &SceneState) {
-        let Some(visible) = &state.visible else { return };
         for &row in rows {
             let env = self.env_ids[row];
-            let to = &mut self.captures;
-            to.poses.index_axis_mut(Axis(0), row).assign(&visible.instance_poses.index_axis(Axis(0), env));
-            to.lights.index_axis_mut(Axis(0), row).assign(&visible.lights.index_axis(Axis(0), env));
-            to.scenes[row].clone_from(state.own_scene(env));
-            let parent = self.parent.zip(state.body_poses.as_ref());
-            let world_from_parent =
-                parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
-            to.world_from_parent[row] = Some(world_from_parent.unwrap_or_else(Pose::identity));
-            to.stamps[row] = state.time[env];
+            self.captures.keep(row, (state, env), self.parent, self.tickets[row]);
+            if let Some(memory) = &mut self.memory {
+                memory.refresh(row, state.step[env]);
+            }
         }
         self.outdate(rows);
+        self.draw_if_eager();
+    }
+
+    /// Keeps what there is to see in some environments for later.
+    fn send(&mut self, rows: &[usize], state: &SceneState, memory: &mut Memory) {
+        for &row in rows {
+            let (env, ticket) = (self.env_ids[row], self.tickets[row]);
+            if let Some(slot) = memory.send(row, state.step[env], &ticket) {
+                memory.waiting.keep(slot, (state, env), self.parent, ticket);
+            }
+        }
+    }
+
+    /// Takes what has arrived; `shown` become the rows that show something else.
+    fn receive(&mut self, state: &SceneState, memory: &mut Memory, shown: &mut Vec<usize>) {
+        for row in 0..self.env_ids.len() {
+            let mut shows = None;
+            while let Some((slot, show)) = memory.receive(row, state.step[self.env_ids[row]]) {
+                memory.remember(row, slot, (self.mounts.row(row), self.rays.shared(row)));
+                self.frame_counts[row] += 1;
+                if show {
+                    self.captures.copy(row, &memory.waiting, slot);
+                }
+                shows = Some(show);
+            }
+            if shows == Some(true) {
+                shown.push(row);
+            }
+        }
+        self.outdate(shown);
+        shown.iter().for_each(|&row| memory.past.shown[row] = true);
+    }
+
+    fn draw_if_eager(&self) {
         if !self.lazy {
             // What is wrong is said to who reads.
             let _ = self.pictures();
+            self.draw_history();
         }
     }
 
@@ -515,6 +635,9 @@ impl Camera {
     fn outdate(&mut self, rows: &[usize]) {
         if rows.is_empty() {
             return;
+        }
+        if let Some(memory) = &mut self.memory {
+            rows.iter().for_each(|&row| memory.past.shown[row] = false);
         }
         let drawn = self.drawn.take();
         let desk = self.desk.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -527,35 +650,17 @@ impl Camera {
     /// Draws what is stale.
     fn draw(&self) -> Canvas {
         let rows = self.mounts.len();
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let desk = &mut *desk;
+        let canvas = self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas.take();
         // It is missing only where a drawing panicked.
-        let mut canvas = desk.canvas.take().unwrap_or_else(|| {
+        let mut canvas = canvas.unwrap_or_else(|| {
             Canvas::new(Pictures::new(self.channels, rows, self.lens.width, self.lens.height), rows)
         });
         let Canvas { pictures, stale, failure } = &mut canvas;
         let is_stale = |row: &usize| stale[*row];
-        desk.views.clear();
-        desk.views.extend((0..rows).filter(is_stale).map(|row| self.view_of(row)));
-        let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(&mut desk.jobs));
-        let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row));
-        for ((row, frame), view) in frames.zip(&desk.views) {
-            let poses = row_of(&self.captures.poses, row);
-            let lights = Some(row_of(&self.captures.lights, row));
-            let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
-            jobs.push((Shot { scene, poses, view, lights }, frame));
-        }
-        let result = desk.rasterizer.render(&mut jobs);
-        let miss = match self.depth_miss {
-            DepthMiss::Inf => None,
-            DepthMiss::Far => Some(self.lens.far),
-            DepthMiss::Zero => Some(0.0),
-        };
-        for (_, frame) in &mut jobs {
-            miss.into_iter().for_each(|value| frame.replace_misses(value));
-        }
-        self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
-        desk.jobs = emptied(jobs);
+        let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row)).map(|(_, frame)| frame);
+        let stale_rows = (0..rows).filter(is_stale).map(|row| (row, row));
+        let look = |row: usize| (self.mounts.row(row), self.rays.row(row));
+        let result = self.develop(&self.captures, look, stale_rows, frames);
         *failure = result.err().and_then(|(job, error)| {
             let row = (0..rows).filter(is_stale).nth(job)?;
             Some(CameraError::Draw { env: self.env_ids[row], error })
@@ -565,6 +670,58 @@ impl Camera {
             stale.fill(false);
         }
         canvas
+    }
+
+    /// Draws captures, those of some rows at some places, into frames, and does to them what the camera does; `look` says from
+    /// where, and through which lens, a place was captured.
+    pub(super) fn develop<'a>(
+        &self,
+        captures: &Captures,
+        look: impl Fn(usize) -> (&'a Mount, Option<&'a LensRays>),
+        places: impl Iterator<Item = (usize, usize)> + Clone,
+        frames: impl Iterator<Item = FrameMut<'a>>,
+    ) -> Result<(), (usize, RenderError)> {
+        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let Desk { rasterizer, views, jobs: kept, tickets, faults, .. } = &mut *desk;
+        views.clear();
+        views.extend(places.clone().map(|(_, place)| {
+            let (mount, _) = look(place);
+            let pose = self.world_from(mount, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
+            self.lens.view(&mount.pixels, PoseF32::from(&pose))
+        }));
+        tickets.clear();
+        let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
+        for (((_, place), frame), view) in places.zip(frames).zip(&*views) {
+            let poses = row_of(&captures.poses, place);
+            let lights = Some(row_of(&captures.lights, place));
+            let scene = captures.scenes[place].0.as_deref().unwrap_or(&self.scene);
+            jobs.push((Shot { scene, poses, view, lights, lens: look(place).1 }, frame));
+            tickets.push(captures.tickets[place]);
+        }
+        let result = rasterizer.render(&mut jobs);
+        if let Some(faults) = faults {
+            faults.spoil(&mut jobs, tickets);
+        }
+        let miss = match self.depth_miss {
+            DepthMiss::Inf => None,
+            DepthMiss::Far => Some(self.lens.far),
+            DepthMiss::Zero => Some(0.0),
+        };
+        for (_, frame) in &mut jobs {
+            miss.into_iter().for_each(|value| frame.replace_misses(value));
+        }
+        self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
+        *kept = emptied(jobs);
+        result
+    }
+
+    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
+    pub(super) fn shot_of<T>(&self, row: usize, act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T) -> T {
+        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
+        let view = &self.view_of(row);
+        let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
+        let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row) })
     }
 
     /// The view of a row that was captured.

@@ -95,7 +95,8 @@ impl Brush {
         let list = &plan.list;
         let mut draw = |tile: &mut Tile, item: &Item| {
             if plan.renderer.sees_by_rays() {
-                plan.tracer.draw(s, stack, tile, projection, (&list.placed, shot.scene.first_ids()), item);
+                let what = (&*list.placed, shot.scene.first_ids());
+                plan.tracer.draw(s, stack, tile, (projection, shot.lens), what, item);
             } else {
                 painter.draw(s, tile, projection, shot.scene, &list.placed, item);
             }

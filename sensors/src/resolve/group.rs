@@ -3,7 +3,8 @@
 use super::shade::{Lighting, shade, sky};
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
-use super::surface::{Source, surface};
+use super::surface::{Ray, Source, surface};
+use crate::camera::LensRays;
 use crate::camera::channel::PixelGroup;
 use crate::lanes::{
     COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, select, select_i, splat, splat_i, splat_u, store,
@@ -17,6 +18,8 @@ use scene::{PoseF32, RenderScene};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
     pub(crate) projection: &'a Projection,
+    /// The rays, where a lens bends them.
+    pub(crate) lens: Option<&'a LensRays>,
     pub(crate) scene: &'a RenderScene,
     pub(crate) poses: &'a [PoseF32],
     pub(crate) placed: &'a [Placed],
@@ -24,7 +27,7 @@ pub(crate) struct Context<'a> {
     pub(crate) shadows: &'a [ShadowMap],
     /// Instead of maps.
     pub(crate) shadow_rays: Option<ShadowRays<'a>>,
-    /// Width of a pixel at depth 1.
+    /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
     pub(crate) pixel: f32,
     /// Whether channels of [`Stage::Detail`](crate::camera::channel::Stage::Detail) are wanted.
     pub(crate) detail: bool,
@@ -91,7 +94,14 @@ pub(crate) fn resolve<S: Simd>(
 ) {
     s.vectorize(
         #[inline(always)]
-        || resolve_lanes(s, context, load_u(s, ids), at.uv(s), pixels, colors),
+        || {
+            let uv = at.uv(s);
+            let bent = context.lens.map(|lens| match at {
+                At::Pixels(first) => lens.of_pixels(s, first),
+                At::Points(_) => lens.of_points(s, uv[0], uv[1]),
+            });
+            resolve_lanes(s, context, load_u(s, ids), (uv, bent), pixels, colors);
+        },
     );
 }
 
@@ -100,17 +110,28 @@ fn resolve_lanes<S: Simd>(
     s: S,
     context: &Context<'_>,
     ids: U<S>,
-    [u, v]: [F<S>; 2],
+    ([u, v], bent): ([F<S>; 2], Option<V3<S>>),
     mut pixels: Option<&mut PixelGroup>,
     mut colors: Option<&mut Colors>,
 ) {
     let projection = context.projection;
-    let direction = projection.world_directions(s, u, v);
-    let length = direction.dot(direction).sqrt();
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    let direction = match bent {
+        None => projection.world_directions(s, u, v),
+        Some(ray) => ray.rotate(&projection.world_from_camera.rotation),
+    };
+    let mut length = direction.dot(direction).sqrt();
+    if bent.is_some() {
+        // There are pixels without a ray.
+        length = select(length.simd_gt(zero), length, one);
+    }
+    // What a number along a ray means for depths.
+    let forward = context.lens.is_none_or(LensRays::is_forward);
+    let ray = bent.map(|ray| Ray { direction: ray, forward });
     let view = if colors.is_some() { direction.scale(1.0 / length) } else { direction };
     let nothing = splat_u(s, NOTHING);
     let missed = ids.simd_eq(nothing);
-    let mut depth = splat(s, f32::INFINITY);
+    let mut along = splat(s, f32::INFINITY);
     let none = V3::splat(s, [0.0; 3]);
     let (mut normal, mut shading, mut position) = (none, none, none);
     let mut color = none;
@@ -129,9 +150,9 @@ fn resolve_lanes<S: Simd>(
         let here: M<S> = ids.simd_ge(splat_u(s, source.first_id)) & ids.simd_lt(splat_u(s, end));
         let bits = here.to_bitmask();
         left &= !bits;
-        let at = surface(s, projection, &source, ids, here, [u, v], direction);
+        let at = surface(s, projection, &source, ids, here, ([u, v], ray), direction);
         if pixels.is_some() {
-            depth = select(here, at.depth, depth);
+            along = select(here, at.along, along);
             normal = V3::select(here, at.normal, normal);
             mask = select_i(here, splat_i(s, source.instance.mask_id), mask);
             if context.detail {
@@ -142,22 +163,27 @@ fn resolve_lanes<S: Simd>(
         if colors.is_some() {
             let Context { scene, lighting, pixel, .. } = *context;
             let shadows = (context.shadows, context.shadow_rays);
-            let distance = at.depth * length;
+            let distance = at.along * length;
             let seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, pixel, here);
             color = V3::select(here, seen, color);
         }
     }
     if let Some(pixels) = &mut pixels {
+        let depth = bent.map_or(along, |ray| select(missed, along, along * ray.z));
         store(depth, &mut pixels.depth);
         pixels.mask = mask.array();
         store_v3(normal, &mut pixels.normal);
         if context.detail {
-            store(depth * length, &mut pixels.distance);
+            store(along * length, &mut pixels.distance);
             store_v3(shading, &mut pixels.shading_normal);
             store_v3(V3::select(missed, none, position), &mut pixels.position);
         }
     }
     if let Some(colors) = &mut colors {
+        if let Some(ray) = bent {
+            // Outside of the image circle no light falls.
+            color = V3::select(ray.dot(ray).simd_gt(zero), color, none);
+        }
         store_v3(color, colors);
     }
 }

@@ -6,7 +6,7 @@ use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_rays::ShadowRays;
 use crate::camera::channel::{FrameMut, Stage};
 use crate::camera::rasterizer::Shot;
-use crate::camera::{RasterCfg, Renderer};
+use crate::camera::{LensRays, RasterCfg, Renderer};
 use crate::ray::RayAssets;
 use crate::ray::bvh::Stack;
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
@@ -79,11 +79,14 @@ impl Plan {
         frame.validate(view.width * view.height)?;
         let projection = Projection::from(view);
         let wants_color = frame.wants(Stage::Color);
+        let multisampled = wants_color && cfg.samples == 4 && !renderer.follows_paths();
+        if let Some(lens) = shot.lens {
+            check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
+        }
         self.shadow_rays = wants_color && cfg.shadows && renderer == Renderer::Hybrid;
         if wants_color && !renderer.follows_paths() {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
         }
-        let multisampled = wants_color && cfg.samples == 4 && !renderer.follows_paths();
         self.planes = if multisampled { SAMPLES.len() } else { 1 };
         let parts = match renderer {
             Renderer::Raster if cfg.lod => Parts::Levels,
@@ -91,7 +94,7 @@ impl Plan {
             Renderer::FastRayTraced | Renderer::RayTraced { .. } => Parts::Whole,
         };
         let keep = |instance: &Instance| Layer::of(instance, cfg.groups);
-        self.list.build(&projection, scene, poses, parts, keep);
+        self.list.build(&projection, shot.lens, scene, poses, parts, keep);
         if renderer.sees_by_rays() || self.shadow_rays {
             self.tracer.find_bodies(scene, assets, keep);
         }
@@ -105,7 +108,7 @@ impl Plan {
 
     /// Prepares lamps and their shadows.
     fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
-        let Shot { scene, poses, view, lights } = *shot;
+        let Shot { scene, poses, view, lights, .. } = *shot;
         let lights = lights.unwrap_or(&scene.lights);
         let mut maps = [None; 256];
         if cfg.shadows {
@@ -167,10 +170,24 @@ impl Plan {
             placed: &self.list.placed,
             lighting: &self.lighting,
             shadows: &self.shadows[..self.maps],
-            pixel: 1.0 / projection.fx.min(projection.fy),
+            pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel() as f32),
+            lens: shot.lens,
             detail,
         }
     }
+}
+
+/// Whether the rays of a lens are those of the picture, and can be followed.
+fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
+    if !renderer.sees_by_rays() {
+        let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
+        return Err(RenderError::LensRenderer { lens, renderer });
+    }
+    let (expected, found) = ([view.width, view.height], lens.size());
+    if found != expected || lens.samples() < samples {
+        return Err(RenderError::LensRays { expected, samples, found, found_samples: lens.samples() });
+    }
+    Ok(())
 }
 
 /// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.

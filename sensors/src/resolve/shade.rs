@@ -242,7 +242,7 @@ pub(crate) fn shade<S: Simd>(
         if let Some(rays) = shadow_rays.filter(|_| light.cast_shadow) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                let from = (at.position, at.normal, at.depth);
+                let from = (at.position, at.normal, at.along);
                 lit = lit * rays.light(s, light, lamp.along.map(|x| -x), from, matters);
             }
         }
@@ -292,7 +292,7 @@ fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixe
     let Some(image) = material.texture.as_deref() else { return V3::splat(s, flat) };
     // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
-    let width = at.depth * pixel / root(s, slant);
+    let width = at.along * pixel / root(s, slant);
     let scale = source.texture_scale;
     let bytes = if texture::is_cube(image) {
         let direction = V3 { x: at.local.x * scale[0], y: at.local.y * scale[1], z: at.local.z * scale[2] };

@@ -123,7 +123,14 @@ impl ShadowMap {
         self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
         let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
-        self.list.build(&projection, scene, poses, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        self.list.build(
+            &projection,
+            None,
+            scene,
+            poses,
+            parts,
+            |i| if solid(i) { Layer::Opaque } else { Layer::Hidden },
+        );
         // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
         self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));

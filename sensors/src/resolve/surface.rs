@@ -8,8 +8,8 @@ use scene::{Instance, PoseF32, RenderMesh, Shape};
 /// The surface at sixteen samples.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface<S: Simd> {
-    /// Depth along the optical axis \[m\].
-    pub(crate) depth: F<S>,
+    /// How many times the ray's direction it is away: depth along the optical axis, or distance, \[m\].
+    pub(crate) along: F<S>,
     /// Normal of the surface itself, towards the camera, world frame.
     pub(crate) normal: V3<S>,
     /// Smooth normal, world frame.
@@ -36,6 +36,15 @@ pub(crate) struct Source<'a> {
     pub(crate) texture_scale: [f32; 3],
 }
 
+/// Sixteen rays that a lens has bent.
+#[derive(Clone, Copy)]
+pub(crate) struct Ray<S: Simd> {
+    /// In the optical frame.
+    pub(crate) direction: V3<S>,
+    /// Whether they have z = 1; else length 1.
+    pub(crate) forward: bool,
+}
+
 /// The surface at the points (u, v) of the picture where `lanes` says that this instance is seen, with the ids that the
 /// visibility buffer has; `direction` is that of the rays in the world frame.
 #[inline(always)]
@@ -45,20 +54,27 @@ pub(crate) fn surface<S: Simd>(
     source: &Source<'_>,
     ids: U<S>,
     lanes: M<S>,
-    [u, v]: [F<S>; 2],
+    ([u, v], bent): ([F<S>; 2], Option<Ray<S>>),
     direction: V3<S>,
 ) -> Surface<S> {
-    let (o, d) = projection.rays(s, &source.placed.local, u, v);
+    let camera = &source.placed.local.instance_from_camera;
+    let (o, d) = match bent {
+        None => projection.rays(s, &source.placed.local, u, v),
+        Some(ray) => (V3::splat(s, camera.translation), ray.direction.rotate(&camera.rotation)),
+    };
     let zero = splat(s, 0.0);
-    let (depth, normal, shading, uv, uv_density);
+    let (along, normal, shading, uv, uv_density);
     if let Some(mesh) = source.placed.mesh(source.instance) {
-        let [x, y, z] = &source.placed.local.instance_from_camera.rotation;
-        let axis = [x[2], y[2], z[2]];
+        let [x, y, z] = &camera.rotation;
+        let axis = match bent {
+            Some(Ray { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
+            _ => V3::splat(s, [x[2], y[2], z[2]]),
+        };
         let hit = triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
-        (depth, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
+        (along, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
-        depth = hit.t;
+        along = hit.t;
         // The others have a unit normal already.
         normal = match source.instance.shape {
             Shape::Plane(_) | Shape::Box(_) => hit.normal,
@@ -71,11 +87,11 @@ pub(crate) fn surface<S: Simd>(
     let back = normal.dot(d).simd_gt(zero);
     let flip = select(back, splat(s, -1.0), splat(s, 1.0));
     let world = source.world_from_instance;
-    let local = o.add(d.scale(depth));
+    let local = o.add(d.scale(along));
     // From the camera outward, as the depth says: agrees with the depth to the last digits.
-    let position = direction.scale(depth).add(V3::splat(s, projection.world_from_camera.translation));
+    let position = direction.scale(along).add(V3::splat(s, projection.world_from_camera.translation));
     Surface {
-        depth,
+        along,
         normal: normal.scale(flip).rotate(&world.rotation),
         shading: shading.scale(flip).rotate(&world.rotation),
         position,
@@ -103,7 +119,7 @@ fn triangles<S: Simd>(
     lanes: M<S>,
     o: V3<S>,
     d: V3<S>,
-    axis: [f32; 3],
+    axis: V3<S>,
 ) -> TriangleHit<S> {
     // Gathered lane by lane: positions and normals of three corners.
     let mut p = [[[0.0f32; LANES]; 3]; 3];
@@ -140,7 +156,6 @@ fn triangles<S: Simd>(
     let facing = select(facing.simd_eq(zero), splat(s, 1e-30), facing);
     let depth = -(normal.dot(ao) / facing);
     // Snapping may cover a sample just outside of a triangle seen edge-on, whose plane is anywhere there.
-    let axis = V3::splat(s, axis);
     let z = [a.sub(o).dot(axis), b.sub(o).dot(axis), c.sub(o).dot(axis)];
     let low = min(min(z[0], z[1]), z[2]);
     let high = max(max(z[0], z[1]), z[2]);

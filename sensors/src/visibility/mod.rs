@@ -94,6 +94,31 @@ pub enum RenderError {
         /// The most that is possible.
         limit: u32,
     },
+    /// A renderer that draws straight lines, and a lens that bends them.
+    #[error(
+        "the {lens} lens bends straight lines, which {renderer} does not; use renderer: FastRayTraced, or RayTraced"
+    )]
+    LensRenderer {
+        /// The lens.
+        lens: &'static str,
+        /// The renderer.
+        renderer: &'static str,
+    },
+    /// Rays of a lens that are not those of the picture.
+    #[error(
+        "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \
+         {samples}"
+    )]
+    LensRays {
+        /// Pixels per row and rows of the picture.
+        expected: [usize; 2],
+        /// Samples per pixel that its colours need.
+        samples: u8,
+        /// Pixels per row and rows that the rays are for.
+        found: [usize; 2],
+        /// Samples per pixel that they are for.
+        found_samples: u8,
+    },
     /// A number of samples that is not offered.
     #[error("{samples} samples per pixel; 1 and 4 are possible")]
     Samples {

@@ -86,32 +86,57 @@ impl DriveState {
         self.drawn[drive][kind as usize].filter(|drawn| drawn.value.to_bits() == now.to_bits())
     }
 
-    /// Draws gains (in torque units) and the effort limit of a drive. What stays as it is is not drawn, and what becomes
-    /// nominal is no longer.
-    pub(crate) fn draw_gains(&mut self, drive: usize, values: [f64; 3]) {
+    /// Draws gains (in torque units) and the effort limit of a drive, those that are given. What becomes nominal is no longer
+    /// drawn.
+    pub(crate) fn draw_gains(&mut self, drive: usize, values: [Option<f64>; 3]) {
         let initial = self.table().drives[drive].initial;
         for (kind, value) in Kind::ALL.into_iter().zip(values) {
-            let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
-            if kind.gain(&gains).to_bits() == value.to_bits() {
-                continue;
+            if let Some(value) = value {
+                self.draw(drive, kind, value, value.to_bits() != kind.gain(&initial).to_bits());
             }
-            let before = self.drawn_gain(drive, kind);
-            let instead_of = before.map_or(kind.set_to(&gains, &setting), |drawn| drawn.instead_of);
-            let is_nominal = value.to_bits() == kind.gain(&initial).to_bits();
-            kind.put(value, &mut gains, &mut setting);
-            self.gains.put(drive, gains);
-            self.settings.put(drive, setting);
-            let mut drawn = self.drawn[drive];
-            drawn[kind as usize] = (!is_nominal).then_some(Drawn { value, instead_of });
-            self.drawn.put(drive, drawn);
         }
     }
 
-    /// As [`draw_gains`](Self::draw_gains), of one of them.
-    pub(crate) fn draw_gain(&mut self, drive: usize, kind: usize, value: f64) {
-        let mut values = Kind::ALL.map(|kind| kind.gain(&self.gains[drive]));
-        values[kind] = value;
-        self.draw_gains(drive, values);
+    /// One of them is drawn as it was, whatever is below it: also its very value, which stays then when that changes.
+    pub(crate) fn redraw_gain(&mut self, drive: usize, kind: usize, value: f64) {
+        self.draw(drive, Kind::ALL[kind], value, true);
+    }
+
+    fn draw(&mut self, drive: usize, kind: Kind, value: f64, is_drawn: bool) {
+        let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
+        let before = self.drawn_gain(drive, kind);
+        let instead_of = before.map_or(kind.set_to(&gains, &setting), |drawn| drawn.instead_of);
+        kind.put(value, &mut gains, &mut setting);
+        self.gains.put(drive, gains);
+        self.settings.put(drive, setting);
+        let mut drawn = self.drawn[drive];
+        drawn[kind as usize] = is_drawn.then_some(Drawn { value, instead_of });
+        self.drawn.put(drive, drawn);
+    }
+
+    /// Sets the stiffness of a drive, in the unit of its type, as a user does: it is drawn no longer, also where it was set
+    /// to the very value that was drawn.
+    pub(crate) fn set_stiffness(&mut self, drive: usize, value: f64) {
+        self.set(drive, |setting| setting.stiffness = value);
+        self.undraw(drive, Kind::Stiffness);
+    }
+
+    /// As [`set_stiffness`](Self::set_stiffness), of the damping.
+    pub(crate) fn set_drive_damping(&mut self, drive: usize, value: f64) {
+        self.set(drive, |setting| setting.damping = value);
+        self.undraw(drive, Kind::Damping);
+    }
+
+    /// As [`set_stiffness`](Self::set_stiffness), of the effort limit.
+    pub(crate) fn set_max_effort(&mut self, drive: usize, max_effort: f64) {
+        self.set_limits(drive, |gains| Gains { max_effort, ..gains });
+        self.undraw(drive, Kind::MaxEffort);
+    }
+
+    fn undraw(&mut self, drive: usize, kind: Kind) {
+        let mut drawn = self.drawn[drive];
+        drawn[kind as usize] = None;
+        self.drawn.put(drive, drawn);
     }
 
     /// The gains and the effort limit of a drive that are drawn, and not set to something else since.

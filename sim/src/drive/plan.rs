@@ -5,7 +5,7 @@ use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, Jo
 use super::models::ActuatorModel;
 use super::table::{Gains, Setting};
 use super::{ActuatorSpec, DriveType};
-use crate::description::{FileDrive, Joint, JointId, JointKind, RobotDescription};
+use crate::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::pattern::{self, PatternError};
@@ -156,7 +156,7 @@ fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting 
     };
     let named = gains.stiffness.is_some() || gains.damping.is_some() || gains.actuator.is_some();
     let driven = match of_file {
-        FileDrive::Coupled => false,
+        FileDrive::Coupled(_) => false,
         FileDrive::Passive => named,
         FileDrive::Unsaid | FileDrive::Effort | FileDrive::Servo { .. } => true,
     };
@@ -216,6 +216,7 @@ fn set_initial_positions(
     initial: &[Option<f64>],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<(), PlanError> {
+    let follows = |plan: &JointPlan| plan.mimic.is_some() || curve(description.joint(plan.joint)).is_some();
     for (plan, value) in plans.iter_mut().zip(initial) {
         let joint = description.joint(plan.joint);
         let wanted = value.or(joint.defaults.map(|file| file.position)).unwrap_or(0.0);
@@ -223,7 +224,7 @@ fn set_initial_positions(
             return Err(PlanError::InitialValue { joint: joint.name.clone(), value: wanted });
         }
         plan.initial = wanted.clamp(plan.usable[0], plan.usable[1]);
-        if plan.mimic.is_none() && plan.initial != wanted {
+        if !follows(plan) && plan.initial != wanted {
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::InitialPositionClamped,
                 joint.source.clone(),
@@ -234,14 +235,30 @@ fn set_initial_positions(
             ));
         }
     }
-    for i in 0..plans.len() {
-        if let Some((driver, multiplier, offset)) = plans[i].mimic
-            && let Some(d) = plans.iter().find(|p| p.joint == driver).map(|p| p.initial)
-        {
-            plans[i].initial = multiplier * d + offset;
-        }
+    for i in (0..plans.len()).filter(|&i| follows(&plans[i])).collect::<Vec<_>>() {
+        let of_plan = |joint| plans.iter().find(|plan| plan.joint == joint).map_or(0.0, |plan| plan.initial);
+        plans[i].initial = followed(description, &of_plan, plans[i].joint);
     }
     Ok(())
+}
+
+/// The curve along which a joint follows another.
+pub(crate) fn curve(joint: &Joint) -> Option<Curve> {
+    match joint.defaults?.drive {
+        FileDrive::Coupled(curve) => curve,
+        _ => None,
+    }
+}
+
+/// Where a joint is that may follow others by mimics and curves, neither of which goes in circles; `of_free` says where
+/// those are that follow nothing.
+pub(crate) fn followed(description: &RobotDescription, of_free: &dyn Fn(JointId) -> f64, joint: JointId) -> f64 {
+    let (driver, multiplier, offset) = description.mimic_driver(joint);
+    let at_driver = match curve(description.joint(driver)) {
+        Some(curve) => curve.position(curve.joint.map_or(curve.at, |joint| followed(description, of_free, joint))),
+        None => of_free(driver),
+    };
+    if driver == joint { at_driver } else { multiplier * at_driver + offset }
 }
 
 /// The joint-space inertia of a robot at its start positions.

@@ -2,7 +2,7 @@
 //!
 //! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
 //! convex hulls included, and finds the same warnings. Masses and dynamics are those of the files, computed by
-//! [`dynamics`](crate::dynamics): nothing is repaired, MuJoCo is not used.
+//! [`dynamics`](crate::dynamics): nothing is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
 
 mod report;
 mod text;
@@ -10,19 +10,21 @@ mod text;
 pub use report::{JointReport, LinkReport, MimicReport, Report, Warning};
 
 use crate::body_inertia::{fuse, rigid_bodies};
-use crate::description::{Geometry, JointId, JointKind, RobotDescription};
+use crate::description::{Curve, Geometry, JointId, JointKind, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::DriveCfg;
-use crate::drive::plan::plan;
+use crate::drive::plan::{curve, followed, plan};
 use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::error::Error;
-use crate::objects::robot::collision_hulls;
+use crate::objects::robot::{RobotCfg, collision_hulls, described};
+use crate::objects::robot_file::MjcfFile;
 use crate::pattern::{closest, list};
 use crate::source::Source;
-use crate::urdf::{UrdfCfg, assemble};
+use crate::urdf::UrdfCfg;
 use nalgebra::Vector3;
 use scene::mesh::{HullCfg, load};
 use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
 
 /// Gravity \[m/s²\].
 const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
@@ -34,9 +36,13 @@ const MIMIC_SLACK: f64 = 1e-6;
 pub struct InspectCfg {
     /// The files.
     pub urdf: UrdfCfg,
+    /// The MJCF file, for a robot that is described by one ([`RobotCfg::mjcf`]): then there are no URDF files. Where a body has
+    /// several joints, there is a link without mass behind each but the last.
+    pub mjcf: Option<MjcfFile>,
     /// Whether the root moves freely.
     pub floating_base: bool,
-    /// Positions \[rad or m\] by joint name; 0 for joints that are not named. Mimic joints follow their driver.
+    /// Positions \[rad or m\] by joint name; for joints that are not named 0, or an MJCF file's `ref`. Joints that follow
+    /// others (by mimics, or by the curves of an MJCF file) are where these put them.
     pub qpos: Vec<(String, f64)>,
 }
 
@@ -90,6 +96,13 @@ pub enum InspectError {
     Dynamics(#[from] DynamicsError),
 }
 
+impl InspectCfg {
+    /// All files, as they are named.
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.urdf.components.iter().map(|c| &c.urdf).chain(self.mjcf.iter().map(|file| &file.path))
+    }
+}
+
 impl From<Error> for InspectError {
     fn from(error: Error) -> Self {
         Self::Load(Box::new(error))
@@ -101,13 +114,21 @@ impl From<Error> for InspectError {
 /// # Errors
 /// Whatever [`add_robot`](crate::SimulationManager::add_robot) refuses in the files, and wrong positions.
 pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
-    let assembly = assemble(&cfg.urdf).map_err(Error::from)?;
-    let (description, mut diagnostics) = (assembly.description, assembly.diagnostics);
+    let robot = RobotCfg {
+        urdf: cfg.urdf.clone(),
+        mjcf: cfg.mjcf.clone(),
+        fix_base: !cfg.floating_base,
+        ..RobotCfg::default()
+    };
+    let (file, description, mut diagnostics) = described(&robot, &(&robot.uid).into(), 0, None)?;
     let configuration = configuration(&description, cfg, &mut diagnostics)?;
     collision_hulls(&description, &HullCfg::default())?;
     check_visual_meshes(&description, &mut diagnostics);
-    for body in rigid_bodies(&description, cfg.floating_base) {
-        fuse(&description, &body, &mut diagnostics);
+    // Inertias of an MJCF file are those that MuJoCo accepted.
+    if file.is_none() {
+        for body in rigid_bodies(&description, cfg.floating_base) {
+            fuse(&description, &body, &mut diagnostics);
+        }
     }
     diagnostics.extend(joint_diagnostics(&description, cfg.floating_base)?);
     sort_by_place(&mut diagnostics, cfg);
@@ -144,20 +165,30 @@ fn configuration(
     }
     let mut configuration = Configuration::zero(description);
     configuration.floating_base = cfg.floating_base;
-    configuration.joint_positions = given.iter().map(|q| q.unwrap_or(0.0)).collect();
+    let start = |id: JointId| description.joint(id).defaults.map_or(0.0, |file| file.position);
+    let of_free = |id: JointId| {
+        let column = drivable.iter().position(|&d| d == id);
+        column.and_then(|column| given[column]).unwrap_or_else(|| start(id))
+    };
+    configuration.joint_positions = drivable.iter().map(|&id| followed(description, &of_free, id)).collect();
     let resolved = configuration.resolved_positions(description)?;
     for ((id, given), followed) in drivable.into_iter().zip(given).zip(resolved) {
         let joint = description.joint(id);
-        if let (Some(mimic), Some(given)) = (&joint.mimic, given)
-            && (given - followed).abs() > MIMIC_SLACK
-        {
-            let driver = &description.joint(description.mimic_driver(id).0).name;
-            let message = format!(
-                "joint {:?} follows {driver:?} to {followed}; the position {given} given for it was ignored",
-                joint.name
-            );
-            diagnostics.push(Diagnostic::new(DiagnosticKind::MimicPositionIgnored, mimic.source.clone(), message));
-        }
+        let Some(given) = given.filter(|given| (given - followed).abs() > MIMIC_SLACK) else { continue };
+        let (source, whom) = match (&joint.mimic, curve(joint)) {
+            (Some(mimic), _) => {
+                let driver = &description.joint(description.mimic_driver(id).0).name;
+                (&mimic.source, format!("follows {driver:?} to"))
+            }
+            (None, Some(Curve { joint: Some(driver), .. })) => {
+                (&joint.source, format!("follows {:?} to", description.joint(driver).name))
+            }
+            (None, Some(Curve { joint: None, .. })) => (&joint.source, "is held at".to_owned()),
+            (None, None) => continue,
+        };
+        let message =
+            format!("joint {:?} {whom} {followed}; the position {given} given for it was ignored", joint.name);
+        diagnostics.push(Diagnostic::new(DiagnosticKind::MimicPositionIgnored, source.clone(), message));
     }
     Ok(configuration)
 }
@@ -195,7 +226,7 @@ fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Res
 
 /// Files in the order given, then lines.
 fn sort_by_place(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
-    let files: Vec<_> = cfg.urdf.components.iter().map(|c| &c.urdf).collect();
+    let files: Vec<_> = cfg.files().collect();
     diagnostics.sort_by_key(|d| {
         d.source.as_ref().map(|s| (files.iter().position(|f| **f == *s.file).unwrap_or(usize::MAX), s.line))
     });

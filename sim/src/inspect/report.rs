@@ -125,7 +125,7 @@ impl Report {
         let poses = kinematics.link_poses();
         Self {
             robot: description.name.clone(),
-            files: cfg.urdf.components.iter().map(|c| c.urdf.display().to_string()).collect(),
+            files: cfg.files().map(|file| file.display().to_string()).collect(),
             total_mass: kinematics.total_mass(),
             com: kinematics.center_of_mass().map(Into::into),
             links: poses.iter().enumerate().map(|(i, pose)| LinkReport::new(description, LinkId(i), pose)).collect(),

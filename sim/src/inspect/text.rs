@@ -15,7 +15,36 @@ const DRAWN_LEVELS: usize = 16;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let counted = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+        self.write_robot(f)?;
+        if self.warnings.is_empty() {
+            return writeln!(f, "\nNo warnings");
+        }
+        writeln!(f, "\n{}", counted(self.warnings.len(), "warning"))?;
+        for warning in &self.warnings {
+            writeln!(f)?;
+            match (&warning.file, warning.line) {
+                (Some(file), Some(line)) => writeln!(f, "{file}:{line}: {}", warning.kind)?,
+                _ => writeln!(f, "{}", warning.kind)?,
+            }
+            for line in wrapped(&warning.message, WIDTH - 4) {
+                writeln!(f, "    {line}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+impl Report {
+    /// The report without its warnings, for who shows them in a way of its own.
+    pub fn without_warnings(&self) -> impl fmt::Display {
+        fmt::from_fn(|f| self.write_robot(f))
+    }
+
+    fn write_robot(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let movable = self.joints.iter().filter(|j| j.kind != "fixed").count();
         writeln!(f, "{}   ({})", self.robot, self.files.join(" + "))?;
         writeln!(
@@ -36,25 +65,9 @@ impl fmt::Display for Report {
         if !self.columns.is_empty() {
             write!(f, "\nAt this position\n\n{}", self.dynamics_table())?;
         }
-        if self.warnings.is_empty() {
-            return writeln!(f, "\nNo warnings");
-        }
-        writeln!(f, "\n{}", counted(self.warnings.len(), "warning"))?;
-        for warning in &self.warnings {
-            writeln!(f)?;
-            match (&warning.file, warning.line) {
-                (Some(file), Some(line)) => writeln!(f, "{file}:{line}: {}", warning.kind)?,
-                _ => writeln!(f, "{}", warning.kind)?,
-            }
-            for line in wrapped(&warning.message, WIDTH - 4) {
-                writeln!(f, "    {line}")?;
-            }
-        }
         Ok(())
     }
-}
 
-impl Report {
     /// Links depth first, children in the order of the files.
     fn tree(&self) -> Table {
         let mut children: HashMap<&str, Vec<&LinkReport>> = HashMap::new();

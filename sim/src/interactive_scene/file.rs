@@ -5,6 +5,7 @@ use super::types::EntityTypes;
 use super::value::{Value, ValueError};
 use super::{ExclusionCfg, SceneCfg, in_every_env};
 use crate::error::{Error, Result};
+use crate::objects::robot_file::MjcfFile;
 use crate::objects::shape::ObjectShape;
 use crate::pattern::closest;
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -201,13 +202,12 @@ impl<'a> Reader<'a> {
             EntityCfg::Robot(robot) => {
                 robot.uid = uid;
                 self.place_urdf(&mut robot.urdf);
-                if let Some(file) = &mut robot.mjcf {
-                    file.place_beside(|path| self.beside(path));
-                }
+                self.place_mjcf(&mut robot.mjcf);
             }
             EntityCfg::Articulation(articulation) => {
                 articulation.uid = uid;
                 self.place_urdf(&mut articulation.urdf);
+                self.place_mjcf(&mut articulation.mjcf);
             }
             EntityCfg::RigidObject(object) => {
                 object.uid = uid;
@@ -239,6 +239,13 @@ impl<'a> Reader<'a> {
         let components = urdf.components.iter_mut().map(|component| &mut component.urdf);
         for path in components.chain(urdf.packages.values_mut()) {
             *path = self.beside(path);
+        }
+    }
+
+    /// Makes the path of an MJCF file relative to the file.
+    fn place_mjcf(&self, mjcf: &mut Option<MjcfFile>) {
+        if let Some(file) = mjcf {
+            file.place_beside(|path| self.beside(path));
         }
     }
 

@@ -11,7 +11,7 @@ use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld::WeldCfg;
 use sensors::{
     ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
-    MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg,
+    MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg, StereoCameraCfg,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
@@ -53,6 +53,7 @@ impl Default for EntityTypes {
             .with::<MjcfCfg>("mjcf")
             .with::<WeldCfg>("weld")
             .with_sensor::<CameraCfg>("camera")
+            .with_sensor::<StereoCameraCfg>("stereo_camera")
             .with_sensor::<RayCasterCfg>("ray_caster")
             .with_sensor::<RayCasterCameraCfg>("ray_caster_camera")
             .with_sensor::<ContactSensorCfg>("contact_sensor")

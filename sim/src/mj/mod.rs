@@ -47,7 +47,7 @@ pub use options::OptionDifference;
 pub use prefetch::prefetch;
 pub use ray::RayHit;
 pub use state::{Inputs, Motion, RawQuats};
-pub(crate) use threads::StayingThreads;
+pub use threads::staying_crew;
 pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 pub use weld::Weld;

@@ -4,7 +4,7 @@
 //! picture. To lend to threads that stay, the compiler has to be told that the loan ends in time. It is here because no
 //! other folder may do that; it calls nothing of MuJoCo's.
 
-use sensors::Threads;
+use sensors::{Crew, Threads};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -26,6 +26,19 @@ struct Shared {
     board: Mutex<Board>,
     wake: Condvar,
     done: Condvar,
+}
+
+/// Threads that stay until the last clone is dropped, as every simulation has them for its sensors: for whoever draws
+/// without a simulation.
+///
+/// ```
+/// use sensors::camera::{ParallelRasterizer, RasterCfg};
+///
+/// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(sim::staying_crew());
+/// # assert_eq!(rasterizer.threads(), 2);
+/// ```
+pub fn staying_crew() -> Crew {
+    Crew::new(Arc::new(StayingThreads::default()))
 }
 
 /// What is to be done now. It is one caller's at a time, from its call until its dismissal is over.

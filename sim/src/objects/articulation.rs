@@ -4,6 +4,7 @@ use crate::drive::{DriveCfg, DriveType, PerJoint};
 use crate::error::Result;
 use crate::manager::{RobotId, SimulationManager};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
+use crate::objects::robot_file::MjcfFile;
 use crate::urdf::UrdfCfg;
 use ::scene::Pose;
 use ::scene::mesh::HullCfg;
@@ -21,20 +22,25 @@ pub struct ArticulationCfg {
     /// The URDF files.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
+    /// The MJCF file, for an articulation that is described by one, as [`RobotCfg::mjcf`] says: then there are no URDF files.
+    /// Its actuators drive nothing where [`drive`](Self::drive) is `None`; its springs, friction and equalities hold.
+    #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
+    pub mjcf: Option<MjcfFile>,
     /// Whether the root link stands fixed in the environment. One that stands free can be put elsewhere in each environment.
     pub fix_base: bool,
-    /// Pose of the root link in the environment.
+    /// Pose of the root link in the environment; of an MJCF file that of the file's world.
     #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Start positions by joint pattern \[rad or m\]; 0 where none matches.
+    /// Start positions by joint pattern \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
     #[serde(with = "scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive. One
     /// that is given has the stiffness and damping of [`DriveCfg::default`], a robot's, where it names no others.
     pub drive: Option<DriveCfg>,
-    /// Dry friction \[N m or N\]; where unset, that of `drive`, or else the URDF's. It leaves joints passive.
+    /// Dry friction \[N m or N\]; where unset, that of `drive`, or else the file's. It leaves joints passive.
     pub friction: Option<PerJoint>,
-    /// Rotor inertia \[kg m² or kg\]; where unset, that of `drive`, or else 0. It leaves joints passive.
+    /// Rotor inertia \[kg m² or kg\]; where unset, that of `drive`, or else 0 for joints of a URDF and the
+    /// MJCF file's own. It leaves joints passive.
     pub armature: Option<PerJoint>,
     /// Whether its links collide with each other.
     pub self_collision: bool,
@@ -50,6 +56,7 @@ impl Default for ArticulationCfg {
         Self {
             uid: "articulation".into(),
             urdf: UrdfCfg::default(),
+            mjcf: None,
             fix_base: robot.fix_base,
             init_pose: robot.init_pose,
             init_qpos: robot.init_qpos,
@@ -72,6 +79,7 @@ impl ArticulationCfg {
         let robot = RobotCfg {
             uid: self.uid,
             urdf: self.urdf,
+            mjcf: self.mjcf,
             fix_base: self.fix_base,
             init_pose: self.init_pose,
             init_qpos: self.init_qpos,

@@ -162,6 +162,9 @@ impl Robot<'_> {
     /// [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success)
     /// says that it is right.
     ///
+    /// No [`Property`](crate::Property) moves a joint or a link's frame, and neither masses nor sizes are looked at: what is
+    /// drawn for an environment changes nothing here.
+    ///
     /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the
     /// robot's root is, up to the rounding of the target's pose in the frame of the root.
     ///

@@ -3,10 +3,10 @@
 pub use super::robot_cfg::RobotCfg;
 
 use crate::compile::{JointIndexing, RobotIndex, Simulation};
-use crate::description::{Inertial, JointKind, LinkId, RobotDescription};
+use crate::description::{Inertial, LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
-use crate::drive::table::Gains;
+use crate::drive::table::{DriveState, Gains};
 use crate::drive::{ActuatorSpec, DriveModel};
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
@@ -87,7 +87,7 @@ impl RobotData {
         for component in &cfg.urdf.components {
             check_pose("component transform", &component.transform)?;
         }
-        let (file, mut description, mut found) = described(&cfg, index, scene)?;
+        let (file, mut description, mut found) = described(&cfg, &role.named(&cfg.uid), index, Some(scene))?;
         load_up(&mut description, &cfg)?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
@@ -171,7 +171,7 @@ impl RobotData {
 
     /// Something of its MJCF file is wrong.
     pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
-        file_error(&self.cfg, error)
+        file_error(&self.cfg, self.named(), error)
     }
 
     /// Pose of the root link at the start.
@@ -184,16 +184,18 @@ impl RobotData {
     }
 }
 
-fn file_error(cfg: &RobotCfg, error: RobotFileError) -> Error {
+fn file_error(cfg: &RobotCfg, robot: Named, error: RobotFileError) -> Error {
     let path = cfg.mjcf.as_ref().map(|file| file.path.display().to_string());
-    Error::RobotFile { robot: cfg.uid.clone(), file: path.unwrap_or_default(), error: Box::new(error) }
+    Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
 }
 
-/// The robot as its files describe it, without payloads, and what is odd in them.
-fn described(
+/// The robot as its files describe it, without payloads, and what is odd in them; where there is a `scene`, also what of the
+/// settings of its MJCF file is not the scene's.
+pub(crate) fn described(
     cfg: &RobotCfg,
+    named: &Named,
     index: usize,
-    scene: &mj::Model,
+    scene: Option<&mj::Model>,
 ) -> Result<(Option<RobotFile>, RobotDescription, Vec<Diagnostic>)> {
     let Some(file) = &cfg.mjcf else {
         let assembly = assemble(&cfg.urdf)?;
@@ -204,8 +206,10 @@ fn described(
         return Err(Error::Config { field: "mjcf", value: format!("{:?}", file.path), expected });
     }
     let mut found = Vec::new();
-    let loading = Loading { uid: &cfg.uid, index, fix_base: cfg.fix_base, self_collision: cfg.self_collision, scene };
-    let (file, description) = RobotFile::load(file, &loading, |error| file_error(cfg, error), &mut found)?;
+    let (fix_base, self_collision) = (cfg.fix_base, cfg.self_collision);
+    let loading = Loading { uid: &cfg.uid, named, index, fix_base, self_collision, scene };
+    let (file, description) =
+        RobotFile::load(file, &loading, |error| file_error(cfg, named.clone(), error), &mut found)?;
     Ok((Some(file), description, found))
 }
 
@@ -440,6 +444,7 @@ impl<'a> Robot<'a> {
 
     /// Joint positions at the start, which [`reset`](crate::SimulationManager::reset) goes back to \[rad or m\], shape
     /// (N, dof).
+    #[doc(alias = "default_joint_pos")]
     pub fn get_default_qpos(&self) -> Array2<f64> {
         let n = self.simulation.batch.num_envs();
         Array2::from_shape_fn((n, self.dof()), |(_, joint)| self.data.plans[joint].initial)
@@ -537,19 +542,12 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked("set_qpos", targets.into(), joint_ids, env_ids)?;
-        let robot = &self.simulation.robots[self.index];
-        for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                for (&joint, &value) in write.joints.iter().zip(row) {
-                    if let Some(drive) = robot.joints[joint].drive {
-                        let [low, high] = env.drives.ranges[drive];
-                        env.drives.position[drive] = value.clamp(low, high);
-                    }
-                }
-            });
-        }
-        Ok(())
+        self.set_targets("set_qpos", targets.into(), joint_ids, env_ids, |drives, indexing, _, value| {
+            if let Some(drive) = indexing.drive {
+                let [low, high] = drives.ranges[drive];
+                drives.position[drive] = value.clamp(low, high);
+            }
+        })
     }
 
     /// Sets velocity targets \[rad/s or m/s\] of the drives; they stay until changed or reset, and are 0 at first. Rows
@@ -564,18 +562,11 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked("set_qvel", velocities.into(), joint_ids, env_ids)?;
-        let robot = &self.simulation.robots[self.index];
-        for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                for (&joint, &value) in write.joints.iter().zip(row) {
-                    if let Some(drive) = robot.joints[joint].drive {
-                        env.drives.velocity[drive] = value;
-                    }
-                }
-            });
-        }
-        Ok(())
+        self.set_targets("set_qvel", velocities.into(), joint_ids, env_ids, |drives, indexing, _, value| {
+            if let Some(drive) = indexing.drive {
+                drives.velocity[drive] = value;
+            }
+        })
     }
 
     /// Sets efforts \[N m or N\] that are added to what the drives give, before the sum is clamped to their limits; they
@@ -592,17 +583,30 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked("set_qf", efforts.into(), joint_ids, env_ids)?;
+        self.set_targets("set_qf", efforts.into(), joint_ids, env_ids, |drives, indexing, plan, value| {
+            if let Some(drive) = indexing.drive {
+                drives.feedforward[drive] = value;
+            } else if plan.mimic.is_none() {
+                drives.applied[indexing.dof] = value.clamp(-plan.max_effort, plan.max_effort);
+            }
+        })
+    }
+
+    /// Changes what is asked of joints by one number each, after everything was checked.
+    fn set_targets(
+        &mut self,
+        argument: &'static str,
+        values: ArrayView2<'_, f64>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+        change: impl Fn(&mut DriveState, &JointIndexing, &JointPlan, f64),
+    ) -> Result<()> {
+        let write = self.checked(argument, values, joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
-                    let (indexing, plan) = (robot.joints[joint], &self.data.plans[joint]);
-                    if let Some(drive) = indexing.drive {
-                        env.drives.feedforward[drive] = value;
-                    } else if plan.mimic.is_none() {
-                        env.drives.applied[indexing.dof] = value.clamp(-plan.max_effort, plan.max_effort);
-                    }
+                    change(&mut env.drives, &robot.joints[joint], &self.data.plans[joint], value);
                 }
             });
         }
@@ -745,11 +749,4 @@ impl<'a> RobotMut<'a> {
 pub(super) struct JointRows<'v> {
     pub(super) joints: Vec<usize>,
     pub(super) rows: Rows<'v>,
-}
-
-impl RobotData {
-    /// How a joint moves.
-    pub fn joint_kind(&self, joint: JointIndex) -> Option<JointKind> {
-        self.plans.get(joint.0).map(|p| self.description.joint(p.joint).kind)
-    }
 }

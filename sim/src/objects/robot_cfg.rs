@@ -34,15 +34,17 @@ pub struct RobotCfg {
     ///   joints that do not follow each other becomes a drive of each, whose targets do not know of each other. Limits of
     ///   efforts are symmetric, activations (filters, integrators, muscles) are gone, targets are not limited by control
     ///   ranges: [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator of which that is not the whole.
-    /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive.
+    /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive,
+    ///   and starts where that curve is for the start of the joint that it follows, whatever [`init_qpos`](Self::init_qpos)
+    ///   says of itself; kinematics take it for a joint of its own, so that [`compute_ik`](crate::Robot::compute_ik) should not be
+    ///   asked to move it. Where several equalities are of one joint, or they go in a circle, it starts at its own `ref`.
     /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
     /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits, also those that
     ///   collide in pairs with what stands in the file's world alone; friction and softness of such pairs are not kept.
     ///   Other pairs of geoms hold where [`self_collision`](Self::self_collision) is on. What the file excludes from colliding
     ///   with its own world collides with the scene.
     /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
-    ///   `solimpfriction` hold for the others. A joint that follows by a curve starts at its own `ref`, wherever
-    ///   [`init_qpos`](Self::init_qpos) lets its driver start, and the coupling pulls it from there.
+    ///   `solimpfriction` hold for the others.
     /// - Named sites are links on fixed joints, which the end of a control part
     ///   ([`Tip::of_part`](crate::kinematics::Tip::of_part)) follows where there is exactly one: to add a site to the last body,
     ///   for a touch sensor say, moves that end. Name the link ([`Tip::at`](crate::kinematics::Tip::at)) where it matters.

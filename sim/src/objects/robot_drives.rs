@@ -11,7 +11,7 @@ use crate::drive::{ActuatorModel, DelayedPd, DriveType};
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
 use crate::objects::rows::{Numbers, distinct_envs};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
@@ -93,7 +93,7 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         self.set_drives("set_stiffness", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
-            drives.set(drive, |setting| setting.stiffness = value);
+            drives.set_stiffness(drive, value);
         })
     }
 
@@ -111,14 +111,15 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         self.set_drives("set_damping", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
-            drives.set(drive, |setting| setting.damping = value);
+            drives.set_drive_damping(drive, value);
         })
     }
 
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
     /// `env_ids` (all where `None`). Their numbers stay, and so does everything else. With `None` a drive gives nothing but
     /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the
-    /// inertia that the joint feels at the robot's initial positions. Nothing warns where that makes an explicit model
+    /// inertia that the joint feels at the robot's initial positions, with the masses of the files and payloads: those that
+    /// were drawn for an environment do not count. Nothing warns where that makes an explicit model
     /// unstable: see [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
@@ -213,12 +214,22 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let write = self.checked_numbers(argument, numbers, values, joint_ids, env_ids)?;
         let drives = self.drives_of(argument, &write.joints)?;
+        self.change_drives(&write, &drives, change);
+        Ok(())
+    }
+
+    /// Changes `drives`, each by its column of what was checked.
+    pub(super) fn change_drives(
+        &mut self,
+        write: &JointRows<'_>,
+        drives: &[(usize, usize, usize)],
+        change: impl Fn(&mut DriveState, usize, f64),
+    ) {
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 drives.iter().for_each(|&(column, _, drive)| change(&mut env.drives, drive, row[column]));
             });
         }
-        Ok(())
     }
 
     /// `(column, joint, drive)` of the `joints` but the mimic ones, each with gains that may change.

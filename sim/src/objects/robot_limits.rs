@@ -1,6 +1,6 @@
 //! Limits of a robot's joints: positions, speeds and efforts, per joint and per environment.
 
-use crate::drive::table::Gains;
+use crate::drive::table::{DriveState, Gains};
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
@@ -159,14 +159,9 @@ impl RobotMut<'_> {
         let drives = self.driven("set_qvel_limits", &write.joints)?;
         let change = |gains: Gains, max_velocity| Gains { max_velocity, ..gains };
         self.check_models("set_qvel_limits", &write, &drives, change)?;
-        for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                for &(column, _, drive) in &drives {
-                    let max_velocity = row[column];
-                    env.drives.set_limits(drive, |gains| Gains { max_velocity, ..gains });
-                }
-            });
-        }
+        self.change_drives(&write, &drives, |drives, drive, max_velocity| {
+            drives.set_limits(drive, |gains| change(gains, max_velocity));
+        });
         Ok(())
     }
 
@@ -190,14 +185,7 @@ impl RobotMut<'_> {
         let write = self.checked_numbers(argument, Numbers::Limit, limits.into(), joint_ids, env_ids)?;
         let drives = self.drives_of(argument, &write.joints)?;
         self.check_models(argument, &write, &drives, |gains, max_effort| Gains { max_effort, ..gains })?;
-        for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                for &(column, _, drive) in &drives {
-                    let max_effort = row[column];
-                    env.drives.set_limits(drive, |gains| Gains { max_effort, ..gains });
-                }
-            });
-        }
+        self.change_drives(&write, &drives, DriveState::set_max_effort);
         Ok(())
     }
 

@@ -56,6 +56,7 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// There is no such part; the error lists those there are.
+    #[doc(alias = "remove_mimic")]
     pub fn get_active_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
         let mut joints = self.get_joint_ids(part)?;
         joints.retain(|&joint| !self.is_mimic(joint));

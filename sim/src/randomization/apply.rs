@@ -20,8 +20,8 @@ pub(crate) struct Maker {
 pub(crate) struct Made {
     /// `None` where the one it has will do.
     model: Option<Model>,
-    /// Of each drive: proportional and derivative gain, effort limit.
-    gains: Vec<(usize, [f64; 3])>,
+    /// Of each drive: proportional and derivative gain, effort limit, where they are drawn anew.
+    gains: Vec<(usize, [Option<f64>; 3])>,
     /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
     damping: Vec<f64>,
     /// As [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows) takes them, of the model.
@@ -51,8 +51,17 @@ impl Maker {
         let values = |property: Property| &properties.values[property as usize];
         let places = &properties.tables.get(Property::Stiffness).places;
         let gains = places.iter().enumerate().map(|(element, &drive)| {
-            let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
-            (drive, gains.map(|of| values(of)[element]))
+            let now = env.drives.gains[drive];
+            let gains = [
+                (Property::Stiffness, now.kp),
+                (Property::DriveDamping, now.kd),
+                (Property::MaxEffort, now.max_effort),
+            ];
+            let drawn = |(of, now): (Property, f64)| {
+                let value = values(of)[element];
+                (properties.is_asked(of, element) || value.to_bits() != now.to_bits()).then_some(value)
+            };
+            (drive, gains.map(drawn))
         });
         let rows = drives.rows(model.as_ref().unwrap_or(env.data().model()));
         Ok(Made { model, gains: gains.collect(), damping, rows })

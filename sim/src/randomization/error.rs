@@ -1,6 +1,7 @@
 //! What can be wrong with properties of environments.
 
 use crate::pattern::PatternError;
+use scene::RenderSceneError;
 
 /// A property cannot be drawn or set.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +53,15 @@ pub enum RandomizationError {
         found: usize,
         /// How many it has.
         expected: usize,
+    },
+    /// What an environment would look like cannot be drawn.
+    #[error("environment {env} cannot be drawn as it would be: {error}")]
+    Look {
+        /// The environment.
+        env: usize,
+        /// What is wrong.
+        #[source]
+        error: RenderSceneError,
     },
     /// MuJoCo 4.x keeps only the diagonal of the inertia matrix of a body that moves freely with its centre of mass in its
     /// origin: there is no room for another centre of mass.

@@ -24,6 +24,7 @@ mod property;
 mod tables;
 mod terms;
 
+use apply::Made;
 pub(crate) use apply::Maker;
 pub use error::RandomizationError;
 pub(crate) use named::NamedValue;
@@ -38,7 +39,7 @@ use crate::compile::Simulation;
 use crate::env::Env;
 use crate::error::Result;
 use crate::manager::{EnvId, SimulationManager, env_mask};
-use scene::{OwnScene, Random};
+use scene::{OwnScene, Random, RenderSceneError};
 use std::sync::Arc;
 
 impl Simulation {
@@ -103,36 +104,67 @@ impl Simulation {
             })
             .collect();
         self.maker = Some(maker);
-        let mut others = Vec::new();
-        for (index, own, made) in made? {
-            let before = self.own_values[index].as_deref().unwrap_or(&NOTHING);
-            let differs = |property: &Property| before[*property as usize] != own[*property as usize];
-            others.extend([Property::Size, Property::Color].iter().any(differs).then_some(index));
+        let made = made?;
+        let looks_other = |(index, own, _): &&(usize, OwnValues, Made)| {
+            let before = self.own_values[*index].as_deref().unwrap_or(&NOTHING);
+            [Property::Size, Property::Color].iter().any(|p| before[*p as usize] != own[*p as usize])
+        };
+        let others: Vec<_> = made.iter().filter(looks_other).map(|(index, own, _)| (*index, own)).collect();
+        let mut looks = Vec::with_capacity(others.len());
+        for (env, look) in self.looks(&others) {
+            looks.push((env, look.map_err(|error| RandomizationError::Look { env, error })?));
+        }
+        for (index, own, made) in made {
             self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
             self.batch.write(index, |env| made.give(env));
         }
-        self.look_anew(&others);
+        self.look_so(looks);
         Ok(())
     }
 
-    /// Makes what environments look like, where their sizes or colours are their own and somebody looks.
-    pub(crate) fn look_anew(&mut self, envs: &[usize]) {
-        let Some(visible) = &self.visible else { return };
-        let owns =
-            |env: usize, property| self.own_values[env].as_ref().and_then(|own| own[property as usize].as_deref());
-        let looks_own = |env: &usize| owns(*env, Property::Size).or(owns(*env, Property::Color)).is_some();
-        if self.own_scenes.is_empty() && !envs.iter().any(looks_own) {
-            return;
+    /// What environments look like with these own values, where somebody looks.
+    fn looks(&self, envs: &[(usize, &OwnValues)]) -> Vec<(usize, Result<OwnScene, RenderSceneError>)> {
+        let of = |own: &&OwnValues, property: Property| own[property as usize].is_some();
+        let looks_own = |own: &&OwnValues| of(own, Property::Size) || of(own, Property::Color);
+        let Some(visible) = &self.visible else { return Vec::new() };
+        if self.own_scenes.is_empty() && !envs.iter().any(|(_, own)| looks_own(own)) {
+            return Vec::new();
         }
         let tables = self.tables();
-        let scene = |env: &usize| {
-            let [sizes, colors] = [Property::Size, Property::Color]
-                .map(|property| tables.get(property).changes(property.width(), owns(*env, property).unwrap_or(&[])));
-            (*env, if looks_own(env) { visible.own_scene(self.batch.model(), &sizes, &colors) } else { OwnScene(None) })
+        let scene = |own: &OwnValues| {
+            if !looks_own(&own) {
+                return Ok(OwnScene(None));
+            }
+            let [sizes, colors] = [Property::Size, Property::Color].map(|property| {
+                let values = own[property as usize].as_deref().unwrap_or(&[]);
+                tables.get(property).changes(property.width(), values)
+            });
+            visible.own_scene(self.batch.model(), &sizes, &colors)
         };
-        let scenes: Vec<(usize, OwnScene)> = envs.iter().map(scene).collect();
-        self.own_scenes.resize(self.own_values.len(), OwnScene(None));
-        scenes.into_iter().for_each(|(env, scene)| self.own_scenes[env] = scene);
+        envs.iter().map(|(env, own)| (*env, scene(own))).collect()
+    }
+
+    /// From now on environments look so.
+    fn look_so(&mut self, looks: Vec<(usize, OwnScene)>) {
+        if !looks.is_empty() {
+            self.own_scenes.resize(self.own_values.len(), OwnScene(None));
+        }
+        looks.into_iter().for_each(|(env, look)| self.own_scenes[env] = look);
+    }
+
+    /// Makes what all environments look like, now that somebody looks; gives the faults of those that cannot be drawn as they
+    /// are, and look as nominally.
+    pub(crate) fn look_anew(&mut self) -> Vec<(usize, RenderSceneError)> {
+        let own = self.own_values.iter().map(|own| own.as_deref().unwrap_or(&NOTHING));
+        let (mut looks, mut faults) = (Vec::new(), Vec::new());
+        for (env, look) in self.looks(&own.enumerate().collect::<Vec<_>>()) {
+            match look {
+                Ok(look) => looks.push((env, look)),
+                Err(error) => faults.push((env, error)),
+            }
+        }
+        self.look_so(looks);
+        faults
     }
 
     /// Takes over, by name, what environments of `old` have for themselves.

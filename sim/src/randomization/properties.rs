@@ -6,6 +6,7 @@ use super::tables::{Table, Tables};
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
 use crate::pattern;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What an environment has for itself, property by property in the order of [`Property::ALL`]; nominal where `None`.
@@ -19,6 +20,8 @@ pub struct Properties {
     pub(super) tables: Arc<Tables>,
     /// In the order of [`Property::ALL`].
     pub(super) values: [Vec<f64>; Property::ALL.len()],
+    /// Gains that were drawn or set here, by property and element: what is drawn is so also where it is what was before.
+    asked: BTreeSet<(Property, usize)>,
 }
 
 impl Properties {
@@ -40,7 +43,12 @@ impl Properties {
                 None => table.nominal.clone(),
             }
         });
-        Self { tables: Arc::clone(tables), values }
+        Self { tables: Arc::clone(tables), values, asked: BTreeSet::new() }
+    }
+
+    /// Whether a gain was drawn or set here.
+    pub(super) fn is_asked(&self, gain: Property, element: usize) -> bool {
+        self.asked.contains(&(gain, element))
     }
 
     /// What differs from the nominal values, bit by bit.
@@ -60,6 +68,19 @@ impl Properties {
                 names.push(name);
             }
         }
+        names
+    }
+
+    /// Names of what draws of a property change. A draw leaves opacities as they nominally are, so it changes no colour that
+    /// can be seen of what is nominally invisible.
+    pub(super) fn names_to_draw(&self, property: Property) -> Vec<&str> {
+        let table = self.tables.get(property);
+        let is_seen = |name: &str| {
+            let opacities = table.nominal.chunks(property.width()).map(|color| color[3]);
+            table.names.iter().zip(opacities).any(|(of, opacity)| of == name && opacity > 0.0)
+        };
+        let mut names = self.names(property);
+        names.retain(|name| property != Property::Color || is_seen(name));
         names
     }
 
@@ -114,6 +135,9 @@ impl Properties {
         let width = property.width();
         let at = element * width..(element + 1) * width;
         self.values[property as usize][at.clone()].copy_from_slice(value);
+        if property.is_gain() {
+            self.asked.insert((property, element));
+        }
         if property == Property::Size {
             // Numbers that the shape does not have.
             let nominal = &self.tables.get(property).nominal[at.clone()];

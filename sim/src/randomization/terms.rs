@@ -94,7 +94,7 @@ impl Randomization {
             if entries.is_empty() {
                 continue;
             }
-            let names = properties.names(property);
+            let names = properties.names_to_draw(property);
             let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.owner())
                 .map_err(|error| RandomizationError::Pattern { property: property.name(), error: Box::new(error) })?;
             let chosen = names.iter().zip(draws).filter_map(|(name, draw)| Some((name.to_string(), draw?)));

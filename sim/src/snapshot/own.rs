@@ -104,7 +104,7 @@ impl SimulationManager {
                 here.recall(&entries[source].state);
                 for (property, element, value) in values {
                     if let Some(kind) = property.gain() {
-                        here.drives.draw_gain(tables.place(*property, *element), kind, value[0]);
+                        here.drives.redraw_gain(tables.place(*property, *element), kind, value[0]);
                     }
                 }
             });

@@ -48,6 +48,31 @@ impl UrdfCfg {
     pub fn single(urdf: impl AsRef<Path>) -> Self {
         Self { components: vec![ComponentCfg::new("robot", urdf)], ..Self::default() }
     }
+
+    /// A robot of files of which each hangs from the tip of the one before. A single one is called `robot`, two are `arm`
+    /// and `hand`, more are `part1`, `part2` and so on.
+    ///
+    /// ```
+    /// use sim::UrdfCfg;
+    ///
+    /// let cfg = UrdfCfg::chain(["arm.urdf", "hand.urdf"]);
+    /// assert_eq!(cfg.components[1].parent.as_deref(), Some("arm"));
+    /// ```
+    pub fn chain<P: AsRef<Path>>(urdfs: impl IntoIterator<Item = P>) -> Self {
+        let urdfs: Vec<P> = urdfs.into_iter().collect();
+        let mut components: Vec<ComponentCfg> = Vec::with_capacity(urdfs.len());
+        for (i, urdf) in urdfs.iter().enumerate() {
+            let name = match (urdfs.len(), i) {
+                (1, _) => "robot".to_owned(),
+                (2, 0) => "arm".to_owned(),
+                (2, _) => "hand".to_owned(),
+                _ => format!("part{}", i + 1),
+            };
+            let parent = components.last().map(|before| before.name.clone());
+            components.push(ComponentCfg { parent, ..ComponentCfg::new(name, urdf) });
+        }
+        Self { components, ..Self::default() }
+    }
 }
 
 /// Case of the names of a merged robot.

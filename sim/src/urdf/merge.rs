@@ -58,7 +58,7 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
     let needs_base = components.roots() > 1 || is_moved;
     if needs_base {
         let source = files[root].links[files[root].tree.root].source.clone();
-        merge.links.push(link(String::new(), source, String::new()));
+        merge.links.push(Link::new(String::new(), source, String::new()));
     }
     for &id in &components.order {
         merge.add(id, &files)?;
@@ -79,21 +79,6 @@ fn name_of(components: &Components, files: &[UrdfFile]) -> String {
     let names = components.order.iter().map(|&c| files[c].robot.name.trim()).filter(|n| !n.is_empty());
     let name = names.collect::<Vec<_>>().join("_");
     if name.is_empty() { "robot".to_owned() } else { name }
-}
-
-/// A link that has nothing yet.
-fn link(name: String, source: Source, component: String) -> Link {
-    Link {
-        name,
-        source,
-        component,
-        inertial: None,
-        visuals: Vec::new(),
-        collisions: Vec::new(),
-        parent_joint: None,
-        child_joints: Vec::new(),
-        between_joints: false,
-    }
 }
 
 struct Merge<'c> {
@@ -172,7 +157,7 @@ impl Merge<'_> {
         for (model, notes) in file.robot.links.iter().zip(&file.links) {
             let names = &mut self.link_names;
             let name = names.claim(&model.name, prefix, &component.name, &notes.source, &mut self.diagnostics);
-            let mut link = link(name, notes.source.clone(), component.name.clone());
+            let mut link = Link::new(name, notes.source.clone(), component.name.clone());
             link.inertial = notes.inertial.as_ref().map(|source| inertial(&model.inertial, source.clone()));
             for (visual, notes) in model.visual.iter().zip(&notes.visuals) {
                 link.visuals.push(shapes.visual(visual, notes, &model.name, &mut self.diagnostics)?);

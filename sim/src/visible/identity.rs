@@ -1,6 +1,7 @@
 //! Mask ids: which number stands for what.
 
 use crate::mj::{Model, ObjectKind};
+use sensors::camera::Thing;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -20,6 +21,12 @@ pub struct MaskId {
     pub body: String,
     /// MuJoCo's geoms; unnamed ones by number.
     pub geoms: Vec<String>,
+}
+
+impl From<&MaskId> for Thing {
+    fn from(id: &MaskId) -> Self {
+        Self { id: id.id, object: id.object.clone(), link: id.link.clone(), class: id.class.clone() }
+    }
 }
 
 /// Who owns each geom.

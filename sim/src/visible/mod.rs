@@ -22,8 +22,9 @@ pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::mj::{Data, Model};
 use crate::simulation_cfg::GroundCfg;
+use scene::pose::from_row;
 use scene::shape::Plane;
-use scene::{Headlight, Instance, Light, Material, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use scene::{Headlight, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
 /// What can be seen of a model.
@@ -41,6 +42,20 @@ pub struct Visible {
 pub(crate) struct Part {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
+}
+
+/// Where a geom is in the frame of what it belongs to: that of the link, given with MuJoCo's body of it; that of its body
+/// where nobody gives one, and its own in the world.
+fn frame_from_geom(model: &Model, geom: usize, link: Option<&(usize, Pose)>) -> Pose {
+    let body = model.geom_bodyid()[geom] as usize;
+    let body_from_frame = match link {
+        Some((of, body_from_link)) if *of == body => *body_from_link,
+        None if body > 0 => Pose::identity(),
+        _ => return Pose::identity(),
+    };
+    let [x, y, z] = [0, 1, 2].map(|k| model.geom_pos()[3 * geom + k]);
+    let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| model.geom_quat()[4 * geom + k]);
+    body_from_frame.inverse() * from_row(&[x, y, z, qw, qx, qy, qz])
 }
 
 /// The ground of a simulation.
@@ -61,11 +76,17 @@ pub(crate) fn ground(cfg: &GroundCfg) -> Part {
 impl Visible {
     /// What can be seen of `model`, as it is: each body one mask id, each geom of the world its own.
     pub fn of_model(model: &Model) -> Self {
-        Self::extract(model, &identity::by_body(model), &Replacements::new())
+        Self::extract(model, &identity::by_body(model), &Replacements::new(), &[])
     }
 
-    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts.
-    pub(crate) fn extract(model: &Model, identities: &Identities, replacements: &Replacements) -> Self {
+    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are MuJoCo's body of
+    /// everything on the body axis of sensors, and the frame of the link in it.
+    pub(crate) fn extract(
+        model: &Model,
+        identities: &Identities,
+        replacements: &Replacements,
+        frames: &[(usize, Pose)],
+    ) -> Self {
         let surfaces = surface::Surfaces::of(model);
         let mut shapes = geom::Shapes::of(model);
         let mut left_out = surfaces.left_out().to_vec();
@@ -83,7 +104,9 @@ impl Visible {
                 let visible = material.rgba[3] > 0.0;
                 let GeomIdentity { mask_id, name, body } = identities.of(geom).clone();
                 let fixed = model.is_fixed(model.geom_bodyid()[geom] as usize);
-                let instance = Instance { shape, material, mask_id, group, visible, name, body, fixed };
+                let frame_from_instance = frame_from_geom(model, geom, body.and_then(|body| frames.get(body as usize)));
+                let instance =
+                    Instance { shape, material, mask_id, group, visible, name, body, fixed, frame_from_instance };
                 if let Err(reason) = instance.validate() {
                     left_out.push(format!("geom {geom} is not drawn: {reason}"));
                     continue;

@@ -2,18 +2,21 @@
 
 use super::{Visible, geom};
 use crate::mj::Model;
-use scene::{Material, OwnScene};
+use scene::{Material, OwnScene, RenderSceneError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 impl Visible {
     /// The scene with other sizes \[m\] and colours, by geom of `model`. Meshes and textures are shared.
+    ///
+    /// # Errors
+    /// A size or a colour that cannot be drawn. Those of [`Properties`](crate::Properties) can.
     pub(crate) fn own_scene(
         &self,
         model: &Model,
         sizes: &BTreeMap<usize, &[f64]>,
         colors: &BTreeMap<usize, &[f64]>,
-    ) -> OwnScene {
+    ) -> Result<OwnScene, RenderSceneError> {
         let mut instances = self.scene.instances().to_vec();
         for (instance, geom) in instances.iter_mut().zip(&self.geoms) {
             let size = sizes.get(geom).and_then(|size| geom::sized(model.geom_type()[*geom] as u32, size));
@@ -26,8 +29,7 @@ impl Visible {
                 instance.material = Material { rgba, ..instance.material.clone() };
             }
         }
-        // Sizes and colours were checked when they were set, and there are as many triangles as before.
-        OwnScene(self.scene.with_instances(instances).ok().map(Arc::new))
+        Ok(OwnScene(Some(Arc::new(self.scene.with_instances(instances)?))))
     }
 
     /// This as it is in an environment whose scene is `own`.
@@ -36,5 +38,29 @@ impl Visible {
             None => Arc::clone(self),
             Some(scene) => Arc::new(Self { scene: Arc::clone(scene), ..(**self).clone() }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mj;
+
+    /// A look that cannot be drawn is an error, not the nominal one.
+    #[test]
+    fn what_cannot_be_drawn_is_an_error() {
+        let text = r#"<mujoco><worldbody><geom type="box" size="0.1 0.2 0.3"/></worldbody></mujoco>"#;
+        let model = mj::compile(text, &[]).expect("compiles").into_model();
+        let visible = Visible::of_model(&model);
+        let look = |size: [f64; 3], red: f64| {
+            let (size, color) = ([(0, &size[..])].into(), [red, 0.0, 0.0, 1.0]);
+            visible.own_scene(&model, &size, &[(0, &color[..])].into())
+        };
+        let error = look([0.1, 0.0, 0.3], 0.5).expect_err("no box is flat");
+        assert!(matches!(error, RenderSceneError::Size { shape: "box", .. }), "{error}");
+        let error = look([0.1, 0.2, 0.3], f64::NAN).expect_err("no colour");
+        assert!(matches!(error, RenderSceneError::Material { .. }), "{error}");
+        // Control.
+        assert!(look([0.4, 0.2, 0.3], 0.5).is_ok_and(|own| own.0.is_some()));
     }
 }

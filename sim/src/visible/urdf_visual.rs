@@ -49,6 +49,12 @@ impl VisualCache {
         std::mem::take(&mut self.diagnostics)
     }
 
+    /// An environment does not look as its properties say.
+    pub(crate) fn say_look(&mut self, env: usize, error: &scene::RenderSceneError) {
+        let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
+        self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
+    }
+
     /// What is drawn for a visual.
     pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
         let of = Of { name: format!("link {link:?}"), source: Some(visual.source.clone()) };

@@ -21,15 +21,7 @@ fn period(length: f64) -> f64 {
     let body = Link::new("body", MASS, [moment, moment, 0.01]).at([0.0, 0.0, -length]);
     let robot = lab.mechanism(&urdf(&[base(), body], &[Joint::hinge("pivot", ["base", "body"], [0.0, 1.0, 0.0])]));
     lab.write_joints(robot, &[ANGLE], &[0.0]);
-    let (mut before, mut times) = ([0.0, ANGLE], Vec::new());
-    lab.watch(5_000, |t, sim| {
-        let q = sim.robot(robot).get_qpos()[(0, 0)];
-        if q * before[1] < 0.0 {
-            times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
-        }
-        before = [t, q];
-    });
-    (times[4] - times[0]) / 2.0
+    lab.period(robot, 5_000)
 }
 
 #[test]

@@ -17,17 +17,8 @@ fn period(cfg: SimulationManagerCfg, angle: f64) -> f64 {
     let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);
     let robot = lab.mechanism(&urdf(&[base(), Link::point("bob", 1.0, [0.0, 0.0, -LENGTH])], &[joint]));
     lab.write_joints(robot, &[angle], &[0.0]);
-    let (mut before, mut times) = ([0.0, angle], Vec::new());
     let steps = (8.0 / lab.dt()).round() as u32;
-    lab.watch(steps, |t, sim| {
-        let q = sim.robot(robot).get_qpos()[(0, 0)];
-        if q * before[1] < 0.0 {
-            times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
-        }
-        before = [t, q];
-    });
-    // Two passages in a period.
-    (times[4] - times[0]) / 2.0
+    lab.period(robot, steps)
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::{Command, Speed, Wants};
 use crate::stage::{Pool, Run};
 use ndarray::arr2;
 use sim::{EnvId, Moment, Observer, SimulationManager};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,6 +28,10 @@ pub struct Conductor {
     wants: Wants,
     /// The step at which it holds; `None` while it runs.
     hold_at: Option<u64>,
+    /// Who wants it held; it runs again when the last of them is gone.
+    held_by: BTreeSet<u64>,
+    /// How fast each viewer wanted it, the last wish last: that one counts, for as long as its viewer is there.
+    speeds: Vec<(u64, Speed)>,
     /// The step at which it looks again.
     look_at: u64,
     /// When the last snapshot was taken.
@@ -46,6 +50,8 @@ impl Conductor {
             pace: None,
             wants: Wants::NOTHING,
             hold_at: None,
+            held_by: BTreeSet::new(),
+            speeds: Vec::new(),
             look_at: 0,
             shown: None,
             dirty: true,
@@ -98,27 +104,57 @@ impl Conductor {
         for viewer in gone {
             self.release(sim, viewer);
         }
+        self.forget_gone(sim.steps(), &viewers);
         !viewers.is_empty()
+    }
+
+    /// What viewers did to time ends with them, whoever else still watches.
+    fn forget_gone(&mut self, steps: u64, viewers: &[u64]) {
+        self.held_by.retain(|viewer| viewers.contains(viewer));
+        if self.held_by.is_empty() && self.hold_at.is_some() {
+            self.hold_at = None;
+            self.restart(steps);
+            self.dirty = true;
+        }
+        let wishes = self.speeds.len();
+        self.speeds.retain(|(viewer, _)| viewers.contains(viewer));
+        if self.speeds.len() < wishes {
+            self.dirty = true;
+            let speed = self.speeds.last().map_or(Speed::Free, |(_, speed)| *speed);
+            if let Some(pace) = self.pace.as_mut().filter(|pace| pace.speed() != speed) {
+                pace.set_speed(speed, steps, Instant::now());
+            }
+        }
     }
 
     fn act(&mut self, sim: &mut SimulationManager, viewer: u64, command: Command) -> Result<(), String> {
         let steps = sim.steps();
         match command {
-            Command::Pause => self.hold_at = self.hold_at.map(|step| step.min(steps)).or(Some(steps)),
+            Command::Pause => {
+                self.hold_at = self.hold_at.map(|step| step.min(steps)).or(Some(steps));
+                self.held_by.insert(viewer);
+            }
             Command::TogglePause => {
                 let next = if self.hold_at.is_some() { Command::Resume } else { Command::Pause };
                 return self.act(sim, viewer, next);
             }
             Command::Resume => {
                 self.hold_at = None;
+                self.held_by.clear();
                 self.restart(steps);
             }
             Command::Step(count) => {
                 let from = self.hold_at.map_or(steps, |step| step.max(steps));
                 self.hold_at = Some(from.saturating_add(u64::from(count)));
+                // Steps in a pause are of those who paused.
+                if self.held_by.is_empty() {
+                    self.held_by.insert(viewer);
+                }
                 self.restart(steps);
             }
             Command::SetSpeed(speed) if speed.is_valid() => {
+                self.speeds.retain(|(other, _)| *other != viewer);
+                self.speeds.push((viewer, speed));
                 self.pace.iter_mut().for_each(|pace| pace.set_speed(speed, steps, Instant::now()));
             }
             Command::SetSpeed(speed) => {
@@ -179,6 +215,8 @@ impl Conductor {
             spring.release(sim);
         }
         (self.hold_at, self.pace, self.refused) = (None, None, None);
+        self.held_by.clear();
+        self.speeds.clear();
     }
 
     /// Steps were done: obeys, shows, waits.

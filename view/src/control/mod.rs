@@ -17,7 +17,8 @@ use sim::{EnvId, JointIndex, RobotId, SimulationManager};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Command {
-    /// Hold the simulation where it is: `update` does not return until it goes on.
+    /// Hold the simulation where it is: `update` does not return until it goes on. It goes on when somebody says so, or when
+    /// all who paused it are gone.
     Pause,
     /// Go on.
     Resume,
@@ -25,7 +26,8 @@ pub enum Command {
     TogglePause,
     /// Do this many steps, then hold again. They are steps that the program asked for: `update(n)` still does n.
     Step(u32),
-    /// How fast simulated time passes from now on.
+    /// How fast simulated time passes from now on, until a viewer sets another speed or this one goes: then it is what the
+    /// others set last.
     SetSpeed(Speed),
     /// Put environments back to their initial state, all of them where `None`.
     Reset(Option<EnvId>),
@@ -118,7 +120,7 @@ impl Default for Wants {
 
 impl Wants {
     /// Nothing.
-    const NOTHING: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
+    pub(crate) const NOTHING: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
 
     /// What two viewers want together.
     fn union(self, other: Self) -> Self {
@@ -140,7 +142,8 @@ pub trait Viewing {
     /// A new viewer of this simulation. The first snapshot is there at once; the next ones come with the steps. All viewers
     /// of a simulation have one [`Conductor`] between them, which the first brings along.
     ///
-    /// The simulation goes on when its viewers are gone, whatever they told it: pauses end, speed is free, springs let go.
+    /// What a viewer told the simulation ends with the viewer: its pause, its speed, its spring. So a simulation goes on, as
+    /// fast as it can, when all are gone.
     fn viewer(&mut self, wants: Wants) -> Viewer;
 }
 

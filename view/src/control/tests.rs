@@ -110,12 +110,22 @@ fn the_simulation_goes_on_when_the_viewer_that_paused_it_is_gone() {
     let running = Running::start(sim);
     viewer.send(Command::SetSpeed(Speed::Times(0.5)));
     viewer.send(Command::Pause);
-    let held = wait_for(&viewer, |s| s.run.paused).run.steps;
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Times(0.5));
+    other.send(Command::Pause);
+    // Steps are of those who paused: whoever asks for one holds nothing.
+    let stepper = other.another(Wants::default());
+    let held = other.newest().unwrap().run.steps;
+    stepper.send(Command::Step(1));
+    let held = wait_for(&other, |s| s.run.paused && s.run.steps == held + 1).run.steps;
     drop(viewer);
-    // Somebody else still watches: it stays held.
+    // The other one paused it as well: it stays held. The speed went with who had set it.
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Free);
     std::thread::sleep(Duration::from_millis(250));
     assert!(running.steps() <= held);
+    // Somebody who only watches does not keep it held.
     drop(other);
+    wait_for(&stepper, |s| !s.run.paused && s.run.steps > held);
+    drop(stepper);
     assert!(running.goes_on_beyond(held + 200), "nobody is there to let it go on");
     let mut sim = running.end();
     // A new viewer finds it running, at free speed, with snapshots.
@@ -125,6 +135,31 @@ fn the_simulation_goes_on_when_the_viewer_that_paused_it_is_gone() {
     drop(sim);
     assert!(viewer.is_over() && !viewer.send(Command::Pause));
     assert!(viewer.wait(u64::MAX - 1, LONG).is_none(), "nobody waits for a simulation that is over");
+}
+
+#[test]
+fn a_speed_ends_with_its_viewer() {
+    let mut sim = sample(1).sim;
+    let below = sim.viewer(Wants::default());
+    let above = below.another(Wants::default());
+    let running = Running::start(sim);
+    below.send(Command::SetSpeed(Speed::Times(20.0)));
+    wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
+    above.send(Command::SetSpeed(Speed::REAL));
+    wait_for(&below, |s| s.run.speed == Speed::REAL);
+    drop(above);
+    wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
+    // Who sets it again has the last word, and leaves nothing else behind.
+    let above = below.another(Wants::default());
+    above.send(Command::SetSpeed(Speed::REAL));
+    wait_for(&below, |s| s.run.speed == Speed::REAL);
+    below.send(Command::SetSpeed(Speed::Times(30.0)));
+    wait_for(&below, |s| s.run.speed == Speed::Times(30.0));
+    drop(above);
+    let gone = wait_for(&below, |_| true).run.steps;
+    wait_for(&below, |s| s.run.steps > gone && s.run.speed == Speed::Times(30.0));
+    drop(below);
+    running.end();
 }
 
 #[test]

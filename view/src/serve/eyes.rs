@@ -11,7 +11,7 @@ use image::codecs::jpeg::JpegEncoder;
 use serde_json::{Value, json};
 use sim::EnvId;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Sides of a picture \[pixels\].
@@ -25,6 +25,7 @@ const PANEL_WIDTH: usize = 320;
 
 /// Gives viewers their eyes.
 pub(super) struct Theatre {
+    /// Keeps the speed that was asked for with the server.
     usher: Viewer,
     shared: Arc<Shared>,
 }
@@ -32,6 +33,8 @@ pub(super) struct Theatre {
 /// What all viewers of a server share.
 struct Shared {
     cfg: ServeCfg,
+    /// Pauses and speeds of all browsers: whoever is in one may leave and come again, and they stay.
+    hands: Mutex<Viewer>,
     /// Who holds it draws: so viewers together take one core from the simulation.
     brush: Mutex<()>,
     seated: AtomicUsize,
@@ -39,15 +42,9 @@ struct Shared {
 
 impl Theatre {
     pub(super) fn new(usher: Viewer, cfg: ServeCfg) -> Self {
-        let theatre =
-            Self { usher, shared: Arc::new(Shared { cfg, brush: Mutex::new(()), seated: AtomicUsize::new(0) }) };
-        theatre.begin();
-        theatre
-    }
-
-    /// As if nobody had ever touched it.
-    fn begin(&self) {
-        self.usher.send(control::Command::SetSpeed(self.shared.cfg.speed));
+        usher.send(control::Command::SetSpeed(cfg.speed));
+        let hands = Mutex::new(usher.another(Wants::NOTHING));
+        Self { usher, shared: Arc::new(Shared { cfg, hands, brush: Mutex::new(()), seated: AtomicUsize::new(0) }) }
     }
 }
 
@@ -59,8 +56,14 @@ impl Show for Theatre {
     }
 
     fn deserted(&self) {
-        self.usher.send(control::Command::Resume);
-        self.begin();
+        // What the old hands did ends with them; what was done in a window stays.
+        *self.shared.hands() = self.usher.another(Wants::NOTHING);
+    }
+}
+
+impl Shared {
+    fn hands(&self) -> MutexGuard<'_, Viewer> {
+        self.hands.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -132,7 +135,7 @@ impl OwnEyes {
     }
 
     fn send(&self, command: control::Command) -> Result<(), String> {
-        let sent = self.viewer.send(command);
+        let sent = self.shared.hands().send(command);
         sent.then_some(()).ok_or_else(|| "the simulation takes no commands: the program does not step it".into())
     }
 

@@ -37,7 +37,7 @@ impl Panel {
             (self.frame, self.size) = (Frame::new(size[0], size[1], channels), size);
         }
         let poses = &stage.look.instances;
-        let shot = Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights) };
+        let shot = Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights), lens: None };
         if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
             return false;
         }
@@ -54,7 +54,7 @@ impl Panel {
         let [width, height] = self.size;
         let finite = depth.iter().copied().filter(|d| d.is_finite());
         let range = finite.fold([f32::MAX, f32::MIN], |[low, high], d| [low.min(d), high.max(d)]);
-        let of: [(&str, &dyn Fn(usize) -> [u8; 3]); 4] = [
+        let of: [(&str, PixelColor<'_>); 4] = [
             ("Color", &|k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]]),
             ("Depth", &|k| depth_color(depth[k], range)),
             ("Mask", &|k| mask_color(mask[k])),
@@ -73,6 +73,9 @@ impl Panel {
         }
     }
 }
+
+/// The colour of a pixel, by its number.
+type PixelColor<'a> = &'a dyn Fn(usize) -> [u8; 3];
 
 /// The same view with fewer pixels, at most `width` in a row.
 fn shrunk(view: &View, width: usize) -> View {

@@ -5,6 +5,7 @@ use crate::error::SensorError;
 use crate::visibility::RenderError;
 use ndarray::{Array, ArrayView, Dimension, Ix3, Ix4};
 use scene::pattern::closest;
+use std::ops::Range;
 
 /// Lanes of a [`PixelGroup`].
 const LANES: usize = 16;
@@ -196,6 +197,35 @@ macro_rules! channels {
             /// The pictures of one channel, if it is there.
             pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
                 C::of(self)
+            }
+
+            /// Moves the pictures of `views`, of `all` there are, up by as many places as `by` says; the last ones fall out.
+            pub(crate) fn move_up(&mut self, all: usize, views: Range<usize>, by: usize) {
+                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+                    let each = numbers.len() / all.max(1);
+                    let kept = views.len().saturating_sub(by) * each;
+                    numbers[views.start * each..views.end * each].copy_within(..kept, by.min(views.len()) * each);
+                })*
+            }
+
+            /// Makes zeros of the pictures of `views`, of `all` there are.
+            pub(crate) fn forget(&mut self, all: usize, views: Range<usize>) {
+                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+                    let each = numbers.len() / all.max(1);
+                    numbers[views.start * each..views.end * each].fill(Default::default());
+                })*
+            }
+
+            /// Copies a view of others, which have the same channels and size; of both it is said how many views there are, and
+            /// which.
+            pub(crate) fn copy_view(&mut self, (all, view): (usize, usize), others: &Self, (count, from): (usize, usize)) {
+                $(if let (Some(numbers), Some(others)) = (
+                    self.$field.as_mut().and_then(|array| array.as_slice_mut()),
+                    others.$field.as_ref().and_then(|array| array.as_slice()),
+                ) {
+                    let (each, other) = (numbers.len() / all.max(1), others.len() / count.max(1));
+                    numbers[view * each..(view + 1) * each].copy_from_slice(&others[from * other..(from + 1) * other]);
+                })*
             }
 
             /// Every view borrowed for drawing, in order.

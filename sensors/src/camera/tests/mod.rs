@@ -1,11 +1,17 @@
 //! Pictures held against independent judges.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod boxes;
+mod calibration;
 mod degenerate;
 mod detail;
 mod determinism;
 mod floors_and_lamps;
 mod golden;
+mod late;
+mod lens_pictures;
+mod lenses;
+mod noisy;
 mod pictures;
 mod reference;
 mod robots;
@@ -14,5 +20,6 @@ mod sensor;
 mod sensor_mistakes;
 mod sensor_values;
 mod stage;
+mod stereo;
 mod traced;
 mod watertight;

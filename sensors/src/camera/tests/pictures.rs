@@ -94,7 +94,7 @@ fn passed(threads: usize, scene: &RenderScene, poses: &[PoseF32], view: &View) -
         let mut frames = vec![Frame::new(view.width, view.height, FOUR); count];
         let mut best = f64::MAX;
         for _ in 0..40 / count.min(4) {
-            let shot = Shot { scene, poses, view, lights: None };
+            let shot = Shot { scene, poses, view, lights: None, lens: None };
             let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
             let start = Instant::now();
             rasterizer.render(&mut jobs).unwrap();

@@ -27,7 +27,7 @@ fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF3
 /// Depth and distance may differ by 1e-4 of themselves: of surfaces seen at a slant of up to 1 : 100, rounding of rays in
 /// single precision makes 1e-5. Normals by 0.5 degrees: a pixel's centre on an edge between two triangles may belong to
 /// either, which is what the few pixels that differ are.
-fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
+pub(super) fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
     let (depth, mask) = (a.depth.as_ref().unwrap(), a.mask.as_ref().unwrap());
     let height = mask.len() / width;
     let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| y * width + x));
@@ -140,7 +140,8 @@ fn every_renderer_draws_the_same_bits_with_any_number_of_threads() {
             for count in [1, 3] {
                 let new = |(_, _, v): &(_, _, View)| Frame::new(v.width, v.height, Channels::ALL);
                 let mut frames: Vec<_> = shots[..count].iter().map(new).collect();
-                let shots = shots.iter().map(|(scene, poses, view)| Shot { scene, poses, view, lights: None });
+                let shots =
+                    shots.iter().map(|(scene, poses, view)| Shot { scene, poses, view, lights: None, lens: None });
                 let mut jobs: Vec<_> = shots.zip(&mut frames).map(|(shot, frame)| (shot, frame.as_mut())).collect();
                 parallel.render(&mut jobs).unwrap();
                 for (k, frame) in frames.iter().enumerate() {

@@ -4,7 +4,7 @@ use super::cfg::RayCasterCameraCfg;
 use super::pixels::Pixels;
 use crate::camera::frustum::frustum;
 use crate::camera::mounts::Mounts;
-use crate::camera::{CameraConvention, DepthMiss, PixelIntrinsics};
+use crate::camera::{CameraConvention, DepthMiss, Lens, Optics, PixelIntrinsics};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::ray::caster::scan::Scan;
@@ -321,7 +321,8 @@ impl Sensor for RayCasterCamera {
     /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let taken = self.shown.taken.get(env);
-        taken.map_or_else(Vec::new, |taken| frustum(&taken.world_from_camera, &taken.lens, self.image_shape()))
+        let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.lens).ok()?)));
+        placed.map_or_else(Vec::new, |(taken, optics)| frustum(&taken.world_from_camera, &optics, self.image_shape()))
     }
 }
 

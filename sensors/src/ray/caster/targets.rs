@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::select::{at_least_one, matching};
 use crate::sensor::SensorContext;
-use scene::RenderScene;
+use scene::{OwnScene, RenderScene};
 use serde::{Deserialize, Serialize};
 
 /// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
@@ -13,7 +13,8 @@ pub enum HitTargets {
     /// What is welded to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
     StaticOnly,
     /// What these patterns name: links `uid/link` (or `link` alone), objects by their uid, geoms of the world by their name
-    /// (`ground`). Regular expressions that must match the whole name.
+    /// (`ground`). Regular expressions that must match the whole name, of something that can be seen in some environment when
+    /// the sensor is built.
     Named(Vec<String>),
     /// Everything that can be seen.
     Everything {
@@ -33,7 +34,7 @@ impl HitTargets {
     ///
     /// # Errors
     ///
-    /// A pattern that is no regular expression or matches nothing, or no pattern at all.
+    /// A pattern that is no regular expression or matches nothing that can be hit, or no pattern at all.
     pub(crate) fn select(
         &self,
         scene: &RenderScene,
@@ -44,7 +45,7 @@ impl HitTargets {
         let in_groups =
             |instance: &scene::Instance| 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
         let named = match self {
-            Self::Named(patterns) => Some(names(scene, patterns, in_groups)?),
+            Self::Named(patterns) => Some(names(scene, patterns, &context.own_scenes, in_groups)?),
             _ => None,
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
@@ -64,15 +65,21 @@ impl HitTargets {
     }
 }
 
-/// Which instances the patterns name. Those that can never be hit have no name to match: a pattern for nothing else is an
-/// error, not a ray caster that misses everything.
+/// Which instances the patterns name. Those that can be hit in no environment, since they are in no group that is hit or
+/// invisible in all of them, have no name to match: a pattern for nothing else is an error, not a ray caster that misses
+/// everything.
 fn names(
     scene: &RenderScene,
     patterns: &[String],
-    can_be_hit: impl Fn(&scene::Instance) -> bool,
+    own_scenes: &[OwnScene],
+    in_groups: impl Fn(&scene::Instance) -> bool,
 ) -> Result<Vec<bool>, SensorError> {
-    let can_be_hit = scene.instances().iter().filter(|i| can_be_hit(i));
-    let mut names: Vec<String> = can_be_hit.map(|i| i.name.to_string()).filter(|n| !n.is_empty()).collect();
+    let seen_by_some = |index: usize| {
+        let own = own_scenes.iter().filter_map(|own| own.0.as_deref());
+        std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
+    };
+    let can_be_hit = scene.instances().iter().enumerate().filter(|(index, i)| in_groups(i) && seen_by_some(*index));
+    let mut names: Vec<String> = can_be_hit.map(|(_, i)| i.name.to_string()).filter(|n| !n.is_empty()).collect();
     names.sort();
     names.dedup();
     at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &names)?;

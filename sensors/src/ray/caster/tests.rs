@@ -9,7 +9,7 @@ use crate::{NoiseCfg, SensorError};
 use ndarray::{Array2, Array3, Axis, array};
 use scene::pose::{from_xyz_rpy, to_row};
 use scene::shape::{Box, Plane, Sphere};
-use scene::{Instance, Material, Pose, PoseF64, RenderScene, SceneState};
+use scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
 use std::sync::Arc;
 
 const DT: f64 = 0.005;
@@ -348,6 +348,20 @@ fn mistakes_are_typed_errors() {
     let ground = || HitTargets::Named(vec!["ground".into()]);
     assert!(RayCasterCfg { targets: ground(), ..scanner() }.build(&context(1, 1)).is_ok());
     assert!(error(RayCasterCfg { targets: ground(), groups: 1 << 5, ..scanner() }).contains("\"ground\""));
+    // One that is invisible, unless some environment sees it; the candidates are what can be hit.
+    let look = |visible: [bool; 5]| {
+        let scene = context(1, 1).scene.unwrap();
+        let mut instances = scene.instances().to_vec();
+        instances.iter_mut().zip(visible).for_each(|(instance, visible)| instance.visible = visible);
+        Arc::new(scene.with_instances(instances).unwrap())
+    };
+    let hidden = || SensorContext { scene: Some(look([true, true, true, true, false])), ..context(1, 1) };
+    let ball = |name: &str| RayCasterCfg { targets: HitTargets::Named(vec![name.into()]), ..scanner() };
+    let said = ball("ball").build(&hidden()).unwrap_err().to_string();
+    assert!(said.contains("\"ball\"") && said.contains("step"), "{said}");
+    assert!(ball("ball|step").build(&hidden()).is_ok());
+    let own_scenes = vec![OwnScene(None), OwnScene(Some(look([true; 5])))];
+    assert!(ball("ball").build(&SensorContext { own_scenes, ..hidden() }).is_ok());
     assert!(
         error(RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() })
             .contains("resolution")

@@ -21,8 +21,9 @@ pub(super) struct Lamp {
     pub(super) diffuse: V3,
     pub(super) specular: V3,
     pub(super) cast_shadow: bool,
-    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\].
-    sight: Option<(V3, f64)>,
+    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\]. Without a direction that is a
+    /// distance.
+    sight: Option<(Option<V3>, f64)>,
 }
 
 /// Light from a lamp at a point.
@@ -62,7 +63,7 @@ impl Lamp {
     }
 
     /// A lamp at a camera.
-    pub(super) fn of_camera(headlight: &scene::Headlight, view: &Projection) -> Self {
+    pub(super) fn of_camera(headlight: &scene::Headlight, view: &Projection, along_axis: bool) -> Self {
         let light = Light {
             kind: LightKind::Point,
             ambient: headlight.ambient,
@@ -71,7 +72,7 @@ impl Lamp {
             ..Light::default()
         };
         let (position, forward) = (view.world_from_camera.translation, view.world_from_camera.rotation.map(|r| r[2]));
-        let sight = Some((to_f64(forward), f64::from(view.near)));
+        let sight = Some((along_axis.then(|| to_f64(forward)), f64::from(view.near)));
         Self { position: to_f64(position), sight, ..Self::new(&light) }
     }
 
@@ -99,7 +100,7 @@ impl Lamp {
         let mut distance = dot(to, to).sqrt();
         if let Some((forward, near)) = self.sight {
             // What is nearer than the camera sees, its housing, does not shade it.
-            let cos = -dot(direction, forward);
+            let cos = forward.map_or(1.0, |forward| -dot(direction, forward));
             distance -= if cos > 1e-3 { near / cos } else { 0.0 };
         }
         Some(Incoming { direction, distance, strength })

@@ -16,6 +16,7 @@ mod texel;
 #[cfg(test)]
 mod tests;
 
+use crate::camera::LensRays;
 use crate::ray::Ray;
 use crate::ray::bvh::Stack;
 use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
@@ -54,6 +55,8 @@ pub(crate) struct Paths<'a> {
     pub(crate) poses: &'a [PoseF32],
     pub(crate) tracer: &'a Tracer,
     pub(crate) projection: &'a Projection,
+    /// Instead of the projection's rays.
+    pub(crate) lens: Option<&'a LensRays>,
     pub(crate) samples: u32,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u32,
@@ -72,8 +75,15 @@ pub(crate) struct Lamps {
 }
 
 impl Lamps {
-    /// Prepares the light. `shadows` is whether lamps cast any, `view` where the camera is.
-    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadows: bool, view: &Projection) {
+    /// Prepares the light. `shadows` is whether lamps cast any, `view` where the camera is, `forward` whether it counts near
+    /// along its axis.
+    pub(crate) fn prepare(
+        &mut self,
+        scene: &RenderScene,
+        lights: &[Light],
+        shadows: bool,
+        (view, forward): (&Projection, bool),
+    ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
         let Self { lamps, dome, sky, haze } = self;
         *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
@@ -83,7 +93,7 @@ impl Lamps {
         lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
         // After the others, of which it takes no place: it is a point, and needs no numbers of its own.
         if scene.headlight.active {
-            lamps.push(Lamp::of_camera(&scene.headlight, view));
+            lamps.push(Lamp::of_camera(&scene.headlight, view, forward));
         }
         for lamp in lamps {
             lamp.cast_shadow &= shadows;
@@ -152,9 +162,20 @@ impl Paths<'_> {
 
     /// The light that comes to a point of the picture, and what is seen there.
     fn radiance(&self, sample: Sample, [u, v]: [f64; 2], stack: &mut Stack) -> (V3, First) {
+        let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
         let view = self.projection;
         let wide = f64::from;
-        let c = [(u - wide(view.cx)) / wide(view.fx), (v - wide(view.cy)) / wide(view.fy), 1.0];
+        let (c, f) = match self.lens {
+            None => {
+                let c = [(u - wide(view.cx)) / wide(view.fx), (v - wide(view.cy)) / wide(view.fy), 1.0];
+                (c, wide(view.fx))
+            }
+            Some(lens) => match lens.optics().ray([u, v]) {
+                Some(c) => (c, 1.0 / lens.pixel()),
+                // Outside of the image circle no light falls.
+                None => return ([0.0; 3], first),
+            },
+        };
         let d = view.world_from_camera.rotation.map(|r| dot(to_f64(r), c));
         let length = dot(d, d).sqrt();
         let direction = scale(d, 1.0 / length);
@@ -162,8 +183,7 @@ impl Paths<'_> {
         let mut ray = Ray { origin: along(to_f64(view.world_from_camera.translation), near, direction), direction };
         let mut limit = far - near;
         // How wide a pixel is at the end of the path so far, and how much wider it gets by the metre.
-        let (mut width, mut spread) = (wide(view.near) / wide(view.fx), 1.0 / (wide(view.fx) * length));
-        let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
+        let (mut width, mut spread) = (wide(view.near) / f, 1.0 / (f * length));
         let (mut light, mut kept) = ([0.0; 3], [1.0; 3]);
         let (mut bounce, mut passes, mut travelled) = (0, 0, near);
         // Whether it goes on as the camera's ray went.

@@ -41,12 +41,22 @@ fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_b
     tracer.place(scene, poses);
     let mut lamps = Lamps::default();
     let projection = &Projection::from(view);
-    lamps.prepare(scene, &scene.lights, true, projection);
+    lamps.prepare(scene, &scene.lights, true, (projection, true));
     let count = 16u32;
     let mut stack = Stack::default();
     let all: Vec<f64> = (0..count)
         .map(|seed| {
-            let paths = Paths { scene, poses, tracer: &tracer, projection, samples, max_bounces, seed, lamps: &lamps };
+            let paths = Paths {
+                scene,
+                poses,
+                tracer: &tracer,
+                projection,
+                lens: None,
+                samples,
+                max_bounces,
+                seed,
+                lamps: &lamps,
+            };
             paths.pixel([0, 0], &mut stack).color[1]
         })
         .collect();

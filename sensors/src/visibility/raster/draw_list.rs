@@ -2,6 +2,7 @@
 
 use super::detail;
 use super::tile::BLOCK;
+use crate::camera::LensRays;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use scene::shape::Cluster;
@@ -101,10 +102,11 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
-    /// Finds what may be seen. `keep` tells instances apart.
+    /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the picture.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,
+        lens: Option<&LensRays>,
         scene: &RenderScene,
         poses: &[PoseF32],
         parts: Parts,
@@ -142,9 +144,11 @@ impl DrawList {
             }
             let middle = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
             let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
-            let Some((rect, nearness)) = bounds(projection, &placed.camera_from_instance, middle, half) else {
-                continue;
+            let seen = match lens {
+                None => bounds(projection, &placed.camera_from_instance, middle, half),
+                Some(lens) => lens_bounds(projection, lens, placed.camera_from_instance.apply(middle), half),
             };
+            let Some((rect, nearness)) = seen else { continue };
             let order = if half.iter().all(|h| h.is_finite()) { nearness } else { f32::MIN };
             let whole = Item { instance: index as u32, cluster: None, rect, nearness, order };
             let mut push = |item| match layer {
@@ -177,7 +181,10 @@ impl DrawList {
         self.opaque.sort_unstable_by(|a, b| {
             b.order.total_cmp(&a.order).then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
         });
-        let depth = |i: u32| self.placed[i as usize].camera_from_instance.translation[2];
+        let depth = |i: u32| {
+            let t = self.placed[i as usize].camera_from_instance.translation;
+            if lens.is_none_or(LensRays::is_forward) { t[2] } else { t.iter().map(|x| x * x).sum::<f32>().sqrt() }
+        };
         self.blended.sort_unstable_by(|(_, a), (_, b)| {
             let order = depth(b.instance).total_cmp(&depth(a.instance));
             order.then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
@@ -237,6 +244,23 @@ fn bounds(
         }
     }
     Some((blocks(projection, lo, hi)?, projection.nearness(near * 0.9999)))
+}
+
+/// Where a box around a point of the optical frame may be seen through a lens, and how near: somewhere, if the range allows
+/// it. Its blocks look for themselves.
+fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
+    let everywhere = everywhere(projection);
+    let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let radius = 1.0001 * length(half);
+    if !radius.is_finite() {
+        return Some((everywhere, f32::MAX));
+    }
+    let at = if lens.is_forward() { middle[2] } else { length(middle) };
+    let (near, far) = (at - radius - 1e-4 * at.abs(), at + radius + 1e-4 * at.abs());
+    if far < projection.near || near > projection.far {
+        return None;
+    }
+    Some((everywhere, if near < projection.near { f32::MAX } else { projection.nearness(near) }))
 }
 
 /// Where a ball may be seen, and how near.

@@ -14,6 +14,8 @@ mod tree;
 use super::Projection;
 use super::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
 use super::raster::{Item, Layer, Placed};
+use crate::camera::LensRays;
+use crate::camera::lens::Sight;
 use crate::lanes::Simd;
 use crate::ray::bvh::Stack;
 use crate::ray::packet::{Packet, WIDTH};
@@ -242,7 +244,7 @@ impl Tracer {
         s: S,
         stack: &mut Stack,
         tile: &mut Tile,
-        projection: &Projection,
+        (projection, lens_rays): (&Projection, Option<&LensRays>),
         (placed, first_ids): (&[Placed], &[u32]),
         item: &Item,
     ) {
@@ -250,11 +252,15 @@ impl Tracer {
         let index = item.instance as usize;
         let Some(body) = &self.bodies[index] else { return };
         let lens = Lens::new(projection, &placed[index]);
+        let sight = lens_rays.zip(body.bounds()).map_or(Sight::Everywhere, |(_, bounds)| sight(&placed[index], bounds));
         s.vectorize(
             #[inline(always)]
             || {
                 for by in area[1]..=area[3] {
                     for bx in area[0]..=area[2] {
+                        if lens_rays.is_some_and(|rays| !rays.may_see([bx, by], &sight)) {
+                            continue;
+                        }
                         let block = tile.block(bx, by);
                         if tile.hidden(block, item.nearness) {
                             continue;
@@ -268,7 +274,11 @@ impl Tracer {
                                 let corner = [(bx * BLOCK) as f64 + dx, (by * BLOCK + row) as f64 + dy];
                                 let at = samples + row * BLOCK..samples + (row + 1) * BLOCK;
                                 let (near, ids) = (&mut tile.nearness[at.clone()], &mut tile.id[at]);
-                                drawn |= lens.row(s, body, corner, stack, near, ids, first_ids[index]);
+                                let rays = match lens_rays {
+                                    None => lens.pinhole(corner),
+                                    Some(rays) => lens.bent(rays, plane, [bx * BLOCK, by * BLOCK + row]),
+                                };
+                                drawn |= lens.row(s, body, rays, stack, near, ids, first_ids[index]);
                             }
                         }
                         if drawn {
@@ -298,6 +308,15 @@ fn seen_from(ray: &Ray, pose: &PoseF64) -> Ray {
     Ray { origin: pose.apply_inverse(ray.origin), direction: pose.rotate_inverse(ray.direction) }
 }
 
+/// Where a thing with bounds in its own frame may be seen.
+fn sight(placed: &Placed, [lo, hi]: [V3; 2]) -> Sight {
+    let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+    let pose = wide(&placed.camera_from_instance);
+    // Poses are single precision.
+    let size = lo.iter().chain(&hi).chain(&pose.translation).fold(0.0f64, |m, x| m.max(x.abs()));
+    Sight::of_ball(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
+}
+
 /// A camera's rays in the frame of an instance.
 struct Lens {
     rotation: [V3; 3],
@@ -319,15 +338,34 @@ impl Lens {
         }
     }
 
-    /// Casts the rays of eight samples beside each other, the first of them at (u, v), and keeps what is nearer than what is
-    /// there. Whether there is any.
+    /// The rays of eight samples beside each other through a pinhole, in the optical frame, the first of them at (u, v).
+    #[inline(always)]
+    fn pinhole(&self, [u, v]: [f64; 2]) -> [V3; WIDTH] {
+        let mut rays = [[0.0, 0.0, 1.0]; WIDTH];
+        for (k, ray) in rays.iter_mut().enumerate() {
+            *ray = [(u + k as f64 - self.c[0]) / self.f[0], (v - self.c[1]) / self.f[1], 1.0];
+        }
+        rays
+    }
+
+    /// The rays of a kind of samples of eight pixels beside each other behind a lens; 0 where there is none.
+    #[inline(always)]
+    fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2]) -> [V3; WIDTH] {
+        let mut out = [[0.0; 3]; WIDTH];
+        for (k, ray) in out.iter_mut().enumerate() {
+            *ray = rays.direction(plane, [x + k, y]).map(f64::from);
+        }
+        out
+    }
+
+    /// Casts the rays of eight samples beside each other, and keeps what is nearer than what is there. Whether there is any.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
     fn row<S: Simd>(
         &self,
         s: S,
         body: &Body,
-        [u, v]: [f64; 2],
+        directions: [V3; WIDTH],
         stack: &mut Stack,
         nearness: &mut [f32],
         ids: &mut [u32],
@@ -336,9 +374,11 @@ impl Lens {
         // Distances along a ray for a metre of depth.
         let mut length = [1.0; WIDTH];
         let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];
-        for (k, (ray, length)) in rays.iter_mut().zip(&mut length).enumerate() {
-            let c = [(u + k as f64 - self.c[0]) / self.f[0], (v - self.c[1]) / self.f[1], 1.0];
-            let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2]);
+        let mut none = [false; WIDTH];
+        for (((ray, length), c), none) in rays.iter_mut().zip(&mut length).zip(&directions).zip(&mut none) {
+            *none = *c == [0.0; 3];
+            let c = if *none { [0.0, 0.0, 1.0] } else { *c };
+            let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2] * c[2]);
             *length = dot(d, d).sqrt();
             // Nothing before the near plane counts: rays begin there.
             *ray = Ray { origin: along(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
@@ -346,7 +386,8 @@ impl Lens {
         let mut packet = Packet::of(&rays, f64::INFINITY);
         for k in 0..WIDTH {
             // What is there is known to single precision.
-            packet.shorten(k, (1.000_001 / f64::from(nearness[k]) - self.near) * length[k]);
+            let limit = (1.000_001 / f64::from(nearness[k]) - self.near) * length[k];
+            packet.shorten(k, if none[k] { -1.0 } else { limit });
         }
         let mut found = [None; WIDTH];
         match body {

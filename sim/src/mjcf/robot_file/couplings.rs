@@ -23,8 +23,17 @@ pub(super) enum Coupling {
         /// Offset \[rad or m\].
         offset: f64,
     },
-    /// In another way.
-    Other,
+    /// In another way: along one curve, where there is only one, and it does not lead back.
+    Other(Option<Follows>),
+}
+
+/// How a joint follows along a curve: `y - y0 = Σ coefficients[k] (x - x0)ᵏ`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Follows {
+    /// The joint that is followed; `None` where it stays where it is, at c0.
+    pub(super) driver: Option<usize>,
+    /// Coefficients, the constant first.
+    pub(super) coefficients: [f64; 5],
 }
 
 /// How each joint of the file follows others; `None` for one that does not.
@@ -59,7 +68,9 @@ pub(super) fn of_joints(
                     names.equalities[equality], names.joints[follower]
                 );
                 diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, source, message));
-                Some(Coupling::Other)
+                let coefficients = [0, 1, 2, 3, 4].map(|k| if driver.is_some() || k == 0 { data[k] } else { 0.0 });
+                let leads_on = driver.is_none_or(|driver| !leads_to(&couplings, driver, follower));
+                Some(Coupling::Other((free && leads_on).then_some(Follows { driver, coefficients })))
             }
         };
     }
@@ -72,7 +83,7 @@ pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Opti
     loop {
         match &couplings[joint] {
             None => return Some((joint, ratio)),
-            Some(Coupling::Other) => return None,
+            Some(Coupling::Other(_)) => return None,
             Some(Coupling::Mimic { driver, multiplier, .. }) => {
                 joint = *driver;
                 ratio *= multiplier;
@@ -81,13 +92,16 @@ pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Opti
     }
 }
 
-/// Whether following mimics from `joint` ends at `end`, or passes it.
+/// Whether following mimics and curves from `joint` ends at `end`, or passes it.
 fn leads_to(couplings: &[Option<Coupling>], mut joint: usize, end: usize) -> bool {
     loop {
         if joint == end {
             return true;
         }
-        let Some(Coupling::Mimic { driver, .. }) = &couplings[joint] else { return false };
-        joint = *driver;
+        joint = match &couplings[joint] {
+            Some(Coupling::Mimic { driver, .. }) => *driver,
+            Some(Coupling::Other(Some(Follows { driver: Some(driver), .. }))) => *driver,
+            _ => return false,
+        };
     }
 }

@@ -23,6 +23,7 @@ use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::mj::{Asset, Model, words};
 use crate::mjcf::document::GeomRole;
+use crate::named::Named;
 use crate::objects::mjcf_part::{engine_sensors, read};
 use crate::objects::robot_file::MjcfFile;
 use crate::source::Source;
@@ -56,14 +57,16 @@ pub struct RobotFile {
 pub(crate) struct Loading<'a> {
     /// Name of the robot.
     pub(crate) uid: &'a str,
+    /// How diagnostics call it.
+    pub(crate) named: &'a Named,
     /// Its number in the simulation.
     pub(crate) index: usize,
     /// Whether its base stands fixed.
     pub(crate) fix_base: bool,
     /// Whether its links collide with each other.
     pub(crate) self_collision: bool,
-    /// The scene so far.
-    pub(crate) scene: &'a Model,
+    /// The scene so far, if there is one.
+    pub(crate) scene: Option<&'a Model>,
 }
 
 impl RobotFile {
@@ -77,7 +80,7 @@ impl RobotFile {
         let (text, model) = read(&file.path, file.text.as_deref(), |error| wrong(RobotFileError::Compile(error)))?;
         let names = PartNames::of_model(&model);
         let places = Places::of(&text, &file.path);
-        let owner = format!("robot {:?}", of.uid);
+        let owner = of.named.to_string();
         let root = tree::root(&model, &names, &places, of.fix_base).map_err(&wrong)?;
         world::check(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
         world::say_contacts(&owner, &model, &names, of.self_collision, &places.file(), diagnostics);
@@ -86,6 +89,7 @@ impl RobotFile {
         friction::say(&owner, &model, &names, &couplings, &places.file(), diagnostics);
         let describing = Describing {
             uid: of.uid,
+            owner: &owner,
             model: &model,
             names: &names,
             places: &places,
@@ -99,7 +103,7 @@ impl RobotFile {
         let part = PartOf { model: &model, names: &names, uid: of.uid, pose: &pose, stem: &stem, rig: None };
         let files = part.check().and_then(|()| part.files()).map_err(|error| wrong(error.into()))?;
         let sensors_left_out = world::sensors(&model, &names);
-        diagnostics.extend(compare(&owner, &text, &file.path, &model, of.scene, &sensors_left_out));
+        diagnostics.extend(compare(&owner, &text, &file.path, &model, of.scene.unwrap_or(&model), &sensors_left_out));
         let is_kept = |s: &usize| sensors_left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
         let sensors = engine_sensors(of.uid, &model, &names, &kept);

@@ -5,12 +5,13 @@
 //! origin. So the k-th joint of a body has its frame in p, turned or moved back by ref, and between two joints of one body
 //! there is a frame that is no body; so there is behind the last where its anchor is not the body's origin.
 
-use super::couplings::Coupling;
+use super::couplings::{Coupling, Follows};
 use super::drives::{Acting, is_single};
 use super::error::RobotFileError;
 use super::places::Places;
 use crate::description::{
-    Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId, Mimic, RobotDescription,
+    Curve, FileDrive, Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId, Mimic,
+    RobotDescription,
 };
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj::{Model, words};
@@ -103,6 +104,8 @@ pub(super) struct Described {
 /// Describes a file.
 pub(super) struct Describing<'a> {
     pub(super) uid: &'a str,
+    /// How diagnostics call the robot.
+    pub(super) owner: &'a str,
     pub(super) model: &'a Model,
     pub(super) names: &'a PartNames,
     pub(super) places: &'a Places,
@@ -146,8 +149,7 @@ impl Describing<'_> {
             let source = self.places.get("site", wanted);
             let name = names.unused(wanted, ".site");
             if name != *wanted {
-                let message =
-                    format!("robot {:?}: the site {wanted:?} is called as a body; its link is {name:?}", self.uid);
+                let message = format!("{}: the site {wanted:?} is called as a body; its link is {name:?}", self.owner);
                 diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, source.clone(), message));
             }
             links.push(self.link(name, source));
@@ -202,11 +204,26 @@ impl Describing<'_> {
             joints.push(fixed(name, source, link_of(body), LinkId(k), body_from_site));
         }
         for (joint, coupling) in self.couplings.iter().enumerate() {
-            if let (Some(id), Some(Coupling::Mimic { source, driver, multiplier, offset })) = (of_file[joint], coupling)
-                && let Some(driver) = of_file[*driver]
-            {
-                let (source, multiplier, offset) = (source.clone(), *multiplier, *offset);
-                joints[id.0].mimic = Some(Mimic { source, joint: driver, multiplier, offset });
+            let Some(id) = of_file[joint] else { continue };
+            match coupling {
+                None => {}
+                Some(Coupling::Mimic { source, driver, multiplier, offset }) => {
+                    if let Some(driver) = of_file[*driver] {
+                        let (source, multiplier, offset) = (source.clone(), *multiplier, *offset);
+                        joints[id.0].mimic = Some(Mimic { source, joint: driver, multiplier, offset });
+                    }
+                }
+                Some(Coupling::Other(follows)) => {
+                    let curve = follows.map(|Follows { driver, coefficients }| Curve {
+                        joint: driver.and_then(|driver| of_file[driver]),
+                        at: driver.map_or(0.0, |driver| self.start(driver)),
+                        start: self.start(joint),
+                        coefficients,
+                    });
+                    if let Some(defaults) = &mut joints[id.0].defaults {
+                        defaults.drive = FileDrive::Coupled(curve);
+                    }
+                }
             }
         }
         for (index, joint) in joints.iter().enumerate() {
@@ -218,19 +235,8 @@ impl Describing<'_> {
         Described { description, links: placed, joints: of_file }
     }
 
-    /// A link that has nothing yet.
     fn link(&self, name: String, source: Source) -> Link {
-        Link {
-            name,
-            source,
-            component: self.uid.into(),
-            inertial: None,
-            visuals: Vec::new(),
-            collisions: Vec::new(),
-            parent_joint: None,
-            child_joints: Vec::new(),
-            between_joints: false,
-        }
+        Link::new(name, source, self.uid.into())
     }
 
     fn inertial(&self, body: usize, source: &Source) -> Option<Inertial> {
@@ -273,10 +279,6 @@ impl Describing<'_> {
             Some("slide") => JointKind::Prismatic,
             _ if range.is_some() => JointKind::Revolute,
             _ => JointKind::Continuous,
-        };
-        let drive = match self.couplings[joint] {
-            Some(Coupling::Other) => crate::description::FileDrive::Coupled,
-            _ => drive,
         };
         Joint {
             name,

@@ -1,0 +1,55 @@
+//! `kinetoscope convert`: a robot as MJCF, for both lines of MuJoCo, with its meshes.
+
+use crate::model::ModelArgs;
+use crate::{Ending, Result, excerpt};
+use kinetoscope::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// The robot as MJCF that plain MuJoCo loads, one file for 2.2.2 and one for 4.x, with meshes and textures beside them
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    model: ModelArgs,
+    /// Folder to write to; made where it is missing
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// Write into a folder that holds something already
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(args: &Args) -> Result<Ending> {
+    if !args.force && !is_empty(&args.out)? {
+        return Err(format!("{}: is not empty; name another folder, or add --force", args.out.display()).into());
+    }
+    let cfg = SimulationManagerCfg { num_envs: 1, ground: None, ..Default::default() };
+    let (sim, _) = args.model.simulation(cfg)?;
+    let left_out = sim.dump(&args.out)?;
+    for file in written(&args.out)? {
+        println!("{}", file.display());
+    }
+    let warned = [sim.diagnostics(), &left_out].map(excerpt::print_warnings);
+    Ok(if warned.contains(&true) { Ending::Warned } else { Ending::Done })
+}
+
+/// Whether a folder holds nothing, or is not there.
+fn is_empty(folder: &Path) -> Result<bool> {
+    match std::fs::read_dir(folder) {
+        Ok(mut entries) => Ok(entries.next().is_none()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(true),
+        Err(error) => Err(format!("{}: {error}", folder.display()).into()),
+    }
+}
+
+/// All files of a folder, in order.
+fn written(folder: &Path) -> Result<Vec<PathBuf>> {
+    let (mut files, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))? {
+            let path = entry?.path();
+            if path.is_dir() { folders.push(path) } else { files.push(path) }
+        }
+    }
+    files.sort();
+    Ok(files)
+}

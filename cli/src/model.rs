@@ -1,0 +1,76 @@
+//! Which model is meant: URDF files, or one MJCF file.
+
+use crate::Result;
+use kinetoscope::assets;
+use kinetoscope::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// The files of a model.
+#[derive(Debug, clap::Args)]
+pub(crate) struct ModelArgs {
+    /// URDF files, of which each further one hangs from the tip of the one before; or one MJCF file
+    #[arg(required = true, value_name = "FILE.urdf|FILE.xml")]
+    files: Vec<PathBuf>,
+    /// Let the root of a robot move freely
+    #[arg(long, alias = "floating_base")]
+    pub(crate) floating_base: bool,
+    /// Folder of a package of package:// addresses; may be repeated
+    #[arg(long, value_name = "NAME=DIR", value_parser = package)]
+    package: Vec<(String, PathBuf)>,
+}
+
+/// What the files are.
+pub(crate) enum Files {
+    Urdf(UrdfCfg),
+    Mjcf(PathBuf),
+}
+
+impl ModelArgs {
+    /// What the files are, by their names.
+    ///
+    /// # Errors
+    /// An MJCF file is not alone.
+    pub(crate) fn files(&self) -> Result<Files> {
+        let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
+        match files.iter().position(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xml"))) {
+            None => {
+                let packages = self.package.iter().cloned().collect();
+                Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }))
+            }
+            Some(0) if files.len() == 1 => Ok(Files::Mjcf(files[0].clone())),
+            Some(at) => {
+                let file = files[at].display();
+                Err(format!("{file}: an MJCF file is a model of its own: give it alone, or URDF files only").into())
+            }
+        }
+    }
+
+    /// A simulation of the model as a robot, in each of some environments.
+    ///
+    /// # Errors
+    /// Whatever is wrong in the files.
+    pub(crate) fn simulation(&self, cfg: SimulationManagerCfg) -> Result<(SimulationManager, RobotId)> {
+        let mut sim = SimulationManager::new(cfg)?;
+        let mut robot = RobotCfg { uid: "robot".into(), fix_base: !self.floating_base, ..Default::default() };
+        match self.files()? {
+            Files::Urdf(urdf) => robot.urdf = urdf,
+            Files::Mjcf(path) => robot.mjcf = Some(MjcfFile::new(path)),
+        }
+        let id = sim.add_robot(robot)?;
+        Ok((sim, id))
+    }
+}
+
+/// A file of the user, else an asset, else the path as it is: the loader says that there is none.
+fn user_or_asset(file: &Path) -> PathBuf {
+    if file.exists() { file.to_path_buf() } else { assets::path(file).unwrap_or_else(|_| file.to_path_buf()) }
+}
+
+fn package(text: &str) -> std::result::Result<(String, PathBuf), String> {
+    let (name, folder) = text.split_once('=').ok_or("write NAME=DIR, such as my_robot=robots/my_robot")?;
+    if name.is_empty() {
+        return Err("the package has no name; write NAME=DIR".to_owned());
+    }
+    let folder = PathBuf::from(folder);
+    if folder.is_dir() { Ok((name.to_owned(), folder)) } else { Err(format!("{} is no folder", folder.display())) }
+}

@@ -1,0 +1,169 @@
+//! `kinetoscope render`: a picture of a model at its initial state.
+
+use crate::model::{Files, ModelArgs};
+use crate::picture::{self, Channel};
+use crate::{Ending, Result, excerpt};
+use clap::ValueEnum;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::PoseF32;
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot, look_at_pose};
+use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::staying_crew;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// A picture of a model as it starts
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    model: ModelArgs,
+    /// The picture, as PNG
+    #[arg(short, long, value_name = "FILE.png")]
+    out: PathBuf,
+    /// What the picture shows
+    #[arg(long, value_enum, default_value_t = Channel::Color)]
+    channel: Channel,
+    #[command(flatten)]
+    look: Look,
+}
+
+/// From where and how a model is drawn.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Look {
+    /// A camera of an MJCF file
+    #[arg(long, conflicts_with_all = ["eye", "target"])]
+    camera: Option<String>,
+    /// Where the camera is, in metres
+    #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = point, allow_hyphen_values = true)]
+    eye: Option<Point>,
+    /// Where it looks, in metres
+    #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = point, allow_hyphen_values = true)]
+    target: Option<Point>,
+    /// Vertical field of view in degrees [default: the camera's, or 45]
+    #[arg(long)]
+    fovy: Option<f64>,
+    /// Pixels per row
+    #[arg(long, default_value_t = 1280)]
+    width: usize,
+    /// Rows
+    #[arg(long, default_value_t = 720)]
+    height: usize,
+    /// How it is drawn
+    #[arg(long, value_enum, default_value_t = Method::Raster)]
+    renderer: Method,
+    /// Paths per pixel, with --renderer rt
+    #[arg(long, default_value_t = 64)]
+    samples: u32,
+}
+
+/// How a picture is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// Rasterizer
+    Raster,
+    /// Rasterizer with shadows by rays
+    Hybrid,
+    /// What is seen by rays, light and shadows as the rasterizer has them
+    FastRt,
+    /// Path tracing
+    Rt,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Point([f64; 3]);
+
+fn point(text: &str) -> std::result::Result<Point, String> {
+    let numbers: Vec<f64> = text.split(',').map(|n| n.trim().parse().unwrap_or(f64::NAN)).collect();
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(Point([x, y, z])),
+        _ => Err("expected three numbers separated by commas, such as 1.5,-2,1".into()),
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Result<Ending> {
+    let (still, mut warned) = match args.model.files()? {
+        Files::Mjcf(path) => (Still::of_mjcf(path, None)?, false),
+        Files::Urdf(_) => {
+            let cfg = SimulationManagerCfg { num_envs: 1, ground: None, ..Default::default() };
+            let (mut sim, _) = args.model.simulation(cfg)?;
+            let still = Still::of_env(&mut sim, EnvId(0))?;
+            (still, excerpt::print_warnings(sim.diagnostics()))
+        }
+    };
+    for left_out in still.visible().left_out() {
+        eprintln!("warning: {left_out}");
+        warned = true;
+    }
+    let view = args.look.view(&still)?;
+    let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
+    let mut frame = Frame::new(view.width, view.height, channels);
+    let start = Instant::now();
+    args.look.rasterizer()?.render(&mut [(still.shot(&view), frame.as_mut())]).map_err(|(_, error)| error)?;
+    let seconds = start.elapsed().as_secs_f64();
+    picture::write(&frame, args.channel, [view.width, view.height], &args.out)?;
+    println!("{}: {} x {} pixels in {:.1} ms", args.out.display(), view.width, view.height, 1e3 * seconds);
+    Ok(if warned { Ending::Warned } else { Ending::Done })
+}
+
+impl Look {
+    /// What the picture shows of a model.
+    ///
+    /// # Errors
+    /// The file has no such camera; sizes or angles that cannot be.
+    pub(crate) fn view(&self, still: &Still) -> Result<View> {
+        let free = still.free_camera();
+        let (pose, fovy) = match (&self.camera, self.eye, self.target) {
+            (Some(name), ..) => {
+                let camera = still.camera(name)?;
+                (camera.world_from_camera, camera.fovy)
+            }
+            (None, Some(eye), Some(target)) => (look_at_pose(eye.0, target.0, [0.0, 0.0, 1.0])?, 45f64.to_radians()),
+            _ => (look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0])?, free.fovy),
+        };
+        let radians = self.fovy.map_or(fovy, f64::to_radians);
+        let pixels = Intrinsics::Fovy { radians }.to_pixels(self.width, self.height)?;
+        let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
+        let [near, far] = free.clip.map(|x| x as f32);
+        let (width, height, world_from_camera) = (self.width, self.height, PoseF32::from(&pose));
+        let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera };
+        view.validate()?;
+        Ok(view)
+    }
+
+    /// What draws it, on every core.
+    ///
+    /// # Errors
+    /// A number of paths that is not possible.
+    pub(crate) fn rasterizer(&self) -> Result<ParallelRasterizer> {
+        let renderer = match self.renderer {
+            Method::Raster => Renderer::Raster,
+            Method::Hybrid => Renderer::Hybrid,
+            Method::FastRt => Renderer::FastRayTraced,
+            Method::Rt => Renderer::RayTraced { samples: self.samples, max_bounces: 4, denoise: true, seed: 0 },
+        };
+        renderer.validate()?;
+        let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+        let cfg = RasterCfg { samples: 4, ..RasterCfg::of_cameras() };
+        let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_crew(staying_crew());
+        rasterizer.set_renderer(renderer);
+        Ok(rasterizer)
+    }
+}
+
+/// Draws a shot again and again for some seconds; gives pictures per second.
+///
+/// # Errors
+/// The shot cannot be drawn.
+pub(crate) fn rate(rasterizer: &mut ParallelRasterizer, shot: Shot<'_>, seconds: f64) -> Result<f64> {
+    let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
+    let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
+    let (start, mut pictures) = (Instant::now(), 0u32);
+    loop {
+        rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
+        pictures += 1;
+        let elapsed = start.elapsed().as_secs_f64();
+        if elapsed >= seconds {
+            return Ok(f64::from(pictures) / elapsed);
+        }
+    }
+}

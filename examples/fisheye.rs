@@ -1,0 +1,230 @@
+//! One scene through many lenses: pinholes with distortion, fisheyes, a panorama, or the twin of a real, calibrated camera.
+//!
+//! ```text
+//! cargo run --release --example fisheye -- --headless --out pictures
+//! cargo run --release --example fisheye -- --headless --lens panorama --width 1024 --height 512 --out pictures
+//! cargo run --release --example fisheye -- --headless --camera-info ost.yaml --renderer rt --out pictures
+//! ```
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::ndarray::{ArrayView1, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::lens::{Domain, Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Panorama};
+use kinetoscope::sensors::camera::lens::{Orthographic, Stereographic};
+use kinetoscope::sensors::camera::{CameraInfo, Lens, PointFrame};
+use launcher::panel::tile;
+use launcher::{Launcher, PathFlags, Renderer, picture};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Draws an arm, a hand and a few objects through lenses.
+#[derive(Debug, Parser)]
+#[command(name = "fisheye")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// Draw through this lens only; may be given several times [default: all of them]
+    #[arg(long = "lens", value_name = "NAME", conflicts_with = "camera_info")]
+    lenses: Vec<String>,
+    /// Draw through the lens of a ROS camera_info file, with its size and intrinsics
+    #[arg(long, alias = "camera_info", value_name = "FILE", conflicts_with_all = ["width", "height"])]
+    camera_info: Option<PathBuf>,
+    /// Pixels per row
+    #[arg(long, default_value_t = 320)]
+    width: usize,
+    /// Rows
+    #[arg(long, default_value_t = 240)]
+    height: usize,
+    #[command(flatten)]
+    paths: PathFlags,
+}
+
+/// Where the cameras are, and what they look at \[m\].
+const EYE: [f64; 3] = [0.75, -0.55, 0.75];
+const TARGET: [f64; 3] = [0.25, 0.0, 0.45];
+
+fn main() -> ExitCode {
+    launcher::run("fisheye", || run(&Args::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result {
+    let renderer = match args.launcher.renderer {
+        // The rasterizer draws straight lines.
+        Renderer::Auto => Renderer::FastRt,
+        other => other,
+    };
+    let renderer = renderer.of_cameras(args.paths)?;
+    let views = views(args)?;
+    let mut sim = SimulationManager::new(args.launcher.simulation_drawn_anyhow()?)?;
+    let robot = sim.add_robot(launcher::arm::bundled()?)?;
+    add_objects(&mut sim)?;
+    let cameras = views
+        .iter()
+        .map(|(name, cfg)| sim.add_sensor(name, CameraCfg { renderer, ..cfg.clone() }))
+        .collect::<Result<Vec<_>, _>>()?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    args.launcher.write_dump(&sim)?;
+    let out = args.launcher.out_folder(true)?;
+
+    let arm = sim.robot(robot).get_joint_ids("arm")?;
+    let target = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0];
+    sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
+    sim.update(u32::try_from(args.launcher.steps.unwrap_or(100))?);
+
+    let (mut pictures, mut lenses) = (Vec::new(), Vec::new());
+    for ((name, _), camera) in views.iter().zip(cameras) {
+        let (picture, report) = show(sim.sensor(camera)?, name, &out)?;
+        println!("{name}: {report}");
+        pictures.push(picture);
+        lenses.push(report);
+    }
+    let all = out.join("lenses.png");
+    picture::write_png(&all, &tile(&pictures))?;
+    println!("{} pictures, side by side in {}", pictures.len(), all.display());
+    args.launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": sim.num_envs(),
+        "threads": sim.threads(),
+        "renderer": renderer,
+        "lenses": lenses,
+        "warnings": sim.warning_counts(),
+    }))
+}
+
+/// Balls all around, so that there is something to see everywhere.
+fn add_objects(sim: &mut SimulationManager) -> launcher::Result {
+    for k in 0..12 {
+        let (angle, radius) = (f64::from(k) * std::f64::consts::TAU / 12.0, 0.12);
+        let at = [EYE[0] + 1.5 * angle.cos(), EYE[1] + 1.5 * angle.sin()];
+        let shade = f64::from(k) / 12.0;
+        sim.add_rigid_object(RigidObjectCfg {
+            uid: format!("ball{k}"),
+            shape: ObjectShape::Sphere { radius },
+            mass: Some(1.0),
+            init_pose: Pose::translation(at[0], at[1], radius),
+            rgba: [0.9 - 0.7 * shade, 0.3, 0.2 + 0.7 * shade, 1.0],
+            ..Default::default()
+        })?;
+    }
+    Ok(())
+}
+
+/// The cameras to draw with, and their names.
+fn views(args: &Args) -> launcher::Result<Vec<(String, CameraCfg)>> {
+    let placement = Placement::LookAt { eye: EYE, target: TARGET, up: [0.0, 0.0, 1.0] };
+    let base = CameraCfg {
+        width: args.width,
+        height: args.height,
+        near: 0.02,
+        far: 50.0,
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { color: true, distance: true, depth: true, mask: true, ..Default::default() },
+        ..Default::default()
+    };
+    if let Some(path) = &args.camera_info {
+        let info = CameraInfo::read(path)?;
+        let mut cfg = base;
+        info.apply_to(&mut cfg);
+        return Ok(vec![("camera_info".into(), cfg)]);
+    }
+    let wanted = |lens: &Lens| args.lenses.is_empty() || args.lenses.iter().any(|name| is_called(name, lens));
+    for name in &args.lenses {
+        Lens::from_name(name)?;
+    }
+    let of = |lens: Lens| {
+        let intrinsics = fitting(&lens, args.width, args.height)?;
+        Ok((lens.name().to_owned(), CameraCfg { lens, intrinsics, ..base.clone() }))
+    };
+    examples().into_iter().filter(wanted).map(of).collect()
+}
+
+/// Whether a name or an alias means a lens of this kind.
+fn is_called(name: &str, lens: &Lens) -> bool {
+    Lens::from_name(name).is_ok_and(|known| known.name() == lens.name())
+}
+
+/// A lens of each kind, with numbers of real ones.
+fn examples() -> Vec<Lens> {
+    vec![
+        Lens::default(),
+        OpenCv { k1: -0.32, k2: 0.13, p1: 0.0005, p2: -0.0003, k3: -0.02, ..OpenCv::default() }.into(),
+        OpenCvFisheye { k1: -0.01, k2: 0.006, k3: -0.004, k4: 0.0006, max_angle: Some(1.6) }.into(),
+        Equidistant { max_angle: 1.7 }.into(),
+        Equisolid { max_angle: 1.7 }.into(),
+        Orthographic { max_angle: 1.5 }.into(),
+        Stereographic { max_angle: 1.7 }.into(),
+        FTheta::default().into(),
+        Panorama {}.into(),
+    ]
+}
+
+/// Intrinsics with which the image circle of a lens fits into the picture; 75 degrees from top to bottom without one.
+fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrinsics> {
+    let Domain { radius, .. } = lens.domain()?;
+    let (w, h) = (width as f64, height as f64);
+    Ok(match lens {
+        Lens::Panorama(_) => Panorama::intrinsics(width, height),
+        Lens::Pinhole(_) | Lens::OpenCv(_) => Intrinsics::Fovy { radians: 75f64.to_radians() },
+        _ => {
+            let f = 0.49 * w.min(h) / radius;
+            Intrinsics::Pixels { fx: f, fy: f, cx: 0.5 * w, cy: 0.5 * h }
+        }
+    })
+}
+
+/// Writes what a camera sees, and its calibration where ROS has a model for it; what there is to say about it.
+fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::RgbImage, Value)> {
+    let start = Instant::now();
+    let (height, width) = camera.image_shape();
+    let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
+    let seconds = start.elapsed().as_secs_f64();
+    let size = [width, height];
+    let picture = picture::color_picture(size, &color);
+    let mut files = vec![format!("{name}.png"), format!("{name}_distance.png")];
+    picture::write_png(&out.join(&files[0]), &picture)?;
+    let distance: Vec<f32> = camera.distance()?.index_axis(Axis(0), 0).iter().copied().collect();
+    let range = picture::finite_range(distance.iter().copied()).unwrap_or([0.0, 1.0]);
+    picture::write_png(&out.join(&files[1]), &picture::depth_picture(size, &distance, range))?;
+    if let Ok(info) = camera.camera_info(name, 0) {
+        files.push(format!("{name}.yaml"));
+        info.write(&out.join(format!("{name}.yaml")))?;
+    }
+    let optics = camera.optics(0)?;
+    let (f, domain) = (optics.pixels(), optics.domain());
+    let hits = camera.mask()?.index_axis(Axis(0), 0).iter().filter(|&&id| id != 0).count();
+    let report = json!({
+        "lens": camera.lens().name(),
+        "parameters": camera.lens(),
+        "width": width,
+        "height": height,
+        "fx": f.fx,
+        "fy": f.fy,
+        "cx": f.cx,
+        "cy": f.cy,
+        "largest_angle_deg": domain.angle.to_degrees(),
+        "pixels_that_hit": hits,
+        "round_trip_error_pixels": round_trip(camera)?,
+        "seconds": seconds,
+        "files": files,
+    });
+    Ok((picture, report))
+}
+
+/// How far the points are from the pixels that they were made of, seen again through the lens \[pixels\].
+fn round_trip(camera: &Camera) -> launcher::Result<f64> {
+    let (map, optics) = (camera.point_map(0, PointFrame::Camera)?, camera.optics(0)?);
+    let mut worst = 0.0f64;
+    for ((y, x), point) in map.rows().into_iter().enumerate().map(|(k, p)| ((k / map.dim().1, k % map.dim().1), p)) {
+        if point[0].is_finite() {
+            let [u, v] = optics.project([0, 1, 2].map(|k| f64::from(point[k]))).ok_or("a point is not seen again")?;
+            worst = worst.max((u - x as f64 - 0.5).hypot(v - y as f64 - 0.5));
+        }
+    }
+    Ok(worst)
+}

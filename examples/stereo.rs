@@ -1,0 +1,215 @@
+//! A pair of eyes that looks at an arm and things on the ground: left, right and disparity pictures, and a coloured point
+//! cloud that was computed of the disparity as one would with a real pair.
+//!
+//! ```text
+//! cargo run --release --example stereo -- --headless --steps 100 --out pictures
+//! ```
+
+mod launcher;
+
+use clap::Parser;
+use image::{Rgb, RgbImage};
+use kinetoscope::ndarray::Axis;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_row;
+use kinetoscope::sensors::camera::colormap::depth_color;
+use launcher::{Launcher, PathFlags, Progress, cloud, picture};
+use nalgebra::Point3;
+use serde_json::json;
+use std::process::ExitCode;
+
+/// Looks at an arm and things on the ground with two eyes.
+#[derive(Debug, Parser)]
+#[command(name = "stereo")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// The environment whose pictures are written
+    #[arg(long, alias = "camera_id", default_value_t = 0)]
+    camera_id: usize,
+    /// Pixels per row
+    #[arg(long, default_value_t = 640)]
+    width: usize,
+    /// Rows
+    #[arg(long, default_value_t = 480)]
+    height: usize,
+    /// Distance of the eyes, in metres
+    #[arg(long, default_value_t = 0.12)]
+    baseline: f64,
+    /// How far the right eye is turned to the left one, in degrees; eyes that are not parallel have no disparity
+    #[arg(long, alias = "toe_in_deg", default_value_t = 0.0)]
+    toe_in_deg: f64,
+    #[command(flatten)]
+    paths: PathFlags,
+}
+
+fn main() -> ExitCode {
+    launcher::run("stereo", || run(&Args::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result {
+    let renderer = args.launcher.renderer.of_cameras(args.paths)?;
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        physics_dt: 1.0 / 100.0,
+        arena_space: args.launcher.arena_space.unwrap_or(3.0),
+        ..args.launcher.simulation_drawn_anyhow()?
+    })?;
+    launcher::check_camera_id(args.camera_id, &sim)?;
+    sim.add_robot(launcher::arm::bundled()?)?;
+    let things = [
+        ("cube", ObjectShape::cube(0.12), [0.55, -0.25, 0.3], [0.85, 0.2, 0.15, 1.0]),
+        ("ball", ObjectShape::Sphere { radius: 0.09 }, [0.45, 0.3, 0.3], [0.2, 0.45, 0.85, 1.0]),
+        ("can", ObjectShape::Cylinder { radius: 0.06, length: 0.16 }, [0.8, 0.1, 0.3], [0.25, 0.65, 0.3, 1.0]),
+    ];
+    for (uid, shape, [x, y, z], rgba) in things {
+        let init_pose = Pose::translation(x, y, z);
+        sim.add_rigid_object(RigidObjectCfg { uid: uid.into(), shape, init_pose, rgba, ..Default::default() })?;
+    }
+    let id = sim.add_sensor("stereo", stereo_cfg(args, renderer))?;
+    args.launcher.write_dump(&sim)?;
+    println!("{}", sim.sensor(id)?);
+    let out = args.launcher.out_folder(true)?;
+
+    let progress = Progress::new(&args.launcher, 200);
+    let mut step = 0;
+    while !progress.stop(step) {
+        let end = progress.end_of_block(step, 20);
+        sim.update((end - step) as u32);
+        step = end;
+        progress.advance(step);
+    }
+    let rate = progress.env_steps_per_second(step, sim.num_envs());
+
+    let stereo = sim.sensor(id)?;
+    let pair = Pair::of(stereo, args.camera_id)?;
+    let size = [args.width, args.height];
+    let files = ["stereo_left.png", "stereo_right.png", "stereo_disparity.png", "stereo_points.ply"];
+    let pictures = [
+        picture::color_picture(size, &pair.left),
+        picture::color_picture(size, &pair.right),
+        pair.disparity_picture(size),
+    ];
+    for (file, picture) in files.iter().zip(&pictures) {
+        picture::write_png(&out.join(file), picture)?;
+    }
+    let points = pair.points(args.width);
+    if points.is_empty() {
+        return Err("the eyes see nothing".into());
+    }
+    cloud::write_ply(&out.join(files[3]), &points)?;
+    let error = pair.reprojection_error(args.width, &points);
+    let range = picture::finite_range(pair.disparity.iter().copied().filter(|d| *d > 0.0));
+    let [low, high] = range.unwrap_or([0.0; 2]);
+    println!("\nDisparities from {low:.2} to {high:.2} pixels; {} points", points.len());
+    println!("Seen by the right eye, they are {error:.1e} pixels from where the disparity says, at most");
+    println!("Written to {}: {}", out.display(), files.join(", "));
+    args.launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": sim.num_envs(),
+        "steps": step,
+        "threads": sim.threads(),
+        "width": args.width,
+        "height": args.height,
+        "camera_id": args.camera_id,
+        "time": stereo.left().stamps()[args.camera_id],
+        "baseline": args.baseline,
+        "disparity_min": low,
+        "disparity_max": high,
+        "points": points.len(),
+        "reprojection_error_pixels": error,
+        "files": files,
+        "renderer": renderer,
+        "env_steps_per_second": rate,
+        "warnings": sim.warning_counts(),
+    }))
+}
+
+/// Eyes in front of the robot, above the things.
+fn stereo_cfg(args: &Args, renderer: kinetoscope::sensors::camera::Renderer) -> StereoCameraCfg {
+    let f = 500.0 * args.width as f64 / 640.0;
+    let placement = Placement::LookAt { eye: [1.9, 0.25, 0.95], target: [0.35, 0.0, 0.25], up: [0.0, 0.0, 1.0] };
+    let camera = CameraCfg {
+        width: args.width,
+        height: args.height,
+        intrinsics: Intrinsics::Pixels { fx: f, fy: f, cx: args.width as f64 / 2.0, cy: args.height as f64 / 2.0 },
+        near: 0.05,
+        far: 10.0,
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { color: true, depth: true, ..Default::default() },
+        update_period: 0.1,
+        renderer,
+        ..Default::default()
+    };
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, -args.toe_in_deg.to_radians(), 0.0);
+    StereoCameraCfg {
+        camera,
+        left_to_right_pos: [args.baseline, 0.0, 0.0],
+        left_to_right_rot: turn,
+        ..Default::default()
+    }
+}
+
+/// What the eyes of one environment saw, and all that a stereo matcher knows of them.
+struct Pair {
+    left: Vec<u8>,
+    right: Vec<u8>,
+    disparity: Vec<f32>,
+    /// fx, fy, cx, cy of the left eye \[pixels\].
+    lens: [f64; 4],
+    baseline: f64,
+    world_from_left: Pose,
+    world_from_right: Pose,
+}
+
+impl Pair {
+    fn of(stereo: &StereoCamera, env: usize) -> launcher::Result<Self> {
+        let k = stereo.left().intrinsic_matrices();
+        let pose = |eye: &Camera| from_row(&std::array::from_fn(|i| eye.pose_w(CameraConvention::Ros)[(env, i)]));
+        let color = |eye: &Camera| -> launcher::Result<Vec<u8>> {
+            Ok(eye.color()?.index_axis(Axis(0), env).iter().copied().collect())
+        };
+        Ok(Self {
+            left: color(stereo.left())?,
+            right: color(stereo.right())?,
+            disparity: stereo.disparity()?.index_axis(Axis(0), env).iter().copied().collect(),
+            lens: [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]],
+            baseline: stereo.left_from_right().translation.x,
+            world_from_left: pose(stereo.left()),
+            world_from_right: pose(stereo.right()),
+        })
+    }
+
+    /// Points in the environment \[m\] with the colours of the left eye, of the disparity alone: z = fx b / d.
+    fn points(&self, width: usize) -> Vec<([f32; 3], [u8; 3])> {
+        let [fx, fy, cx, cy] = self.lens;
+        let point = |(k, &d): (usize, &f32)| {
+            let (u, v, z) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5, fx * self.baseline / f64::from(d));
+            let at = self.world_from_left * Point3::new((u - cx) / fx * z, (v - cy) / fy * z, z);
+            (at.coords.map(|x| x as f32).into(), [self.left[4 * k], self.left[4 * k + 1], self.left[4 * k + 2]])
+        };
+        self.disparity.iter().enumerate().filter(|(_, d)| **d > 0.0).map(point).collect()
+    }
+
+    /// How far from where the disparity says the right eye has the points: the largest distance in pixels.
+    fn reprojection_error(&self, width: usize, points: &[([f32; 3], [u8; 3])]) -> f64 {
+        let [fx, fy, cx, cy] = self.lens;
+        let right_from_world = self.world_from_right.inverse();
+        let pixels = self.disparity.iter().enumerate().filter(|(_, d)| **d > 0.0);
+        pixels.zip(points).fold(0.0, |worst: f64, ((k, &d), (point, _))| {
+            let at = right_from_world * Point3::from(*point).cast::<f64>();
+            let (u, v) = ((k % width) as f64 + 0.5 - f64::from(d), (k / width) as f64 + 0.5);
+            let off = [fx * at.x / at.z + cx - u, fy * at.y / at.z + cy - v];
+            worst.max(off[0].abs()).max(off[1].abs())
+        })
+    }
+
+    /// Near (a large disparity) is red, far blue, nothing black.
+    fn disparity_picture(&self, [width, height]: [usize; 2]) -> RgbImage {
+        let seen = self.disparity.iter().copied().filter(|d| *d > 0.0);
+        let range = picture::finite_range(seen).unwrap_or([0.0, 1.0]);
+        RgbImage::from_fn(width as u32, height as u32, |x, y| {
+            let d = self.disparity[y as usize * width + x as usize];
+            Rgb(if d > 0.0 { depth_color(d, range) } else { [0; 3] })
+        })
+    }
+}

@@ -1,0 +1,127 @@
+//! Boxes in the picture.
+
+use super::outline::outline;
+use crate::camera::segmentation::{SegmentLevel, Segmentation};
+use crate::camera::sensor::Camera;
+use crate::error::SensorError;
+use crate::visibility::raster::Layer;
+use ndarray::Axis;
+
+/// A rectangle of a picture \[pixels\]: from the edge where its first pixel begins to the edge where its last one ends, u to
+/// the right, v down; the whole picture is \[0, 0\] to \[W, H\]. Isaac's `x_max` and `y_max` are the last pixel itself, one
+/// less.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelBox {
+    /// Left and upper edge.
+    pub min: [f64; 2],
+    /// Right and lower edge.
+    pub max: [f64; 2],
+}
+
+/// Where a segment is in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Box2d {
+    /// The segment, see [`Segmentation::segments`].
+    pub id: i32,
+    /// Around the pixels that see it; `None` where none does.
+    pub tight: Option<PixelBox>,
+    /// Around all of it between the near and the far plane, whatever hides it, clipped to the picture. For exact shapes and
+    /// the vertices of meshes, not for pixels; level of detail is not looked at. `None` where it is beside the picture.
+    pub loose: Option<PixelBox>,
+    /// How many pixels see it.
+    pub visible_pixels: usize,
+}
+
+impl Segmentation {
+    /// Where the segments of a level are in the picture of environment `env`, those that are in it at all (one of the two
+    /// boxes is there), in the order of [`segments`](Self::segments).
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
+    /// an environment that the camera does not see.
+    pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
+        let row = camera.row(env)?;
+        let mask = camera.mask()?;
+        let (height, width) = camera.image_shape();
+        let mut boxes = Boxes::new(self, level);
+        for ((v, u), &id) in mask.index_axis(Axis(0), row).indexed_iter() {
+            boxes.see(id, [u, v]);
+        }
+        camera.shot_of(row, |rasterizer, shot| {
+            for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {
+                if matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil)
+                    && let Some(extent) = outline(shot.view, instance, pose)
+                {
+                    boxes.reach(instance.mask_id, extent);
+                }
+            }
+        });
+        Ok(boxes.finish([width as f64, height as f64]))
+    }
+}
+
+/// Boxes while they grow.
+struct Boxes<'a> {
+    segmentation: &'a Segmentation,
+    level: SegmentLevel,
+    list: Vec<Growing>,
+    /// The mask id that was last looked for, and where its segment is in the list.
+    last: (i32, Option<usize>),
+}
+
+/// A box while it grows.
+#[derive(Clone, Copy)]
+struct Growing {
+    id: i32,
+    pixels: usize,
+    seen: [[usize; 2]; 2],
+    /// Smallest and largest u, then v.
+    whole: Option<[[f64; 2]; 2]>,
+}
+
+impl<'a> Boxes<'a> {
+    fn new(segmentation: &'a Segmentation, level: SegmentLevel) -> Self {
+        let growing = |id| Growing { id, pixels: 0, seen: [[usize::MAX; 2], [0; 2]], whole: None };
+        let list = segmentation.segments(level).iter().map(|segment| growing(segment.id)).collect();
+        Self { segmentation, level, list, last: (0, None) }
+    }
+
+    fn of(&mut self, mask_id: i32) -> Option<&mut Growing> {
+        if self.last.0 != mask_id {
+            let segment = self.segmentation.segment_of(self.level, mask_id);
+            self.last = (mask_id, self.list.iter().position(|growing| growing.id == segment));
+        }
+        self.last.1.map(|at| &mut self.list[at])
+    }
+
+    /// A pixel sees something.
+    fn see(&mut self, mask_id: i32, at: [usize; 2]) {
+        let Some(growing) = self.of(mask_id) else { return };
+        growing.pixels += 1;
+        for axis in 0..2 {
+            growing.seen[0][axis] = growing.seen[0][axis].min(at[axis]);
+            growing.seen[1][axis] = growing.seen[1][axis].max(at[axis] + 1);
+        }
+    }
+
+    /// Something reaches from smallest to largest u, then v.
+    fn reach(&mut self, mask_id: i32, extent: [[f64; 2]; 2]) {
+        let Some(growing) = self.of(mask_id) else { return };
+        let before = growing.whole.unwrap_or(extent);
+        growing.whole = Some([0, 1].map(|k| [before[k][0].min(extent[k][0]), before[k][1].max(extent[k][1])]));
+    }
+
+    fn finish(self, size: [f64; 2]) -> Vec<Box2d> {
+        let loose = |[u, v]: [[f64; 2]; 2]| {
+            let (min, max) = ([u[0].max(0.0), v[0].max(0.0)], [u[1].min(size[0]), v[1].min(size[1])]);
+            (min[0] < max[0] && min[1] < max[1]).then_some(PixelBox { min, max })
+        };
+        let boxes = self.list.into_iter().map(|Growing { id, pixels, seen, whole }| {
+            let [min, max] = seen.map(|corner| corner.map(|x| x as f64));
+            let tight = (pixels > 0).then_some(PixelBox { min, max });
+            Box2d { id, tight, loose: whole.and_then(loose), visible_pixels: pixels }
+        });
+        boxes.filter(|b| b.tight.is_some() || b.loose.is_some()).collect()
+    }
+}

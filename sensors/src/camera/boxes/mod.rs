@@ -1,0 +1,11 @@
+//! Boxes around things: in the picture, and in the environment.
+
+mod flat;
+mod occlusion;
+mod outline;
+mod solid;
+mod support;
+
+pub use flat::{Box2d, PixelBox};
+pub use occlusion::Occlusion;
+pub use solid::Box3d;

@@ -1,0 +1,300 @@
+//! Where in the picture a thing is, as if nothing else were there and the picture had no edges.
+
+use super::support::reach;
+use crate::visibility::View;
+use scene::shape::Plane;
+use scene::{Instance, PoseF32, Shape};
+
+/// Edges around a circle of what is cut by the near or the far plane and has no corners of its own: the polygon is inside of
+/// the circle by 1 - cos(pi / 256) of its radius at most, 7.5e-5.
+const SEGMENTS: usize = 256;
+
+/// A thing in the camera's optical frame, double precision.
+struct Seen {
+    rotation: [[f64; 3]; 3],
+    translation: [f64; 3],
+}
+
+impl Seen {
+    fn point(&self, p: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.translation[i] + (0..3).map(|j| self.rotation[i][j] * p[j]).sum::<f64>())
+    }
+
+    /// R diag(radii²) Rᵀ: n · M n is the square of how far an ellipsoid reaches along n.
+    fn spread(&self, radii: [f64; 3]) -> [[f64; 3]; 3] {
+        let r = &self.rotation;
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * r[j][k] * radii[k] * radii[k]).sum()))
+    }
+}
+
+/// Smallest and largest x / z and y / z so far.
+#[derive(Clone, Copy)]
+struct Extent([[f64; 2]; 2]);
+
+impl Extent {
+    const NONE: Self = Self([[f64::INFINITY, f64::NEG_INFINITY]; 2]);
+
+    fn add(&mut self, axis: usize, value: f64) {
+        let [low, high] = &mut self.0[axis];
+        (*low, *high) = (low.min(value), high.max(value));
+    }
+
+    fn point(&mut self, [x, y, z]: [f64; 3]) {
+        self.add(0, x / z);
+        self.add(1, y / z);
+    }
+
+    /// A ball stretched along axes, or a disc, wholly in front of the camera.
+    ///
+    /// A plane through the eye with the normal n touches it where (n · c)² = n · M n, c its centre. With n = (1, 0, -s), which
+    /// is the plane x = s z, that is a quadratic equation in s, whose roots are the ends of what is seen.
+    fn ellipsoid(&mut self, seen: &Seen, center: [f64; 3], radii: [f64; 3]) {
+        let (c, m) = (seen.point(center), seen.spread(radii));
+        for axis in 0..2 {
+            let a = c[2] * c[2] - m[2][2];
+            let b = c[axis] * c[2] - m[axis][2];
+            let root = (b * b - a * (c[axis] * c[axis] - m[axis][axis])).max(0.0).sqrt();
+            self.add(axis, (b - root) / a);
+            self.add(axis, (b + root) / a);
+        }
+    }
+}
+
+/// Smallest and largest u, then v, of the picture \[pixels\] of what an instance has between the near and the far plane, not
+/// clipped to the picture; `None` where that is nothing.
+pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &PoseF32) -> Option<[[f64; 2]; 2]> {
+    let pose = view.world_from_camera.inverse_times(world_from_instance);
+    let seen =
+        Seen { rotation: pose.rotation.map(|row| row.map(f64::from)), translation: pose.translation.map(f64::from) };
+    let shape = &instance.shape;
+    if matches!(shape, Shape::Plane(_)) && !is_before(&seen) {
+        return None;
+    }
+    let (near, far) = (f64::from(view.near), f64::from(view.far));
+    let [low, high] = reach(shape, seen.rotation[2]).map(|z| z + seen.translation[2]);
+    if !(high >= near && low <= far) {
+        return None;
+    }
+    let mut extent = Extent::NONE;
+    let endless = matches!(shape, Shape::Plane(Plane { half }) if half.contains(&0.0));
+    if low > near && high < far && !endless {
+        whole(&mut extent, shape, &seen);
+    } else {
+        cut(&mut extent, shape, &seen, [near, far], view);
+    }
+    let ([fx, fy], [cx, cy]) = ([view.fx, view.fy].map(f64::from), [view.cx, view.cy].map(f64::from));
+    let [x, y] = extent.0;
+    (x[0] <= x[1]).then(|| [x.map(|x| fx * x + cx), y.map(|y| fy * y + cy)])
+}
+
+/// Whether the camera is on the side of a plane that is seen.
+fn is_before(seen: &Seen) -> bool {
+    // The camera in the plane's frame: -Rᵀ t.
+    (0..3).map(|i| seen.rotation[i][2] * seen.translation[i]).sum::<f64>() < 0.0
+}
+
+/// A shape between the near and the far plane. x / z has its extremes over a convex hull among those over its parts.
+fn whole(extent: &mut Extent, shape: &Shape, seen: &Seen) {
+    let wide = f64::from;
+    match shape {
+        Shape::Sphere(s) => extent.ellipsoid(seen, [0.0; 3], [wide(s.radius); 3]),
+        Shape::Ellipsoid(s) => extent.ellipsoid(seen, [0.0; 3], s.radii.map(wide)),
+        Shape::Capsule(s) => {
+            for z in [-wide(s.half_length), wide(s.half_length)] {
+                extent.ellipsoid(seen, [0.0, 0.0, z], [wide(s.radius); 3]);
+            }
+        }
+        Shape::Cylinder(s) => {
+            for z in [-wide(s.half_length), wide(s.half_length)] {
+                extent.ellipsoid(seen, [0.0, 0.0, z], [wide(s.radius), wide(s.radius), 0.0]);
+            }
+        }
+        Shape::Box(s) => {
+            for corner in 0..8 {
+                let side = |k: usize| if corner >> k & 1 == 1 { wide(s.half[k]) } else { -wide(s.half[k]) };
+                extent.point(seen.point([side(0), side(1), side(2)]));
+            }
+        }
+        Shape::Plane(s) => rectangle(s.half.map(wide)).into_iter().for_each(|p| extent.point(seen.point(p))),
+        Shape::Mesh(s) => points(extent, s.mesh.positions(), seen),
+        Shape::HeightField(s) => points(extent, s.mesh().positions(), seen),
+    }
+}
+
+fn points(extent: &mut Extent, positions: &[[f32; 3]], seen: &Seen) {
+    for p in positions {
+        extent.point(seen.point(p.map(f64::from)));
+    }
+}
+
+fn rectangle([x, y]: [f64; 2]) -> [[f64; 3]; 4] {
+    [[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]]
+}
+
+/// What a shape has between two depths, of its triangles.
+fn cut(extent: &mut Extent, shape: &Shape, seen: &Seen, range: [f64; 2], view: &View) {
+    let of_mesh = |extent: &mut Extent, positions: &[[f32; 3]], triangles: &[[u32; 3]]| {
+        for triangle in triangles {
+            let corners = triangle.map(|k| positions.get(k as usize).copied().unwrap_or_default());
+            polygon(extent, &corners.map(|p| seen.point(p.map(f64::from))), range);
+        }
+    };
+    match shape {
+        Shape::Plane(Plane { half }) => {
+            let half = half.map(|half| if half == 0.0 { horizon(view, seen, range[1]) } else { f64::from(half) });
+            polygon(extent, &rectangle(half).map(|p| seen.point(p)), range);
+        }
+        Shape::Mesh(s) => of_mesh(extent, s.mesh.positions(), s.mesh.triangles()),
+        Shape::HeightField(s) => of_mesh(extent, s.mesh().positions(), s.mesh().triangles()),
+        _ => {
+            let mesh = shape.tessellate(SEGMENTS);
+            of_mesh(extent, &mesh.positions, &mesh.triangles);
+        }
+    }
+}
+
+/// The corners of what a convex polygon has between two depths: its own, and where its edges cross them.
+fn polygon(extent: &mut Extent, corners: &[[f64; 3]], range: [f64; 2]) {
+    for (k, a) in corners.iter().enumerate() {
+        if (range[0]..=range[1]).contains(&a[2]) {
+            extent.point(*a);
+        }
+        let b = corners[(k + 1) % corners.len()];
+        for z in range {
+            let (before, after) = (a[2] - z, b[2] - z);
+            if before * after < 0.0 {
+                let share = before / (before - after);
+                extent.point([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), z]);
+            }
+        }
+    }
+}
+
+/// Half the side of a square that has all of an endless plane that the picture shows.
+fn horizon(view: &View, seen: &Seen, far: f64) -> f64 {
+    let wide = |c: f32, f: f32, n: usize| f64::from(c.abs().max((n as f32 - c).abs()) / f);
+    let (x, y) = (wide(view.cx, view.fx, view.width), wide(view.cy, view.fy, view.height));
+    let to_origin = seen.translation.iter().map(|t| t * t).sum::<f64>().sqrt();
+    to_origin + far * (1.0 + x * x + y * y).sqrt()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use scene::Material;
+    use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
+
+    fn view() -> View {
+        View {
+            width: 640,
+            height: 480,
+            fx: 500.0,
+            fy: 520.0,
+            cx: 310.5,
+            cy: 250.25,
+            near: 0.1,
+            far: 20.0,
+            world_from_camera: PoseF32::IDENTITY,
+        }
+    }
+
+    fn of(shape: impl Into<Shape>, pose: &PoseF32) -> Option<[[f64; 2]; 2]> {
+        outline(&view(), &Instance::new(shape, Material::default(), 1), pose)
+    }
+
+    /// A rotation of some angles and a place.
+    fn pose(rpy: [f64; 3], at: [f64; 3]) -> PoseF32 {
+        PoseF32::from(&scene::pose::from_xyz_rpy(at, rpy))
+    }
+
+    /// The rays to a ball fill a cone of half the angle asin(r / d) about the direction of its centre, in the plane of y = 0
+    /// too: so u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
+    #[test]
+    fn the_silhouette_of_a_ball_is_that_of_its_cone() {
+        for (at, radius) in [([0.3, -0.2, 2.0], 0.25), ([-3.0, 1.0, 1.5], 0.4), ([0.0, 0.0, 0.6], 0.45)] {
+            let found = of(Sphere { radius: radius as f32 }, &pose([0.4, 0.3, -1.0], at)).unwrap();
+            let radius = f64::from(radius as f32);
+            let end = |x: f64, sign: f64| (x.atan2(at[2]) + sign * (radius / x.hypot(at[2])).asin()).tan();
+            for (axis, (f, c)) in [(500.0, 310.5), (520.0, 250.25)].into_iter().enumerate() {
+                for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
+                    let expected = f * end(at[axis], sign) + c;
+                    // The pose is in single precision: 1e-7 of metres, magnified by f / z and by the slant.
+                    assert!((found[axis][side] - expected).abs() < 2e-3, "{at:?}: {found:?}, {expected}");
+                }
+            }
+        }
+    }
+
+    /// Points of fine triangles are on the surface, so they are inside of the outline; the outermost is near its edge: a
+    /// circle's polygon is inside by R (1 - cos(pi / n)), times f / z and the slant of what is seen.
+    #[test]
+    fn outlines_hold_every_point_and_no_more() {
+        let shapes: Vec<Shape> = vec![
+            Ellipsoid { radii: [0.3, 0.1, 0.2] }.into(),
+            Capsule { radius: 0.1, half_length: 0.3 }.into(),
+            Cylinder { radius: 0.2, half_length: 0.25 }.into(),
+            Box { half: [0.1, 0.2, 0.3] }.into(),
+            Plane { half: [0.3, 0.2] }.into(),
+        ];
+        let mut whole = 0;
+        for (k, shape) in shapes.iter().enumerate() {
+            for turn in 0..12 {
+                let t = f64::from(turn);
+                // The last ones reach through the near plane.
+                let z = if turn < 8 { 1.2 + 0.3 * t } else { 0.1 + 0.03 * (t - 8.0) };
+                let pose = pose([0.5 * t + 0.3, 0.7 * t, 1.1 * t + k as f64], [0.2 * t.sin(), 0.3 * t.cos(), z]);
+                let Some(found) = of(shape.clone(), &pose) else {
+                    assert!(matches!(shape, Shape::Plane(_)), "only planes have a side that is not seen");
+                    continue;
+                };
+                let mesh = shape.tessellate(512);
+                let mut extremes = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+                let mut nearest = f64::INFINITY;
+                for p in &mesh.positions {
+                    let [x, y, z] = pose.apply(*p).map(f64::from);
+                    nearest = nearest.min(z);
+                    if z < 0.1 {
+                        continue;
+                    }
+                    for (axis, value) in [500.0 * x / z + 310.5, 520.0 * y / z + 250.25].into_iter().enumerate() {
+                        let [low, high] = &mut extremes[axis];
+                        (*low, *high) = (low.min(value), high.max(value));
+                    }
+                }
+                for axis in 0..2 {
+                    let ([low, high], [least, most]) = (found[axis], extremes[axis]);
+                    // What is cut is a polygon of 256 edges: 7.5e-5 of 0.3 m, at 0.1 m and 520 pixels, some more at a slant.
+                    let slack = if nearest < 0.11 { 0.5 } else { 2e-3 };
+                    assert!(low <= least + slack && high >= most - slack, "{shape:?} {turn}: {found:?} {extremes:?}");
+                    if nearest > 0.5 {
+                        whole += 1;
+                        // 1 - cos(pi / 512) is 1.9e-5: of 0.3 m, 520 pixels and depths above 0.5 m 6e-3 pixels, twice at a slant.
+                        assert!(low >= least - 2e-2 && high <= most + 2e-2, "{shape:?} {turn}: {found:?} {extremes:?}");
+                    }
+                }
+            }
+        }
+        assert!(whole > 50, "{whole}");
+    }
+
+    #[test]
+    fn what_cannot_be_seen_has_no_outline() {
+        let ball = Sphere { radius: 0.2 };
+        assert_eq!(of(ball, &pose([0.0; 3], [0.0, 0.0, -0.5])), None, "behind");
+        assert_eq!(of(ball, &pose([0.0; 3], [0.0, 0.0, 20.3])), None, "too far");
+        assert!(of(ball, &pose([0.0; 3], [0.0, 0.0, 20.1])).is_some());
+        assert_eq!(of(Plane { half: [1.0, 1.0] }, &pose([0.0; 3], [0.0, 0.0, 2.0])), None, "from behind");
+    }
+
+    /// A camera 1 m above the ground that looks ahead sees it up to its far plane, 20 m away: v = cy + fy / 20, without end
+    /// to the sides and below.
+    #[test]
+    fn endless_planes_end_at_the_far_plane() {
+        // z of the plane is up, which is -y of the camera.
+        let ground = PoseF32 { rotation: [[1., 0., 0.], [0., 0., -1.], [0., 1., 0.]], translation: [0.0, 1.0, 0.0] };
+        let [u, v] = of(Plane::INFINITE, &ground).unwrap();
+        assert!((v[0] - (250.25 + 520.0 / 20.0)).abs() < 1e-3, "{v:?}");
+        assert!(v[1] > 480.0 && u[0] < 0.0 && u[1] > 640.0);
+    }
+}

@@ -1,0 +1,101 @@
+//! Boxes in the environment.
+
+use super::support::reach;
+use crate::camera::segmentation::{SegmentLevel, Segmentation};
+use crate::camera::sensor::Camera;
+use crate::error::SensorError;
+use crate::visibility::raster::Layer;
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use scene::{Instance, Pose, PoseF32};
+
+/// A box around a segment, along the axes of the segment's own frame: that of the link; of an object with several links that
+/// of its first one; of a class that of its first object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Box3d {
+    /// The segment, see [`Segmentation::segments`].
+    pub id: i32,
+    /// Where the segment's frame is in the environment.
+    pub pose: Pose,
+    /// Smallest coordinates in that frame \[m\].
+    pub min: [f64; 3],
+    /// Largest coordinates in that frame \[m\].
+    pub max: [f64; 3],
+}
+
+impl Box3d {
+    /// The eight corners in the environment \[m\]: x changes first, then y, then z, smallest coordinates first.
+    pub fn corners(&self) -> [[f64; 3]; 8] {
+        std::array::from_fn(|corner| {
+            let side = |k: usize| if corner >> k & 1 == 1 { self.max[k] } else { self.min[k] };
+            (self.pose * Point3::new(side(0), side(1), side(2))).coords.into()
+        })
+    }
+
+    /// Lengths of its sides \[m\].
+    pub fn size(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| self.max[k] - self.min[k])
+    }
+
+    /// Its middle in the environment \[m\].
+    pub fn center(&self) -> [f64; 3] {
+        let middle = [0, 1, 2].map(|k| 0.5 * (self.min[k] + self.max[k]));
+        (self.pose * Point3::from(middle)).coords.into()
+    }
+}
+
+impl Segmentation {
+    /// Boxes around the segments of a level in environment `env` at the instant that the camera captured, in the order of
+    /// [`segments`](Self::segments): of everything that the camera could draw, in its picture or not, but for what is without
+    /// end. They are those of exact shapes and of the vertices of meshes. No picture is drawn.
+    ///
+    /// # Errors
+    ///
+    /// An environment that the camera does not see, or has not captured yet.
+    pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
+        let row = camera.row(env)?;
+        camera.view(env)?;
+        Ok(camera.shot_of(row, |rasterizer, shot| {
+            let drawn =
+                |instance: &Instance| matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil);
+            let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
+            let of = |id: i32| -> Option<Box3d> {
+                let parts = all.clone().filter(|(instance, _)| self.segment_of(level, instance.mask_id) == id);
+                // The first thing of the segment that is drawn gives the frame.
+                let (first, place) = parts.clone().min_by_key(|(instance, _)| instance.mask_id)?;
+                let pose = frame_of(first, place);
+                let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+                for (instance, place) in parts {
+                    for (axis, [low, high]) in extent(&pose, instance, place).into_iter().enumerate() {
+                        (min[axis], max[axis]) = (min[axis].min(low), max[axis].max(high));
+                    }
+                }
+                let ends = min.iter().chain(&max).all(|x| x.is_finite());
+                ends.then_some(Box3d { id, pose, min, max })
+            };
+            self.segments(level).iter().filter_map(|segment| of(segment.id)).collect()
+        }))
+    }
+}
+
+/// Where the frame of the thing that an instance belongs to is.
+fn frame_of(instance: &Instance, world_from_instance: &PoseF32) -> Pose {
+    pose_of(world_from_instance) * instance.frame_from_instance.inverse()
+}
+
+/// The pose of a matrix.
+fn pose_of(pose: &PoseF32) -> Pose {
+    let r = pose.rotation.map(|row| row.map(f64::from));
+    let matrix = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| r[i][j]));
+    let rotation = UnitQuaternion::from_rotation_matrix(&matrix);
+    Pose::from_parts(Vector3::from(pose.translation.map(f64::from)).into(), rotation)
+}
+
+/// Smallest and largest x, y and z of an instance in a frame.
+fn extent(frame: &Pose, instance: &Instance, world_from_instance: &PoseF32) -> [[f64; 2]; 3] {
+    let relative = frame.inverse() * pose_of(world_from_instance);
+    let rotation = relative.rotation.to_rotation_matrix();
+    [0, 1, 2].map(|axis| {
+        let row = rotation.matrix().row(axis);
+        reach(&instance.shape, [row[0], row[1], row[2]]).map(|x| x + relative.translation.vector[axis])
+    })
+}

@@ -1,0 +1,365 @@
+//! ROS's calibration files: `camera_info` as `camera_calibration` and `camera_info_manager` write it.
+//!
+//! Source: ROS, package `camera_calibration_parsers`, and the message `sensor_msgs/CameraInfo`.
+
+mod error;
+mod write;
+mod yaml;
+
+use super::cfg::CameraCfg;
+use super::intrinsics::{Intrinsics, PixelIntrinsics};
+use super::lens::{Lens, OpenCv, OpenCvFisheye};
+use super::sensor::Camera;
+use crate::error::SensorError;
+pub use error::CalibrationError;
+use nalgebra::{Matrix3, Matrix3x4};
+use scene::pattern::closest;
+use std::fmt;
+use std::path::Path;
+use yaml::{Node, Value};
+
+/// The fields of a file.
+const FIELDS: [&str; 8] = [
+    "image_width",
+    "image_height",
+    "camera_name",
+    "camera_matrix",
+    "distortion_model",
+    "distortion_coefficients",
+    "rectification_matrix",
+    "projection_matrix",
+];
+/// How far a rectification matrix may be from a rotation: files have six digits or more.
+const ROTATION: f64 = 1e-3;
+
+/// ROS's names of distortions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DistortionModel {
+    /// k1, k2, p1, p2, k3 of [`OpenCv`].
+    PlumbBob,
+    /// k1, k2, p1, p2, k3, k4, k5, k6 of [`OpenCv`]; s1 to s4 too where there are twelve.
+    RationalPolynomial,
+    /// k1, k2, k3, k4 of [`OpenCvFisheye`].
+    Equidistant,
+}
+
+impl DistortionModel {
+    const ALL: [Self; 3] = [Self::PlumbBob, Self::RationalPolynomial, Self::Equidistant];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlumbBob => "plumb_bob",
+            Self::RationalPolynomial => "rational_polynomial",
+            Self::Equidistant => "equidistant",
+        }
+    }
+
+    /// How many coefficients it may have.
+    fn counts(self) -> &'static [usize] {
+        match self {
+            Self::PlumbBob => &[4, 5],
+            Self::RationalPolynomial => &[8, 12, 14],
+            Self::Equidistant => &[4],
+        }
+    }
+}
+
+/// A camera's calibration.
+///
+/// ```
+/// use sensors::camera::{CameraCfg, CameraInfo, Renderer};
+///
+/// let text = "
+/// image_width: 640
+/// image_height: 480
+/// camera_name: wrist
+/// camera_matrix: { rows: 3, cols: 3, data: [610.2, 0, 324.1, 0, 611.0, 238.7, 0, 0, 1] }
+/// distortion_model: plumb_bob
+/// distortion_coefficients: { rows: 1, cols: 5, data: [-0.31, 0.11, 0.0004, -0.0002, 0] }
+/// rectification_matrix: { rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1] }
+/// projection_matrix: { rows: 3, cols: 4, data: [580.1, 0, 323.0, 0, 0, 592.3, 238.0, 0, 0, 0, 1, 0] }
+/// ";
+/// let info = CameraInfo::parse(text, "wrist.yaml")?;
+/// // The simulated twin: raw pictures of that camera, as its driver publishes them.
+/// let mut cfg = CameraCfg { renderer: Renderer::FastRayTraced, ..CameraCfg::default() };
+/// info.apply_to(&mut cfg);
+/// assert_eq!((cfg.width, cfg.lens.name()), (640, "opencv"));
+/// # Ok::<(), sensors::camera::CalibrationError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraInfo {
+    /// Name of the camera; may be empty.
+    pub name: String,
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// K: `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of raw pictures \[pixels\].
+    pub camera_matrix: Matrix3<f64>,
+    /// What D means.
+    pub distortion_model: DistortionModel,
+    /// D, in the order of the model.
+    pub distortion_coefficients: Vec<f64>,
+    /// R: the rotation that rectified pictures are turned by. Raw pictures do not depend on it.
+    pub rectification_matrix: Matrix3<f64>,
+    /// P: of rectified pictures \[pixels\]. Raw pictures do not depend on it.
+    pub projection_matrix: Matrix3x4<f64>,
+}
+
+impl CameraInfo {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// Of the first thing that is wrong, with file and line, or field.
+    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads the text of a file; errors call it `file`. Fields other than those of `camera_info` do not count.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, file: &str) -> Result<Self, CalibrationError> {
+        let root = yaml::parse(text, file)?;
+        let reader = Reader { file };
+        let Value::Table(fields) = &root.value else {
+            let problem = format!("is {}, not a table of fields", root.value.kind());
+            return Err(reader.wrong(root.line, "the file", problem));
+        };
+        let find = |name: &str| fields.iter().find(|(key, _)| key == name).map(|(_, node)| node);
+        let get = |name: &'static str| {
+            find(name).ok_or_else(|| CalibrationError::Missing { file: file.into(), field: name.into() })
+        };
+        let width = reader.size("image_width", get("image_width")?)?;
+        let height = reader.size("image_height", get("image_height")?)?;
+        let name = match find("camera_name") {
+            Some(node) => reader.text("camera_name", node)?.to_owned(),
+            None => String::new(),
+        };
+        let k = get("camera_matrix")?;
+        let camera_matrix = Matrix3::from_row_slice(&reader.matrix("camera_matrix", k, [3, 3])?);
+        Intrinsics::from_matrix(&camera_matrix)
+            .map_err(|error| reader.wrong(k.line, "camera_matrix", format!("is of no camera: {error}")))?;
+        let (distortion_model, distortion_coefficients) =
+            reader.distortion(get("distortion_model")?, get("distortion_coefficients")?)?;
+        let r = get("rectification_matrix")?;
+        let rectification_matrix = Matrix3::from_row_slice(&reader.matrix("rectification_matrix", r, [3, 3])?);
+        let off = (rectification_matrix * rectification_matrix.transpose() - Matrix3::identity()).amax();
+        if off > ROTATION || rectification_matrix.determinant() < 0.0 {
+            let determinant = rectification_matrix.determinant();
+            let problem = format!("is no rotation: its determinant is {determinant:.4}, its rows are {off:.4} off");
+            return Err(reader.wrong(r.line, "rectification_matrix", problem));
+        }
+        let p = get("projection_matrix")?;
+        let projection_matrix = Matrix3x4::from_row_slice(&reader.matrix("projection_matrix", p, [3, 4])?);
+        let determinant = projection_matrix.fixed_columns::<3>(0).determinant();
+        if determinant == 0.0 {
+            let problem = "is singular: the determinant of its first three columns is 0".into();
+            return Err(reader.wrong(p.line, "projection_matrix", problem));
+        }
+        Ok(Self {
+            name,
+            width,
+            height,
+            camera_matrix,
+            distortion_model,
+            distortion_coefficients,
+            rectification_matrix,
+            projection_matrix,
+        })
+    }
+
+    /// The calibration of a simulated camera: R is the identity and P is K, as of a camera alone.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Lens`] if `camera_info` has no model for the lens.
+    pub fn of(
+        name: &str,
+        [width, height]: [usize; 2],
+        pixels: &PixelIntrinsics,
+        lens: &Lens,
+    ) -> Result<Self, CalibrationError> {
+        let (distortion_model, distortion_coefficients) = of_lens(lens)?;
+        let camera_matrix = Intrinsics::from(*pixels).matrix(width, height)?;
+        let mut projection_matrix = Matrix3x4::zeros();
+        projection_matrix.fixed_columns_mut::<3>(0).copy_from(&camera_matrix);
+        Ok(Self {
+            name: name.into(),
+            width,
+            height,
+            camera_matrix,
+            distortion_model,
+            distortion_coefficients,
+            rectification_matrix: Matrix3::identity(),
+            projection_matrix,
+        })
+    }
+
+    /// Focal lengths and principal point of raw pictures.
+    pub fn intrinsics(&self) -> Intrinsics {
+        let k = &self.camera_matrix;
+        Intrinsics::Pixels { fx: k[(0, 0)], fy: k[(1, 1)], cx: k[(0, 2)], cy: k[(1, 2)] }
+    }
+
+    /// The lens of raw pictures.
+    pub fn lens(&self) -> Lens {
+        let d = &self.distortion_coefficients;
+        match self.distortion_model {
+            DistortionModel::PlumbBob | DistortionModel::RationalPolynomial => OpenCv::from_coefficients(d).into(),
+            DistortionModel::Equidistant => {
+                let k = |i: usize| d.get(i).copied().unwrap_or(0.0);
+                OpenCvFisheye { k1: k(0), k2: k(1), k3: k(2), k4: k(3), max_angle: None }.into()
+            }
+        }
+    }
+
+    /// Makes a camera the simulated twin of this one: its size, intrinsics and lens. The renderer stays: a lens needs one that
+    /// follows rays.
+    pub fn apply_to(&self, cfg: &mut CameraCfg) {
+        (cfg.width, cfg.height) = (self.width, self.height);
+        (cfg.intrinsics, cfg.lens) = (self.intrinsics(), self.lens());
+    }
+}
+
+impl Camera {
+    /// The calibration of the camera in environment `env`, called `name`: what ROS's nodes need to read its pictures.
+    ///
+    /// # Errors
+    ///
+    /// An environment that the camera does not see, and [`CalibrationError::Lens`].
+    pub fn camera_info(&self, name: &str, env: usize) -> Result<CameraInfo, SensorError> {
+        let (optics, (height, width)) = (self.optics(env)?, self.image_shape());
+        Ok(CameraInfo::of(name, [width, height], &optics.pixels(), &optics.lens())?)
+    }
+}
+
+/// ROS's model of a lens, and its coefficients.
+fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
+    let refuse = |reason| Err(CalibrationError::Lens { lens: lens.name(), reason });
+    match *lens {
+        Lens::Pinhole(_) => Ok((DistortionModel::PlumbBob, vec![0.0; 5])),
+        Lens::OpenCv(OpenCv { max_angle: Some(_), .. })
+        | Lens::OpenCvFisheye(OpenCvFisheye { max_angle: Some(_), .. }) => refuse("it has no place for max_angle"),
+        Lens::OpenCv(lens) => {
+            let all = lens.coefficients();
+            let used = all.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);
+            Ok(match used {
+                0..=5 => (DistortionModel::PlumbBob, all[..5].to_vec()),
+                6..=8 => (DistortionModel::RationalPolynomial, all[..8].to_vec()),
+                _ => (DistortionModel::RationalPolynomial, all.to_vec()),
+            })
+        }
+        Lens::OpenCvFisheye(lens) => Ok((DistortionModel::Equidistant, vec![lens.k1, lens.k2, lens.k3, lens.k4])),
+        _ => refuse("its models are plumb_bob, rational_polynomial (opencv) and equidistant (opencv_fisheye)"),
+    }
+}
+
+/// Reads fields.
+struct Reader<'a> {
+    file: &'a str,
+}
+
+impl Reader<'_> {
+    fn wrong(&self, line: usize, field: &str, problem: String) -> CalibrationError {
+        CalibrationError::Field { file: self.file.into(), line, field: field.into(), problem }
+    }
+
+    fn text<'n>(&self, field: &str, node: &'n Node) -> Result<&'n str, CalibrationError> {
+        match &node.value {
+            Value::Scalar(text) => Ok(text),
+            other => Err(self.wrong(node.line, field, format!("is {}, not a word", other.kind()))),
+        }
+    }
+
+    fn size(&self, field: &str, node: &Node) -> Result<usize, CalibrationError> {
+        let text = self.text(field, node)?;
+        text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| {
+            self.wrong(node.line, field, format!("is {text:?}; it must be a whole number of pixels, at least 1"))
+        })
+    }
+
+    fn number(&self, field: &str, node: &Node) -> Result<f64, CalibrationError> {
+        let text = self.text(field, node)?;
+        text.parse::<f64>()
+            .ok()
+            .filter(|x| x.is_finite())
+            .ok_or_else(|| self.wrong(node.line, field, format!("has {text:?}; it must be a finite number")))
+    }
+
+    /// `rows`, `cols` and `data` of a matrix.
+    fn numbers(&self, field: &str, node: &Node) -> Result<([usize; 2], Vec<f64>), CalibrationError> {
+        let Value::Table(parts) = &node.value else {
+            let problem = format!("is {}, not a table of rows, cols and data", node.value.kind());
+            return Err(self.wrong(node.line, field, problem));
+        };
+        let part = |name: &str| {
+            parts.iter().find(|(key, _)| key == name).map(|(_, node)| node).ok_or_else(|| {
+                let problem = format!("has no {name}; a matrix has rows, cols and data");
+                self.wrong(node.line, field, problem)
+            })
+        };
+        let size = |name: &str| {
+            let node = part(name)?;
+            let text = self.text(&format!("{field}.{name}"), node)?;
+            text.parse::<usize>().map_err(|_| {
+                self.wrong(node.line, &format!("{field}.{name}"), format!("is {text:?}; it must be a whole number"))
+            })
+        };
+        let (shape, data) = ([size("rows")?, size("cols")?], part("data")?);
+        let name = format!("{field}.data");
+        let Value::List(list) = &data.value else {
+            return Err(self.wrong(data.line, &name, format!("is {}, not a list of numbers", data.value.kind())));
+        };
+        let numbers = list.iter().map(|node| self.number(&name, node)).collect::<Result<Vec<f64>, _>>()?;
+        if shape[0].checked_mul(shape[1]) != Some(numbers.len()) {
+            let problem =
+                format!("has {} numbers, not the {} x {} of rows and cols", numbers.len(), shape[0], shape[1]);
+            return Err(self.wrong(data.line, &name, problem));
+        }
+        Ok((shape, numbers))
+    }
+
+    /// A matrix of a shape, row by row.
+    fn matrix(&self, field: &str, node: &Node, expected: [usize; 2]) -> Result<Vec<f64>, CalibrationError> {
+        let (shape, numbers) = self.numbers(field, node)?;
+        if shape != expected {
+            let [[rows, cols], [r, c]] = [shape, expected];
+            return Err(self.wrong(node.line, field, format!("is {rows} x {cols}; it must be {r} x {c}")));
+        }
+        Ok(numbers)
+    }
+
+    fn distortion(&self, model: &Node, d: &Node) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
+        let name = self.text("distortion_model", model)?;
+        let Some(known) = DistortionModel::ALL.into_iter().find(|known| known.name() == name) else {
+            let candidates = closest(name, DistortionModel::ALL.map(DistortionModel::name));
+            let (file, line) = (self.file.into(), model.line);
+            return Err(CalibrationError::Model { file, line, model: name.into(), candidates });
+        };
+        let field = "distortion_coefficients";
+        let (_, numbers) = self.numbers(field, d)?;
+        let (found, counts) = (numbers.len(), known.counts());
+        if !counts.contains(&found) {
+            let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+            let problem = format!("has {found} numbers; {name} has {}", counts.join(" or "));
+            return Err(self.wrong(d.line, field, problem));
+        }
+        if numbers.iter().skip(12).any(|&tilt| tilt != 0.0) {
+            let problem = "tilts the sensor (its last two numbers), which is not offered".into();
+            return Err(self.wrong(d.line, field, problem));
+        }
+        Ok((known, numbers))
+    }
+}
+
+impl fmt::Display for DistortionModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

@@ -1,0 +1,70 @@
+//! Calibration files as ROS writes them.
+
+use super::{CalibrationError, CameraInfo};
+use std::fmt::Write as _;
+use std::path::Path;
+
+impl CameraInfo {
+    /// The text of a file. Numbers have as many digits as they need: reading it again gives the same bits.
+    pub fn to_yaml(&self) -> String {
+        let mut out = String::new();
+        let Self { width, height, distortion_model, .. } = self;
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "image_width: {width}\nimage_height: {height}\ncamera_name: {}", word(&self.name));
+        let k = self.camera_matrix.transpose();
+        matrix(&mut out, "camera_matrix", [3, 3], k.as_slice());
+        let _ = writeln!(out, "distortion_model: {distortion_model}");
+        let d = &self.distortion_coefficients;
+        matrix(&mut out, "distortion_coefficients", [1, d.len()], d);
+        let r = self.rectification_matrix.transpose();
+        matrix(&mut out, "rectification_matrix", [3, 3], r.as_slice());
+        let p = self.projection_matrix.transpose();
+        matrix(&mut out, "projection_matrix", [3, 4], p.as_slice());
+        out
+    }
+
+    /// Writes a file.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::File`].
+    pub fn write(&self, path: &Path) -> Result<(), CalibrationError> {
+        std::fs::write(path, self.to_yaml())
+            .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })
+    }
+}
+
+/// A matrix, row by row.
+fn matrix(out: &mut String, name: &str, [rows, cols]: [usize; 2], data: &[f64]) {
+    let data: Vec<String> = data.iter().map(|&x| number(x)).collect();
+    let _ = writeln!(out, "{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]", data.join(", "));
+}
+
+/// A number as YAML 1.1 has them too: with a point, and a sign in the exponent.
+fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    let Some((digits, exponent)) = text.split_once('e') else { return text };
+    let point = if digits.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{digits}{point}e{sign}{exponent}")
+}
+
+/// A word, quoted where it could be something else.
+fn word(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+    if text.chars().all(plain) && text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        return text.into();
+    }
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            c if c.is_control() => {
+                let _ = write!(out, "\\U{:08x}", u32::from(c));
+            }
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}

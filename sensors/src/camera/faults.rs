@@ -1,0 +1,47 @@
+//! What happens to pictures after they were drawn: imperfections of the camera, then noise of the numbers that it sends.
+
+use super::cfg::CameraCfg;
+use super::imperfection::Imperfections;
+use super::parallel::Job;
+use super::picture_noise::PictureNoise;
+use super::ticket::Ticket;
+use crate::crew::Crew;
+use crate::error::SensorError;
+use crate::sensor::SensorContext;
+
+/// What happens to pictures after they were drawn. There is none of it for a perfect camera.
+#[derive(Clone, Debug)]
+pub(super) struct Faults {
+    imperfections: Imperfections,
+    noise: Option<PictureNoise>,
+    /// As many as threads.
+    workers: Vec<()>,
+    crew: Crew,
+}
+
+impl Faults {
+    /// What `cfg` asks for, where pictures are `period` \[s\] apart.
+    pub(super) fn new(cfg: &CameraCfg, context: &SensorContext, period: f64) -> Result<Option<Self>, SensorError> {
+        let noise = PictureNoise::new(cfg, period)?;
+        cfg.imperfections.check(cfg.channels)?;
+        let any = noise.is_some() || !cfg.imperfections.is_empty();
+        Ok(any.then(|| Self {
+            imperfections: cfg.imperfections.clone(),
+            noise,
+            workers: vec![(); context.threads.max(1)],
+            crew: context.crew.clone(),
+        }))
+    }
+
+    /// Spoils pictures in which misses are infinite; each is spoilt by one thread.
+    pub(super) fn spoil(&mut self, jobs: &mut [Job<'_>], tickets: &[Ticket]) {
+        let Self { imperfections, noise, workers, crew } = self;
+        let noise = noise.as_ref();
+        crew.share(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
+            imperfections.spoil(frame, shot.view, ticket);
+            if let Some(noise) = noise {
+                noise.disturb(frame, ticket);
+            }
+        });
+    }
+}

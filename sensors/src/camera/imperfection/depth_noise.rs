@@ -1,0 +1,63 @@
+//! Noise that grows with the square of the depth.
+
+use super::{OfDepth, Picture, within};
+use crate::camera::ticket::Stream;
+use crate::error::SensorError;
+use serde::{Deserialize, Serialize};
+
+/// Noise of depth from triangulation: disparities have errors of the same size everywhere, so that those of depth z grow with
+/// its square. The standard deviation is `constant + quadratic (z - offset)²`. What comes out nearer than the near plane or
+/// beyond the far plane saturates there.
+///
+/// By default [`DepthNoise::KHOSHELHAM`]. Errors of neighbouring pixels are independent; on a real sensor they are not quite.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DepthNoise {
+    /// Standard deviation at depth `offset` \[m\], 0 to 1000.
+    pub constant: f64,
+    /// Growth with the square of the depth \[1/m\], 0 to 1000.
+    pub quadratic: f64,
+    /// The depth at which the parabola has its bottom \[m\], -1000 to 1000.
+    pub offset: f64,
+}
+
+impl DepthNoise {
+    /// Kinect: 1.425e-3 z², which is 36 mm at 5 m. Source: Khoshelham and Oude Elberink 2012, "Accuracy and resolution of
+    /// Kinect depth data for indoor mapping applications", Sensors 12: sigma = m/(f b) z² sigma_d with m/(f b) = 2.85e-5 per
+    /// centimetre and sigma_d = 1/2.
+    pub const KHOSHELHAM: Self = Self { constant: 0.0, quadratic: 1.425e-3, offset: 0.0 };
+    /// Kinect, facing a wall: 1.2 mm + 1.9e-3 (z - 0.4 m)². Source: Nguyen, Izadi and Lovell 2012, "Modeling Kinect sensor noise
+    /// for improved 3D reconstruction and tracking", 3DIMPVT. Their growth at grazing angles is not in here: see
+    /// [`Holes::max_angle`](super::Holes::max_angle).
+    pub const NGUYEN: Self = Self { constant: 1.2e-3, quadratic: 1.9e-3, offset: 0.4 };
+}
+
+impl Default for DepthNoise {
+    fn default() -> Self {
+        Self::KHOSHELHAM
+    }
+}
+
+impl OfDepth for DepthNoise {
+    fn check(&self) -> Result<(), SensorError> {
+        const UP_TO: &str = "it must be 0 to 1000";
+        within("constant of the depth noise", self.constant, [0.0, 1000.0], UP_TO)?;
+        within("quadratic of the depth noise", self.quadratic, [0.0, 1000.0], UP_TO)?;
+        within("offset of the depth noise", self.offset, [-1000.0, 1000.0], "it must be -1000 to 1000")
+    }
+
+    fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>) {
+        let (near, far) = (picture.view.near, picture.view.far);
+        for (block, depths) in (0..).zip(depths.chunks_mut(4)) {
+            if depths.iter().all(|depth| depth.is_infinite()) {
+                continue;
+            }
+            let normals = picture.ticket.normals(Stream::DEPTH, block);
+            for (depth, normal) in depths.iter_mut().zip(normals).filter(|(depth, _)| depth.is_finite()) {
+                let z = f64::from(*depth);
+                let sigma = self.constant + self.quadratic * (z - self.offset).powi(2);
+                *depth = ((z + sigma * normal) as f32).max(near).min(far);
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Where a projector and a camera beside it measure nothing.
+
+use super::{OfDepth, Picture, within};
+use crate::error::SensorError;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
+
+/// Where structured light measures nothing, although the camera sees something: holes say what a miss says.
+///
+/// - **Grazing surfaces** send back too little of the pattern: where the angle between the ray and the normal is larger than
+///   `max_angle`. The normal is that of the depths around: of the neighbour beside and of that above or below whose inverse
+///   depths differ less.
+/// - **Shadows of the projector**: a pinhole beside the camera, on its x axis, in line with its rows. A pixel whose ray from
+///   the projector meets something else before has no pattern on it: a band beside the edge of what is in front, of
+///   `fx baseline (1/z_front - 1/z_behind)` pixels. Shadows of what the camera does not see are missing.
+///
+/// Source: Khoshelham and Oude Elberink 2012, section 2 (geometry: a projector 75 mm beside the camera) and 3.1 (gaps from
+/// occlusions and surfaces' properties); Nguyen, Izadi and Lovell 2012 (little is measured beyond some 80 degrees).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Holes {
+    /// Largest angle between the ray and the normal of what is measured \[rad\], 0 to pi/2.
+    pub max_angle: f64,
+    /// Where the projector is on the camera's x axis \[m\], -1000 to 1000: to the right where positive; 0 for no shadows.
+    pub baseline: f64,
+}
+
+impl Default for Holes {
+    /// 80 degrees, and a projector 75 mm to the right.
+    fn default() -> Self {
+        Self { max_angle: 80f64.to_radians(), baseline: 0.075 }
+    }
+}
+
+impl OfDepth for Holes {
+    fn check(&self) -> Result<(), SensorError> {
+        within("max_angle of the holes", self.max_angle, [0.0, FRAC_PI_2], "it must be 0 to pi/2")?;
+        within("baseline of the holes", self.baseline, [-1000.0, 1000.0], "it must be -1000 to 1000")
+    }
+
+    fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>) {
+        // Holes are marked by their sign first: what is around them still tells of the truth.
+        if self.max_angle < FRAC_PI_2 {
+            let least = self.max_angle.cos();
+            for pixel in 0..depths.len() {
+                if facing(depths, pixel, picture).is_some_and(|cosine| cosine < least) {
+                    depths[pixel] = -depths[pixel].abs();
+                }
+            }
+        }
+        if self.baseline != 0.0 {
+            let reach = f64::from(picture.view.fx) * self.baseline;
+            depths.chunks_mut(picture.view.width.max(1)).for_each(|row| shade(row, reach));
+        }
+        depths.iter_mut().filter(|depth| **depth < 0.0).for_each(|depth| *depth = f32::INFINITY);
+    }
+}
+
+/// Inverse of the depth that was there, \[1/m\]; `None` for a miss.
+fn inverse(depth: f32) -> Option<f64> {
+    depth.is_finite().then(|| 1.0 / f64::from(depth.abs()))
+}
+
+/// Cosine of the angle between a pixel's ray and the normal of the surface there; `None` for a miss.
+///
+/// On a plane the inverse depth is a linear function of the ray (x, y, 1), whose coefficients are its normal.
+fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
+    let (width, view) = (picture.view.width, picture.view);
+    let here = inverse(depths[pixel])?;
+    // The smaller of the differences to both sides: the other may be across an edge.
+    let slope = |before: Option<usize>, after: Option<usize>| {
+        let at = |pixel: Option<usize>| inverse(*depths.get(pixel?)?);
+        let (before, after) = (at(before).map(|there| here - there), at(after).map(|there| there - here));
+        match (before, after) {
+            (Some(a), Some(b)) => Some(if a.abs() < b.abs() { a } else { b }),
+            (one, other) => one.or(other),
+        }
+    };
+    let column = pixel % width;
+    let across = slope((column > 0).then(|| pixel.wrapping_sub(1)), (column + 1 < width).then_some(pixel + 1))?;
+    let down = slope(pixel.checked_sub(width), Some(pixel + width))?;
+    let [x, y] = picture.ray(pixel);
+    let (a, b) = (across * f64::from(view.fx), down * f64::from(view.fy));
+    let c = here - a * x - b * y;
+    Some(here / ((a * a + b * b + c * c) * (x * x + y * y + 1.0)).sqrt())
+}
+
+/// Marks the pixels of a row that the projector does not reach. Something at depth z is seen by it `reach / z` pixels to the
+/// left of where the camera sees it, so the order along the row tells what is in front of what: coming from the projector's
+/// side, what lies behind the farthest reached so far is in a shadow.
+fn shade(row: &mut [f32], reach: f64) {
+    let count = row.len();
+    // Seen from its left side, a projector to the left is one to the right.
+    let mut first = f64::INFINITY;
+    for k in 0..count {
+        let pixel = if reach > 0.0 { count - 1 - k } else { k };
+        let Some(inverse) = inverse(row[pixel]) else { continue };
+        let seen = (count - k) as f64 - reach.abs() * inverse;
+        if seen < first {
+            first = seen;
+        } else {
+            row[pixel] = -row[pixel].abs();
+        }
+    }
+}

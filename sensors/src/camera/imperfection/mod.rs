@@ -1,0 +1,204 @@
+//! What a real camera does to a perfect picture: one imperfection per file, all of them in one list.
+//!
+//! Those of light work on linear light, where 1 is a white surface in full light: colours are taken back through the tone curve
+//! and sRGB, spoilt, and brought to the screen again. So they see what the bytes still tell, 256 levels, and of what is white
+//! on the screen the least light that is. Those of depth work on the depth along the optical axis, from which distance
+//! follows. All other channels stay the truth.
+//!
+//! Motion blur is none of them: light that falls in while the shutter is open is of several instants, and a camera here
+//! captures one.
+
+mod tone;
+
+use super::channel::{Channel, Channels, Color, Depth, FrameMut};
+use super::error::CameraError;
+use super::ticket::Ticket;
+use crate::error::SensorError;
+use crate::visibility::View;
+use serde::{Deserialize, Serialize};
+use tone::TONE;
+
+/// An imperfection of light.
+trait OfLight {
+    /// Checks its numbers.
+    fn check(&self) -> Result<(), SensorError>;
+
+    /// Spoils the linear light (red, green, blue) of a pixel.
+    fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>);
+}
+
+/// An imperfection of measured depth.
+trait OfDepth {
+    /// Checks its numbers.
+    fn check(&self) -> Result<(), SensorError>;
+
+    /// Spoils a picture of depths \[m\], row by row; where nothing is measured they are infinite.
+    fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>);
+}
+
+/// What picture it is, and through which lens.
+#[derive(Clone, Copy, Debug)]
+struct Picture<'a> {
+    view: &'a View,
+    ticket: &'a Ticket,
+}
+
+/// A pixel of a picture.
+#[derive(Clone, Copy, Debug)]
+struct Place<'a> {
+    picture: Picture<'a>,
+    /// Counted row by row from the top left.
+    pixel: usize,
+}
+
+impl Picture<'_> {
+    /// The direction through the centre of a pixel whose depth is 1, x and y.
+    fn ray(&self, pixel: usize) -> [f64; 2] {
+        let View { width, fx, fy, cx, cy, .. } = *self.view;
+        let (u, v) = ((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
+        [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy)]
+    }
+
+    /// Cosine of the angle between the ray of a pixel and the optical axis.
+    fn cosine(&self, pixel: usize) -> f64 {
+        let [x, y] = self.ray(pixel);
+        1.0 / (x * x + y * y + 1.0).sqrt()
+    }
+}
+
+/// Declares the imperfections: a module with a type of its own each, in the order in which they come about.
+macro_rules! imperfections {
+    (
+        light { $($(#[$of_light:meta])* $light:ident :: $Light:ident,)* }
+        depth { $($(#[$of_depth:meta])* $depth:ident :: $Depth:ident,)* }
+    ) => {
+        $(mod $light; pub use $light::$Light;)*
+        $(mod $depth; pub use $depth::$Depth;)*
+
+        /// What is not perfect about a camera; `None`, as by default, for what is.
+        ///
+        /// Random numbers depend on the seed of the simulation, the environment, the name of the camera, which picture it is
+        /// and which pixel, and on nothing else.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Imperfections {
+            $($(#[$of_light])* pub $light: Option<$Light>,)*
+            $($(#[$of_depth])* pub $depth: Option<$Depth>,)*
+        }
+
+        impl Imperfections {
+            /// Whether there is one of light.
+            fn of_light(&self) -> bool {
+                false $(|| self.$light.is_some())*
+            }
+
+            /// Whether there is one of depth.
+            fn of_depth(&self) -> bool {
+                false $(|| self.$depth.is_some())*
+            }
+
+            /// Checks all numbers.
+            fn check_numbers(&self) -> Result<(), SensorError> {
+                $(self.$light.as_ref().map_or(Ok(()), OfLight::check)?;)*
+                $(self.$depth.as_ref().map_or(Ok(()), OfDepth::check)?;)*
+                Ok(())
+            }
+
+            fn spoil_light(&self, light: &mut [f64; 3], place: &Place<'_>) {
+                $(if let Some(imperfection) = &self.$light {
+                    imperfection.spoil(light, place);
+                })*
+            }
+
+            fn spoil_depth(&self, depths: &mut [f32], picture: &Picture<'_>) {
+                $(if let Some(imperfection) = &self.$depth {
+                    imperfection.spoil(depths, picture);
+                })*
+            }
+        }
+    };
+}
+
+imperfections! {
+    light {
+        /// Less light away from the optical axis.
+        vignetting::Vignetting,
+        /// Longer or shorter exposure.
+        exposure::Exposure,
+        /// Noise of the light itself, which comes in quanta.
+        shot_noise::ShotNoise,
+        /// Noise of the electronics.
+        read_noise::ReadNoise,
+    }
+    depth {
+        /// Where a projector and a camera beside it measure nothing.
+        holes::Holes,
+        /// Noise that grows with the square of the depth.
+        depth_noise::DepthNoise,
+    }
+}
+
+impl Imperfections {
+    /// Whether there is none.
+    pub(crate) fn is_empty(&self) -> bool {
+        !self.of_light() && !self.of_depth()
+    }
+
+    /// Checks numbers, and that a camera with these channels measures what is spoilt.
+    pub(crate) fn check(&self, channels: Channels) -> Result<(), SensorError> {
+        let off = |channel| Err(CameraError::ChannelOff { channel, enabled: channels.names() }.into());
+        if self.of_light() && !channels.color {
+            return off(Color::NAME);
+        }
+        if self.of_depth() && !channels.depth && !channels.distance {
+            return off(Depth::NAME);
+        }
+        self.check_numbers()
+    }
+
+    /// Spoils a frame in which misses are infinite.
+    pub(crate) fn spoil(&self, frame: &mut FrameMut<'_>, view: &View, ticket: &Ticket) {
+        let picture = Picture { view, ticket };
+        if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
+            for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
+                let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| TONE.light(byte));
+                self.spoil_light(&mut light, &Place { picture, pixel });
+                bytes[..3].copy_from_slice(&light.map(|light| TONE.byte(light)));
+            }
+        }
+        if !self.of_depth() {
+            return;
+        }
+        match (frame.depth.as_deref_mut(), frame.distance.as_deref_mut()) {
+            (Some(depths), distances) => {
+                self.spoil_depth(depths, &picture);
+                for (pixel, (distance, depth)) in distances.into_iter().flatten().zip(depths).enumerate() {
+                    *distance = (f64::from(*depth) / picture.cosine(pixel)) as f32;
+                }
+            }
+            (None, Some(distances)) => {
+                let scale = |distances: &mut [f32], factor: &dyn Fn(f64) -> f64| {
+                    for (pixel, distance) in distances.iter_mut().enumerate() {
+                        *distance = (f64::from(*distance) * factor(picture.cosine(pixel))) as f32;
+                    }
+                };
+                scale(distances, &|cosine| cosine);
+                self.spoil_depth(distances, &picture);
+                scale(distances, &|cosine| 1.0 / cosine);
+            }
+            (None, None) => {}
+        }
+    }
+}
+
+/// Whether `field` of an imperfection is from `range[0]` to `range[1]`, as `expected` says.
+fn within(field: &'static str, value: f64, range: [f64; 2], expected: &'static str) -> Result<(), SensorError> {
+    if (range[0]..=range[1]).contains(&value) {
+        return Ok(());
+    }
+    Err(SensorError::OutOfRange { field: field.into(), value, expected })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

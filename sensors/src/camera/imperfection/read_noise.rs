@@ -1,0 +1,36 @@
+//! Noise of the electronics.
+
+use super::{OfLight, Place, within};
+use crate::camera::ticket::Stream;
+use crate::error::SensorError;
+use serde::{Deserialize, Serialize};
+
+/// Noise of the electronics: normal, the same at every brightness. Red, green and blue have their own. What falls below no
+/// light is black.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReadNoise {
+    /// Standard deviation, in linear light (1 is a white surface in full light, as exposed), 0 to 100: electrons of read noise
+    /// divided by [`ShotNoise::electrons`](super::ShotNoise::electrons).
+    pub std: f64,
+}
+
+impl Default for ReadNoise {
+    /// 10 electrons of 5000.
+    fn default() -> Self {
+        Self { std: 0.002 }
+    }
+}
+
+impl OfLight for ReadNoise {
+    fn check(&self) -> Result<(), SensorError> {
+        within("std of the read noise", self.std, [0.0, 100.0], "it must be 0 to 100")
+    }
+
+    fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
+        let normals = place.picture.ticket.normals(Stream::READ, place.pixel as u32);
+        for (light, normal) in light.iter_mut().zip(normals) {
+            *light += self.std * normal;
+        }
+    }
+}

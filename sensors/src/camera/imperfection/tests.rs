@@ -1,0 +1,352 @@
+//! Every imperfection against its law.
+
+use super::*;
+use crate::camera::Frame;
+use scene::PoseF32;
+use std::f64::consts::FRAC_PI_2;
+
+const SIDE: usize = 200;
+
+fn view(size: [usize; 2], f: f32) -> View {
+    let [cx, cy] = size.map(|side| 0.5 * side as f32);
+    let world_from_camera = PoseF32::IDENTITY;
+    View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
+}
+
+/// The picture of a number.
+fn ticket(number: u64) -> Ticket {
+    let mut ticket = Ticket::first(11, 3, "eye");
+    (0..number).for_each(|_| ticket.due());
+    ticket
+}
+
+/// What becomes of a grey picture.
+fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<u8> {
+    let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
+    frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
+    imperfections.spoil(&mut frame.as_mut(), &view([SIDE; 2], 150.0), &ticket(picture));
+    frame.color.unwrap()
+}
+
+/// Mean, variance and number of the light of all pixels and colours. The bytes of a picture are steps, which add a twelfth of
+/// their square to the variance (Sheppard): that is taken off.
+fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
+    let bytes = spoilt(imperfections, byte, u64::from(byte));
+    let lights: Vec<f64> = bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|byte| TONE.light(byte)).collect();
+    let n = lights.len() as f64;
+    let mean = lights.iter().sum::<f64>() / n;
+    let variance = lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / n;
+    let step = 0.5 * (TONE.light(byte + 1) - TONE.light(byte - 1));
+    [mean, variance - step * step / 12.0, n]
+}
+
+/// The line through points (mean, variance), each weighted by its own scatter: intercept, slope, and the scatter of both.
+///
+/// The variance of n numbers scatters by sqrt((2 + 1/N) / n) of itself, where N electrons, at least a hundred here, make the
+/// distribution less normal; least squares with these weights give the scatter of the line.
+fn line(points: &[[f64; 3]]) -> ([f64; 2], [f64; 2]) {
+    let mut s = [0.0; 5];
+    for [x, y, n] in points {
+        let weight = n / (2.01 * y * y);
+        [1.0, *x, x * x, *y, x * y].iter().zip(&mut s).for_each(|(term, sum)| *sum += weight * term);
+    }
+    let [w, x, xx, y, xy] = s;
+    let d = w * xx - x * x;
+    ([(xx * y - x * xy) / d, (w * xy - x * y) / d], [(xx / d).sqrt(), (w / d).sqrt()])
+}
+
+#[test]
+fn shot_noise_grows_with_the_signal_and_read_noise_does_not() {
+    let (electrons, std) = (1000.0, 0.01);
+    let shot_noise = Some(ShotNoise { electrons });
+    let read_noise = Some(ReadNoise { std });
+    let both = Imperfections { shot_noise, read_noise, ..Imperfections::default() };
+    let shot = Imperfections { shot_noise, ..Imperfections::default() };
+    let read = Imperfections { read_noise, ..Imperfections::default() };
+    // Far enough from black that nothing is cut off there: at byte 100, light of 0.127 is more than eight deviations.
+    let levels = [100, 130, 160, 190];
+    for (imperfections, slope, intercept) in
+        [(&both, 1.0 / electrons, std * std), (&shot, 1.0 / electrons, 0.0), (&read, 0.0, std * std)]
+    {
+        let points = levels.map(|byte| photon_transfer(imperfections, byte));
+        for (byte, [mean, variance, n]) in levels.into_iter().zip(points) {
+            let (light, bound) = (TONE.light(byte), 6.0 * (variance / n).sqrt());
+            // A byte's middle and the mean of its light differ by an eighth of the change of the step: below 1e-5 here.
+            assert!((mean - light).abs() < bound + 1e-5, "{byte}: {mean} is not {light}");
+        }
+        let ([found_intercept, found_slope], [of_intercept, of_slope]) = line(&points);
+        assert!((found_slope - slope).abs() < 6.0 * of_slope, "{found_slope} is not {slope} ± {of_slope}");
+        assert!((found_intercept - intercept).abs() < 6.0 * of_intercept, "{found_intercept} ± {of_intercept}");
+        // The control: either noise would be missed.
+        assert!(6.0 * of_slope < 0.2 / electrons && 6.0 * of_intercept < 0.5 * std * std);
+    }
+}
+
+#[test]
+fn noise_is_of_each_picture_and_colour() {
+    let shot = Imperfections { shot_noise: Some(ShotNoise { electrons: 200.0 }), ..Imperfections::default() };
+    let read = Imperfections { read_noise: Some(ReadNoise { std: 0.02 }), ..Imperfections::default() };
+    for imperfections in [shot, read] {
+        let lights = |picture| -> Vec<f64> {
+            let bytes = spoilt(&imperfections, 150, picture);
+            bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|b| TONE.light(b) - TONE.light(150)).collect()
+        };
+        let (a, b) = (lights(1), lights(2));
+        assert_eq!(a, lights(1), "the same picture");
+        let correlation = |a: &[f64], b: &[f64]| {
+            let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+            sum(a, b) / (sum(a, a) * sum(b, b)).sqrt()
+        };
+        let bound = 6.0 / (a.len() as f64).sqrt();
+        assert!(correlation(&a, &b).abs() < bound, "pictures");
+        assert!(correlation(&a[1..], &a[..a.len() - 1]).abs() < bound, "red, green and blue");
+        assert!(correlation(&a, &a) > 0.99, "the control");
+    }
+}
+
+/// Poisson's distribution, every quantile of it: mean and variance are equal.
+#[test]
+fn few_electrons_are_counted_one_by_one() {
+    for electrons in [0.5, 3.0, 20.0] {
+        let byte = 128;
+        let shot = ShotNoise { electrons: electrons / TONE.light(byte) };
+        let (view, n) = (view([SIDE; 2], 150.0), 40_000);
+        let mut counts = Vec::new();
+        for pixel in 0..n {
+            let mut light = [TONE.light(byte); 3];
+            shot.spoil(&mut light, &Place { picture: Picture { view: &view, ticket: &ticket(1) }, pixel });
+            counts.extend(light.map(|light| light * shot.electrons));
+        }
+        assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
+        let n = counts.len() as f64;
+        let mean = counts.iter().sum::<f64>() / n;
+        let variance = counts.iter().map(|count| (count - mean).powi(2)).sum::<f64>() / n;
+        // Means scatter by sqrt(N / n); variances by sqrt((2 + 1 / N) / n) of themselves.
+        assert!((mean - electrons).abs() < 6.0 * (electrons / n).sqrt(), "{mean}");
+        assert!((variance / electrons - 1.0).abs() < 6.0 * ((2.0 + 1.0 / electrons) / n).sqrt(), "{variance}");
+    }
+}
+
+#[test]
+fn light_falls_with_the_fourth_power_of_the_cosine() {
+    for strength in [0.0, 0.5, 1.0] {
+        let vignetting = Some(Vignetting { strength });
+        let bytes = spoilt(&Imperfections { vignetting, ..Imperfections::default() }, 200, 1);
+        let mut off = 0;
+        for (pixel, found) in bytes.chunks(4).enumerate() {
+            let (u, v) = ((pixel % SIDE) as f64 + 0.5, (pixel / SIDE) as f64 + 0.5);
+            let angle = ((u - 100.0).hypot(v - 100.0) / 150.0).atan();
+            let light = TONE.light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4)));
+            let expected = TONE.byte(light);
+            assert!(found[..3].iter().all(|byte| byte.abs_diff(expected) <= 1), "{pixel}: {found:?}, {expected}");
+            assert_eq!(found[3], 255);
+            off += usize::from(found[0] != expected);
+        }
+        // Only where the two ways to compute it round to different sides.
+        assert!(off < SIDE, "{off}");
+    }
+    // The control: at a corner, 43 degrees off the axis, 0.28 of the light is left.
+    let vignetting = Some(Vignetting::default());
+    let corner = spoilt(&Imperfections { vignetting, ..Imperfections::default() }, 200, 1)[0];
+    let left = TONE.light(corner) / TONE.light(200);
+    assert!((left - 0.28).abs() < 0.01, "{left}");
+}
+
+#[test]
+fn a_stop_is_twice_the_light() {
+    let exposed = |byte, stops| {
+        let exposure = Some(Exposure { stops });
+        spoilt(&Imperfections { exposure, ..Imperfections::default() }, byte, 1)[0]
+    };
+    // Bytes below the knee, by sRGB's own formula; the renderers' curve is within 0.2 of it, twice, and bytes are rounded.
+    let screen = |light: f64| 255.0 * (1.055 * light.powf(1.0 / 2.4) - 0.055);
+    let light = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    for byte in 40..140u8 {
+        for stops in [-1.0, 0.0, 1.0] {
+            let expected = screen(light(f64::from(byte)) * f64::exp2(stops));
+            let found = f64::from(exposed(byte, stops));
+            assert!((found - expected).abs() < 1.1, "{byte}, {stops}: {found} is not {expected}");
+        }
+    }
+    assert_eq!([exposed(255, -20.0), exposed(0, 20.0), exposed(1, 20.0)], [0, 0, 255]);
+    assert!(exposed(100, 1.0) > 130, "the control");
+}
+
+#[test]
+fn nothing_is_what_it_was() {
+    let light = Imperfections {
+        vignetting: Some(Vignetting { strength: 0.0 }),
+        exposure: Some(Exposure { stops: 0.0 }),
+        read_noise: Some(ReadNoise { std: 0.0 }),
+        ..Imperfections::default()
+    };
+    for byte in 0..=255 {
+        let bytes = spoilt(&light, byte, 1);
+        assert!(bytes.chunks(4).all(|pixel| *pixel == [byte, byte, byte, 255]), "{byte}");
+    }
+}
+
+/// What becomes of depths, with distances beside them.
+fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
+    let picture = Picture { view, ticket: &ticket(1) };
+    let along = |depths: &[f32]| -> Vec<f32> {
+        let distance = |(pixel, depth): (usize, &f32)| (f64::from(*depth) / picture.cosine(pixel)) as f32;
+        depths.iter().enumerate().map(distance).collect()
+    };
+    let channels = Channels { depth: true, distance: true, ..Channels::default() };
+    let mut frame = Frame::new(view.width, view.height, channels);
+    (frame.depth, frame.distance) = (Some(depths.to_vec()), Some(along(depths)));
+    imperfections.spoil(&mut frame.as_mut(), view, picture.ticket);
+    let (depths, distances) = (frame.depth.take().unwrap(), frame.distance.clone().unwrap());
+    assert_eq!(distances, along(&depths), "distance follows depth");
+    depths
+}
+
+/// Without a depth channel, distances are spoilt as with one, but for rounding.
+#[test]
+fn distances_alone_are_spoilt_alike() {
+    let (view, n) = (view([60, 40], 50.0), 60 * 40);
+    let all = Imperfections {
+        depth_noise: Some(DepthNoise::NGUYEN),
+        holes: Some(Holes::default()),
+        ..Imperfections::default()
+    };
+    let depths: Vec<f32> = (0..n).map(|k| if k % 60 < 30 { 2.0 } else { 1.0 }).collect();
+    let expected = spoilt_depths(&all, &depths, &view);
+    let picture = Picture { view: &view, ticket: &ticket(1) };
+    let mut frame = Frame::new(60, 40, Channels { distance: true, ..Channels::default() });
+    let distances = depths.iter().enumerate().map(|(k, depth)| (f64::from(*depth) / picture.cosine(k)) as f32);
+    frame.distance = Some(distances.collect());
+    all.spoil(&mut frame.as_mut(), &view, picture.ticket);
+    for (pixel, (distance, depth)) in frame.distance.unwrap().iter().zip(&expected).enumerate() {
+        let found = f64::from(*distance) * picture.cosine(pixel);
+        assert!(found == f64::from(*depth) || (found / f64::from(*depth) - 1.0).abs() < 1e-6, "{found} {depth}");
+    }
+    assert!(expected.iter().any(|depth| depth.is_infinite()), "there are holes");
+}
+
+/// The standard deviation of depth, as a function of depth \[m\].
+type Law = fn(f64) -> f64;
+
+/// Deviations scatter by sqrt(1 / 2n) of themselves, means by sigma / sqrt(n): six times that.
+#[test]
+fn depth_noise_grows_with_the_square_of_the_depth() {
+    let (view, n) = (view([SIDE; 2], 150.0), (SIDE * SIDE) as f64);
+    let laws: [(DepthNoise, Law); 2] = [
+        (DepthNoise::KHOSHELHAM, |z| 2.85e-5 * 100.0 * z * z * 0.5),
+        (DepthNoise::NGUYEN, |z| 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4)),
+    ];
+    for (depth_noise, law) in laws {
+        for z in [0.5, 1.0, 2.0, 5.0] {
+            let all = Imperfections { depth_noise: Some(depth_noise), ..Imperfections::default() };
+            let mut depths = vec![z as f32; SIDE * SIDE];
+            depths[7] = f32::INFINITY;
+            let found = spoilt_depths(&all, &depths, &view);
+            assert_eq!(found[7], f32::INFINITY, "a miss stays a miss");
+            let errors: Vec<f64> = found.iter().filter(|z| z.is_finite()).map(|found| f64::from(*found) - z).collect();
+            let mean = errors.iter().sum::<f64>() / n;
+            let sigma = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
+            assert!(mean.abs() < 6.0 * sigma / n.sqrt(), "{z} m: {mean}");
+            assert!((sigma / law(z) - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{z} m: {sigma}");
+        }
+    }
+    // The control: the deviations at 1 m and 2 m are four times apart, not twice.
+    assert_eq!((laws[0].1)(2.0) / (laws[0].1)(1.0), 4.0);
+    let huge = DepthNoise { constant: 1000.0, quadratic: 0.0, offset: 0.0 };
+    let all = Imperfections { depth_noise: Some(huge), ..Imperfections::default() };
+    let found = spoilt_depths(&all, &[50.0; SIDE * SIDE], &view);
+    assert!(found.iter().all(|z| (0.01..=100.0).contains(z)), "saturated");
+}
+
+/// A box 1 m away before a wall 2 m away: the shadow is fx b (1/1 - 1/2) pixels wide, on the side that the projector is not on.
+#[test]
+fn the_projector_casts_a_shadow() {
+    let view = view([100, 8], 100.0);
+    let row: Vec<f32> = (0..100).map(|u| if (20..40).contains(&u) { 1.0 } else { 2.0 }).collect();
+    let holes_with = |baseline: f64| {
+        let holes = Some(Holes { max_angle: FRAC_PI_2, baseline });
+        spoilt_depths(&Imperfections { holes, ..Imperfections::default() }, &row.repeat(8), &view)
+    };
+    for baseline in [0.075, 0.15, -0.075, -0.15, 0.0] {
+        let found = holes_with(baseline);
+        let width = 100.0 * f64::abs(baseline) * (1.0 - 0.5);
+        for (k, depth) in found.iter().enumerate() {
+            let u = (k % 100) as f64;
+            // Of the pixels beside the first of the box, whose own centre is lit.
+            let shaded = match baseline {
+                b if b > 0.0 => u < 20.0 && 20.0 - u <= width,
+                b if b < 0.0 => u > 39.0 && u - 39.0 <= width,
+                _ => false,
+            };
+            assert_eq!(depth.is_infinite(), shaded, "{baseline}: {u}");
+            assert!(shaded || *depth == row[k % 100]);
+        }
+    }
+    assert_eq!(holes_with(0.15).iter().filter(|depth| depth.is_infinite()).count(), 7 * 8, "the control");
+}
+
+/// Tilted planes: the angle between ray and normal is known at every pixel.
+#[test]
+fn grazing_surfaces_are_holes() {
+    let view = view([80, 60], 60.0);
+    let max_angle = 60f64.to_radians();
+    let holes = Some(Holes { max_angle, baseline: 0.0 });
+    let all = Imperfections { holes, ..Imperfections::default() };
+    let (mut inside, mut outside) = (0, 0);
+    for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
+        let picture = Picture { view: &view, ticket: &ticket(1) };
+        let ray = |pixel| {
+            let [x, y] = picture.ray(pixel);
+            nalgebra::Vector3::new(x, y, 1.0)
+        };
+        let normal = nalgebra::Vector3::from(normal).normalize();
+        // A plane 2 m from the camera; what it does not reach is missed.
+        let depth = |pixel| -2.0 / normal.dot(&ray(pixel));
+        let depths: Vec<f32> =
+            (0..80 * 60).map(|k| if depth(k) > 0.0 { depth(k) as f32 } else { f32::INFINITY }).collect();
+        let found = spoilt_depths(&all, &depths, &view);
+        for (pixel, (found, depth)) in found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite())
+        {
+            let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
+            // Depths in single precision tell the angle to this.
+            if (angle - max_angle).abs() > 1e-3 {
+                assert_eq!(found.is_infinite(), angle > max_angle, "{normal:?}, {pixel}: {angle}");
+                *(if angle > max_angle { &mut inside } else { &mut outside }) += 1;
+                assert!(found.is_infinite() || found == depth);
+            }
+        }
+    }
+    assert!(inside > 1000 && outside > 1000, "the control: {inside} {outside}");
+}
+
+#[test]
+fn bad_numbers_are_refused() {
+    let color = Channels { color: true, ..Channels::default() };
+    let depth = Channels { depth: true, ..Channels::default() };
+    let mut bad = Vec::new();
+    for value in [-0.1, 1.1, f64::NAN] {
+        bad.push(Imperfections { vignetting: Some(Vignetting { strength: value }), ..Imperfections::default() });
+        bad.push(Imperfections { shot_noise: Some(ShotNoise { electrons: value - 1.0 }), ..Default::default() });
+        bad.push(Imperfections { exposure: Some(Exposure { stops: 30.0 * value.signum() }), ..Default::default() });
+    }
+    bad.push(Imperfections { read_noise: Some(ReadNoise { std: -1.0 }), ..Default::default() });
+    bad.push(Imperfections { read_noise: Some(ReadNoise { std: f64::INFINITY }), ..Default::default() });
+    for imperfections in &bad {
+        let error = imperfections.check(color).unwrap_err();
+        assert!(matches!(error, SensorError::OutOfRange { .. }), "{error}");
+    }
+    let holes = |max_angle, baseline| {
+        Imperfections { holes: Some(Holes { max_angle, baseline }), ..Imperfections::default() }.check(depth)
+    };
+    assert!(holes(1.0, 0.1).is_ok() && holes(2.0, 0.1).is_err() && holes(1.0, f64::NAN).is_err());
+    let noise = DepthNoise { quadratic: -1.0, ..DepthNoise::default() };
+    let error = Imperfections { depth_noise: Some(noise), ..Default::default() }.check(depth).unwrap_err().to_string();
+    assert_eq!(error, "quadratic of the depth noise is -1; it must be 0 to 1000");
+    // What is not measured cannot be spoilt.
+    let shot = Imperfections { shot_noise: Some(ShotNoise::default()), ..Imperfections::default() };
+    let error = shot.check(depth).unwrap_err().to_string();
+    assert_eq!(error, "the camera does not measure color; it measures depth");
+    let holes = Imperfections { holes: Some(Holes::default()), ..Imperfections::default() };
+    assert!(holes.check(color).is_err() && holes.check(depth).is_ok());
+    assert!(Imperfections::default().check(Channels::default()).is_ok());
+}

@@ -1,0 +1,80 @@
+//! Bytes of the screen as linear light, and back: the inverse of the renderers' own curve.
+
+use crate::lanes::{Scalar, splat};
+use crate::resolve::tone::encode;
+use std::sync::LazyLock;
+
+/// The curve, read backwards once.
+pub(super) static TONE: LazyLock<Tone> = LazyLock::new(Tone::new);
+
+/// The curve in both directions. A byte that becomes light becomes the same byte again.
+#[derive(Debug)]
+pub(super) struct Tone {
+    /// Light of each byte: in the middle of what becomes that byte, and for 255 the least.
+    lights: [f64; 256],
+    /// The least light of each byte from 1 on.
+    least: [f32; 255],
+}
+
+impl Tone {
+    fn new() -> Self {
+        let least = std::array::from_fn(|k| reach(k as f32 + 1.0));
+        // The curve adds half a byte, which rounds.
+        let light = |byte: usize| if byte == 255 { least[254] } else { reach(byte as f32 + 0.5) };
+        Self { lights: std::array::from_fn(|byte| f64::from(light(byte))), least }
+    }
+
+    pub(super) fn light(&self, byte: u8) -> f64 {
+        self.lights[usize::from(byte)]
+    }
+
+    pub(super) fn byte(&self, light: f64) -> u8 {
+        let light = light as f32;
+        self.least.partition_point(|least| *least <= light) as u8
+    }
+}
+
+/// The least light whose byte, before it is cut off, is `value` at least.
+fn reach(value: f32) -> f32 {
+    // Positive numbers are in the order of their bits; the curve never falls.
+    let (mut below, mut above) = (0, 1000f32.to_bits());
+    if encode(Scalar, splat(Scalar, 0.0)).array()[0] >= value {
+        return 0.0;
+    }
+    while above - below > 1 {
+        let middle = below.midpoint(above);
+        let byte = encode(Scalar, splat(Scalar, f32::from_bits(middle))).array()[0];
+        *(if byte >= value { &mut above } else { &mut below }) = middle;
+    }
+    f32::from_bits(above)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_comes_back() {
+        for byte in 0..=255 {
+            assert_eq!(TONE.byte(TONE.light(byte)), byte);
+        }
+        assert_eq!([-1.0, 0.0, 1e9, f64::INFINITY].map(|light| TONE.byte(light)), [0, 0, 255, 255]);
+    }
+
+    /// Against the closed form of the curve: sRGB's own inverse, and above 0.7 that of y = 0.7 + 0.3 k / (k + 0.3). The
+    /// renderers' polynomial is within 0.2 of 255 of the standard, and the middle of a byte is found to far less.
+    #[test]
+    fn bytes_are_the_light_of_the_curve() {
+        let screen = |light: f64| {
+            let k = light - 0.7;
+            let bent = if k > 0.0 { 0.7 + 0.3 * k / (k + 0.3) } else { light };
+            255.0 * if bent <= 0.0031308 { 12.92 * bent } else { 1.055 * bent.powf(1.0 / 2.4) - 0.055 }
+        };
+        for byte in 0..255 {
+            let found = screen(TONE.light(byte));
+            assert!((found - f64::from(byte)).abs() < 0.25, "{byte}: {found}");
+        }
+        assert!((screen(TONE.light(255)) - 254.5).abs() < 0.25);
+        assert!((screen(TONE.light(100) * 1.02) - 100.0).abs() > 0.5, "the control: two percent would be seen");
+    }
+}

@@ -1,0 +1,112 @@
+//! Noise of the numbers of pictures, channel by channel: [`NoiseCfg`] of other sensors, looked up instead of drawn.
+
+use super::cfg::CameraCfg;
+use super::channel::{Channel as _, Channels, Color, Depth, Distance, FrameMut};
+use super::ticket::{Stream, Ticket};
+use crate::error::SensorError;
+use crate::noise::{NoiseCfg, check};
+use crate::sampling::Channel;
+
+/// The noise of each channel that has some.
+#[derive(Clone, Debug)]
+pub(crate) struct PictureNoise {
+    color: Option<NoiseCfg>,
+    depth: Option<NoiseCfg>,
+    distance: Option<NoiseCfg>,
+    /// Square root of the time between pictures.
+    sqrt_period: f64,
+    /// Depths that can be measured.
+    range: [f64; 2],
+}
+
+/// Bytes of a colour.
+const BYTES: [f64; 2] = [0.0, 255.0];
+
+impl PictureNoise {
+    /// The noise that `cfg` asks for, where pictures are `period` \[s\] apart; `None` where it asks for none.
+    pub(crate) fn new(cfg: &CameraCfg, period: f64) -> Result<Option<Self>, SensorError> {
+        let range = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
+        let candidates = [
+            (cfg.channels.color, Channel::within(Color::NAME, 0, BYTES)),
+            (cfg.channels.depth, Channel::within(Depth::NAME, 0, range)),
+            (cfg.channels.distance, Channel::within(Distance::NAME, 0, far_along_rays(range))),
+        ];
+        let measured: Vec<Channel> = candidates.into_iter().filter(|(on, _)| *on).map(|(_, channel)| channel).collect();
+        // By their own names, for those that have others.
+        let named = cfg.noise.iter().map(|(name, noise)| (own_name(name), noise));
+        check(cfg.dropout, named.clone(), &measured)?;
+        let of = |channel: &str| {
+            let mut found = named.clone().filter(|(name, _)| *name == channel).map(|(_, noise)| *noise);
+            match (found.next(), found.next()) {
+                (_, Some(_)) => Err(SensorError::Pattern(format!("the noise of {channel:?} is given by two names"))),
+                (noise, None) => Ok(noise),
+            }
+        };
+        if cfg.noise.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Self {
+            color: of(Color::NAME)?,
+            depth: of(Depth::NAME)?,
+            distance: of(Distance::NAME)?,
+            sqrt_period: period.sqrt(),
+            range,
+        }))
+    }
+
+    /// Adds the noise of a picture to a frame in which misses are infinite.
+    pub(crate) fn disturb(&self, frame: &mut FrameMut<'_>, ticket: &Ticket) {
+        if let (Some(noise), Some(bytes)) = (&self.color, frame.color.as_deref_mut()) {
+            // Four pixels have twelve numbers: their opacity is none.
+            for (k, pixels) in (0..).zip(bytes.chunks_mut(16)) {
+                let blocks = [0, 1, 2].map(|b| self.errors(noise, 0, ticket, 3 * k + b));
+                let errors = blocks.as_flattened().chunks_exact(3);
+                for (pixel, errors) in pixels.chunks_exact_mut(4).zip(errors) {
+                    for (byte, error) in pixel.iter_mut().zip(errors) {
+                        *byte = noise.settle(f64::from(*byte) + error, BYTES).round() as u8;
+                    }
+                }
+            }
+        }
+        let ranges = [self.range, far_along_rays(self.range)];
+        let channels = [(&self.depth, frame.depth.as_deref_mut()), (&self.distance, frame.distance.as_deref_mut())];
+        for ((channel, (noise, numbers)), range) in (1..).zip(channels).zip(ranges) {
+            let (Some(noise), Some(numbers)) = (noise, numbers) else { continue };
+            for (block, numbers) in (0..).zip(numbers.chunks_mut(4)) {
+                let errors = self.errors(noise, channel, ticket, block);
+                // Nothing was hit: noise does not make a hit of it.
+                for (number, error) in numbers.iter_mut().zip(errors).filter(|(number, _)| number.is_finite()) {
+                    *number = noise.settle(f64::from(*number) + error, range) as f32;
+                }
+            }
+        }
+    }
+
+    /// What is added to four numbers of a channel.
+    fn errors(&self, noise: &NoiseCfg, channel: u8, ticket: &Ticket, block: u32) -> [f64; 4] {
+        let mut errors = [0.0; 4];
+        let mut add = |size: f64, numbers: [f64; 4]| {
+            errors.iter_mut().zip(numbers).for_each(|(error, number)| *error += size * number);
+        };
+        if noise.bias_std > 0.0 {
+            add(noise.bias_std, ticket.biases(Stream::bias(channel), block));
+        }
+        if noise.bias_walk > 0.0 {
+            add(noise.bias_walk * self.sqrt_period, ticket.walks(Stream::walk(channel), block));
+        }
+        if noise.std > 0.0 {
+            add(noise.std, ticket.normals(Stream::white(channel), block));
+        }
+        errors
+    }
+}
+
+/// Distances that can be measured: rays through corners are longer than their depth, by how much depends on the lens.
+fn far_along_rays([near, _]: [f64; 2]) -> [f64; 2] {
+    [near, f64::from(f32::MAX)]
+}
+
+/// The name of a channel that may be called otherwise; what is no channel stays as it is.
+fn own_name(name: &str) -> &str {
+    Channels::from_names(&[name]).ok().and_then(|channels| channels.names().first().copied()).unwrap_or(name)
+}

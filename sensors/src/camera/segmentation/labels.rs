@@ -1,0 +1,297 @@
+//! What mask ids stand for, by instance, link and class.
+
+use crate::camera::error::CameraError;
+use crate::error::SensorError;
+use crate::select::matching;
+use scene::pattern::{PatternError, closest};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// Something that has a mask id of its own: a link of a robot, a rigid object, a geom of the world.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Thing {
+    /// What the mask channel says, never 0.
+    pub id: i32,
+    /// The robot, the object, the geom of the world.
+    pub object: String,
+    /// The link, where the object has several.
+    pub link: Option<String>,
+    /// Its semantic class, where no label gives it another.
+    pub class: String,
+}
+
+impl Thing {
+    /// `object/link`, or the object where it has no links.
+    pub fn name(&self) -> String {
+        self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
+    }
+}
+
+/// What is one segment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum SegmentLevel {
+    /// Each object: a robot is one. Its id is the smallest mask id of its links, so it stays when more is added.
+    #[default]
+    Instance,
+    /// Each link and each object without links. Ids are mask ids.
+    Link,
+    /// Each class. Ids count from 1 in the order in which the classes first appear among mask ids.
+    Semantic,
+}
+
+/// Which things belong to which class.
+///
+/// ```
+/// use sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, Thing};
+///
+/// let thing = |id, object: &str| Thing { id, object: object.into(), link: None, class: "object".into() };
+/// let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture")]);
+/// let all = Segmentation::new([thing(1, "table"), thing(2, "shelf"), thing(3, "cube")], &cfg)?;
+/// assert_eq!(all.segments(SegmentLevel::Semantic)[0].name, "furniture");
+/// assert_eq!(all.segment_of(SegmentLevel::Semantic, 2), 1);
+/// # Ok::<(), sensors::SensorError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SegmentationCfg {
+    /// Patterns and classes. A pattern is a regular expression that must match the whole name of an object (`arm`, which
+    /// means all its links), `object/link`, or the link alone. What none matches keeps its own class.
+    #[serde(with = "scene::file_format::pairs")]
+    pub labels: Vec<(String, String)>,
+}
+
+impl SegmentationCfg {
+    /// Labels by pattern.
+    pub fn labeled(labels: &[(&str, &str)]) -> Self {
+        Self { labels: labels.iter().map(|(pattern, class)| ((*pattern).into(), (*class).into())).collect() }
+    }
+}
+
+/// One segment of a level.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Its number in segmented pictures, never 0.
+    pub id: i32,
+    /// The object, `object/link`, or the class.
+    pub name: String,
+    /// Its class; of an object whose links have several, that of the first.
+    pub class: String,
+    /// The mask ids that it is made of, in order.
+    pub mask_ids: Vec<i32>,
+}
+
+/// What mask ids stand for: turns pictures of the mask channel into segmented ones, and says which number means what.
+#[derive(Clone, Debug)]
+pub struct Segmentation {
+    levels: [Level; 3],
+}
+
+/// One level.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Level {
+    segments: Vec<Segment>,
+    /// Mask id and segment, by mask id.
+    of_mask: Vec<(i32, i32)>,
+}
+
+impl Level {
+    /// The segment that a mask id belongs to.
+    pub(super) fn of(&self, mask_id: i32) -> i32 {
+        if mask_id == 0 {
+            return 0;
+        }
+        let at = self.of_mask.binary_search_by_key(&mask_id, |(mask, _)| *mask);
+        at.map_or(Segmentation::UNKNOWN, |at| self.of_mask[at].1)
+    }
+}
+
+impl Segmentation {
+    /// The segment of mask ids that are not among the things: what was added later.
+    pub const UNKNOWN: i32 = -1;
+
+    /// Segments of some things.
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError::MaskId`] for a mask id that is 0 or given twice; [`SensorError::Pattern`] for a pattern that is no
+    /// regular expression or matches nothing (with the nearest names), and a thing that two patterns match.
+    pub fn new(things: impl IntoIterator<Item = Thing>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
+        let mut things: Vec<Thing> = things.into_iter().collect();
+        things.sort_by_key(|thing| thing.id);
+        let wrong = |id, problem| Err(CameraError::MaskId { id, problem }.into());
+        if let Some(nothing) = things.iter().find(|thing| thing.id == 0) {
+            return wrong(nothing.id, "means that nothing was hit");
+        }
+        if let Some(pair) = things.windows(2).find(|pair| pair[0].id == pair[1].id) {
+            return wrong(pair[0].id, "is given twice");
+        }
+        label(&mut things, &cfg.labels)?;
+        let by = |key: fn(&Thing) -> String, numbered: bool| level(&things, key, numbered);
+        let levels =
+            [by(|thing| thing.object.clone(), false), by(Thing::name, false), by(|thing| thing.class.clone(), true)];
+        Ok(Self { levels })
+    }
+
+    /// What there is on a level: which id means what.
+    pub fn segments(&self, level: SegmentLevel) -> &[Segment] {
+        &self.level(level).segments
+    }
+
+    /// The segment that a mask id belongs to: 0 for 0 (nothing was hit), [`UNKNOWN`](Self::UNKNOWN) for what is not
+    /// among the things.
+    pub fn segment_of(&self, level: SegmentLevel, mask_id: i32) -> i32 {
+        self.level(level).of(mask_id)
+    }
+
+    pub(super) fn level(&self, level: SegmentLevel) -> &Level {
+        match level {
+            SegmentLevel::Instance => &self.levels[0],
+            SegmentLevel::Link => &self.levels[1],
+            SegmentLevel::Semantic => &self.levels[2],
+        }
+    }
+}
+
+/// Gives things the classes of the labels that match them.
+fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), SensorError> {
+    let names: Vec<String> = things.iter().map(Thing::name).collect();
+    let objects: Vec<String> = things.iter().map(|thing| thing.object.clone()).collect();
+    let mut taken_by: Vec<Option<&str>> = vec![None; things.len()];
+    for (pattern, class) in labels {
+        let of_objects = matching(pattern, &objects, "object");
+        let of_links = matching(pattern, &names, "object or link");
+        let mut found = match (of_objects, of_links) {
+            (Ok(objects), Ok(links)) => [objects, links].concat(),
+            (Ok(found), Err(_)) | (Err(_), Ok(found)) => found,
+            (Err(_), Err(SensorError::UnknownName { what, name, .. })) => {
+                let mut known: Vec<&str> = objects.iter().chain(&names).map(String::as_str).collect();
+                known.extend(things.iter().filter_map(|thing| thing.link.as_deref()));
+                known.sort_unstable();
+                known.dedup();
+                let candidates = closest(&name, known).into_iter().map(str::to_owned).collect();
+                return Err(SensorError::UnknownName { what, name, candidates });
+            }
+            (Err(_), Err(wrong)) => return Err(wrong),
+        };
+        found.sort_unstable();
+        found.dedup();
+        for index in found {
+            if let Some(first) = taken_by[index].replace(pattern) {
+                let (what, name) = ("object or link", names[index].clone());
+                let twice = PatternError::MatchedTwice { what, name, first: first.into(), second: pattern.clone() };
+                return Err(SensorError::Pattern(twice.to_string()));
+            }
+            things[index].class.clone_from(class);
+        }
+    }
+    Ok(())
+}
+
+/// Things that share a key are one segment, whose id is their first mask id, or a number from 1 on.
+fn level(things: &[Thing], key: fn(&Thing) -> String, numbered: bool) -> Level {
+    let mut level = Level::default();
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for thing in things {
+        let name = key(thing);
+        let segments = &mut level.segments;
+        let index = *known.entry(name.clone()).or_insert(segments.len());
+        if index == segments.len() {
+            let id = if numbered { index as i32 + 1 } else { thing.id };
+            segments.push(Segment { id, name, class: thing.class.clone(), mask_ids: Vec::new() });
+        }
+        segments[index].mask_ids.push(thing.id);
+        level.of_mask.push((thing.id, segments[index].id));
+    }
+    level
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+
+    fn thing(id: i32, object: &str, link: Option<&str>, class: &str) -> Thing {
+        Thing { id, object: object.into(), link: link.map(Into::into), class: class.into() }
+    }
+
+    fn things() -> Vec<Thing> {
+        vec![
+            thing(1, "ground", None, "ground"),
+            thing(6, "shelf", None, "object"),
+            thing(2, "arm", Some("base"), "robot"),
+            thing(3, "arm", Some("finger_l"), "robot"),
+            thing(4, "arm", Some("finger_r"), "robot"),
+            thing(5, "table", None, "object"),
+            thing(7, "cube", None, "toy"),
+        ]
+    }
+
+    fn classes(cfg: &SegmentationCfg) -> Vec<(i32, String, Vec<i32>)> {
+        let all = Segmentation::new(things(), cfg).unwrap();
+        let of = |s: &Segment| (s.id, s.name.clone(), s.mask_ids.clone());
+        all.segments(SegmentLevel::Semantic).iter().map(of).collect()
+    }
+
+    #[test]
+    fn segments_of_every_level() {
+        let all = Segmentation::new(things(), &SegmentationCfg::default()).unwrap();
+        let names = |level| -> Vec<(i32, &str)> {
+            all.segments(level).iter().map(|segment| (segment.id, segment.name.as_str())).collect()
+        };
+        let expected = [(1, "ground"), (2, "arm"), (5, "table"), (6, "shelf"), (7, "cube")];
+        assert_eq!(names(SegmentLevel::Instance), expected);
+        assert_eq!(
+            names(SegmentLevel::Link)[..4],
+            [(1, "ground"), (2, "arm/base"), (3, "arm/finger_l"), (4, "arm/finger_r")]
+        );
+        assert_eq!(names(SegmentLevel::Semantic), [(1, "ground"), (2, "robot"), (3, "object"), (4, "toy")]);
+        let of = |level| [0, 1, 2, 4, 6, 7, 8, -5].map(|id| all.segment_of(level, id));
+        assert_eq!(of(SegmentLevel::Instance), [0, 1, 2, 2, 6, 7, -1, -1]);
+        assert_eq!(of(SegmentLevel::Link), [0, 1, 2, 4, 6, 7, -1, -1]);
+        assert_eq!(of(SegmentLevel::Semantic), [0, 1, 2, 2, 3, 4, -1, -1]);
+        // What is added later changes no id.
+        let more = things().into_iter().chain([thing(8, "lamp", None, "light")]);
+        let more = Segmentation::new(more, &SegmentationCfg::default()).unwrap();
+        for level in [SegmentLevel::Instance, SegmentLevel::Link, SegmentLevel::Semantic] {
+            assert_eq!(more.segments(level)[..all.segments(level).len()], *all.segments(level), "{level:?}");
+        }
+    }
+
+    #[test]
+    fn labels_give_classes_by_pattern() {
+        let own = |id, name: &str, ids: &[i32]| (id, name.to_string(), ids.to_vec());
+        let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture"), ("finger.*", "hand")]);
+        let expected = [
+            own(1, "ground", &[1]),
+            own(2, "robot", &[2]),
+            own(3, "hand", &[3, 4]),
+            own(4, "furniture", &[5, 6]),
+            own(5, "toy", &[7]),
+        ];
+        assert_eq!(classes(&cfg), expected);
+        // An object is all its links; a link may be named in full; classes may be those of others.
+        let cfg = SegmentationCfg::labeled(&[("arm|cube", "toy"), ("ground", "object")]);
+        assert_eq!(classes(&cfg), [own(1, "object", &[1, 5, 6]), own(2, "toy", &[2, 3, 4, 7])]);
+        let cfg = SegmentationCfg::labeled(&[("arm/finger_l", "left")]);
+        assert_eq!(classes(&cfg)[2], own(3, "left", &[3]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let error = |labels: &[(&str, &str)]| {
+            Segmentation::new(things(), &SegmentationCfg::labeled(labels)).unwrap_err().to_string()
+        };
+        let said = error(&[("tabel", "furniture")]);
+        assert!(said.starts_with("there is no object or link \"tabel\"; known are \"table\""), "{said}");
+        assert!(error(&[("fingerl", "hand")]).contains("known are \"finger_l\""));
+        let said = error(&[("arm", "robot"), ("finger_.", "hand")]);
+        assert!(said.contains("\"arm/finger_l\" is matched by both \"arm\" and \"finger_.\""), "{said}");
+        assert!(error(&[("(", "x")]).contains("not a regular expression"));
+        assert!(error(&[("(?!a)b", "x")]).contains("look-around"));
+        let cfg = SegmentationCfg::default();
+        let of = |things: Vec<Thing>| Segmentation::new(things, &cfg).unwrap_err().to_string();
+        assert_eq!(of(vec![thing(0, "a", None, "b")]), "mask id 0 means that nothing was hit");
+        assert_eq!(of(vec![thing(3, "a", None, "b"), thing(3, "c", None, "b")]), "mask id 3 is given twice");
+    }
+}

@@ -1,0 +1,43 @@
+//! Colours of segments.
+
+use super::labels::Segmentation;
+
+/// The colour of a segment, red, green, blue and opacity: another one for each of the ids 1 to 2²⁴ - 1, always the same, and
+/// those of small ids far apart. Nothing (0) is black and transparent; what a segmentation does not know is black, as Isaac
+/// has both.
+///
+/// The 24 bits of an id are the 24 bits of its colour in another order: bit 3 i + c is bit 7 - i of channel c. Source: the
+/// colour map of the PASCAL VOC challenge.
+pub fn segment_color(id: i32) -> [u8; 4] {
+    match id {
+        0 => [0; 4],
+        Segmentation::UNKNOWN => [0, 0, 0, 255],
+        _ => {
+            let channel = |c: u32| (0..8).fold(0u8, |sum, i| sum | ((id >> (3 * i + c) & 1) as u8) << (7 - i));
+            [channel(0), channel(1), channel(2), 255]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn colours_are_distinct_and_those_of_few_things_far_apart() {
+        let all: HashSet<[u8; 4]> = (0..1 << 24).step_by(7).chain(0..4096).map(segment_color).collect();
+        assert_eq!(all.len(), (0..1 << 24).step_by(7).chain(0..4096).collect::<HashSet<i32>>().len());
+        // The first seven are the corners of a cube with sides of 128.
+        assert_eq!(
+            [1, 2, 3, 4].map(segment_color),
+            [[128, 0, 0, 255], [0, 128, 0, 255], [128, 128, 0, 255], [0, 0, 128, 255]]
+        );
+        let apart = |a: [u8; 4], b: [u8; 4]| a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max();
+        let few: Vec<[u8; 4]> = (1..64).map(segment_color).collect();
+        for (k, a) in few.iter().enumerate() {
+            assert!(few[..k].iter().all(|b| apart(*a, *b) >= Some(64)), "{a:?}");
+        }
+        assert_eq!((segment_color(0), segment_color(-1)), ([0; 4], [0, 0, 0, 255]));
+    }
+}

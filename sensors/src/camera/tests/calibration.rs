@@ -1,0 +1,139 @@
+//! Calibration files: what a real one says, and what is wrong with broken ones.
+
+use super::super::lens::{Equidistant, OpenCv, OpenCvFisheye};
+use super::super::{
+    CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, PixelIntrinsics, Renderer,
+};
+use super::stage::{built, cfg, context};
+
+/// As `cameracalibrator` writes it, with what some drivers add.
+const FILE: &str = "\
+# oST version 5.0 parameters
+image_width: 64
+image_height: 48
+camera_name: narrow_stereo/left
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [ 61.02341,  0.     , 32.41077,
+           0.     , 61.10022, 23.87015,
+           0.     ,  0.     ,  1.     ]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [-0.312471, 0.118365, 4.13e-4, -0.000218, 0.000000]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1., 0., 0.,
+         0., 1., 0.,
+         0., 0., 1.]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [58.01243, 0., 32.30114, 0.,
+         0., 59.23112, 23.80009, 0.,
+         0., 0., 1., 0.]
+binning_x: 0
+";
+
+#[test]
+fn a_real_file_gives_the_camera() {
+    let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
+    assert_eq!((info.name.as_str(), info.width, info.height), ("narrow_stereo/left", 64, 48));
+    assert_eq!(info.intrinsics(), Intrinsics::Pixels { fx: 61.02341, fy: 61.10022, cx: 32.41077, cy: 23.87015 });
+    let lens = OpenCv { k1: -0.312471, k2: 0.118365, p1: 4.13e-4, p2: -0.000218, ..OpenCv::default() };
+    assert_eq!(info.lens(), Lens::from(lens));
+    assert_eq!((info.projection_matrix[(0, 2)], info.projection_matrix[(1, 1)]), (32.30114, 59.23112));
+    // The camera of it says the same of itself.
+    let mut twin = CameraCfg { renderer: Renderer::FastRayTraced, ..cfg() };
+    info.apply_to(&mut twin);
+    let camera = built(&twin, &context(1));
+    assert!(camera.depth().unwrap().iter().any(|depth| depth.is_finite()));
+    let said = camera.camera_info("twin", 0).unwrap();
+    assert_eq!((said.camera_matrix, said.distortion_model), (info.camera_matrix, info.distortion_model));
+    assert_eq!(said.distortion_coefficients, info.distortion_coefficients);
+}
+
+#[test]
+fn files_come_back_as_they_were_written() {
+    let mut info = CameraInfo::parse(FILE, "left.yaml").unwrap();
+    // Numbers of all sizes, and a name that is none without quotes.
+    info.camera_matrix[(0, 2)] = 1.0 / 3.0;
+    info.distortion_coefficients = vec![1e-7, -2.5e-300, 1e16, 123_456.789, -0.0];
+    info.name = "7: \"wrist\" \\ \u{7} é # no".into();
+    let text = info.to_yaml();
+    assert!(text.contains("1.0e-7, -2.5e-300, 1.0e+16"), "{text}");
+    assert_eq!(CameraInfo::parse(&text, "again").unwrap(), info);
+    let pixels = PixelIntrinsics { fx: 300.25, fy: 301.0, cx: 320.0, cy: 240.0 };
+    let twelve: Vec<f64> = (1..13).map(|k| 0.001 * f64::from(k)).collect();
+    for (lens, model, count) in [
+        (Lens::default(), DistortionModel::PlumbBob, 5),
+        (OpenCv::from_coefficients(&twelve[..5]).into(), DistortionModel::PlumbBob, 5),
+        (OpenCv::from_coefficients(&twelve[..8]).into(), DistortionModel::RationalPolynomial, 8),
+        (OpenCv::from_coefficients(&twelve).into(), DistortionModel::RationalPolynomial, 12),
+        (OpenCvFisheye { k1: 0.1, k4: -0.01, ..Default::default() }.into(), DistortionModel::Equidistant, 4),
+    ] {
+        let info = CameraInfo::of("front", [640, 480], &pixels, &lens).unwrap();
+        assert_eq!((info.distortion_model, info.distortion_coefficients.len()), (model, count));
+        let again = CameraInfo::parse(&info.to_yaml(), "front.yaml").unwrap();
+        assert_eq!(again, info);
+        assert_eq!(again.intrinsics(), Intrinsics::from(pixels));
+        assert!(again.lens() == lens || lens.is_pinhole() && again.lens().is_pinhole());
+    }
+    let refused =
+        [Lens::from(Equidistant::default()), OpenCvFisheye { max_angle: Some(1.5), ..Default::default() }.into()];
+    for lens in refused {
+        let error = CameraInfo::of("front", [640, 480], &pixels, &lens).unwrap_err();
+        assert!(matches!(error, CalibrationError::Lens { .. }), "{error}");
+    }
+    let folder = std::env::temp_dir().join(format!("kinetoscope-calibration-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("front.yaml");
+    info.write(&path).unwrap();
+    assert_eq!(CameraInfo::read(&path).unwrap(), info);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let error = CameraInfo::read(&path).unwrap_err();
+    assert!(matches!(&error, CalibrationError::File { path: p, .. } if *p == path), "{error}");
+}
+
+/// Every mistake is named with file, line and field.
+#[test]
+fn broken_files_say_where() {
+    let broken = |from: &str, to: &str| {
+        assert!(FILE.contains(from), "{from}");
+        CameraInfo::parse(&FILE.replacen(from, to, 1), "left.yaml").unwrap_err().to_string()
+    };
+    for (from, to, said) in [
+        ("image_width: 64", "image_width: -64", "left.yaml:2: image_width is \"-64\"; it must be a whole number"),
+        ("image_height: 48\n", "", "left.yaml: image_height is missing"),
+        ("image_height: 48", "image_height: [48]", "left.yaml:3: image_height is a list of 1, not a word"),
+        ("61.02341", "0.", "left.yaml:5: camera_matrix is of no camera: fx of the lens is 0"),
+        ("61.02341", "61.02341, 7", "left.yaml:8: camera_matrix.data has 10 numbers, not the 3 x 3"),
+        ("61.02341,  0. ", "61.02341,  0.5", "row 0, column 1 is 0.5"),
+        ("61.02341", "sixty", "left.yaml:8: camera_matrix.data has \"sixty\"; it must be a finite number"),
+        ("61.02341", ".nan", "it must be a finite number"),
+        ("plumb_bob", "plum_bob", "left.yaml:11: there is no distortion model \"plum_bob\"; known are plumb_bob"),
+        ("plumb_bob", "equidistant", "left.yaml:12: distortion_coefficients has 5 numbers; equidistant has 4"),
+        ("  cols: 5\n", "", "distortion_coefficients has no cols"),
+        ("data: [1., 0., 0.", "data: [1., 0., 0.5", "rectification_matrix is no rotation"),
+        ("data: [58.01243", "data: [0.", "projection_matrix is singular"),
+        ("data: [1., 0., 0.,", "data: [1., 0., 0.", "left.yaml:19: rectification_matrix.data has \"0. 0.\""),
+        ("image_height: 48", "image_height: 48\nimage_height: 49", "left.yaml:4:1: \"image_height\" is there twice"),
+        ("camera_matrix:", "camera_matrix", "left.yaml:"),
+        ("image_width: 64", "image_width: &w 64\nextra: *w", "aliases"),
+    ] {
+        let error = broken(from, to);
+        assert!(error.contains(said), "{from:?} -> {to:?}: {error}");
+    }
+    let error = |text: &str| CameraInfo::parse(text, "f").unwrap_err().to_string();
+    assert_eq!(error(""), "f:1:1: the file is empty");
+    assert!(error("just words").contains("not a table of fields"));
+    assert!(error(&format!("a: {}", "[".repeat(2000))).starts_with("f:1:"));
+    assert!(error("a: 1\n---\nb: 2\n").contains("second document"));
+    let tilted = FILE.replacen("plumb_bob", "rational_polynomial", 1);
+    let tilted =
+        tilted.replacen("[-0.312471, 0.118365, 4.13e-4, -0.000218, 0.000000]", "[0,0,0,0,0,0,0,0,0,0,0,0,0.1,0]", 1);
+    assert!(error(&tilted.replacen("cols: 5", "cols: 14", 1)).contains("tilts the sensor"));
+}

@@ -1,0 +1,214 @@
+//! The noise of cameras, against its distribution.
+//!
+//! Means of n numbers scatter by sigma / sqrt(n), variances by sqrt(2 / n) of themselves, correlations by 1 / sqrt(n): bounds
+//! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
+
+use super::super::{Camera, CameraCfg, Channels, Extrinsics, Placement};
+use super::stage::{BALL, DT, GROUND, SIZE, built, cfg, context, state};
+use crate::noise::NoiseCfg;
+use crate::sensor::{Sensor, SensorContext};
+use ndarray::Axis;
+
+const PIXELS: f64 = (SIZE[0] * SIZE[1]) as f64;
+
+/// Straight down onto the ground, 2 m away, from where no ball is seen.
+fn down(noise: &[(&str, NoiseCfg)]) -> CameraCfg {
+    let placement = Placement::LookAt { eye: [50.0, 0.0, 2.0], target: [50.0, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
+    let noise = noise.iter().map(|(name, noise)| (name.to_string(), *noise)).collect();
+    CameraCfg { extrinsics: Extrinsics { placement, ..Extrinsics::default() }, noise, ..cfg() }
+}
+
+fn depths(camera: &Camera, row: usize) -> Vec<f64> {
+    camera.depth().unwrap().index_axis(Axis(0), row).iter().map(|depth| f64::from(*depth) - 2.0).collect()
+}
+
+fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len() as f64
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64
+}
+
+/// Errors of all pixels at 20 steps, one after the other.
+fn errors(cfg: &CameraCfg, context: &SensorContext, row: usize) -> Vec<f64> {
+    let mut camera = built(cfg, context);
+    let mut all = Vec::new();
+    for step in 1..=20 {
+        camera.update(&state(&vec![step; context.num_envs])).unwrap();
+        all.extend(depths(&camera, row));
+    }
+    all
+}
+
+#[test]
+fn white_noise_is_normal_and_independent() {
+    let mut context = context(2);
+    let std = 0.05;
+    let cfg = down(&[("depth", NoiseCfg::white(std))]);
+    let first = errors(&cfg, &context, 0);
+    let n = first.len() as f64;
+    let bound = 6.0 / n.sqrt();
+    assert!(mean(&first).abs() < bound * std, "{}", mean(&first));
+    let variance = product(&first, &first);
+    assert!((variance / (std * std) - 1.0).abs() < bound * 2f64.sqrt(), "{variance}");
+    let fourth = first.iter().map(|x| (x / std).powi(4)).sum::<f64>() / n;
+    assert!((fourth - 3.0).abs() < bound * 96f64.sqrt(), "{fourth}");
+    // Of neighbours, of rows, of pictures, of environments, of sensors, of seeds.
+    let alike = |a: &[f64], b: &[f64]| product(a, b) / (std * std);
+    for apart in [1, SIZE[0], PIXELS as usize] {
+        assert!(alike(&first, &first[apart..]).abs() < bound * 1.1, "{apart} numbers apart");
+    }
+    assert!(alike(&first, &errors(&cfg, &context, 1)).abs() < bound, "environments");
+    assert_eq!(first, errors(&cfg, &context, 0), "the same again");
+    context.name = "other".into();
+    assert!(alike(&first, &errors(&cfg, &context, 0)).abs() < bound, "sensors");
+    context.name = "".into();
+    context.seed = 1;
+    assert!(alike(&first, &errors(&cfg, &context, 0)).abs() < bound, "seeds");
+    assert!(alike(&first, &first) > 0.9, "the control");
+}
+
+/// An environment has its noise whichever process it is in.
+#[test]
+fn environments_of_other_processes_have_the_same_noise() {
+    let whole = context(4);
+    let cfg = down(&[("depth", NoiseCfg::white(0.1))]);
+    let part = SensorContext { first_env: 2, ..context(2) };
+    assert_eq!(errors(&cfg, &whole, 3), errors(&cfg, &part, 1));
+    assert_ne!(errors(&cfg, &whole, 1), errors(&cfg, &part, 1), "the control");
+}
+
+#[test]
+fn biases_stay_until_the_reset_and_walk() {
+    let context = context(1);
+    let bias_std = 0.03;
+    let mut camera = built(&down(&[("depth", NoiseCfg { bias_std, ..NoiseCfg::default() })]), &context);
+    let first = depths(&camera, 0);
+    assert!((product(&first, &first) / bias_std.powi(2) - 1.0).abs() < 6.0 * (2.0 / PIXELS).sqrt());
+    camera.update(&state(&[1])).unwrap();
+    assert_eq!(depths(&camera, 0), first);
+    camera.refresh(&[0], &state(&[1])).unwrap();
+    assert_eq!(depths(&camera, 0), first);
+    camera.reset(&[0], &state(&[0])).unwrap();
+    let second = depths(&camera, 0);
+    assert!((product(&first, &second) / bias_std.powi(2)).abs() < 6.0 / PIXELS.sqrt());
+    // A walk of 0.2 m per root second is sqrt(t) times that after t seconds; pictures are 4 steps apart.
+    let walk = NoiseCfg { bias_walk: 0.2, ..NoiseCfg::default() };
+    let cfg = CameraCfg { update_period: 4.0 * DT, ..down(&[("depth", walk)]) };
+    let mut camera = built(&cfg, &context);
+    assert!(depths(&camera, 0).iter().all(|error| error.abs() < 1e-5), "it begins where the truth is");
+    let mut at = Vec::new();
+    for step in 1..=80u64 {
+        camera.update(&state(&[step])).unwrap();
+        if step == 20 || step == 80 {
+            at.push(depths(&camera, 0));
+        }
+    }
+    let [early, late] = [0.1, 0.4].map(|seconds| 0.04 * seconds);
+    for (walked, variance) in at.iter().zip([early, late]) {
+        let found = product(walked, walked);
+        assert!((found / variance - 1.0).abs() < 6.0 * (2.0 / PIXELS).sqrt(), "{found} is not {variance}");
+    }
+    // The covariance of a walk at two times is the variance at the earlier one.
+    let together = product(&at[0], &at[1]);
+    assert!((together - early).abs() < 6.0 * ((early * late + early * early) / PIXELS).sqrt(), "{together}");
+}
+
+#[test]
+fn depths_are_whole_steps_within_what_is_seen() {
+    let context = context(1);
+    let resolution = 0.125;
+    let cfg = down(&[("depth", NoiseCfg { std: 1.0, resolution, ..NoiseCfg::default() })]);
+    let camera = built(&CameraCfg { near: 0.5, far: 3.0, ..cfg }, &context);
+    let mut ends = [0; 2];
+    for depth in camera.depth().unwrap() {
+        assert_eq!((depth / 0.125).fract(), 0.0);
+        assert!((0.5..=3.0).contains(depth));
+        [0.5, 3.0].iter().zip(&mut ends).for_each(|(end, count)| *count += usize::from(depth == end));
+    }
+    assert!(ends.iter().all(|count| *count > 50), "the control: noise reaches both ends, {ends:?}");
+}
+
+/// Channels have noise of their own, misses stay misses, and what has no noise is the truth.
+#[test]
+fn misses_and_other_channels_stay() {
+    let context = context(2);
+    let noise: [(String, NoiseCfg); 2] =
+        [("depth", 0.05), ("distance_to_camera", 0.02)].map(|(name, std)| (name.into(), NoiseCfg::white(std)));
+    let (noisy, perfect) = (built(&CameraCfg { noise: noise.into(), ..cfg() }, &context), built(&cfg(), &context));
+    let mut errors = [Vec::new(), Vec::new()];
+    let mask = perfect.mask().unwrap();
+    for (at, id) in mask.indexed_iter() {
+        let pairs = [
+            (noisy.depth().unwrap()[at], perfect.depth().unwrap()[at]),
+            (noisy.distance().unwrap()[at], perfect.distance().unwrap()[at]),
+        ];
+        for ((found, true_), errors) in pairs.into_iter().zip(&mut errors) {
+            if *id == 0 {
+                assert_eq!(found, f32::INFINITY);
+            } else {
+                errors.push(f64::from(found - true_));
+            }
+        }
+    }
+    let n = errors[0].len() as f64;
+    for (errors, std) in errors.iter().zip([0.05, 0.02]) {
+        assert!(errors.iter().all(|error| error.abs() < 6.9 * std), "numbers of 32 bits reach no farther");
+        assert!((product(errors, errors) / (std * std) - 1.0).abs() < 6.0 * (2.0 / n).sqrt());
+    }
+    assert!((product(&errors[0], &errors[1]) / (0.05 * 0.02)).abs() < 6.0 / n.sqrt(), "channels");
+    assert!(mask.iter().any(|id| *id == BALL) && mask.iter().any(|id| *id == GROUND));
+    assert_eq!(noisy.mask().unwrap(), mask);
+    assert_eq!(noisy.color().unwrap(), perfect.color().unwrap());
+    assert_eq!(noisy.normal().unwrap(), perfect.normal().unwrap());
+    assert_eq!(noisy.position().unwrap(), perfect.position().unwrap());
+}
+
+/// Bytes are rounded, which adds a twelfth to the variance.
+#[test]
+fn colours_have_noise_in_steps_of_their_bytes() {
+    let context = context(1);
+    let std = 4.0;
+    let cfg = down(&[("rgb", NoiseCfg::white(std))]);
+    let (mut noisy, mut perfect) = (built(&cfg, &context), built(&down(&[]), &context));
+    let mut errors: [Vec<f64>; 3] = Default::default();
+    for step in 1..=20 {
+        noisy.update(&state(&[step])).unwrap();
+        perfect.update(&state(&[step])).unwrap();
+        let (noisy, perfect) = (noisy.color().unwrap(), perfect.color().unwrap());
+        for (at, byte) in perfect.indexed_iter() {
+            let found = noisy[at];
+            if at.3 == 3 {
+                assert_eq!(found, 255, "opacity has none");
+            } else {
+                // So that nothing is cut off.
+                assert!((35..=220).contains(byte), "{byte}");
+                errors[at.3].push(f64::from(found) - f64::from(*byte));
+            }
+        }
+    }
+    let (n, variance) = (errors[0].len() as f64, std * std + 1.0 / 12.0);
+    for (k, errors_of_one) in errors.iter().enumerate() {
+        assert!(mean(errors_of_one).abs() < 6.0 * (variance / n).sqrt());
+        let found = product(errors_of_one, errors_of_one);
+        assert!((found / variance - 1.0).abs() < 6.0 * (2.0 / n).sqrt(), "{found}");
+        let next = product(errors_of_one, &errors[(k + 1) % 3]) / variance;
+        assert!(next.abs() < 6.0 / n.sqrt(), "red, green and blue: {next}");
+    }
+    let coarse = NoiseCfg { resolution: 16.0, ..NoiseCfg::white(20.0) };
+    let camera = built(&down(&[("color", coarse)]), &context);
+    let bytes = camera.color().unwrap();
+    let whole = |byte: &u8| byte.is_multiple_of(16) || *byte == 255;
+    assert!(bytes.iter().all(whole), "whole steps, or the end");
+}
+
+/// Whether there is noise or not, the perfect camera's bits come out where there is none to add.
+#[test]
+fn noise_of_nothing_is_nothing() {
+    let context = context(1);
+    let nothing =
+        [("depth", 0.0), ("distance", 0.0), ("color", 0.0)].map(|(name, std)| (name.to_string(), NoiseCfg::white(std)));
+    let camera = built(&CameraCfg { noise: nothing.into(), channels: Channels::ALL, ..cfg() }, &context);
+    assert_eq!(super::stage::bits(&camera, [0]), super::stage::bits(&built(&cfg(), &context), [0]));
+}
