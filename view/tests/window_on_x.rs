@@ -6,9 +6,12 @@ use scene::Pose;
 use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use view::window::App;
-use view::{Canvas, Closed, OpenWindow, Viewing, Wants, Window, WindowCfg, WindowError};
+use view::{Canvas, Closed, OpenWindow, Speed, Viewing, Wants, Window, WindowCfg, WindowError};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT, KeyButMask,
@@ -71,6 +74,38 @@ fn simulation() -> SimulationManager {
     })
     .unwrap();
     sim
+}
+
+/// A simulation that a thread steps until it is told to stop.
+struct Running {
+    steps: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<SimulationManager>,
+}
+
+impl Running {
+    fn start(mut sim: SimulationManager) -> Self {
+        let (steps, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+        let (count, ends) = (Arc::clone(&steps), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            while !ends.load(Ordering::SeqCst) {
+                sim.update(1);
+                count.fetch_add(1, Ordering::SeqCst);
+            }
+            sim
+        });
+        Self { steps, stop, thread }
+    }
+
+    /// Steps that are done.
+    fn steps(&self) -> u64 {
+        self.steps.load(Ordering::SeqCst)
+    }
+
+    fn end(self) -> SimulationManager {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.join().unwrap()
+    }
 }
 
 /// The upper left of the whole display, as red, green and blue.
@@ -157,12 +192,7 @@ fn a_window_shows_obeys_and_goes() {
     assert_ne!(pixels(&other)[from..], expected[from..]);
 
     // A key: the space bar pauses, and lets go on.
-    let run = std::thread::spawn(move || {
-        while sim.time()[0] < 2.0 {
-            sim.update(1);
-        }
-        sim
-    });
+    let run = Running::start(sim);
     let paused = |is: bool| viewer.newest().is_some_and(|snapshot| snapshot.run.paused == is);
     press(&connection, window.number(), 0x20);
     until("it pauses", || paused(true));
@@ -170,17 +200,19 @@ fn a_window_shows_obeys_and_goes() {
     until("it goes on", || paused(false));
     // As fast as can be.
     press(&connection, window.number(), 0x30);
-    let mut sim = run.join().unwrap();
+    until("it is as fast as can be", || viewer.newest().is_some_and(|snapshot| snapshot.run.speed == Speed::Free));
+    let mut sim = run.end();
 
-    // Sizes that nobody wants: the window stays, and shows something.
+    // Sizes that nobody wants: the window stays, and shows something down to its last pixel, where a new size leaves black.
+    const SCREEN: [usize; 2] = [1280, 800];
     for size in [[1u32, 1], [9000, 7000], [480, 270]] {
         let aux = ConfigureWindowAux::new().width(size[0]).height(size[1]);
         connection.configure_window(window.number(), &aux).unwrap();
         connection.flush().unwrap();
-        (0..5).for_each(|_| {
-            sim.update(1);
-            std::thread::sleep(Duration::from_millis(40));
-        });
+        sim.update(5);
+        let [column, row] = [0, 1].map(|k| SCREEN[k].min(size[k] as usize) - 1);
+        let last = row * SCREEN[0] + column;
+        until("it is drawn at this size", || screenshot(&connection, SCREEN)[last] != [0; 3]);
         assert!(window.is_open(), "{size:?}: {:?}", window.closed());
     }
 
@@ -213,18 +245,14 @@ fn a_window_shows_obeys_and_goes() {
     let window = sim.open_window_with(display.cfg()).unwrap();
     let viewer = sim.viewer(Wants::default());
     press(&connection, window.number(), 0x20);
-    let run = std::thread::spawn(move || {
-        let first = sim.steps();
-        while sim.steps() < first + 300 {
-            sim.update(1);
-        }
-        sim
-    });
+    let run = Running::start(sim);
     until("it pauses", || viewer.newest().is_some_and(|snapshot| snapshot.run.paused));
     drop(viewer);
     display.server.kill().unwrap();
     assert!(matches!(ended(&window), Closed::DisplayLost(_)), "{:?}", window.closed());
-    let mut sim = run.join().unwrap();
+    let held = run.steps();
+    until("it goes on", || run.steps() > held + 10);
+    let mut sim = run.end();
 
     // And there is no display any more.
     let error = sim.open_window_with(display.cfg()).unwrap_err();

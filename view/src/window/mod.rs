@@ -194,6 +194,11 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
     let mut canvas = Canvas::default();
     let (mut last, mut wants) = (0, Wants::default());
     let mut outdated = true;
+    // Before the first key, which would do nothing where nothing is shown.
+    if let Some(snapshot) = viewer.newest() {
+        last = snapshot.number;
+        app.show(snapshot);
+    }
     loop {
         for happened in screen.poll()? {
             match happened {
