@@ -75,6 +75,8 @@ fn run(args: &Args) -> launcher::Result {
     println!("[INFO]: Setup complete...");
     println!("{}\n{}\n{}", sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, 1000);
     let mut noise: Vec<Random> =
         (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();

@@ -58,6 +58,8 @@ fn run(args: &Args) -> launcher::Result {
 
     println!("Starting simulation...");
     let phases = phases(&sim, robot, args.swap_hand)?;
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, PHASE * phases.len() as u64);
     let mut finished = Vec::new();
     let mut step = 0;

@@ -104,6 +104,8 @@ fn run(args: &Args) -> launcher::Result {
         }
         target
     };
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, POSITION_2_EVERY);
     let mut album = Album { out, raw: args.raw, files: Vec::new(), drawing: Duration::ZERO, images: 0 };
     let mut step = 0;

@@ -99,6 +99,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).get_pose());
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;

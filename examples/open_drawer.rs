@@ -104,6 +104,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
     args.launcher.write_dump(&sim)?;
     let stands = scatter(&mut sim, cabinet)?;
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)

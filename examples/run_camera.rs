@@ -70,6 +70,8 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", sim.sensor(camera)?);
     let out = args.launcher.out_folder(args.save || args.draw)?;
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut drawing, mut images) = (0, Duration::ZERO, 0);
     let mut files: Vec<String> = Vec::new();

@@ -58,6 +58,8 @@ fn run(args: &Args) -> launcher::Result {
     }
     args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(frames)?);
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, 1000);
     let count = sim.sensor(frames)?.target_frame_names().len();
     let mut step = 0;

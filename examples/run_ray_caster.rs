@@ -97,6 +97,8 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(scanner)?);
     let scene = Scene { ball, terrain, scanner };
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, 1000);
     let mut step = 0;
     while !progress.stop(step) {

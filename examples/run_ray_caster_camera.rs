@@ -63,6 +63,8 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", sim.sensor(camera)?);
     let out = args.launcher.out_folder(args.save)?;
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut stepping, mut files) = (0, Duration::ZERO, Vec::new());
     let (mut pictures, mut seen) = (0, 0);

@@ -7,6 +7,7 @@ pub use ndarray;
 pub use scene;
 pub use sensors;
 pub use sim;
+pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
@@ -33,5 +34,8 @@ pub mod prelude {
         RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
+    };
+    pub use view::{
+        OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
     };
 }

@@ -14,12 +14,22 @@ pub(crate) mod trial;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Speed, Viewer, Viewing, Wants};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+
+/// Lets a simulation go on that somebody paused.
+static KEY: OnceLock<Viewer> = OnceLock::new();
+
+/// Ctrl+C ends an example also while somebody holds it, in a window or in a browser.
+fn keep_key(sim: &mut SimulationManager) {
+    // One is enough for both.
+    KEY.get_or_init(|| sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
+}
 
 /// Errors end an example with a message and exit code 2.
 pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -36,6 +46,10 @@ pub(crate) struct Launcher {
     /// Run without a window
     #[arg(long)]
     pub(crate) headless: bool,
+    /// Show the simulation in browsers, in real time until a viewer says otherwise; at 127.0.0.1:8080 where no address is
+    /// given. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
+    pub(crate) serve: Option<String>,
     /// Where physics runs
     #[arg(long, value_enum, default_value_t = Device::Cpu)]
     pub(crate) device: Device,
@@ -157,15 +171,40 @@ impl Launcher {
                         and --threads to choose how many cores"
                 .into());
         }
-        if !self.headless {
-            println!("There is no window yet: going on headless.");
-        }
         Ok(SimulationManagerCfg {
             num_envs: self.num_envs,
             seed: self.seed,
             threads: self.threads,
             ..Default::default()
         })
+    }
+
+    /// Shows the simulation in browsers where `--serve` asks for it.
+    ///
+    /// # Errors
+    /// The address is none, or in use.
+    pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
+        let Some(address) = &self.serve else { return Ok(()) };
+        let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
+        let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
+        println!("Open {} in a browser", served.url());
+        keep_key(sim);
+        Ok(())
+    }
+
+    /// Opens a window onto the simulation, unless `--headless` says otherwise. Where there is no display, that is said, and
+    /// the example goes on without.
+    pub(crate) fn open_window(&self, sim: &mut SimulationManager) {
+        if self.headless {
+            return;
+        }
+        match sim.open_window() {
+            Ok(_) => {
+                println!("A window is open, in real time: H in it shows the keys.");
+                keep_key(sim);
+            }
+            Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
+        }
     }
 
     /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.
@@ -270,6 +309,11 @@ impl Progress {
         let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
+            // A viewer that holds the simulation does not hold the program.
+            if let Some(key) = KEY.get() {
+                key.send(Command::Resume);
+                key.send(Command::SetSpeed(Speed::Free));
+            }
             if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }

@@ -16,6 +16,7 @@ use crate::mj::{
     self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
 };
 use crate::wrenches::Wrenches;
+use ::scene::state::Contact;
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -422,30 +423,50 @@ impl Env {
     pub(crate) fn capture_present(&mut self, capture: &Capture) {
         self.seldom.solved.clear();
         self.solved_now = true;
+        if !self.solve_aside(|env, before| env.capture(before, capture)) {
+            self.seldom.solved.clear();
+        }
+    }
+
+    /// The contacts of the present state with the forces that MuJoCo solves for it; none where it cannot be solved. Nothing
+    /// that was captured changes, and nothing that decides a later step.
+    pub(crate) fn present_contacts(&mut self, capture: &Capture, contacts: &mut Vec<Contact>) {
+        let mut solved = Solved::default();
+        let take = |env: &mut Self, before: &Motion| {
+            let qvel = before.qvel(env.data.model());
+            capture.take(&mut env.data, qvel, &mut solved)
+        };
+        let done = self.solve_aside(take);
+        contacts.clear();
+        contacts.extend(solved.contacts.iter().filter(|_| done));
+    }
+
+    /// Solves the present state, lets `take` look at what was solved, and goes back. Says whether it could be solved.
+    fn solve_aside(&mut self, mut take: impl FnMut(&mut Self, &Motion) -> Result<(), EngineError>) -> bool {
         if self.diverged.is_some() {
-            return;
+            return false;
         }
         let mut scratch = SCRATCH.take();
         let before = &mut scratch.before;
         self.save_present(before);
-        loop {
+        let good = loop {
             self.apply_inputs();
-            let done = self.data.step2().and_then(|()| self.capture(before, capture));
+            let done = self.data.step2().and_then(|()| take(self, before));
             match judge(done, &self.data.take_warnings()) {
-                Verdict::Good => break,
+                Verdict::Good => break true,
                 Verdict::NeedsRoom(what) if self.grow(what, before).is_ok() => {}
                 Verdict::NeedsRoom(_) | Verdict::Bad(_) => {
-                    self.seldom.solved.clear();
                     self.data.reset();
-                    break;
+                    break false;
                 }
             }
-        }
+        };
         self.go_to(before);
         // This state had a forward pass before, with this data or a smaller one.
         let _ = self.data.step1();
         self.data.take_warnings();
         SCRATCH.set(scratch);
+        good
     }
 
     /// What was last captured.

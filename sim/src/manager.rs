@@ -278,6 +278,11 @@ impl SimulationManager {
         self.sensors.get_mut(id)
     }
 
+    /// The sensors of a type with their names, in the order in which they were added; without those that failed.
+    pub fn sensor_ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
+        self.sensors.ids()
+    }
+
     /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
     /// configured to ([`SensorCfg::debug_vis`]), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
@@ -445,6 +450,12 @@ impl SimulationManager {
     /// There is none; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
         self.find_robot(uid, "robot", RobotData::is_robot)
+    }
+
+    /// All robots with their uids, in the order in which they were added, and the articulations that are none.
+    pub fn robot_ids(&self) -> Vec<(&str, RobotId)> {
+        let robots = self.contents.robots.iter().enumerate();
+        robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.serial, index })).collect()
     }
 
     /// Of those robots that are `wanted`, the one called `uid`.

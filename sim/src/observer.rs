@@ -66,6 +66,8 @@ impl<O> fmt::Debug for ObserverId<O> {
 pub(crate) struct Observers {
     seats: Vec<Seat>,
     next: u64,
+    /// Physics steps so far.
+    steps: u64,
 }
 
 struct Seat {
@@ -133,6 +135,22 @@ impl SimulationManager {
         any.and_then(|any| any.downcast_mut()).ok_or(Error::NoObserver)
     }
 
+    /// The observers of a type, in the order in which they were added; without the one that is being told right now.
+    pub fn observer_ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
+        let is = |seat: &&Seat| {
+            let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
+            any.is_some_and(|any| any.is::<O>())
+        };
+        let id = |seat: &Seat| ObserverId { manager: self.serial, number: seat.number, observer: PhantomData };
+        self.observers.seats.iter().filter(is).map(id).collect()
+    }
+
+    /// Physics steps that [`update`](Self::update) has done since the simulation was made, whatever was reset meanwhile: what
+    /// an observer counts by.
+    pub fn steps(&self) -> u64 {
+        self.observers.steps
+    }
+
     #[track_caller]
     fn seat_of<O>(&self, id: ObserverId<O>) -> Result<usize> {
         assert!(id.manager == self.serial, "this handle is of another SimulationManager");
@@ -144,6 +162,7 @@ impl SimulationManager {
     pub(crate) fn step_observed(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
         if self.observers.seats.is_empty() {
             step(self, steps);
+            self.observers.steps += u64::from(steps);
             return steps;
         }
         self.tell_written();
@@ -156,6 +175,7 @@ impl SimulationManager {
         let first = waits.iter().map(|(_, wait)| *wait).min().unwrap_or(u64::MAX);
         let block = u32::try_from(first).unwrap_or(u32::MAX).min(steps);
         step(self, block);
+        self.observers.steps += u64::from(block);
         for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
             self.tell(*number, &Moment::Stepped);
         }

@@ -273,6 +273,18 @@ impl SensorList {
         id.index
     }
 
+    /// The sensors of a type, with their names.
+    pub(crate) fn ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
+        let is = |entry: &Entry| {
+            let sensor = entry.slot.as_ref().ok().and_then(|slot| slot.sensor().ok());
+            let any: Option<&dyn Any> = sensor.map(|sensor| sensor as &dyn Any);
+            any.is_some_and(|any| any.is::<S>())
+        };
+        let id = |index| SensorId { manager: self.manager, index, sensor: PhantomData };
+        let all = self.entries.iter().enumerate().filter(|(_, entry)| is(entry));
+        all.map(|(index, entry)| (entry.uid.clone(), id(index))).collect()
+    }
+
     /// The sensor of a handle.
     ///
     /// # Panics

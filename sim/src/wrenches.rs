@@ -6,6 +6,7 @@
 //! lines of MuJoCo: the model, which 4.x could tell to (`body_gravcomp`), is the same for all environments.
 
 use crate::mj::Data;
+use crate::mjcf::scene::MAX_ROBOTS;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// In whose axes a wrench is given.
@@ -33,6 +34,9 @@ pub(crate) struct Wrench {
     pub(crate) torque: Vector3<f64>,
 }
 
+/// Stands for the robot in [`Wrench::of`] where somebody pulls at a body.
+const PULLED: usize = MAX_ROBOTS;
+
 /// All that is applied in one environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wrenches {
@@ -58,6 +62,12 @@ impl Wrenches {
         self.list.extend(wrench);
     }
 
+    /// Pulls at a body, whatever else acts on it; a force of zero ends it.
+    pub(crate) fn pull(&mut self, body: usize, mujoco_body: usize, force: Vector3<f64>, torque: Vector3<f64>) {
+        let wrench = Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque };
+        self.replace((PULLED, body), (force != Vector3::zeros()).then_some(wrench));
+    }
+
     /// Gives bodies their weight, or takes it.
     pub(crate) fn set_weightless(&mut self, bodies: &[usize], weightless: bool) {
         self.weightless.retain(|body| !bodies.contains(body));
@@ -66,11 +76,12 @@ impl Wrenches {
         }
     }
 
-    /// The same on another model, where `body` says which body is which.
+    /// The same on another model, where `body` says which body is which. Nobody pulls any more: what is pulled at has another
+    /// number there.
     pub(crate) fn moved(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
         let moved = |wrench: &Wrench| Some(Wrench { body: body(wrench.body)?, ..wrench.clone() });
         Self {
-            list: self.list.iter().filter_map(moved).collect(),
+            list: self.list.iter().filter(|wrench| wrench.of.0 != PULLED).filter_map(moved).collect(),
             weightless: self.weightless.iter().filter_map(|&old| body(old)).collect(),
         }
     }

@@ -149,7 +149,11 @@ fn clock(time: Duration) -> String {
 }
 
 fn install(context: &Context<'_>) -> Outcome {
-    setup::prepare(context.repo, Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip] }).map(|_| ())
+    setup::prepare(
+        context.repo,
+        Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip, Need::Chromium] },
+    )
+    .map(|_| ())
 }
 
 fn rules(context: &Context<'_>) -> Outcome {

@@ -103,6 +103,8 @@ pub(crate) enum Need {
     Pip,
     Venv,
     OsMesa,
+    Chromium,
+    Xvfb,
 }
 
 impl Need {
@@ -115,6 +117,8 @@ impl Need {
             Self::Pip => &["python3-pip"],
             Self::Venv => &["python3-venv"],
             Self::OsMesa => &["libosmesa6"],
+            Self::Chromium => &["chromium"],
+            Self::Xvfb => &["xvfb"],
         }
     }
 
@@ -132,6 +136,8 @@ impl Need {
             Self::OsMesa => {
                 "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
             }
+            Self::Chromium => "Chromium (the page of the browser view is tested in it)",
+            Self::Xvfb => "Xvfb, an X server without a screen (the window is tested on it)",
         }
     }
 }
@@ -168,10 +174,16 @@ impl Machine {
                 self.header("mujoco/mujoco.h").is_some()
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
+            Need::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
             Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Need::Pip | Need::Venv => (self.python_has)(need),
             Need::OsMesa => {
                 self.library_folders().iter().flat_map(|dir| entries(dir)).any(|file| is_osmesa(&file_name(&file)))
+            }
+            // As the tests look for it.
+            Need::Chromium => {
+                let names = ["chromium", "chromium-browser", "google-chrome"];
+                self.search_path.iter().any(|dir| names.iter().any(|name| dir.join(name).is_file()))
             }
         }
     }
@@ -378,6 +390,22 @@ mod tests {
         let library = format!("usr/lib/{}-linux-gnu/libOSMesa.so.8", env::consts::ARCH);
         assert!(machine(&[&library]).1.has(Need::OsMesa));
         assert_eq!(packages(&[Need::OsMesa]), ["libosmesa6"]);
+    }
+
+    #[test]
+    fn any_chromium_on_the_search_path_will_do() {
+        assert!(!machine(&["usr/bin/firefox"]).1.has(Need::Chromium));
+        assert!(machine(&["usr/bin/chromium"]).1.has(Need::Chromium));
+        assert!(machine(&["usr/bin/google-chrome"]).1.has(Need::Chromium));
+        assert_eq!(packages(&[Need::Chromium]), ["chromium"]);
+    }
+
+    #[test]
+    fn xvfb_is_a_program() {
+        assert!(!machine(&["usr/share/doc/xvfb/copyright"]).1.has(Need::Xvfb));
+        let (_dir, with) = machine(&["usr/bin/Xvfb"]);
+        assert!(with.has(Need::Xvfb));
+        assert_eq!(packages(&[Need::Xvfb]), ["xvfb"]);
     }
 
     #[test]

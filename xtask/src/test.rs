@@ -22,7 +22,7 @@ pub(crate) struct TestArgs {
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
     // MuJoCo's own renderer is a judge of our pictures where both have the same MuJoCo.
     let judged = args.mujoco == Some(Line::Wheel);
-    let extras: &[Need] = if judged { &[Need::Pip, Need::Venv, Need::OsMesa] } else { &[] };
+    let extras: &[Need] = if judged { &[Need::Xvfb, Need::Pip, Need::Venv, Need::OsMesa] } else { &[Need::Xvfb] };
     let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras })?;
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
     let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args));

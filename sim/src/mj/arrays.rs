@@ -267,6 +267,8 @@ data_arrays! {
     xpos: f64, "Body positions \\[m\\], (nbody, 3).";
     xquat: f64, "Body orientations, wxyz, (nbody, 4).";
     xipos: f64, "Centres of mass \\[m\\], (nbody, 3).";
+    xanchor: f64, "Anchors of joints \\[m\\], (njnt, 3).";
+    xaxis: f64, "Axes of joints, (njnt, 3).";
     cvel: f64, "Spatial velocities about the subtree's centre of mass, (nbody, 6).";
     cacc: f64, "Spatial accelerations about the subtree's centre of mass, minus gravity, (nbody, 6); see [`Data::solve_accelerations`].";
     cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's centre of mass, (nbody, 6); see [`Data::solve_accelerations`].";

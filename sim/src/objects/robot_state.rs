@@ -47,6 +47,11 @@ impl Robot<'_> {
         self.active_joint_ids().len()
     }
 
+    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target.
+    pub fn is_driven(&self, joint: JointIndex) -> bool {
+        self.data.plans().get(joint.0).is_some_and(|plan| plan.actuator.is_some())
+    }
+
     /// The joints of a control part that follow no other joint, in the order of its patterns.
     ///
     /// # Errors

@@ -1,0 +1,177 @@
+//! The page of the browser view in Chromium, without a screen: it loads, a picture arrives, a slider moves the joint, pause
+//! pauses. Skipped where there is no Chromium, except in CI.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod chromium;
+#[path = "../serve/running.rs"]
+#[allow(dead_code, reason = "a part of it is needed here")]
+mod running;
+
+use chromium::{Chromium, Tab};
+use kinetoscope::prelude::*;
+use running::{Running, wait_until};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Where screenshots of the page are written, for the documentation; nowhere without it.
+const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
+
+/// A browser, or nothing where there is none and nobody requires one.
+fn browser() -> Option<Chromium> {
+    let found = Chromium::find();
+    if found.is_none() {
+        let required = std::env::var_os("CI").is_some_and(|ci| !ci.is_empty() && ci != "0" && ci != "false");
+        assert!(!required, "CI needs Chromium: apt-get install --no-install-recommends chromium");
+        eprintln!("skipped: there is no chromium, chromium-browser or google-chrome on this machine");
+    }
+    found.map(|program| Chromium::start(&program))
+}
+
+/// The page of a simulation, when it is connected.
+fn page<'a>(browser: &'a Chromium, running: &Running) -> Tab<'a> {
+    let mut tab = browser.open(&running.url);
+    tab.wait_until("connected", "document.getElementById('link').dataset.state === 'connected'");
+    tab
+}
+
+fn screenshot(tab: &mut Tab<'_>, name: &str) {
+    if let Some(folder) = std::env::var_os(SCREENSHOTS) {
+        std::fs::write(PathBuf::from(folder).join(name), tab.screenshot()).unwrap();
+    }
+}
+
+/// Colours of the stage's canvas, and the part of its pixels that is red as the cube is.
+const LOOK: &str = "(() => {
+    const canvas = document.getElementById('stage');
+    const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    const colors = new Set();
+    let red = 0;
+    for (let k = 0; k < bytes.length; k += 4) {
+        const [r, g, b] = [bytes[k], bytes[k + 1], bytes[k + 2]];
+        colors.add(65536 * r + 256 * g + b);
+        if (r > 60 && r > 2.5 * Math.max(g, b)) red += 1;
+    }
+    return { colors: colors.size, red: red / (canvas.width * canvas.height), width: canvas.width, height: canvas.height };
+})()";
+
+#[test]
+fn the_page_shows_the_simulation_and_acts_on_it() {
+    let Some(browser) = browser() else { return };
+    let running = Running::start(2);
+    let mut tab = page(&browser, &running);
+    assert_eq!(tab.evaluate("document.title"), "arm – Kinetoscope");
+
+    // A picture arrives, as large as it is shown, with the cube in it.
+    tab.wait_until("a picture", "document.getElementById('cover').hidden");
+    tab.wait_until(
+        "a picture of the canvas' size",
+        "(() => { const c = document.getElementById('stage'); return c.width === c.clientWidth && c.height === c.clientHeight; })()",
+    );
+    let look = tab.evaluate(LOOK);
+    assert!(look["colors"].as_u64() > Some(100) && look["red"].as_f64() > Some(0.001), "{look}");
+    assert!(look["width"].as_u64() > Some(400), "{look}");
+
+    // So does the camera's.
+    tab.wait_until("the camera", "!document.getElementById('panel').hidden");
+    let size = tab.evaluate("[document.getElementById('panel').width, document.getElementById('panel').height]");
+    assert_eq!(size, json!([128, 96]));
+
+    // A slider that is dragged by the mouse moves its joint, in the simulation.
+    let sliders =
+        tab.evaluate("[...document.querySelectorAll('#joints input[type=range]')].map((s) => s.dataset.joint)");
+    assert_eq!(sliders, json!(["JOINT1", "JOINT2", "JOINT3", "JOINT4", "JOINT5", "JOINT6"]));
+    let slider = "document.querySelector('#joints input[data-joint=JOINT1]')";
+    let [x, y, width, _] = tab.rectangle(slider);
+    let range = tab.evaluate(&format!("[Number({slider}.min), Number({slider}.max)]"));
+    let [lower, upper] = [0, 1].map(|k| range[k].as_f64().unwrap());
+    tab.drag([x + 0.5 * width, y], [x + 0.6 * width, y]);
+    let target = tab.evaluate(&format!("{slider}.valueAsNumber")).as_f64().unwrap();
+    // A tenth of the way is a tenth of the range, but for the width of the thumb (16 of some 300 pixels).
+    let expected = 0.5 * (lower + upper) + 0.1 * (upper - lower);
+    assert!((target - expected).abs() < 0.02 * (upper - lower), "{target} for {expected}");
+    running.wait_until("the joint comes to where the slider is", |now| {
+        now.steps > 0 && (now.positions[(0, 0)] - target).abs() < 0.02
+    });
+
+    // Pause pauses, by a click, and the button says what it does next.
+    tab.click("document.getElementById('pause')");
+    tab.wait_until("paused", "document.getElementById('pause').textContent === 'Play'");
+    let held = running.now().steps;
+    std::thread::sleep(Duration::from_millis(400));
+    assert!(running.now().steps <= held + 1, "it steps on");
+    assert_eq!(tab.evaluate("document.getElementById('rate').textContent"), "paused");
+    let time = "document.getElementById('time').textContent";
+    let before = tab.evaluate(time);
+    tab.click("document.getElementById('step')");
+    tab.wait_until("a step", &format!("{time} !== {before}"));
+    tab.click("document.getElementById('pause')");
+    running.wait_until("it goes on", |now| now.steps > held + 50);
+
+    // One environment of the two, another speed, another view: everything is taken by the simulation without a word.
+    tab.choose("environment", "1");
+    tab.choose("speed", "1");
+    tab.wait_until("real time", "document.getElementById('speed').value === '1'");
+    let [x, y, width, height] = tab.rectangle("document.getElementById('stage')");
+    tab.drag([x + 0.5 * width, y], [x + 0.6 * width, y + 0.1 * height]);
+    std::thread::sleep(Duration::from_secs(3));
+    assert_eq!(tab.evaluate("document.getElementById('note').hidden"), true, "nothing was refused");
+    assert_eq!(tab.evaluate("document.getElementById('environment').value"), "1");
+    screenshot(&mut tab, "serve.png");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_lost_connection_is_said_and_found_again() {
+    let Some(browser) = browser() else { return };
+    let running = Running::start(1);
+    let address = running.address.to_string();
+    let mut tab = page(&browser, &running);
+    tab.wait_until("a picture", "document.getElementById('cover').hidden");
+    drop(running);
+    tab.wait_until("lost", "document.getElementById('link').dataset.state !== 'connected'");
+    tab.wait_until("nothing can be pressed", "document.getElementById('pause').disabled");
+    // The port is free again once the system has forgotten the old connections.
+    let again = Running::start_at(1, &address, ServeCfg::default());
+    tab.wait_until("found again", "document.getElementById('link').dataset.state === 'connected'");
+    tab.wait_until("it can be pressed", "!document.getElementById('pause').disabled");
+    wait_until("one viewer", || again.viewers() == 1);
+}
+
+#[test]
+fn the_page_is_readable_dark_and_narrow() {
+    let Some(browser) = browser() else { return };
+    let running = Running::start(1);
+    let mut tab = page(&browser, &running);
+    tab.wait_until("a picture", "document.getElementById('cover').hidden");
+    // Every control has a name for those who do not see it.
+    let unnamed = tab.evaluate(
+        "[...document.querySelectorAll('button, input, select, canvas')]
+            .filter((e) => !(e.labels?.length || e.getAttribute('aria-label') || e.getAttribute('aria-labelledby')
+                || e.tagName === 'BUTTON' && e.textContent.trim()))
+            .map((e) => e.outerHTML)",
+    );
+    assert_eq!(unnamed, json!([]));
+    for (scheme, width, name) in
+        [("light", 1400, "serve_light.png"), ("dark", 1400, "serve_dark.png"), ("light", 420, "serve_narrow.png")]
+    {
+        tab.show_as(scheme, [width, 900]);
+        // Contrast of text on its ground, after WCAG 2: 4.5 is asked for.
+        let contrast = tab.evaluate(
+            "(() => {
+                const parse = (c) => c.match(/[\\d.]+/g).slice(0, 3).map(Number);
+                const light = (c) => parse(c).map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+                    .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+                const card = getComputedStyle(document.querySelector('.card')).backgroundColor;
+                const of = (e) => { const [a, b] = [light(getComputedStyle(e).color), light(card)].sort((x, y) => y - x); return (a + 0.05) / (b + 0.05); };
+                return Math.min(...['h2', '.hint', '.joint .name', '.joint output', '#link', 'dt'].map((s) => of(document.querySelector(s))));
+            })()",
+        );
+        assert!(contrast.as_f64() >= Some(4.5), "{scheme}: {contrast}");
+        let overflow = tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth");
+        assert_eq!(overflow, 0, "{scheme} {width}: the page is wider than its window");
+        std::thread::sleep(Duration::from_millis(700));
+        screenshot(&mut tab, name);
+    }
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}

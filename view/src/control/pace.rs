@@ -1,0 +1,154 @@
+//! How fast simulated time passes, measured and held.
+
+use super::Speed;
+use std::time::{Duration, Instant};
+
+/// Farther behind than this the lost time is given up: a simulation that was held does not rush to catch up.
+const GIVE_UP: Duration = Duration::from_millis(200);
+/// Over how long the speed is measured.
+const WINDOW: Duration = Duration::from_millis(500);
+/// How long steps may go on without a look at commands, about.
+const LOOK: Duration = Duration::from_millis(8);
+
+/// The clock of a simulation that somebody watches.
+#[derive(Debug)]
+pub(super) struct Pace {
+    speed: Speed,
+    dt: f64,
+    /// A moment and the step that was due then.
+    anchor: (Instant, u64),
+    /// When the measurement began, and with which step.
+    window: (Instant, u64),
+    measured: Option<f64>,
+    /// A step takes about this long when nothing is waited for.
+    step_time: Duration,
+    /// When the last wait ended, and with which step.
+    resumed: (Instant, u64),
+}
+
+impl Pace {
+    pub(super) fn new(dt: f64, steps: u64, now: Instant) -> Self {
+        let mark = (now, steps);
+        let step_time = Duration::from_millis(4);
+        Self { speed: Speed::Free, dt, anchor: mark, window: mark, measured: None, step_time, resumed: mark }
+    }
+
+    pub(super) fn speed(&self) -> Speed {
+        self.speed
+    }
+
+    pub(super) fn set_speed(&mut self, speed: Speed, steps: u64, now: Instant) {
+        self.speed = speed;
+        self.restart(steps, now);
+    }
+
+    /// Counts from now: after a pause, a reset, another speed.
+    pub(super) fn restart(&mut self, steps: u64, now: Instant) {
+        (self.anchor, self.window, self.resumed, self.measured) = ((now, steps), (now, steps), (now, steps), None);
+    }
+
+    /// Simulated seconds per second over the last half second; `None` at first.
+    pub(super) fn measured(&self) -> Option<f64> {
+        self.measured
+    }
+
+    /// Steps were done.
+    pub(super) fn note(&mut self, steps: u64, now: Instant) {
+        let (since, first) = self.resumed;
+        let done = steps.saturating_sub(first);
+        if done > 0 {
+            let each = now.saturating_duration_since(since) / u32::try_from(done).unwrap_or(u32::MAX);
+            self.step_time = (self.step_time * 3 + each) / 4;
+        }
+        self.resumed = (now, steps);
+        let (began, first) = self.window;
+        let long = now.saturating_duration_since(began);
+        if long >= WINDOW {
+            self.measured = Some(steps.saturating_sub(first) as f64 * self.dt / long.as_secs_f64());
+            self.window = (now, steps);
+        }
+    }
+
+    /// How long to wait before the next step; none where the machine is behind.
+    pub(super) fn ahead(&mut self, steps: u64, now: Instant) -> Duration {
+        let Speed::Times(factor) = self.speed else { return Duration::ZERO };
+        let (began, first) = self.anchor;
+        let due = began + Duration::from_secs_f64(steps.saturating_sub(first) as f64 * self.dt / factor);
+        if now.saturating_duration_since(due) > GIVE_UP {
+            self.anchor = (now, steps);
+        }
+        due.saturating_duration_since(now)
+    }
+
+    /// The waiting is over.
+    pub(super) fn waited(&mut self, steps: u64, now: Instant) {
+        self.resumed = (now, steps);
+    }
+
+    /// Steps until it is looked again.
+    pub(super) fn block(&self) -> u64 {
+        let by_work = LOOK.as_secs_f64() / self.step_time.as_secs_f64().max(1e-9);
+        let by_pace = match self.speed {
+            Speed::Free => f64::INFINITY,
+            Speed::Times(factor) => LOOK.as_secs_f64() * factor / self.dt,
+        };
+        (by_work.min(by_pace) as u64).clamp(1, 100_000)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.01;
+
+    #[test]
+    fn real_time_waits_for_what_is_left_of_each_step() {
+        let start = Instant::now();
+        let mut pace = Pace::new(DT, 5, start);
+        assert_eq!(pace.ahead(50, start), Duration::ZERO, "free speed never waits");
+        pace.set_speed(Speed::REAL, 5, start);
+        // Ten steps are 100 ms; 30 ms are gone.
+        let wait = pace.ahead(15, start + Duration::from_millis(30));
+        assert!(wait.abs_diff(Duration::from_millis(70)) < Duration::from_micros(1), "{wait:?}");
+        pace.set_speed(Speed::Times(0.1), 5, start);
+        let wait = pace.ahead(15, start);
+        assert!(wait.abs_diff(Duration::from_secs(1)) < Duration::from_micros(1), "{wait:?}");
+    }
+
+    #[test]
+    fn what_was_lost_is_given_up() {
+        let start = Instant::now();
+        let mut pace = Pace::new(DT, 0, start);
+        pace.set_speed(Speed::REAL, 0, start);
+        // A second behind: no wait, and from here on it counts anew.
+        let late = start + Duration::from_secs(1);
+        assert_eq!(pace.ahead(1, late), Duration::ZERO);
+        let wait = pace.ahead(2, late);
+        assert!(wait.abs_diff(Duration::from_millis(10)) < Duration::from_micros(1), "{wait:?}");
+    }
+
+    #[test]
+    fn speed_is_measured_over_half_a_second() {
+        let start = Instant::now();
+        let mut pace = Pace::new(DT, 0, start);
+        pace.note(10, start + Duration::from_millis(100));
+        assert_eq!(pace.measured(), None);
+        pace.note(100, start + Duration::from_millis(500));
+        assert!(pace.measured().is_some_and(|speed| (speed - 2.0).abs() < 1e-9), "{:?}", pace.measured());
+    }
+
+    #[test]
+    fn looks_are_some_milliseconds_apart() {
+        let start = Instant::now();
+        let mut pace = Pace::new(0.001, 0, start);
+        // Steps of 20 µs, again and again.
+        for k in 1..40u32 {
+            pace.note(u64::from(k) * 100, start + Duration::from_millis(2) * k);
+        }
+        let block = pace.block();
+        assert!((300..=400).contains(&block), "8 ms are 400 steps: {block}");
+        pace.set_speed(Speed::REAL, 0, start);
+        assert_eq!(pace.block(), 8);
+    }
+}

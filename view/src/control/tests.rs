@@ -1,0 +1,348 @@
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use super::spring::Spring;
+use super::*;
+use crate::sample::{MASS, sample};
+use crate::stage::Snapshot;
+use scene::Pose;
+use sim::{BodyMotion, RigidObjectCfg, SimulationManagerCfg};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Longer than anything here takes on a busy machine: what is not there by then does not come.
+const LONG: Duration = Duration::from_secs(30);
+
+/// A simulation that a thread steps until it is told to stop.
+struct Running {
+    steps: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<SimulationManager>>,
+}
+
+impl Running {
+    fn start(mut sim: SimulationManager) -> Self {
+        let (steps, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+        let (count, ends) = (Arc::clone(&steps), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            while !ends.load(Ordering::SeqCst) {
+                sim.update(1);
+                count.fetch_add(1, Ordering::SeqCst);
+            }
+            sim
+        });
+        Self { steps, stop, thread: Some(thread) }
+    }
+
+    fn steps(&self) -> u64 {
+        self.steps.load(Ordering::SeqCst)
+    }
+
+    /// Waits until it has done more than `steps` steps.
+    fn goes_on_beyond(&self, steps: u64) -> bool {
+        let start = Instant::now();
+        while self.steps() <= steps && start.elapsed() < LONG {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.steps() > steps
+    }
+
+    /// The simulation, stopped; whoever held it has to be gone.
+    fn end(mut self) -> SimulationManager {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.take().unwrap().join().unwrap()
+    }
+}
+
+/// The first snapshot from now on that is as it should be.
+fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+    let start = Instant::now();
+    let mut after = 0;
+    while start.elapsed() < LONG {
+        if let Some(snapshot) = viewer.wait(after, Duration::from_millis(100)) {
+            if is(&snapshot) {
+                return snapshot;
+            }
+            after = snapshot.number;
+        }
+    }
+    panic!("no such snapshot; the newest is {:?}", viewer.newest().map(|s| s.run.clone()));
+}
+
+/// Steps until something is so. Commands are obeyed some milliseconds later, whatever number of steps that is.
+fn step_until(sim: &mut SimulationManager, is: impl Fn(&SimulationManager) -> bool) {
+    let start = Instant::now();
+    while !is(sim) {
+        assert!(start.elapsed() < LONG, "it never comes");
+        sim.update(1);
+    }
+}
+
+#[test]
+fn a_pause_holds_and_steps_are_counted() {
+    let mut sim = sample(2).sim;
+    let viewer = sim.viewer(Wants::default());
+    let running = Running::start(sim);
+    assert!(viewer.send(Command::Pause));
+    let held = wait_for(&viewer, |s| s.run.paused).run.steps;
+    // It is inside of update: the step that it holds at was done, and update has not returned.
+    let done = running.steps();
+    assert!(done == held || done + 1 == held, "{done} {held}");
+    std::thread::sleep(Duration::from_millis(200));
+    assert_eq!(running.steps(), done, "a held simulation does no step");
+    assert!(viewer.send(Command::Step(7)));
+    let after = wait_for(&viewer, |s| s.run.paused && s.run.steps > held);
+    assert_eq!(after.run.steps, held + 7);
+    // The cube's time says so too: steps of 10 ms.
+    assert!((after.envs[1].look.time - (held + 7) as f64 * 0.01).abs() < 1e-9);
+    assert!(viewer.send(Command::Resume));
+    assert!(running.goes_on_beyond(held + 100));
+    drop(viewer);
+    running.end();
+}
+
+#[test]
+fn the_simulation_goes_on_when_the_viewer_that_paused_it_is_gone() {
+    let mut sim = sample(1).sim;
+    let viewer = sim.viewer(Wants::default());
+    let other = viewer.another(Wants::default());
+    let running = Running::start(sim);
+    viewer.send(Command::SetSpeed(Speed::Times(0.5)));
+    viewer.send(Command::Pause);
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Times(0.5));
+    other.send(Command::Pause);
+    // Steps are of those who paused: whoever asks for one holds nothing.
+    let stepper = other.another(Wants::default());
+    let held = other.newest().unwrap().run.steps;
+    stepper.send(Command::Step(1));
+    let held = wait_for(&other, |s| s.run.paused && s.run.steps == held + 1).run.steps;
+    drop(viewer);
+    // The other one paused it as well: it stays held. The speed went with who had set it.
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Free);
+    std::thread::sleep(Duration::from_millis(250));
+    assert!(running.steps() <= held);
+    // Somebody who only watches does not keep it held.
+    drop(other);
+    wait_for(&stepper, |s| !s.run.paused && s.run.steps > held);
+    drop(stepper);
+    assert!(running.goes_on_beyond(held + 200), "nobody is there to let it go on");
+    let mut sim = running.end();
+    // A new viewer finds it running, at free speed, with snapshots.
+    let viewer = sim.viewer(Wants::default());
+    let snapshot = viewer.newest().unwrap();
+    assert!(!snapshot.run.paused && snapshot.run.speed == Speed::Free);
+    drop(sim);
+    assert!(viewer.is_over() && !viewer.send(Command::Pause));
+    assert!(viewer.wait(u64::MAX - 1, LONG).is_none(), "nobody waits for a simulation that is over");
+}
+
+#[test]
+fn a_speed_ends_with_its_viewer() {
+    let mut sim = sample(1).sim;
+    let below = sim.viewer(Wants::default());
+    let above = below.another(Wants::default());
+    let running = Running::start(sim);
+    below.send(Command::SetSpeed(Speed::Times(20.0)));
+    wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
+    above.send(Command::SetSpeed(Speed::REAL));
+    wait_for(&below, |s| s.run.speed == Speed::REAL);
+    drop(above);
+    wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
+    // Who sets it again has the last word, and leaves nothing else behind.
+    let above = below.another(Wants::default());
+    above.send(Command::SetSpeed(Speed::REAL));
+    wait_for(&below, |s| s.run.speed == Speed::REAL);
+    below.send(Command::SetSpeed(Speed::Times(30.0)));
+    wait_for(&below, |s| s.run.speed == Speed::Times(30.0));
+    drop(above);
+    let gone = wait_for(&below, |_| true).run.steps;
+    wait_for(&below, |s| s.run.steps > gone && s.run.speed == Speed::Times(30.0));
+    drop(below);
+    running.end();
+}
+
+#[test]
+fn a_slider_moves_its_joint_and_a_reset_puts_it_back() {
+    let sample = sample(2);
+    let (mut sim, robot) = (sample.sim, sample.robot);
+    let viewer = sim.viewer(Wants::default());
+    let names = Arc::clone(&viewer.newest().unwrap().names);
+    assert_eq!(names.joints.len(), 1);
+    assert!(names.joints[0].name == "arm/turn" && names.joints[0].driven && names.joints[0].robot == robot);
+    let joint = names.joints[0].joint;
+    viewer.send(Command::SetTarget { robot, joint, env: Some(EnvId(1)), value: 0.8 });
+    sim.update(300);
+    let q = sim.robot(robot).get_qpos();
+    // The drive has no load about the vertical: it ends in its target. Critically damped or slower poles of 10 s⁻¹ and
+    // more leave e^-20 of the way after 3 s.
+    assert!((q[(1, 0)] - 0.8).abs() < 1e-6, "{q}");
+    assert_eq!(q[(0, 0)], 0.0, "the other environment was not asked");
+    viewer.send(Command::Reset(Some(EnvId(1))));
+    step_until(&mut sim, |sim| sim.time()[1] < 1.0);
+    assert!(sim.time()[0] > 2.9, "only one was put back");
+    assert!(sim.robot(robot).get_qpos()[(1, 0)].abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_done_is_said_and_nothing_panics() {
+    let mut one = sample(1);
+    let other = sample(1);
+    let viewer = one.sim.viewer(Wants::default());
+    let nonsense = [
+        Command::SetSpeed(Speed::Times(0.0)),
+        Command::SetSpeed(Speed::Times(f64::NAN)),
+        Command::Reset(Some(EnvId(9))),
+        Command::SetTarget { robot: other.robot, joint: JointIndex(0), env: None, value: 0.0 },
+        Command::SetTarget { robot: one.robot, joint: JointIndex(7), env: None, value: 0.0 },
+        Command::SetTarget { robot: one.robot, joint: JointIndex(0), env: Some(EnvId(9)), value: 0.0 },
+        Command::SetTarget { robot: one.robot, joint: JointIndex(0), env: None, value: f64::NAN },
+        Command::Drag { env: EnvId(9), body: 0, hold: [0.0; 3], target: [0.0; 3] },
+        Command::Drag { env: EnvId(0), body: 99, hold: [0.0; 3], target: [0.0; 3] },
+        Command::Drag { env: EnvId(0), body: 2, hold: [0.0; 3], target: [f64::INFINITY; 3] },
+    ];
+    for command in nonsense {
+        let before = viewer.newest().unwrap().number;
+        assert!(viewer.send(command));
+        one.sim.update(1);
+        let start = Instant::now();
+        let mut newest = viewer.newest().unwrap();
+        while (newest.number == before || newest.run.refused.is_none()) && start.elapsed() < LONG {
+            one.sim.update(1);
+            newest = viewer.newest().unwrap();
+        }
+        assert!(newest.run.refused.is_some(), "{command:?}");
+    }
+    assert!(one.sim.diverged().is_empty());
+}
+
+/// Steps of 10 ms: it is looked after every one, and at step s it is waited until (s - s0) 10 ms after the step s0 that
+/// the speed was set at, the first one. So 40 steps take 38 steps' time at least. A busy machine may take longer.
+#[test]
+fn real_time_is_not_overtaken() {
+    let mut sim = sample(1).sim;
+    let viewer = sim.viewer(Wants::default());
+    let start = Instant::now();
+    sim.update(40);
+    let free = start.elapsed();
+    let set = |sim: &mut SimulationManager, speed| {
+        viewer.send(Command::SetSpeed(speed));
+        step_until(sim, |_| viewer.newest().is_some_and(|snapshot| snapshot.run.speed == speed));
+    };
+    set(&mut sim, Speed::REAL);
+    let start = Instant::now();
+    sim.update(40);
+    let real = start.elapsed();
+    assert!(real >= Duration::from_millis(380), "{real:?}");
+    set(&mut sim, Speed::Times(4.0));
+    let start = Instant::now();
+    sim.update(40);
+    let fast = start.elapsed();
+    assert!(fast >= Duration::from_millis(80), "{fast:?}");
+    // The control: without a speed nothing is waited for. (40 steps of one box take some milliseconds.)
+    assert!(free < real, "{free:?} {real:?}");
+}
+
+#[test]
+fn the_force_of_a_spring_points_to_its_end_and_slows_what_moves() {
+    let motion = BodyMotion {
+        pose: Pose::translation(1.0, 2.0, 3.0),
+        linear: [0.0; 3],
+        angular: [0.0; 3],
+        carried_mass: 2.0,
+        is_fixed: false,
+    };
+    let spring = Spring { env: EnvId(0), body: 0, hold: [0.1, 0.0, 0.0], target: [1.1, 2.0, 3.5] };
+    let [point, force] = spring.force(&motion);
+    // 2 kg (8 rad/s)² 0.5 m = 64 N, straight up.
+    assert!((0..3).all(|k| (point[k] - [1.1, 2.0, 3.0][k]).abs() < 1e-12));
+    assert!((0..3).all(|k| (force[k] - [0.0, 0.0, 64.0][k]).abs() < 1e-9), "{force:?}");
+    // Turning about z with 1 rad/s, the point moves along y with 0.1 m/s: 2 kg 2 (8 rad/s) 0.1 m/s against it.
+    let [_, force] = spring.force(&BodyMotion { angular: [0.0, 0.0, 1.0], ..motion });
+    assert!((force[1] + 3.2).abs() < 1e-9, "{force:?}");
+}
+
+/// A free body in its centre of mass on the spring is a critically damped oscillator: x(t) = 1 - (1 + w t) e^-wt.
+#[test]
+fn a_dragged_body_follows_as_the_closed_form_says() {
+    let cfg = SimulationManagerCfg { gravity: [0.0; 3].into(), physics_dt: 1e-3, ground: None, ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let cube = RigidObjectCfg { uid: "cube".into(), mass: Some(MASS), ..Default::default() };
+    let id = sim.add_rigid_object(cube).unwrap();
+    let viewer = sim.viewer(Wants::default());
+    viewer.send(Command::Drag { env: EnvId(0), body: 0, hold: [0.0; 3], target: [1.0, 0.0, 0.0] });
+    // The command is obeyed after the first step.
+    sim.update(1);
+    for k in 1..=5 {
+        sim.update(100);
+        let wt = 8.0 * 0.1 * f64::from(k);
+        let expected = 1.0 - (1.0 + wt) * (-wt).exp();
+        let x = sim.rigid_object(id).get_pose()[(0, 0)];
+        // Semi-implicit Euler with the force of the beginning of the step moves the poles by w² h / 2 relative to w: the
+        // curve is late or early by less than w h = 0.8 %, of a way of 1 m.
+        assert!((x - expected).abs() < 0.008, "after {wt}: {x}, not {expected}");
+    }
+    viewer.send(Command::Release);
+    sim.update(1);
+    let v = sim.rigid_object(id).get_velocity()[(0, 0)];
+    sim.update(100);
+    let after = sim.rigid_object(id).get_velocity()[(0, 0)];
+    assert_eq!(v, after, "let go, it flies on as it was");
+    // A viewer that goes lets go as well.
+    viewer.send(Command::Drag { env: EnvId(0), body: 0, hold: [0.0; 3], target: [9.0, 0.0, 0.0] });
+    let speed = |sim: &SimulationManager| sim.rigid_object(id).get_velocity()[(0, 0)];
+    step_until(&mut sim, |sim| speed(sim) > after);
+    drop(viewer);
+    // While it is pulled it is looked after every step.
+    sim.update(2);
+    let v = speed(&sim);
+    sim.update(50);
+    assert_eq!(v, speed(&sim));
+}
+
+/// Watching, with everything that can be wanted, changes no bit; nor does a viewer that never looks and lets nothing go.
+#[test]
+fn watching_changes_nothing_and_waits_for_nobody() {
+    let run = |watch: bool| {
+        let mut sample = sample(3);
+        let wants = Wants { rate: 1000.0, contacts: Some(Shown::All), ..Wants::default() };
+        let mut held = Vec::new();
+        let viewers: Vec<Viewer> = (0..3).filter(|_| watch).map(|_| sample.sim.viewer(wants)).collect();
+        for k in 0..50 {
+            sample.sim.update(4);
+            // It keeps every snapshot it gets: more than there are.
+            held.extend(viewers.iter().filter_map(Viewer::newest));
+            if k == 20 {
+                sample.sim.reset(Some(&[EnvId(1)])).unwrap();
+            }
+        }
+        if watch {
+            let mut numbers: Vec<u64> = held.iter().map(|snapshot| snapshot.number).collect();
+            numbers.dedup();
+            assert!(numbers.len() > 1, "there were snapshots: {numbers:?}");
+            assert!(numbers.len() <= 5, "a pool of 5 for 3 viewers: {numbers:?}");
+        }
+        let mut bits = Vec::new();
+        sample.sim.batch().for_each(|_, env| {
+            let data = env.data();
+            let numbers = data.qpos().iter().chain(data.qvel()).chain(data.qacc_warmstart());
+            bits.extend(numbers.map(|x| x.to_bits()));
+        });
+        bits
+    };
+    assert_eq!(run(true), run(false));
+}
+
+#[test]
+fn a_viewer_sees_what_was_added_later() {
+    let mut sample = sample(1);
+    let viewer = sample.sim.viewer(Wants::default());
+    let before = viewer.newest().unwrap();
+    let cfg = RigidObjectCfg { uid: "late".into(), init_pose: Pose::translation(0.0, 1.0, 0.5), ..Default::default() };
+    sample.sim.add_rigid_object(cfg).unwrap();
+    let after = viewer.newest().unwrap();
+    assert!(after.number > before.number);
+    assert!(after.names.bodies.iter().any(|name| name == "late"));
+    assert_eq!(before.names.bodies.len() + 1, after.names.bodies.len(), "a snapshot never changes");
+    assert_eq!(after.envs[0].look.bodies.len(), after.names.bodies.len());
+}

@@ -1,0 +1,69 @@
+//! A small simulation for tests: an arm with one joint, a cube on the ground, a camera over it.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use scene::Pose;
+use sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use sim::{
+    DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg,
+    UrdfCfg,
+};
+
+/// Half the length of the cube's edges \[m\].
+pub(crate) const HALF: f64 = 0.1;
+/// Mass of the cube \[kg\].
+pub(crate) const MASS: f64 = 2.0;
+
+/// A plate that turns about the vertical, 1 m beside the cube.
+const ARM: &str = r#"<robot name="arm"><link name="base"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="plate"/><origin xyz="1 0 0.5"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="50" velocity="5"/></joint>
+  <link name="plate">
+    <inertial><mass value="1"/><inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><geometry><box size="0.4 0.4 0.05"/></geometry></visual>
+    <collision><geometry><box size="0.4 0.4 0.05"/></geometry></collision>
+  </link></robot>"#;
+
+pub(crate) struct Sample {
+    pub(crate) sim: SimulationManager,
+    pub(crate) robot: RobotId,
+    pub(crate) camera: SensorId<Camera>,
+}
+
+/// `num_envs` environments with steps of 10 ms.
+pub(crate) fn sample(num_envs: usize) -> Sample {
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        num_envs,
+        physics_dt: 0.01,
+        threads: Some(1),
+        arena_space: 4.0,
+        ..Default::default()
+    })
+    .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("arm.urdf");
+    std::fs::write(&file, ARM).unwrap();
+    let drive =
+        DriveCfg { stiffness: [("turn", 100.0)].into(), damping: [("turn", 10.0)].into(), ..Default::default() };
+    let cfg = RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(&file), drive, ..Default::default() };
+    let robot = sim.add_robot(cfg).unwrap();
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(2.0 * HALF),
+        mass: Some(MASS),
+        init_pose: Pose::translation(0.0, 0.0, HALF),
+        rgba: [0.8, 0.1, 0.1, 1.0],
+        ..Default::default()
+    })
+    .unwrap();
+    let placement = Placement::LookAt { eye: [0.6, 0.5, 0.8], target: [0.2, 0.0, 0.1], up: [0.0, 0.0, 1.0] };
+    let cfg = CameraCfg {
+        width: 64,
+        height: 48,
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() },
+        ..Default::default()
+    };
+    let camera = sim.add_sensor("eye", cfg).unwrap();
+    Sample { sim, robot, camera }
+}

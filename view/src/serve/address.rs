@@ -1,0 +1,147 @@
+//! Where the browser view listens.
+
+use super::error::ServeError;
+use std::io::ErrorKind;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+
+/// Where an address without a port listens.
+const PORT: u16 = 8080;
+/// Ports that are tried as candidates where one is taken.
+const NEXT: u16 = 64;
+
+/// What the user wrote, as an address: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` and `8080` are known;
+/// names of other machines are not looked up.
+pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
+    let text = given.trim();
+    let local = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+    if let Ok(address) = text.parse::<SocketAddr>() {
+        return Ok(address);
+    }
+    if let Ok(ip) = text.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>() {
+        return Ok(SocketAddr::new(ip, PORT));
+    }
+    if let Ok(port) = text.parse::<u16>() {
+        return Ok(local(port));
+    }
+    let (host, port) = text.rsplit_once(':').unwrap_or((text, ""));
+    let wanted = if port.is_empty() { Some(PORT) } else { port.parse::<u16>().ok() };
+    if let (true, Some(port)) = (host.is_empty() || host.eq_ignore_ascii_case("localhost"), wanted) {
+        return Ok(local(port));
+    }
+    let reason = match wanted {
+        None => format!("{port:?} is no port: ports are 0 to 65535"),
+        Some(_) => format!("{host:?} is neither an IP address of this machine nor localhost"),
+    };
+    let port = wanted.unwrap_or(PORT);
+    let candidates = vec![local(port).to_string(), SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).to_string()];
+    Err(ServeError::Address { given: given.into(), reason, candidates })
+}
+
+/// Listens there; the next free port is a candidate where this one is taken.
+pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
+    let error = match TcpListener::bind(address) {
+        Ok(listener) => return Ok(listener),
+        Err(error) => error,
+    };
+    let ip = address.ip();
+    match error.kind() {
+        ErrorKind::AddrInUse => Err(ServeError::PortInUse { address, next: next_free(address) }),
+        ErrorKind::PermissionDenied => {
+            let next = next_free(SocketAddr::new(ip, PORT - 1));
+            Err(ServeError::Address {
+                given: address.to_string(),
+                reason: format!("port {} needs rights that this program has not", address.port()),
+                candidates: next.iter().map(ToString::to_string).collect(),
+            })
+        }
+        ErrorKind::AddrNotAvailable => Err(ServeError::Address {
+            given: address.to_string(),
+            reason: format!("{ip} is not an address of this machine"),
+            candidates: [IpAddr::from(Ipv4Addr::LOCALHOST), Ipv4Addr::UNSPECIFIED.into()]
+                .map(|ip| SocketAddr::new(ip, address.port()).to_string())
+                .to_vec(),
+        }),
+        _ => Err(ServeError::Listen { address, error }),
+    }
+}
+
+/// The next port that nobody listens on.
+fn next_free(address: SocketAddr) -> Option<SocketAddr> {
+    let ports = (1..=NEXT).filter_map(|k| address.port().checked_add(k));
+    ports.map(|port| SocketAddr::new(address.ip(), port)).find(|address| TcpListener::bind(address).is_ok())
+}
+
+/// How others reach what listens there: where it listens on every address, the one that packets leave from.
+pub(super) fn reachable(address: SocketAddr) -> SocketAddr {
+    if !address.ip().is_unspecified() {
+        return address;
+    }
+    // Connecting a UDP socket sends nothing: it only asks which interface would be used. The other end is an address of
+    // documentations (RFC 5737), which nobody has.
+    let outgoing = || {
+        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+        socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9)).ok()?;
+        Some(socket.local_addr().ok()?.ip())
+    };
+    let ip = outgoing().filter(|ip| !ip.is_unspecified()).unwrap_or(Ipv4Addr::LOCALHOST.into());
+    SocketAddr::new(ip, address.port())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_people_write_is_understood() {
+        for (given, expected) in [
+            ("127.0.0.1:8080", "127.0.0.1:8080"),
+            ("localhost:9000", "127.0.0.1:9000"),
+            ("localhost", "127.0.0.1:8080"),
+            ("9000", "127.0.0.1:9000"),
+            (":9000", "127.0.0.1:9000"),
+            ("0.0.0.0:80", "0.0.0.0:80"),
+            ("::1", "[::1]:8080"),
+            ("[::1]", "[::1]:8080"),
+            ("[::1]:0", "[::1]:0"),
+            (" 10.0.0.7 ", "10.0.0.7:8080"),
+            ("", "127.0.0.1:8080"),
+        ] {
+            assert_eq!(parse(given).expect(given).to_string(), expected, "{given:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused_with_candidates() {
+        for (given, says, candidate) in [
+            ("127.0.0.1:99999", "is no port", "127.0.0.1:8080"),
+            ("example.org:8080", "neither an IP address", "127.0.0.1:8080"),
+            ("localhost:eighty", "is no port", "127.0.0.1:8080"),
+            ("1.2.3:70", "neither an IP address", "127.0.0.1:70"),
+            ("-1", "neither an IP address", "127.0.0.1:8080"),
+        ] {
+            let Err(ServeError::Address { reason, candidates, .. }) = parse(given) else { panic!("{given:?}") };
+            assert!(reason.contains(says), "{given:?}: {reason}");
+            assert_eq!(candidates[0], candidate, "{given:?}");
+        }
+    }
+
+    #[test]
+    fn a_port_in_use_names_the_next_free_one() {
+        let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = taken.local_addr().expect("it listens");
+        let Err(ServeError::PortInUse { address: named, next: Some(next) }) = listen(address) else {
+            panic!("port {} is taken", address.port())
+        };
+        assert_eq!(named, address);
+        assert!(next.port() > address.port());
+        listen(next).expect("the candidate is free");
+    }
+
+    #[test]
+    fn an_address_of_another_machine_is_refused() {
+        // Of documentations (RFC 5737).
+        let error = listen("192.0.2.1:0".parse().expect("an address")).expect_err("nobody has it");
+        assert!(matches!(&error, ServeError::Address { .. }), "{error}");
+        assert!(error.to_string().contains("not an address of this machine"), "{error}");
+    }
+}

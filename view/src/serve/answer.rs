@@ -1,0 +1,114 @@
+//! Answers of HTTP. Every connection is closed after one.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::time::{Duration, Instant};
+
+/// How long the other end may take to read an answer.
+const WRITE_TIME: Duration = Duration::from_secs(5);
+/// How much of what is still on its way is read before closing, and for how long: closing with something unread would
+/// destroy the answer before it is read.
+const LINGER: (usize, Duration) = (256 << 10, Duration::from_millis(300));
+
+/// Why something was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Status {
+    BadRequest,
+    Forbidden,
+    NotFound,
+    WrongMethod,
+    Timeout,
+    UpgradeRequired,
+    TooLarge,
+    Busy,
+    Broken,
+}
+
+impl Status {
+    fn line(self) -> &'static str {
+        match self {
+            Self::BadRequest => "400 Bad Request",
+            Self::Forbidden => "403 Forbidden",
+            Self::NotFound => "404 Not Found",
+            Self::WrongMethod => "405 Method Not Allowed",
+            Self::Timeout => "408 Request Timeout",
+            Self::UpgradeRequired => "426 Upgrade Required",
+            Self::TooLarge => "431 Request Header Fields Too Large",
+            Self::Busy => "503 Service Unavailable",
+            Self::Broken => "500 Internal Server Error",
+        }
+    }
+
+    fn says(self) -> &'static str {
+        match self {
+            Self::BadRequest => "This is no request that is understood here.",
+            Self::Forbidden => {
+                "Not allowed. Open the address that the program printed, with its token where it has one; pages of other \
+                 sites may not come here."
+            }
+            Self::NotFound => "There is nothing here: the page is at /.",
+            Self::WrongMethod => "Only GET is answered here.",
+            Self::Timeout => "The request took too long.",
+            Self::UpgradeRequired => "This is for WebSockets of version 13.",
+            Self::TooLarge => "The request is too large.",
+            Self::Busy => "There are as many viewers as may be: close one, and load this page again.",
+            Self::Broken => "Something is broken here.",
+        }
+    }
+}
+
+/// Sends a page.
+pub(super) fn page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: bool) {
+    let policy = format!(
+        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
+         data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    );
+    let more = [("Content-Security-Policy", policy.as_str()), ("Content-Type", "text/html; charset=utf-8")];
+    send(stream, "200 OK", &more, html, with_body);
+}
+
+/// Refuses.
+pub(super) fn refuse(stream: &mut TcpStream, status: Status) {
+    let more: &[(&str, &str)] = match status {
+        Status::WrongMethod => &[("Allow", "GET, HEAD")],
+        Status::UpgradeRequired => &[("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")],
+        Status::Busy => &[("Retry-After", "5")],
+        _ => &[],
+    };
+    let more: Vec<_> = more.iter().copied().chain([("Content-Type", "text/plain; charset=utf-8")]).collect();
+    send(stream, status.line(), &more, &format!("{}\n", status.says()), true);
+}
+
+fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {
+    let more: String = more.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+    let head = format!(
+        "HTTP/1.1 {line}\r\n{more}Content-Length: {}\r\nCache-Control: no-store\r\nReferrer-Policy: no-referrer\r\n\
+         X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
+        body.len()
+    );
+    let body = if with_body { body } else { "" };
+    let sent = stream.set_write_timeout(Some(WRITE_TIME)).and_then(|()| stream.write_all((head + body).as_bytes()));
+    if sent.is_ok() {
+        linger(stream);
+    }
+}
+
+/// Reads what is still coming, up to a bound.
+pub(super) fn linger(stream: &mut TcpStream) {
+    let (most, time) = LINGER;
+    let start = Instant::now();
+    let (mut seen, mut chunk) = (0, [0; 4096]);
+    if stream.shutdown(Shutdown::Write).is_err() {
+        return;
+    }
+    while seen < most {
+        let left = time.saturating_sub(start.elapsed());
+        if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
+            return;
+        }
+        match stream.read(&mut chunk) {
+            Ok(0) | Err(_) => return,
+            Ok(n) => seen += n,
+        }
+    }
+}

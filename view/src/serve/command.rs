@@ -1,0 +1,115 @@
+//! What a page may ask for.
+
+use serde::Deserialize;
+
+/// A command of one viewer, as JSON: `{"do": "orbit", "dx": 0.1, "dy": 0}`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum Command {
+    /// A picture or a state has arrived: the next may come.
+    Seen { what: Seen },
+    /// Pictures are to be so large \[pixels\].
+    Size { width: usize, height: usize },
+    /// Turns the view, in heights of the picture.
+    Orbit { dx: f64, dy: f64 },
+    /// Moves the view, in heights of the picture.
+    Pan { dx: f64, dy: f64 },
+    /// Comes nearer, in notches of a wheel.
+    Zoom { by: f64 },
+    /// Looks from where it began.
+    Home,
+    /// Looks at one environment, or at all.
+    Environment { env: Option<usize> },
+    /// Shows what a camera sensor sees, or none.
+    Camera { name: Option<String> },
+    /// Shows or hides something.
+    Overlay { name: String, on: bool },
+    /// Holds the simulation.
+    Pause,
+    /// Goes on.
+    Play,
+    /// Does one step, and holds then.
+    Step,
+    /// Resets the environment that is looked at, or all.
+    Reset,
+    /// Simulated seconds per second; without bound where there is none.
+    Speed { factor: Option<f64> },
+    /// Moves a joint's target \[rad or m\] in the environment that is looked at, or in all.
+    Target { robot: String, joint: String, value: f64 },
+}
+
+/// What has arrived.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Seen {
+    /// A picture.
+    Picture,
+    /// Contents or a state.
+    State,
+}
+
+impl Command {
+    /// Reads a command; what is wrong with it is said in words.
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let command: Self = serde_json::from_str(text).map_err(|error| format!("not understood: {error}"))?;
+        command.check()?;
+        Ok(command)
+    }
+
+    /// Numbers that mean something.
+    fn check(&self) -> Result<(), String> {
+        // A hand does not move further between two pictures.
+        const FAR: f64 = 100.0;
+        let within = |value: f64, what: &str| {
+            if value.abs() <= FAR { Ok(()) } else { Err(format!("{what} is {value}: -{FAR} to {FAR} would do")) }
+        };
+        match self {
+            Self::Orbit { dx, dy } | Self::Pan { dx, dy } => within(*dx, "dx").and_then(|()| within(*dy, "dy")),
+            Self::Zoom { by } => within(*by, "by"),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_read() {
+        for (text, expected) in [
+            (r#"{"do":"pause"}"#, Command::Pause),
+            (r#"{"do":"seen","what":"picture"}"#, Command::Seen { what: Seen::Picture }),
+            (r#"{"do":"environment","env":null}"#, Command::Environment { env: None }),
+            (r#"{"do":"environment","env":3}"#, Command::Environment { env: Some(3) }),
+            (r#"{"do":"zoom","by":-1.5}"#, Command::Zoom { by: -1.5 }),
+            (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
+            (
+                r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,
+                Command::Target { robot: "sr5".into(), joint: "J1".into(), value: 0.5 },
+            ),
+        ] {
+            assert_eq!(Command::parse(text), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_command_is_refused_in_words() {
+        for (text, says) in [
+            ("", "not understood"),
+            ("pause", "not understood"),
+            ("[]", "not understood"),
+            (r#"{"do":"fly"}"#, "unknown variant `fly`, expected one of `seen`"),
+            (r#"{"do":"environment","env":-1}"#, "not understood"),
+            (r#"{"do":"target","robot":"a","joint":"b","value":1e999}"#, "not understood"),
+            (r#"{"do":"target","robot":"a","joint":"b"}"#, "missing field `value`"),
+            (r#"{"do":"orbit","dx":1e300,"dy":0}"#, "dx is"),
+            (r#"{"do":"zoom","by":-101}"#, "by is -101"),
+        ] {
+            let reason = Command::parse(text).expect_err(text);
+            assert!(reason.contains(says), "{text}: {reason}");
+        }
+        let deep = "[".repeat(10_000);
+        assert!(Command::parse(&deep).is_err());
+    }
+}

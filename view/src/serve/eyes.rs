@@ -1,0 +1,336 @@
+//! The eyes of a viewer in a browser: which environment they look at, from where, and what is drawn over it.
+
+use super::ServeCfg;
+use super::command::Command;
+use super::show::{Eyes, Picture, Show};
+use super::state;
+use crate::control::{self, Speed, Viewer, Wants};
+use crate::stage::{Canvas, Eye, Look, Names, Overlays, Painter, Panel, Shown, Snapshot, Trails};
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use serde_json::{Value, json};
+use sim::EnvId;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Sides of a picture \[pixels\].
+const SIDES: [usize; 2] = [16, 2048];
+/// Pixels of a picture, at most: of a larger page the picture is coarser than its screen.
+const MOST_PIXELS: usize = 1920 * 1080;
+/// Between two pictures of a camera.
+const PANEL_EVERY: Duration = Duration::from_millis(100);
+/// Width of each of the four pictures of a camera, at most \[pixels\].
+const PANEL_WIDTH: usize = 320;
+
+/// Gives viewers their eyes.
+pub(super) struct Theatre {
+    /// Keeps the speed that was asked for with the server.
+    usher: Viewer,
+    shared: Arc<Shared>,
+}
+
+/// What all viewers of a server share.
+struct Shared {
+    cfg: ServeCfg,
+    /// Pauses and speeds of all browsers: whoever is in one may leave and come again, and they stay.
+    hands: Mutex<Viewer>,
+    /// Who holds it draws: so viewers together take one core from the simulation.
+    brush: Mutex<()>,
+    seated: AtomicUsize,
+}
+
+impl Theatre {
+    pub(super) fn new(usher: Viewer, cfg: ServeCfg) -> Self {
+        usher.send(control::Command::SetSpeed(cfg.speed));
+        let hands = Mutex::new(usher.another(Wants::NOTHING));
+        Self { usher, shared: Arc::new(Shared { cfg, hands, brush: Mutex::new(()), seated: AtomicUsize::new(0) }) }
+    }
+}
+
+impl Show for Theatre {
+    fn eyes(&self) -> Box<dyn Eyes> {
+        self.shared.seated.fetch_add(1, Ordering::AcqRel);
+        let wants = Wants { rate: self.shared.cfg.rate, ..Wants::default() };
+        Box::new(OwnEyes::new(self.usher.another(wants), wants, Arc::clone(&self.shared)))
+    }
+
+    fn deserted(&self) {
+        // What the old hands did ends with them; what was done in a window stays.
+        *self.shared.hands() = self.usher.another(Wants::NOTHING);
+    }
+}
+
+impl Shared {
+    fn hands(&self) -> MutexGuard<'_, Viewer> {
+        self.hands.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+struct OwnEyes {
+    viewer: Viewer,
+    wants: Wants,
+    shared: Arc<Shared>,
+    eye: Option<Eye>,
+    shown: Shown,
+    overlays: Overlays,
+    trails: Trails,
+    size: [usize; 2],
+    camera: Option<String>,
+    painter: Painter,
+    panel: Panel,
+    canvas: Canvas,
+    /// Raised by what changes the picture without the simulation.
+    looks: u64,
+    /// Snapshot and look of the last picture.
+    drawn: (u64, u64),
+    /// The same of the last picture of a camera, and when that was.
+    panel_drawn: (u64, u64),
+    panel_at: Option<Instant>,
+    told_names: Option<(Arc<Names>, usize)>,
+    told: Option<Value>,
+}
+
+impl Drop for OwnEyes {
+    fn drop(&mut self) {
+        self.shared.seated.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+impl OwnEyes {
+    fn new(viewer: Viewer, wants: Wants, shared: Arc<Shared>) -> Self {
+        Self {
+            viewer,
+            wants,
+            shared,
+            eye: None,
+            shown: Shown::All,
+            overlays: Overlays::default(),
+            trails: Trails::default(),
+            size: [960, 540],
+            camera: None,
+            painter: Painter::new(1),
+            panel: Panel::new(1),
+            canvas: Canvas::default(),
+            looks: 1,
+            drawn: (0, 0),
+            panel_drawn: (0, 0),
+            panel_at: None,
+            told_names: None,
+            told: None,
+        }
+    }
+
+    /// Looks at the newest snapshot for as long as something is made of it: held longer, fewer would come.
+    fn with_newest<T>(&mut self, make: impl FnOnce(&mut Self, &Snapshot) -> T) -> Option<T> {
+        let snapshot = self.viewer.newest()?;
+        Some(make(self, &snapshot))
+    }
+
+    fn env(&self) -> Option<EnvId> {
+        match self.shown {
+            Shown::All => None,
+            Shown::One(env) => Some(EnvId(env)),
+        }
+    }
+
+    fn send(&self, command: control::Command) -> Result<(), String> {
+        let sent = self.shared.hands().send(command);
+        sent.then_some(()).ok_or_else(|| "the simulation takes no commands: the program does not step it".into())
+    }
+
+    fn home(&self, snapshot: &Snapshot) -> Eye {
+        match self.shown {
+            Shown::All => Eye::overview(snapshot),
+            Shown::One(env) => {
+                let envs = snapshot.envs.get(env).into_iter().cloned().collect();
+                Eye::overview(&Snapshot { envs, ..Snapshot::default() })
+            }
+        }
+    }
+
+    fn move_eye(&mut self, by: impl FnOnce(&mut Eye)) -> Result<(), String> {
+        let eye = self.eye.or_else(|| self.with_newest(|own, snapshot| own.home(snapshot)));
+        self.eye = eye.map(|mut eye| {
+            by(&mut eye);
+            eye
+        });
+        self.looks += 1;
+        Ok(())
+    }
+
+    fn choose(&mut self, env: Option<usize>) -> Result<(), String> {
+        let count = self.with_newest(|_, snapshot| snapshot.envs.len()).unwrap_or(0);
+        if let Some(env) = env.filter(|env| *env >= count) {
+            let there_are = if count == 1 { "is 1 environment".into() } else { format!("are {count} environments") };
+            return Err(format!("environment {env}: there {there_are}, from 0"));
+        }
+        self.shown = env.map_or(Shown::All, Shown::One);
+        self.eye = None;
+        self.looks += 1;
+        self.want();
+        Ok(())
+    }
+
+    fn choose_camera(&mut self, name: Option<String>) -> Result<(), String> {
+        let known = self.with_newest(|_, snapshot| snapshot.names.cameras.clone()).unwrap_or_default();
+        if let Some(name) = name.as_ref().filter(|name| !known.contains(name)) {
+            return Err(format!("there is no camera {name:?}; there are {known:?}"));
+        }
+        self.camera = name;
+        self.looks += 1;
+        Ok(())
+    }
+
+    fn set_overlay(&mut self, name: &str, on: bool) -> Result<(), String> {
+        let Some((.., of)) = state::OVERLAYS.iter().find(|(known, ..)| *known == name) else {
+            let known: Vec<&str> = state::OVERLAYS.iter().map(|(known, ..)| *known).collect();
+            return Err(format!("there is no overlay {name:?}; there are {known:?}"));
+        };
+        *of(&mut self.overlays) = on;
+        self.looks += 1;
+        self.want();
+        Ok(())
+    }
+
+    /// Asks for what is drawn, and no more: contacts are solved for the purpose.
+    fn want(&mut self) {
+        let wants = Wants { contacts: self.overlays.contacts.then_some(self.shown), ..self.wants };
+        if wants != self.wants {
+            self.wants = wants;
+            self.viewer.set_wants(wants);
+        }
+    }
+
+    fn resize(&mut self, width: usize, height: usize) -> Result<(), String> {
+        let [least, most] = SIDES;
+        if ![width, height].iter().all(|side| (least..=4 * most).contains(side)) {
+            return Err(format!("{width} x {height}: pictures have sides of {least} to {} pixels", 4 * most));
+        }
+        // Larger ones are drawn smaller, in the same shape.
+        let by_pixels = (MOST_PIXELS as f64 / (width * height) as f64).sqrt();
+        let scale = by_pixels.min(most as f64 / width.max(height) as f64).min(1.0);
+        self.size = [width, height].map(|side| ((side as f64 * scale) as usize).max(1));
+        self.looks += 1;
+        Ok(())
+    }
+
+    fn set_target(&self, robot: &str, joint: &str, value: f64) -> Result<(), String> {
+        let snapshot = self.viewer.newest().ok_or("nothing is known of the simulation yet")?;
+        let found = state::find_joint(&snapshot.names, robot, joint)?;
+        let (robot, joint) = (found.robot, found.joint);
+        self.send(control::Command::SetTarget { robot, joint, env: self.env(), value })
+    }
+
+    fn draw_stage(&mut self, snapshot: &Snapshot) -> Option<Picture> {
+        self.trails.add(snapshot);
+        let key = (snapshot.number, self.looks);
+        if self.drawn == key {
+            return None;
+        }
+        self.drawn = key;
+        let eye = self.eye.unwrap_or_else(|| self.home(snapshot));
+        self.eye = Some(eye);
+        let view = eye.view(self.size[0], self.size[1]);
+        let look = Look { shown: self.shown, overlays: self.overlays, trails: Some(&self.trails), ..Look::default() };
+        let shared = Arc::clone(&self.shared);
+        let _brush = shared.brush.lock().unwrap_or_else(PoisonError::into_inner);
+        self.painter.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
+        let file = self.jpeg()?;
+        let about = json!({"shows": "stage", "type": "image/jpeg", "snapshot": snapshot.number});
+        Some(Picture { about, file })
+    }
+
+    fn draw_panel(&mut self, snapshot: &Snapshot) -> Option<Picture> {
+        let key = (snapshot.number, self.looks);
+        let rests = self.panel_at.is_some_and(|at| at.elapsed() < PANEL_EVERY);
+        if self.panel_drawn == key || rests {
+            return None;
+        }
+        let name = self.camera.clone()?;
+        (self.panel_drawn, self.panel_at) = (key, Some(Instant::now()));
+        let camera = snapshot.names.cameras.iter().position(|known| *known == name)?;
+        let env = self.env().map_or(0, |env| env.0);
+        let shared = Arc::clone(&self.shared);
+        let _brush = shared.brush.lock().unwrap_or_else(PoisonError::into_inner);
+        let drawn = self.panel.draw(snapshot, camera, env, PANEL_WIDTH, &mut self.canvas);
+        let about = json!({"shows": "camera", "type": "image/jpeg", "camera": name, "environment": env});
+        Some(Picture { about, file: drawn.then(|| self.jpeg()).flatten()? })
+    }
+
+    /// What is on the canvas, as a file.
+    fn jpeg(&self) -> Option<Vec<u8>> {
+        let [width, height] = self.canvas.dimensions().map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+        let rgb: Vec<u8> = self.canvas.bytes().as_chunks::<4>().0.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+        let mut file = Vec::with_capacity(rgb.len() / 12);
+        let mut encoder = JpegEncoder::new_with_quality(&mut file, self.shared.cfg.quality.clamp(1, 100));
+        encoder.encode(&rgb, width, height, ExtendedColorType::Rgb8).ok()?;
+        Some(file)
+    }
+}
+
+impl Eyes for OwnEyes {
+    fn contents(&mut self) -> Option<Value> {
+        self.with_newest(|own, snapshot| {
+            let now = (&snapshot.names, snapshot.envs.len());
+            if own.told_names.as_ref().is_some_and(|(names, envs)| Arc::ptr_eq(names, now.0) && *envs == now.1) {
+                return None;
+            }
+            own.told_names = Some((Arc::clone(now.0), now.1));
+            own.told = None;
+            Some(state::contents(snapshot, &own.overlays))
+        })
+        .flatten()
+    }
+
+    fn state(&mut self) -> Option<Value> {
+        let viewers = self.shared.seated.load(Ordering::Acquire);
+        self.with_newest(|own, snapshot| {
+            let state = state::state(snapshot, own.shown, viewers);
+            let told = own.told.as_ref() == Some(&state);
+            own.told = Some(state.clone());
+            (!told).then_some(state)
+        })
+        .flatten()
+    }
+
+    fn obey(&mut self, command: Command) -> Result<(), String> {
+        let height = self.size[1];
+        let pixels = |way: [f64; 2]| way.map(|part| part * height as f64);
+        match command {
+            Command::Seen { .. } => Ok(()),
+            Command::Size { width, height } => self.resize(width, height),
+            Command::Orbit { dx, dy } => self.move_eye(|eye| eye.orbit(pixels([dx, dy]), height)),
+            Command::Pan { dx, dy } => self.move_eye(|eye| eye.pan(pixels([dx, dy]), height)),
+            Command::Zoom { by } => self.move_eye(|eye| eye.zoom(by)),
+            Command::Home => {
+                (self.eye, self.looks) = (None, self.looks + 1);
+                Ok(())
+            }
+            Command::Environment { env } => self.choose(env),
+            Command::Camera { name } => self.choose_camera(name),
+            Command::Overlay { name, on } => self.set_overlay(&name, on),
+            Command::Pause => self.send(control::Command::Pause),
+            Command::Play => self.send(control::Command::Resume),
+            Command::Step => self.send(control::Command::Step(1)),
+            Command::Reset => self.send(control::Command::Reset(self.env())),
+            Command::Speed { factor: None } => self.send(control::Command::SetSpeed(Speed::Free)),
+            Command::Speed { factor: Some(factor) } => {
+                let [slow, fast] = Speed::RANGE;
+                if !(slow..=fast).contains(&factor) {
+                    return Err(format!("speed {factor}: {slow} to {fast} would do"));
+                }
+                self.send(control::Command::SetSpeed(Speed::Times(factor)))
+            }
+            Command::Target { robot, joint, value } => self.set_target(&robot, &joint, value),
+        }
+    }
+
+    fn pictures(&mut self) -> Vec<Picture> {
+        let pictures = self.with_newest(|own, snapshot| {
+            let stage = own.draw_stage(snapshot);
+            stage.into_iter().chain(own.draw_panel(snapshot)).collect()
+        });
+        pictures.unwrap_or_default()
+    }
+}

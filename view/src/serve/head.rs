@@ -1,0 +1,150 @@
+//! The head of an HTTP request, with bounds on its size and on the time it may take.
+
+use super::answer::Status;
+use std::io::{ErrorKind, Read};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// Bytes of a request line with its headers, at most. Browsers send less than 2 kB; cookies of other pages on this machine
+/// come along.
+const MAX_BYTES: usize = 16 << 10;
+/// Headers, at most.
+const MAX_HEADERS: usize = 96;
+/// How long a head may take, all of it: one byte a second is no request.
+const MAX_TIME: Duration = Duration::from_secs(5);
+
+/// What was asked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Head {
+    pub(super) method: String,
+    /// Without the query.
+    pub(super) path: String,
+    /// What stands behind the question mark.
+    pub(super) query: String,
+    headers: Vec<(String, String)>,
+    /// Bytes that came after the head.
+    pub(super) rest: Vec<u8>,
+}
+
+impl Head {
+    /// Reads a head; `None` where the other end said nothing at all.
+    pub(super) fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
+        let start = Instant::now();
+        let mut bytes = Vec::new();
+        let mut chunk = [0; 2048];
+        loop {
+            let left = MAX_TIME.saturating_sub(start.elapsed());
+            if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
+                return Err(Status::Timeout);
+            }
+            match stream.read(&mut chunk) {
+                Ok(0) if bytes.is_empty() => return Ok(None),
+                Ok(0) => return Err(Status::BadRequest),
+                Ok(n) => bytes.extend_from_slice(&chunk[..n]),
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                    return Err(Status::Timeout);
+                }
+                Err(_) => return Ok(None),
+            }
+            if let Some(head) = Self::parse(&bytes)? {
+                return Ok(Some(head));
+            }
+            if bytes.len() >= MAX_BYTES {
+                return Err(Status::TooLarge);
+            }
+        }
+    }
+
+    /// A whole head, or `None` where more has to come.
+    fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+        let mut request = httparse::Request::new(&mut headers);
+        let length = match request.parse(bytes) {
+            Ok(httparse::Status::Complete(length)) if length <= MAX_BYTES => length,
+            Ok(httparse::Status::Complete(_)) | Err(httparse::Error::TooManyHeaders) => return Err(Status::TooLarge),
+            Ok(httparse::Status::Partial) => return Ok(None),
+            Err(_) => return Err(Status::BadRequest),
+        };
+        let target = request.path.unwrap_or_default();
+        let (path, query) = target.split_once('?').unwrap_or((target, ""));
+        let text =
+            |value: &[u8]| std::str::from_utf8(value).map(|v| v.trim().to_string()).map_err(|_| Status::BadRequest);
+        let headers: Result<Vec<_>, Status> =
+            request.headers.iter().map(|h| Ok((h.name.to_ascii_lowercase(), text(h.value)?))).collect();
+        Ok(Some(Self {
+            method: request.method.unwrap_or_default().into(),
+            path: path.into(),
+            query: query.into(),
+            headers: headers?,
+            rest: bytes[length..].to_vec(),
+        }))
+    }
+
+    /// The value of a header, `name` in small letters. One that came twice says nothing that can be relied on: an error.
+    pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Status> {
+        let mut values = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
+        match (values.next(), values.next()) {
+            (value, None) => Ok(value),
+            _ => Err(Status::BadRequest),
+        }
+    }
+
+    /// Whether a header that lists words has this one.
+    pub(super) fn lists(&self, name: &str, word: &str) -> bool {
+        let values = self.headers.iter().filter(|(n, _)| n == name);
+        values.flat_map(|(_, value)| value.split(',')).any(|item| item.trim().eq_ignore_ascii_case(word))
+    }
+
+    /// A value of the query.
+    pub(super) fn query(&self, key: &str) -> Option<&str> {
+        self.query.split('&').filter_map(|pair| pair.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Option<Head>, Status> {
+        Head::parse(text.as_bytes())
+    }
+
+    #[test]
+    fn a_request_is_taken_apart() {
+        let text =
+            "GET /live?a=1&token=xyz HTTP/1.1\r\nHost: localhost:8080\r\nConnection: keep-alive, Upgrade\r\n\r\nmore";
+        let head = parsed(text).expect("well formed").expect("whole");
+        assert_eq!((head.method.as_str(), head.path.as_str(), head.query("token")), ("GET", "/live", Some("xyz")));
+        assert_eq!(head.header("host"), Ok(Some("localhost:8080")));
+        assert_eq!(head.header("origin"), Ok(None));
+        assert!(head.lists("connection", "upgrade") && !head.lists("connection", "close"));
+        assert_eq!(head.rest, b"more");
+    }
+
+    #[test]
+    fn a_request_in_pieces_waits_for_the_rest() {
+        let text = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
+        for end in 1..text.len() {
+            assert_eq!(parsed(&text[..end]), Ok(None), "{:?}", &text[..end]);
+        }
+        assert!(parsed(text).expect("well formed").is_some());
+    }
+
+    #[test]
+    fn what_is_no_request_is_refused() {
+        for text in [
+            "\u{0}\u{1}\u{2}\u{3}",
+            "\u{16}\u{3}\u{1}\u{2}",
+            "GET\r\n\r\n",
+            "GET / HTTP/9.9\r\n\r\n",
+            "G@T / HTTP/1.1\nHost\n\n",
+        ] {
+            assert_eq!(parsed(text), Err(Status::BadRequest), "{text:?}");
+        }
+        let many: String = (0..=MAX_HEADERS).map(|k| format!("a{k}: b\r\n")).collect();
+        assert_eq!(parsed(&format!("GET / HTTP/1.1\r\n{many}\r\n")), Err(Status::TooLarge));
+        let twice = parsed("GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n").expect("well formed").expect("whole");
+        assert_eq!(twice.header("host"), Err(Status::BadRequest));
+    }
+}

@@ -1,0 +1,203 @@
+//! A picture that is drawn on: what the renderer drew, and lines and letters over it.
+
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::text::{Baseline, Text};
+use std::convert::Infallible;
+
+/// Four bytes per pixel: red, green, blue, and 255; row by row from the top left.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Canvas {
+    size: [usize; 2],
+    bytes: Vec<u8>,
+}
+
+impl Canvas {
+    /// A black picture of `width` by `height` pixels.
+    pub fn new(width: usize, height: usize) -> Self {
+        let mut canvas = Self::default();
+        canvas.resize(width, height);
+        canvas
+    }
+
+    /// Another size; what is on it is lost where that changes anything.
+    pub fn resize(&mut self, width: usize, height: usize) {
+        if self.size != [width, height] {
+            self.size = [width, height];
+            self.bytes.clear();
+            self.bytes.extend([0, 0, 0, 255].repeat(width * height));
+        }
+    }
+
+    /// Pixels per row, rows.
+    pub fn dimensions(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The bytes, to draw on.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.bytes
+    }
+
+    /// Colour of a pixel; `None` outside.
+    pub fn pixel(&self, x: usize, y: usize) -> Option<[u8; 3]> {
+        let [width, height] = self.size;
+        let at = (x < width && y < height).then_some(4 * (y * width + x))?;
+        self.bytes.get(at..at + 3).map(|rgb| [rgb[0], rgb[1], rgb[2]])
+    }
+
+    /// Colours a pixel, if there is one.
+    pub fn set(&mut self, x: i32, y: i32, color: [u8; 3]) {
+        self.blend(x, y, color, 255);
+    }
+
+    /// Mixes a colour into a pixel, with an opacity of 0 to 255.
+    fn blend(&mut self, x: i32, y: i32, color: [u8; 3], opacity: u8) {
+        let [width, height] = self.size;
+        let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
+        if x >= width || y >= height {
+            return;
+        }
+        let (at, a) = (4 * (y * width + x), u32::from(opacity));
+        for (to, new) in self.bytes[at..at + 3].iter_mut().zip(color) {
+            *to = ((u32::from(*to) * (255 - a) + u32::from(new) * a + 127) / 255) as u8;
+        }
+    }
+
+    /// A filled rectangle, with an opacity of 0 to 255.
+    pub fn fill(&mut self, [x, y]: [i32; 2], [width, height]: [i32; 2], color: [u8; 3], opacity: u8) {
+        let [w, h] = self.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
+        for row in y.max(0)..y.saturating_add(height).min(h) {
+            for column in x.max(0)..x.saturating_add(width).min(w) {
+                self.blend(column, row, color, opacity);
+            }
+        }
+    }
+
+    /// A line from pixel to pixel, one pixel wide. Of ends far outside, what is inside is drawn.
+    pub fn line(&mut self, from: [f32; 2], to: [f32; 2], color: [u8; 3]) {
+        let Some([from, to]) = clipped(from, to, self.size.map(|n| n as f32)) else { return };
+        let delta = [to[0] - from[0], to[1] - from[1]];
+        let steps = delta[0].abs().max(delta[1].abs()).ceil().max(1.0);
+        for k in 0..=steps as i32 {
+            let t = k as f32 / steps;
+            self.set((from[0] + t * delta[0]).floor() as i32, (from[1] + t * delta[1]).floor() as i32, color);
+        }
+    }
+
+    /// Letters with their top left corner at a pixel, on a shade that makes them readable on everything.
+    pub fn text(&mut self, text: &str, [x, y]: [i32; 2], font: &MonoFont<'_>, color: [u8; 3]) {
+        let cell = font.character_size;
+        let (columns, lines) = text.lines().fold((0, 0), |(w, n), line| (w.max(line.chars().count()), n + 1));
+        let [width, height] = [columns as i32 * cell.width as i32, lines * cell.height as i32];
+        self.fill([x - 2, y - 1], [width + 4, height + 2], [20, 22, 26], 150);
+        let [r, g, b] = color;
+        let style = MonoTextStyle::new(font, Rgb888::new(r, g, b));
+        let Ok(_) = Text::with_baseline(text, Point::new(x, y), style, Baseline::Top).draw(self);
+    }
+
+    /// Copies `picture` to a place; what does not fit is left out.
+    pub fn paste(&mut self, picture: &Self, [x, y]: [usize; 2]) {
+        let [width, height] = self.size;
+        let [w, h] = picture.size;
+        let columns = w.min(width.saturating_sub(x));
+        for row in 0..h.min(height.saturating_sub(y)) {
+            let (to, from) = (4 * ((y + row) * width + x), 4 * row * w);
+            self.bytes[to..to + 4 * columns].copy_from_slice(&picture.bytes[from..from + 4 * columns]);
+        }
+    }
+}
+
+/// The part of a line inside of a picture, a pixel around it included; `None` where there is none (Liang and Barsky 1984).
+fn clipped(from: [f32; 2], to: [f32; 2], size: [f32; 2]) -> Option<[[f32; 2]; 2]> {
+    if from.iter().chain(&to).any(|x| !x.is_finite()) {
+        return None;
+    }
+    let (mut first, mut last) = (0.0f32, 1.0f32);
+    for k in 0..2 {
+        let delta = to[k] - from[k];
+        for (p, q) in [(-delta, from[k] + 1.0), (delta, size[k] + 1.0 - from[k])] {
+            if p == 0.0 && q < 0.0 {
+                return None;
+            } else if p < 0.0 {
+                first = first.max(q / p);
+            } else if p > 0.0 {
+                last = last.min(q / p);
+            }
+        }
+    }
+    let at = |t: f32| [0, 1].map(|k| from[k] + t * (to[k] - from[k]));
+    (first <= last).then(|| [at(first), at(last)])
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        let [width, height] = self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        Size::new(width, height)
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(at, color) in pixels {
+            self.set(at.x, at.y, [color.r(), color.g(), color.b()]);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use embedded_graphics::mono_font::ascii::FONT_6X10;
+
+    #[test]
+    fn lines_reach_their_ends_and_stay_inside() {
+        let mut canvas = Canvas::new(10, 8);
+        canvas.line([1.5, 2.5], [7.5, 5.5], [255, 0, 0]);
+        assert_eq!([canvas.pixel(1, 2), canvas.pixel(7, 5)], [Some([255, 0, 0]); 2]);
+        assert_eq!(canvas.pixel(7, 2), Some([0, 0, 0]));
+        // Through the whole picture, from far outside; and past it.
+        canvas.line([-1e6, 3.5], [1e6, 3.5], [0, 255, 0]);
+        assert!((0..10).all(|x| canvas.pixel(x, 3) == Some([0, 255, 0])));
+        let before = canvas.clone();
+        canvas.line([-1e6, -30.0], [1e6, -30.0], [0, 0, 255]);
+        canvas.line([f32::NAN, 0.0], [1.0, 1.0], [0, 0, 255]);
+        assert_eq!(canvas, before);
+    }
+
+    #[test]
+    fn drawing_on_the_smallest_pictures_is_no_mistake() {
+        for size in [[0, 0], [1, 1], [1, 300]] {
+            let mut canvas = Canvas::new(size[0], size[1]);
+            canvas.text("Some words\nand more", [-5, -3], &FONT_6X10, [255; 3]);
+            canvas.fill([i32::MAX - 1, 0], [i32::MAX, i32::MAX], [1, 2, 3], 255);
+            canvas.line([0.0, 0.0], [9.0, 9.0], [9; 3]);
+            canvas.paste(&Canvas::new(4, 4), [3, 3]);
+            assert_eq!(canvas.bytes().len(), 4 * size[0] * size[1]);
+        }
+    }
+
+    #[test]
+    fn letters_are_readable() {
+        let mut canvas = Canvas::new(40, 14);
+        canvas.text("H", [4, 2], &FONT_6X10, [255; 3]);
+        let white = (0..14)
+            .flat_map(|y| (0..40).map(move |x| (x, y)))
+            .filter(|&(x, y)| canvas.pixel(x, y).unwrap() == [255; 3]);
+        let found: Vec<_> = white.collect();
+        // Two bars of seven pixels and a bar of three between them.
+        assert_eq!(found.len(), 17, "{found:?}");
+        assert!(found.iter().all(|&(x, y)| (4..10).contains(&x) && (2..12).contains(&y)));
+    }
+}

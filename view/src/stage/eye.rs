@@ -1,0 +1,224 @@
+//! Where a viewer looks from.
+
+use super::snapshot::Snapshot;
+use nalgebra::Vector3;
+use sensors::visibility::View;
+
+/// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the
+/// world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// The point it turns about, in the middle of the picture \[m\].
+    pub target: [f64; 3],
+    /// How far that is \[m\].
+    pub distance: f64,
+    /// Direction of the way it looks, in the horizontal plane \[rad\]: 0 is along x, a quarter turn along y.
+    pub azimuth: f64,
+    /// How far up it looks \[rad\]; negative is down.
+    pub elevation: f64,
+    /// Vertical field of view \[rad\].
+    pub fovy: f64,
+}
+
+impl Default for Eye {
+    fn default() -> Self {
+        Self { target: [0.0, 0.0, 0.3], distance: 3.0, azimuth: 2.4, elevation: -0.45, fovy: 45f64.to_radians() }
+    }
+}
+
+/// It never looks quite straight up or down \[rad\]: there right and left would be lost.
+const STEEPEST: f64 = 1.55;
+/// Nearest and farthest distance of the point it turns about \[m\].
+const DISTANCES: [f64; 2] = [0.02, 1e4];
+
+impl Eye {
+    /// From `eye` to `target` \[m\]; `None` where they are the same or not finite.
+    pub fn looking(eye: [f64; 3], target: [f64; 3]) -> Option<Self> {
+        let way = Vector3::from(target) - Vector3::from(eye);
+        let distance = way.norm();
+        if !(distance.is_finite() && distance > 1e-9) {
+            return None;
+        }
+        let azimuth = if way.xy().norm() > 1e-9 { way.y.atan2(way.x) } else { 0.0 };
+        let elevation = (way.z / distance).clamp(-1.0, 1.0).asin().clamp(-STEEPEST, STEEPEST);
+        Some(Self {
+            target,
+            distance: distance.clamp(DISTANCES[0], DISTANCES[1]),
+            azimuth,
+            elevation,
+            ..Self::default()
+        })
+    }
+
+    /// So that all environments of a snapshot are in the picture, seen from the front, the side and above.
+    pub fn overview(snapshot: &Snapshot) -> Self {
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for env in &snapshot.envs {
+            let moving = env.look.masses.iter().map(|(at, _)| *at);
+            for at in moving.chain([[0.0, 0.0, 0.0]]) {
+                for k in 0..3 {
+                    let x = at[k] + env.origin[k];
+                    // What has flown away is not in the overview.
+                    if x.is_finite() && at[k].abs() < 20.0 {
+                        (low[k], high[k]) = (low[k].min(x), high[k].max(x));
+                    }
+                }
+            }
+        }
+        if low[0] > high[0] {
+            return Self::default();
+        }
+        let target = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
+        let radius = Vector3::from(high).metric_distance(&Vector3::from(low)) / 2.0 + 0.5;
+        let eye = Self::default();
+        Self { target, distance: radius / (0.5 * eye.fovy).sin(), ..eye }
+    }
+
+    /// The way it looks.
+    pub fn forward(&self) -> [f64; 3] {
+        let (sin, cos) = self.elevation.sin_cos();
+        [cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin]
+    }
+
+    /// Where it is \[m\].
+    pub fn position(&self) -> [f64; 3] {
+        let forward = self.forward();
+        [0, 1, 2].map(|k| self.target[k] - self.distance * forward[k])
+    }
+
+    /// To the right in the picture, and up in it.
+    fn axes(&self) -> [Vector3<f64>; 2] {
+        let forward = Vector3::from(self.forward());
+        let right = Vector3::new(self.azimuth.sin(), -self.azimuth.cos(), 0.0);
+        [right, right.cross(&forward)]
+    }
+
+    fn shift(&mut self, by: Vector3<f64>) {
+        self.target = (Vector3::from(self.target) + by).into();
+    }
+
+    /// Turns about the target, as if the scene were dragged by pixels of a picture of `height` rows.
+    pub fn orbit(&mut self, [dx, dy]: [f64; 2], height: usize) {
+        let scale = std::f64::consts::PI / height.max(1) as f64;
+        self.azimuth = (self.azimuth - dx * scale).rem_euclid(std::f64::consts::TAU);
+        self.elevation = (self.elevation - dy * scale).clamp(-STEEPEST, STEEPEST);
+    }
+
+    /// Turns where it stands, as if the scene were dragged: the target moves.
+    pub fn turn(&mut self, [dx, dy]: [f64; 2], height: usize) {
+        let eye = Vector3::from(self.position());
+        self.orbit([-dx, -dy], height);
+        self.target = (eye + self.distance * Vector3::from(self.forward())).into();
+    }
+
+    /// Moves so that what is at the target's distance follows the mouse, by pixels of a picture of `height` rows.
+    pub fn pan(&mut self, [dx, dy]: [f64; 2], height: usize) {
+        let [right, up] = self.axes();
+        let scale = 2.0 * self.distance * (0.5 * self.fovy).tan() / height.max(1) as f64;
+        self.shift((up * dy - right * dx) * scale);
+    }
+
+    /// Comes nearer by steps of a wheel; negative ones go away.
+    pub fn zoom(&mut self, steps: f64) {
+        self.distance = (self.distance * 0.85f64.powf(steps)).clamp(DISTANCES[0], DISTANCES[1]);
+    }
+
+    /// Flies by distances ahead, to the right and up \[m\].
+    pub fn fly(&mut self, [ahead, right, up]: [f64; 3]) {
+        let [to_right, _] = self.axes();
+        self.shift(Vector3::from(self.forward()) * ahead + to_right * right + Vector3::z() * up);
+    }
+
+    /// The camera for a picture of `width` by `height` pixels.
+    pub fn view(&self, width: usize, height: usize) -> View {
+        let [eye, target] = [self.position(), self.target].map(|p| p.map(|x| x as f32));
+        let near = (0.01 * self.distance).clamp(0.005, 0.05) as f32;
+        let far = (20.0 * self.distance).max(500.0) as f32;
+        let size = [width, height].map(|n| n.clamp(1, View::MAX_SIDE));
+        let view = View::look_at(size, self.fovy as f32, eye, target, [0.0, 0.0, 1.0]);
+        // Far from the origin single precision may lose the target.
+        let fallback = || View::look_at(size, self.fovy as f32, [-1.0, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]);
+        view.or_else(|_| fallback()).map_or_else(|_| plain(size), |view| View { near, far, ..view })
+    }
+}
+
+/// A camera in the origin.
+fn plain([width, height]: [usize; 2]) -> View {
+    let [cx, cy] = [0.5 * width as f32, 0.5 * height as f32];
+    let world_from_camera = scene::PoseF32::IDENTITY;
+    View { width, height, fx: cy.max(1.0), fy: cy.max(1.0), cx, cy, near: 0.01, far: 100.0, world_from_camera }
+}
+
+/// Pixel of a point of the world; `None` behind the camera.
+pub(super) fn project(view: &View, point: [f64; 3]) -> Option<[f32; 2]> {
+    let [x, y, z] = view.world_from_camera.apply_inverse(point.map(|p| p as f32));
+    (z > view.near).then(|| [view.fx * x / z + view.cx, view.fy * y / z + view.cy])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: [f64; 3], b: [f64; 3]) -> bool {
+        (0..3).all(|k| (a[k] - b[k]).abs() < 1e-9)
+    }
+
+    #[test]
+    fn it_looks_from_where_it_was_put() {
+        let eye = Eye::looking([3.0, -1.0, 2.0], [0.5, 0.5, 0.5]);
+        assert!(eye.is_some_and(|eye| close(eye.position(), [3.0, -1.0, 2.0]) && close(eye.target, [0.5; 3])));
+        assert_eq!(Eye::looking([1.0; 3], [1.0; 3]), None);
+        assert_eq!(Eye::looking([f64::NAN; 3], [1.0; 3]), None);
+    }
+
+    #[test]
+    fn orbiting_keeps_the_target_in_the_middle_and_turning_keeps_the_place() {
+        let mut eye = Eye::default();
+        eye.orbit([200.0, -35.0], 540);
+        let middle = project(&eye.view(960, 540), eye.target);
+        assert!(middle.is_some_and(|[x, y]| (x - 480.0).abs() < 0.01 && (y - 270.0).abs() < 0.01), "{middle:?}");
+        let place = eye.position();
+        eye.turn([33.0, 12.0], 540);
+        assert!(close(place, eye.position()));
+        // Dragging down the whole height, again and again, ends nearly over it.
+        (0..9).for_each(|_| eye.orbit([0.0, 540.0], 540));
+        assert!((eye.elevation + STEEPEST).abs() < 1e-12);
+        assert!(eye.view(960, 540).validate().is_ok());
+    }
+
+    /// A point at the target's distance moves with the mouse, pixel by pixel: the plane of the target is parallel to the
+    /// picture.
+    #[test]
+    fn panning_moves_the_scene_with_the_mouse() {
+        let mut eye = Eye::default();
+        let point = eye.target;
+        eye.pan([40.0, -25.0], 540);
+        let seen = project(&eye.view(960, 540), point);
+        // f32 coordinates of some metres at 650 pixels a radian: 1e-3 pixels.
+        assert!(seen.is_some_and(|[x, y]| (x - 520.0).abs() < 0.01 && (y - 245.0).abs() < 0.01), "{seen:?}");
+    }
+
+    #[test]
+    fn zoom_and_flight() {
+        let mut eye = Eye::default();
+        let away = eye.distance;
+        eye.zoom(1.0);
+        assert!((eye.distance / away - 0.85).abs() < 1e-12);
+        eye.zoom(1e6);
+        assert!(eye.distance == DISTANCES[0] && eye.view(10, 10).validate().is_ok());
+        eye.zoom(-1e6);
+        assert!(eye.distance == DISTANCES[1] && eye.view(10, 10).validate().is_ok());
+        let mut eye = Eye { azimuth: 0.0, elevation: 0.0, ..Eye::default() };
+        let place = eye.position();
+        eye.fly([1.0, 2.0, 3.0]);
+        // Looking along x, right is -y.
+        assert!(close(eye.position(), [place[0] + 1.0, place[1] - 2.0, place[2] + 3.0]));
+    }
+
+    #[test]
+    fn no_size_of_a_window_is_a_mistake() {
+        for [width, height] in [[0, 0], [1, 1], [1, 10_000], [100_000, 1]] {
+            assert!(Eye::default().view(width, height).validate().is_ok(), "{width} x {height}");
+        }
+    }
+}

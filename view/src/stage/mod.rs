@@ -1,0 +1,26 @@
+//! What a viewer sees: snapshots of the whole stage, and everything that is drawn of them.
+
+mod assembly;
+mod canvas;
+mod color;
+mod eye;
+mod overlay;
+mod painter;
+mod panel;
+mod pick;
+mod pool;
+mod snapshot;
+mod trail;
+
+#[cfg(test)]
+mod tests;
+
+pub use canvas::Canvas;
+pub use eye::Eye;
+pub use overlay::Overlays;
+pub use painter::{Look, Painter};
+pub use panel::Panel;
+pub use pick::{Picked, describe};
+pub(crate) use pool::Pool;
+pub use snapshot::{EnvStage, JointName, Names, Run, Shown, Snapshot};
+pub use trail::Trails;

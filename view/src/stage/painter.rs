@@ -1,0 +1,102 @@
+//! Draws a snapshot, on the thread of whoever looks.
+
+use super::assembly::{Assembly, MARKERS, chosen};
+use super::canvas::Canvas;
+use super::color;
+use super::overlay::Overlays;
+use super::pick::Picked;
+use super::snapshot::{Shown, Snapshot};
+use super::trail::Trails;
+use scene::Marker;
+use sensors::camera::{FrameMut, ParallelRasterizer, RasterCfg, Shot};
+use sensors::visibility::{RenderError, View};
+
+/// Draws pictures of snapshots. It keeps its memory: use one for all pictures of a window.
+#[derive(Debug)]
+pub struct Painter {
+    rasterizer: ParallelRasterizer,
+    cfg: RasterCfg,
+    assembly: Assembly,
+}
+
+/// What a picture shows besides the scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Look<'a> {
+    /// Which environments.
+    pub shown: Shown,
+    /// What is drawn over it.
+    pub overlays: Overlays,
+    /// What was clicked on.
+    pub picked: Option<&'a Picked>,
+    /// Where bodies were.
+    pub trails: Option<&'a Trails>,
+    /// A spring that is pulled, from where to where in its environment \[m\].
+    pub spring: Option<(usize, [[f64; 3]; 2])>,
+}
+
+impl Painter {
+    /// Draws on `threads` threads, with four samples per pixel.
+    pub fn new(threads: usize) -> Self {
+        let cfg = RasterCfg::of_cameras();
+        Self { rasterizer: ParallelRasterizer::new(cfg, threads), cfg, assembly: Assembly::default() }
+    }
+
+    /// Samples per pixel, 1 or 4.
+    pub fn set_samples(&mut self, samples: u8) {
+        self.cfg.samples = samples;
+    }
+
+    /// Draws a snapshot as `view` sees it: `view` looks at the overview, or at the one environment that is shown, which then is
+    /// where the overview has it. The canvas gets the size of the view.
+    ///
+    /// # Errors
+    /// The view is no good.
+    pub fn draw(
+        &mut self,
+        snapshot: &Snapshot,
+        view: &View,
+        look: &Look<'_>,
+        canvas: &mut Canvas,
+    ) -> Result<(), RenderError> {
+        canvas.resize(view.width, view.height);
+        let mut markers = look.overlays.markers(snapshot, look.shown);
+        if let Some((picked, pose)) = look.picked.and_then(|picked| Some((picked, picked.pose(snapshot)?))) {
+            markers.push((picked.env, Marker::axes(pose, 0.12)));
+        }
+        if let Some((env, [from, to])) = look.spring {
+            let way = [0, 1, 2].map(|k| to[k] - from[k]);
+            markers.extend(Marker::arrow(from, way, color::CHOSEN).map(|marker| (env, marker)));
+        }
+        self.assembly.set(snapshot, look.shown, &markers);
+        let lights = chosen(snapshot, look.shown).next().map(|(_, env)| env.look.lights.as_slice());
+        if let Some(scene) = &self.assembly.scene {
+            let groups = look.overlays.groups() | 1 << MARKERS;
+            self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });
+            let shot = Shot { scene, poses: &self.assembly.poses, view, lights, lens: None };
+            let frame = FrameMut { color: Some(canvas.bytes_mut()), ..FrameMut::default() };
+            self.rasterizer.render(&mut [(shot, frame)]).map_err(|(_, error)| error)?;
+        }
+        if let Some(trails) = look.trails.filter(|_| look.overlays.trails) {
+            trails.draw(snapshot, look.shown, view, canvas);
+        }
+        look.overlays.write_names(snapshot, look.shown, view, canvas);
+        Ok(())
+    }
+
+    /// What is seen at a pixel of a picture; `None` for the sky. Markers are not in the way.
+    pub fn pick(&mut self, snapshot: &Snapshot, view: &View, look: &Look<'_>, [x, y]: [f64; 2]) -> Option<Picked> {
+        self.assembly.set(snapshot, look.shown, &[]);
+        let scene = self.assembly.scene.as_ref()?;
+        // One pixel of the picture, with the same rays.
+        let (column, row) = (x.floor() as f32, y.floor() as f32);
+        let pixel = View { width: 1, height: 1, cx: view.cx - column, cy: view.cy - row, ..*view };
+        let (mut mask, mut position) = ([0], [0.0; 3]);
+        let frame = FrameMut { mask: Some(&mut mask), position: Some(&mut position), ..FrameMut::default() };
+        // Details count here, and cost nothing.
+        self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.groups(), lod: false, ..self.cfg });
+        let shot = Shot { scene, poses: &self.assembly.poses, view: &pixel, lights: None, lens: None };
+        self.rasterizer.render(&mut [(shot, frame)]).ok()?;
+        let &(env, instance) = self.assembly.parts.get(usize::try_from(mask[0] - 1).ok()?)?;
+        Picked::new(snapshot, env, instance, position)
+    }
+}

@@ -1,0 +1,87 @@
+//! What a camera sensor sees, live: colour, depth, mask and normals in a grid of 2 x 2.
+
+use super::canvas::Canvas;
+use super::snapshot::Snapshot;
+use embedded_graphics::mono_font::ascii::FONT_6X10;
+use sensors::camera::colormap::{depth_color, mask_color, normal_color};
+use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
+use sensors::visibility::View;
+
+/// Draws what camera sensors see from snapshots, without asking the sensors for anything: with the pose and the lens of the
+/// camera at its last measurement, and everything else where it is now.
+#[derive(Debug)]
+pub struct Panel {
+    rasterizer: ParallelRasterizer,
+    frame: Frame,
+    size: [usize; 2],
+}
+
+impl Panel {
+    /// Draws on `threads` threads.
+    pub fn new(threads: usize) -> Self {
+        let cfg = RasterCfg { samples: 1, ..RasterCfg::of_cameras() };
+        Self { rasterizer: ParallelRasterizer::new(cfg, threads), frame: Frame::default(), size: [0; 2] }
+    }
+
+    /// Draws camera `camera` of environment `env` in a grid, each picture at most `width` pixels wide. `false`, and nothing is
+    /// drawn, where that camera does not look at that environment.
+    pub fn draw(&mut self, snapshot: &Snapshot, camera: usize, env: usize, width: usize, canvas: &mut Canvas) -> bool {
+        let Some(stage) = snapshot.envs.get(env) else { return false };
+        let Some((view, scene)) = stage.views.get(camera).copied().flatten().zip(snapshot.scene_of(stage)) else {
+            return false;
+        };
+        let view = shrunk(&view, width);
+        let size = [view.width, view.height];
+        if self.size != size || self.frame.color.is_none() {
+            let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
+            (self.frame, self.size) = (Frame::new(size[0], size[1], channels), size);
+        }
+        let poses = &stage.look.instances;
+        let shot = Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights), lens: None };
+        if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
+            return false;
+        }
+        canvas.resize(2 * size[0], 2 * size[1]);
+        self.compose(canvas);
+        true
+    }
+
+    fn compose(&self, canvas: &mut Canvas) {
+        let Frame { color: Some(color), depth: Some(depth), mask: Some(mask), normal: Some(normal), .. } = &self.frame
+        else {
+            return;
+        };
+        let [width, height] = self.size;
+        let finite = depth.iter().copied().filter(|d| d.is_finite());
+        let range = finite.fold([f32::MAX, f32::MIN], |[low, high], d| [low.min(d), high.max(d)]);
+        let of: [(&str, PixelColor<'_>); 4] = [
+            ("Color", &|k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]]),
+            ("Depth", &|k| depth_color(depth[k], range)),
+            ("Mask", &|k| mask_color(mask[k])),
+            ("Normals", &|k| normal_color([normal[3 * k], normal[3 * k + 1], normal[3 * k + 2]])),
+        ];
+        for (index, (title, pixel)) in of.into_iter().enumerate() {
+            let [left, top] = [index % 2 * width, index / 2 * height];
+            let bytes = canvas.bytes_mut();
+            for row in 0..height {
+                let line = &mut bytes[4 * ((top + row) * 2 * width + left)..][..4 * width];
+                for (column, to) in line.chunks_exact_mut(4).enumerate() {
+                    to[..3].copy_from_slice(&pixel(row * width + column));
+                }
+            }
+            canvas.text(title, [left as i32 + 4, top as i32 + 3], &FONT_6X10, [240; 3]);
+        }
+    }
+}
+
+/// The colour of a pixel, by its number.
+type PixelColor<'a> = &'a dyn Fn(usize) -> [u8; 3];
+
+/// The same view with fewer pixels, at most `width` in a row.
+fn shrunk(view: &View, width: usize) -> View {
+    let scale = (width.max(1) as f32 / view.width as f32).min(1.0);
+    let side = |n: usize| ((n as f32 * scale).round() as usize).max(1);
+    let (width, height) = (side(view.width), side(view.height));
+    let [sx, sy] = [width as f32 / view.width as f32, height as f32 / view.height as f32];
+    View { width, height, fx: view.fx * sx, fy: view.fy * sy, cx: view.cx * sx, cy: view.cy * sy, ..*view }
+}

@@ -1,0 +1,75 @@
+//! What was clicked on.
+
+use super::snapshot::Snapshot;
+use nalgebra::{Point3, Vector3};
+use scene::Pose;
+
+/// A point of something that was clicked on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picked {
+    /// The environment.
+    pub env: usize,
+    /// `uid/link`, the uid of an object, the name of a geom of the world.
+    pub name: String,
+    /// The body, as [`Names::bodies`](super::Names::bodies) numbers them; `None` for the world.
+    pub body: Option<usize>,
+    /// The mask id.
+    pub mask_id: i32,
+    /// Where, in the environment \[m\].
+    pub point: [f64; 3],
+    /// Where, in the body's frame \[m\]; in the environment for the world.
+    pub hold: [f64; 3],
+}
+
+impl Picked {
+    /// An instance of an environment that was hit in a point of the overview.
+    pub(super) fn new(snapshot: &Snapshot, env: usize, instance: usize, position: [f32; 3]) -> Option<Self> {
+        let stage = snapshot.envs.get(env)?;
+        let scene = snapshot.scene_of(stage)?;
+        let hit = scene.instances().get(instance)?;
+        let body = hit.body.and_then(|body| usize::try_from(body).ok());
+        // The ground is one for all, and nobody's in particular.
+        let point = [0, 1, 2].map(|k| f64::from(position[k]) - stage.origin[k]);
+        let pose = body.and_then(|body| stage.look.bodies.get(body));
+        let hold = pose.map_or(point, |pose| pose.inverse_transform_point(&Point3::from(point)).into());
+        Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, hold })
+    }
+
+    /// Where the body is now; `None` for the world, and for what is gone.
+    pub fn pose(&self, snapshot: &Snapshot) -> Option<Pose> {
+        snapshot.envs.get(self.env)?.look.bodies.get(self.body?).copied()
+    }
+
+    /// Where the point is now, in its environment \[m\].
+    pub fn point_now(&self, snapshot: &Snapshot) -> [f64; 3] {
+        self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.hold)).into())
+    }
+}
+
+/// What there is to say of something that was clicked on: name, pose, the contact forces on it.
+pub fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
+    let mut lines = vec![format!("{}  (environment {}, mask id {})", picked.name, picked.env, picked.mask_id)];
+    let Some(pose) = picked.pose(snapshot) else {
+        let [x, y, z] = picked.point;
+        lines.push(format!("point  {x:+.3} {y:+.3} {z:+.3} m"));
+        return lines;
+    };
+    let (t, q) = (pose.translation.vector, pose.rotation);
+    lines.push(format!("position  {:+.3} {:+.3} {:+.3} m", t.x, t.y, t.z));
+    lines.push(format!("quaternion w x y z  {:+.3} {:+.3} {:+.3} {:+.3}", q.w, q.i, q.j, q.k));
+    let (mut count, mut sum) = (0, Vector3::zeros());
+    let of = |body: Option<u32>| body.is_some_and(|body| Some(body as usize) == picked.body);
+    for contact in snapshot.envs.get(picked.env).into_iter().flat_map(|env| &env.contacts) {
+        // The force is on the second body; the first has its negative.
+        for sign in contact.bodies.iter().zip([-1.0, 1.0]).filter(|(body, _)| of(**body)).map(|(_, sign)| sign) {
+            count += 1;
+            sum += Vector3::from(contact.force) * sign;
+        }
+    }
+    lines.push(match count {
+        0 => "no contact".into(),
+        1 => format!("1 contact: force on it  {:+.2} {:+.2} {:+.2} N", sum.x, sum.y, sum.z),
+        n => format!("{n} contacts: force on it  {:+.2} {:+.2} {:+.2} N", sum.x, sum.y, sum.z),
+    });
+    lines
+}

@@ -1,0 +1,52 @@
+//! Memory of snapshots, used again and again.
+
+use super::snapshot::{Names, Run, Snapshot};
+use crate::control::Wants;
+use sim::SimulationManager;
+use std::sync::Arc;
+
+/// A fixed number of snapshots, of which those that nobody holds are filled again.
+#[derive(Debug, Default)]
+pub(crate) struct Pool {
+    snapshots: Vec<Arc<Snapshot>>,
+    taken: u64,
+    names: Option<Arc<Names>>,
+}
+
+impl Pool {
+    /// A snapshot of now; `None` where all `size` of them are in somebody's hands.
+    pub(crate) fn take(
+        &mut self,
+        sim: &mut SimulationManager,
+        size: usize,
+        wants: &Wants,
+        run: Run,
+    ) -> Option<Arc<Snapshot>> {
+        if self.names.as_ref().is_none_or(|names| !names.fit(sim)) {
+            self.names = Some(Arc::new(Names::of(sim)));
+        }
+        let names = Arc::clone(self.names.as_ref()?);
+        if self.snapshots.len() > size {
+            // Of viewers that went.
+            self.snapshots.retain(|snapshot| Arc::strong_count(snapshot) > 1);
+        }
+        let free = self.snapshots.iter().position(|snapshot| Arc::strong_count(snapshot) == 1);
+        let place = free.unwrap_or(self.snapshots.len());
+        if place == self.snapshots.len() {
+            if place >= size {
+                return None;
+            }
+            self.snapshots.push(Arc::default());
+        }
+        let snapshot = Arc::get_mut(&mut self.snapshots[place])?;
+        self.taken += 1;
+        snapshot.number = self.taken;
+        snapshot.fill(sim, &names, wants, run);
+        Some(Arc::clone(&self.snapshots[place]))
+    }
+
+    /// Something was added to the simulation.
+    pub(crate) fn forget_names(&mut self) {
+        self.names = None;
+    }
+}

@@ -1,0 +1,495 @@
+//! What a window does with mouse and keys, and what it draws: everything but the window.
+
+use super::hud;
+use super::keys::{Action, Key, action};
+use crate::control::{Command, Speed, Wants};
+use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Shown, Snapshot, Trails, describe};
+use nalgebra::Vector3;
+use sensors::visibility::View;
+use sim::EnvId;
+use std::collections::HashSet;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What happens to a window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Input {
+    /// A key was pressed, or is held and repeats.
+    Press(Key),
+    /// A key was let go.
+    Release(Key),
+    /// A button of the mouse was pressed at a pixel: 1 is the left one, 2 the middle one, 3 the right one.
+    ButtonPress(u8, [f64; 2], Modifiers),
+    /// A button was let go.
+    ButtonRelease(u8, [f64; 2]),
+    /// The mouse is at a pixel.
+    Move([f64; 2]),
+    /// The wheel was turned by steps, away from the user, at a pixel.
+    Wheel(f64, [f64; 2]),
+    /// The window has this many pixels.
+    Resize([usize; 2]),
+    /// The keyboard is somebody else's now.
+    FocusLost,
+}
+
+/// Keys that are held while a button is pressed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Modifiers {
+    /// Shift.
+    pub shift: bool,
+    /// Control.
+    pub ctrl: bool,
+}
+
+/// What the mouse is doing.
+#[derive(Clone, Debug, PartialEq)]
+enum Grip {
+    Orbit,
+    Pan,
+    Turn,
+    /// A slider of a joint.
+    Slider(usize),
+    /// A body, held in a plane at this depth of the picture \[m\].
+    Spring {
+        picked: Picked,
+        depth: f64,
+        target: [f64; 3],
+    },
+}
+
+/// A mouse that moved less than this between press and release clicked \[pixels\].
+const CLICK: f64 = 3.0;
+/// Width of each of the panel's four pictures \[pixels\].
+const PANEL: usize = 160;
+
+/// The state of a window.
+pub struct App {
+    painter: Painter,
+    panel: Panel,
+    /// The panel's pictures.
+    small: Canvas,
+    trails: Trails,
+    snapshot: Option<Arc<Snapshot>>,
+    size: [usize; 2],
+    eye: Option<Eye>,
+    shown: Shown,
+    /// The environment that panels and sliders are of.
+    env: usize,
+    /// The camera sensor that is looked through.
+    through: Option<usize>,
+    /// The camera sensor of the panel.
+    panel_of: Option<usize>,
+    overlays: Overlays,
+    picked: Option<Picked>,
+    follow: Option<[f64; 3]>,
+    grip: Option<(Grip, [f64; 2], [f64; 2])>,
+    held: HashSet<Key>,
+    sliders: Option<usize>,
+    help: bool,
+    commands: Vec<Command>,
+    drawn: Vec<Instant>,
+    flown: Instant,
+}
+
+/// Short: snapshots and pictures are long.
+impl fmt::Debug for App {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("App")
+            .field("size", &self.size)
+            .field("eye", &self.eye)
+            .field("shown", &(self.shown, self.env))
+            .field("cameras", &(self.through, self.panel_of))
+            .field("overlays", &self.overlays)
+            .field("picked", &(&self.picked, self.follow))
+            .field("held", &self.held)
+            .field("panels", &(self.sliders, self.help))
+            .finish_non_exhaustive()
+    }
+}
+
+impl App {
+    /// A window of `size` pixels, drawn on `threads` threads.
+    pub fn new(size: [usize; 2], threads: usize) -> Self {
+        Self {
+            painter: Painter::new(threads),
+            panel: Panel::new(threads),
+            small: Canvas::default(),
+            trails: Trails::default(),
+            snapshot: None,
+            size,
+            eye: None,
+            shown: Shown::All,
+            env: 0,
+            through: None,
+            panel_of: None,
+            overlays: Overlays::default(),
+            picked: None,
+            follow: None,
+            grip: None,
+            held: HashSet::new(),
+            sliders: None,
+            help: false,
+            commands: Vec::new(),
+            drawn: Vec::new(),
+            flown: Instant::now(),
+        }
+    }
+
+    /// A newer snapshot.
+    pub fn show(&mut self, snapshot: Arc<Snapshot>) {
+        self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
+        if self.eye.is_none() {
+            self.eye = Some(Eye::overview(&snapshot));
+        }
+        // Numbers of bodies are other ones when something was added.
+        if let Some(picked) = &mut self.picked
+            && picked.body.is_some()
+        {
+            picked.body = snapshot.names.bodies.iter().position(|name| *name == picked.name);
+        }
+        if let (Some(last), Some(picked), Some(eye)) = (self.follow, &self.picked, &mut self.eye) {
+            let now = picked.point_now(&snapshot);
+            (0..3).for_each(|k| eye.target[k] += now[k] - last[k]);
+            self.follow = Some(now);
+        }
+        self.trails.add(&snapshot);
+        self.snapshot = Some(snapshot);
+        self.pull();
+    }
+
+    /// Looks from somewhere else.
+    pub fn look_from(&mut self, eye: Eye) {
+        self.eye = Some(eye);
+    }
+
+    /// Where it looks from, where it looks freely.
+    pub fn eye(&self) -> Eye {
+        self.eye.unwrap_or_default()
+    }
+
+    /// What was clicked on last.
+    pub fn picked(&self) -> Option<&Picked> {
+        self.picked.as_ref()
+    }
+
+    /// What it wants to find in snapshots.
+    pub fn wants(&self) -> Wants {
+        let one = Shown::One(self.picked.as_ref().map_or(self.env, |picked| picked.env));
+        let contacts = match (self.overlays.contacts, self.picked.is_some()) {
+            (true, _) => Some(self.shown),
+            (false, true) => Some(one),
+            (false, false) => None,
+        };
+        Wants { contacts, markers: self.overlays.sensors, ..Wants::default() }
+    }
+
+    /// What it asks the simulation for, since this was called last.
+    pub fn take_commands(&mut self) -> Vec<Command> {
+        std::mem::take(&mut self.commands)
+    }
+
+    /// Whether the picture changes even where nothing happens: keys to fly are held.
+    pub fn moves(&self) -> bool {
+        !self.held.is_empty()
+    }
+
+    fn env_id(&self) -> Option<EnvId> {
+        match self.shown {
+            Shown::All => None,
+            Shown::One(env) => Some(EnvId(env)),
+        }
+    }
+
+    /// Something happened.
+    pub fn handle(&mut self, input: Input) {
+        match input {
+            Input::Press(key) => self.press(key),
+            Input::Release(key) => {
+                self.held.remove(&key);
+            }
+            Input::ButtonPress(button, at, modifiers) => self.grip(button, at, modifiers),
+            Input::ButtonRelease(_, at) => self.release(at),
+            Input::Move(at) => self.drag(at),
+            Input::Wheel(steps, at) => self.wheel(steps, at),
+            Input::Resize(size) => self.size = size,
+            Input::FocusLost => self.held.clear(),
+        }
+    }
+
+    fn press(&mut self, key: Key) {
+        let Some(action) = action(key) else { return };
+        if let Action::Fly(_) = action {
+            if self.held.is_empty() {
+                self.flown = Instant::now();
+            }
+            self.held.insert(key);
+            return;
+        }
+        let Some(snapshot) = self.snapshot.clone() else { return };
+        let (run, envs, cameras) = (&snapshot.run, snapshot.envs.len().max(1), snapshot.names.cameras.len());
+        let factor = match run.speed {
+            Speed::Times(factor) => factor,
+            Speed::Free => run.measured_speed.map_or(1.0, |speed| speed.clamp(0.01, 100.0)),
+        };
+        let next = |current: Option<usize>| match current {
+            None if cameras > 0 => Some(0),
+            Some(k) if k + 1 < cameras => Some(k + 1),
+            _ => None,
+        };
+        let o = &mut self.overlays;
+        match action {
+            Action::Pause => self.commands.push(Command::TogglePause),
+            Action::Steps(count) => self.commands.push(Command::Step(count)),
+            Action::Slower => self.commands.push(Command::SetSpeed(Speed::Times((factor / 2.0).max(Speed::RANGE[0])))),
+            Action::Faster => self.commands.push(Command::SetSpeed(Speed::Times((factor * 2.0).min(Speed::RANGE[1])))),
+            Action::RealTime => self.commands.push(Command::SetSpeed(Speed::REAL)),
+            Action::FreeSpeed => self.commands.push(Command::SetSpeed(Speed::Free)),
+            Action::Reset => self.commands.push(Command::Reset(self.env_id())),
+            Action::NextEnv => self.show_env((self.env + 1) % envs),
+            Action::PreviousEnv => self.show_env((self.env + envs - 1) % envs),
+            Action::AllEnvs => self.shown = Shown::All,
+            Action::NextCamera => self.through = next(self.through),
+            Action::FreeView => self.through = None,
+            Action::Overview => (self.eye, self.follow, self.through) = (Some(Eye::overview(&snapshot)), None, None),
+            Action::Follow => {
+                let point = self.picked.as_ref().map(|picked| picked.point_now(&snapshot));
+                self.follow = point.filter(|_| self.follow.is_none());
+            }
+            Action::Sensors => o.sensors = !o.sensors,
+            Action::Contacts => o.contacts = !o.contacts,
+            Action::Frames => o.frames = !o.frames,
+            Action::JointAxes => o.joints = !o.joints,
+            Action::Masses => o.masses = !o.masses,
+            Action::Names => o.names = !o.names,
+            Action::Trails => o.trails = !o.trails,
+            Action::Collisions => o.collisions = !o.collisions,
+            Action::Visuals => o.visuals = !o.visuals,
+            Action::Panel => self.panel_of = next(self.panel_of),
+            Action::Sliders => self.sliders = if self.sliders.is_none() { Some(0) } else { None },
+            Action::Help => self.help = !self.help,
+            Action::Unselect => (self.picked, self.follow, self.help) = (None, None, false),
+            Action::Fly(_) => {}
+        }
+    }
+
+    /// Shows one environment; the eye goes along.
+    fn show_env(&mut self, env: usize) {
+        let Some(snapshot) = &self.snapshot else { return };
+        let from = self.env_id().and_then(|EnvId(k)| snapshot.envs.get(k)).map(|env| env.origin);
+        let to = snapshot.envs.get(env).map(|env| env.origin);
+        if let (Some(to), Some(eye)) = (to, &mut self.eye) {
+            match from {
+                Some(from) => (0..3).for_each(|k| eye.target[k] += to[k] - from[k]),
+                None => *eye = Eye { target: [to[0], to[1], to[2] + 0.3], ..Eye::default() },
+            }
+        }
+        (self.env, self.shown) = (env, Shown::One(env));
+    }
+
+    /// The camera of the picture.
+    fn view(&self) -> View {
+        let [width, height] = self.size.map(|n| n.clamp(1, View::MAX_SIDE));
+        if let Some(view) = self.through_view(width, height) {
+            return view;
+        }
+        self.eye.unwrap_or_default().view(width, height)
+    }
+
+    /// What a camera sensor looks at, its picture as large as fits.
+    fn through_view(&self, width: usize, height: usize) -> Option<View> {
+        let env = self.snapshot.as_ref()?.envs.get(self.env)?;
+        let view = env.views.get(self.through?).copied().flatten()?;
+        let scale = (width as f32 / view.width as f32).min(height as f32 / view.height as f32);
+        let mut pose = view.world_from_camera;
+        (0..3).for_each(|k| pose.translation[k] += env.origin[k] as f32);
+        // The principal point keeps its place in the sensor's picture, which is in the middle of the window.
+        let [left, top] = [width as f32 - scale * view.width as f32, height as f32 - scale * view.height as f32];
+        let (cx, cy) = (view.cx * scale + 0.5 * left, view.cy * scale + 0.5 * top);
+        Some(View { width, height, fx: view.fx * scale, fy: view.fy * scale, cx, cy, world_from_camera: pose, ..view })
+    }
+
+    fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
+        let Some(snapshot) = self.snapshot.clone() else { return };
+        let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
+        let grip = match button {
+            1 if on_slider.is_some() => {
+                let Some((joint, value)) = on_slider else { return };
+                self.set_target(&snapshot, joint, value);
+                Some(Grip::Slider(joint))
+            }
+            1 if self.sliders.is_some() && at[0] >= self.size[0] as f64 - f64::from(hud::SLIDERS) => None,
+            1 if modifiers.ctrl => self.spring(&snapshot, at),
+            1 if modifiers.shift => Some(Grip::Pan),
+            1 => Some(Grip::Orbit),
+            2 => Some(Grip::Turn),
+            3 => Some(Grip::Pan),
+            _ => None,
+        };
+        self.grip = grip.map(|grip| (grip, at, at));
+    }
+
+    /// A body to be pulled.
+    fn spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<Grip> {
+        let view = self.view();
+        let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
+        let picked = self.painter.pick(snapshot, &view, &look, at)?;
+        picked.body?;
+        let origin = snapshot.envs.get(picked.env)?.origin;
+        let in_overview = [0, 1, 2].map(|k| (picked.point[k] + origin[k]) as f32);
+        let depth = f64::from(view.world_from_camera.apply_inverse(in_overview)[2]);
+        let target = picked.point;
+        self.picked = Some(picked.clone());
+        Some(Grip::Spring { picked, depth, target })
+    }
+
+    /// Where a pixel is in an environment, at a depth \[m\].
+    fn at_depth(&self, [x, y]: [f64; 2], depth: f64, origin: [f64; 3]) -> [f64; 3] {
+        let view = self.view();
+        let in_camera = [(x as f32 - view.cx) / view.fx, (y as f32 - view.cy) / view.fy, 1.0].map(|n| n * depth as f32);
+        let p = view.world_from_camera.apply(in_camera);
+        [0, 1, 2].map(|k| f64::from(p[k]) - origin[k])
+    }
+
+    fn drag(&mut self, at: [f64; 2]) {
+        let Some((mut grip, start, last)) = self.grip.take() else { return };
+        let by = [at[0] - last[0], at[1] - last[1]];
+        let height = self.size[1];
+        let free = self.through.is_none();
+        match (&mut grip, &mut self.eye) {
+            (Grip::Orbit, Some(eye)) if free => eye.orbit(by, height),
+            (Grip::Pan, Some(eye)) if free => eye.pan(by, height),
+            (Grip::Turn, Some(eye)) if free => eye.turn(by, height),
+            _ => {}
+        }
+        if let Some(snapshot) = self.snapshot.clone() {
+            match &mut grip {
+                Grip::Slider(joint) => {
+                    let value = hud::slider_value(&snapshot, self.env, *joint, self.size[0], at[0]);
+                    value.into_iter().for_each(|value| self.set_target(&snapshot, *joint, value));
+                }
+                Grip::Spring { picked, depth, target } => {
+                    let origin = snapshot.envs.get(picked.env).map_or([0.0; 3], |env| env.origin);
+                    *target = self.at_depth(at, *depth, origin);
+                }
+                Grip::Orbit | Grip::Pan | Grip::Turn => {}
+            }
+        }
+        self.grip = Some((grip, start, at));
+        self.pull();
+    }
+
+    /// Sends the spring as it is.
+    fn pull(&mut self) {
+        if let Some((Grip::Spring { picked, target, .. }, ..)) = &self.grip
+            && let Some(body) = picked.body
+        {
+            let (env, hold, target) = (EnvId(picked.env), picked.hold, *target);
+            let drag = Command::Drag { env, body, hold, target };
+            self.commands.retain(|command| !matches!(command, Command::Drag { .. }));
+            self.commands.push(drag);
+        }
+    }
+
+    fn release(&mut self, at: [f64; 2]) {
+        let Some((grip, start, _)) = self.grip.take() else { return };
+        match grip {
+            Grip::Spring { .. } => self.commands.push(Command::Release),
+            Grip::Orbit if (at[0] - start[0]).hypot(at[1] - start[1]) < CLICK => self.select(at),
+            _ => {}
+        }
+    }
+
+    fn select(&mut self, at: [f64; 2]) {
+        let Some(snapshot) = self.snapshot.clone() else { return };
+        let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
+        let view = self.view();
+        self.picked = self.painter.pick(&snapshot, &view, &look, at);
+        self.follow = None;
+        if let Some(picked) = self.picked.as_ref().filter(|picked| picked.body.is_some()) {
+            self.env = picked.env;
+        }
+    }
+
+    fn wheel(&mut self, steps: f64, at: [f64; 2]) {
+        let count = self.snapshot.as_ref().map_or(0, |snapshot| hud::driven(snapshot).len());
+        if let Some(first) = &mut self.sliders
+            && at[0] >= self.size[0] as f64 - f64::from(hud::SLIDERS)
+        {
+            let moved = first.saturating_add_signed(-(steps as isize));
+            *first = moved.min(count.saturating_sub(1));
+        } else if let Some(eye) = self.eye.as_mut().filter(|_| self.through.is_none()) {
+            eye.zoom(steps);
+        }
+    }
+
+    fn set_target(&mut self, snapshot: &Snapshot, joint: usize, value: f64) {
+        let Some(name) = snapshot.names.joints.get(joint) else { return };
+        let (robot, joint, env) = (name.robot, name.joint, Some(EnvId(self.env)));
+        self.commands.push(Command::SetTarget { robot, joint, env, value });
+    }
+
+    /// Flies on while keys are held.
+    fn fly(&mut self, now: Instant) {
+        let seconds = now.saturating_duration_since(self.flown).as_secs_f64().min(0.1);
+        self.flown = now;
+        let Some(eye) = self.eye.as_mut().filter(|_| self.through.is_none()) else { return };
+        let mut way = Vector3::zeros();
+        for key in &self.held {
+            if let Some(Action::Fly(direction)) = action(*key) {
+                way += Vector3::from(direction.map(f64::from));
+            }
+        }
+        // As fast as what is looked at is far.
+        eye.fly((way * eye.distance * seconds).into());
+    }
+
+    /// Draws the window's picture; black before the first snapshot.
+    pub fn draw(&mut self, canvas: &mut Canvas, now: Instant) {
+        let [width, height] = self.size.map(|n| n.clamp(1, View::MAX_SIDE));
+        canvas.resize(width, height);
+        self.fly(now);
+        let Some(snapshot) = self.snapshot.clone() else { return };
+        self.drawn.retain(|then| now.saturating_duration_since(*then).as_secs_f64() < 1.0);
+        self.drawn.push(now);
+        let view = self.view();
+        let spring = match &self.grip {
+            Some((Grip::Spring { picked, target, .. }, ..)) => {
+                Some((picked.env, [picked.point_now(&snapshot), *target]))
+            }
+            _ => None,
+        };
+        let shown = if self.through.is_some() { Shown::One(self.env) } else { self.shown };
+        let look =
+            Look { shown, overlays: self.overlays, picked: self.picked.as_ref(), trails: Some(&self.trails), spring };
+        // Views of windows are good ones; one that is not leaves the last picture.
+        let _ = self.painter.draw(&snapshot, &view, &look, canvas);
+        let through = self.through.and_then(|camera| snapshot.names.cameras.get(camera));
+        let name =
+            through.map_or_else(|| "free view".into(), |name| format!("camera {name}, environment {}", self.env));
+        hud::status(canvas, &snapshot, self.shown, &name, self.drawn.len() as f64);
+        if let Some(picked) = &self.picked {
+            let mut lines = describe(picked, &snapshot);
+            lines.extend(self.follow.map(|_| "followed".into()));
+            hud::note(canvas, &lines);
+        }
+        self.draw_panel(&snapshot, canvas);
+        if let Some(first) = self.sliders {
+            hud::sliders(canvas, &snapshot, self.env, first);
+        }
+        if self.help {
+            hud::help(canvas);
+        }
+    }
+
+    /// The camera panel in the lower right corner, beside the sliders.
+    fn draw_panel(&mut self, snapshot: &Snapshot, canvas: &mut Canvas) {
+        let Some(camera) = self.panel_of else { return };
+        if self.panel.draw(snapshot, camera, self.env, PANEL, &mut self.small) {
+            let [width, height] = self.small.dimensions();
+            let aside = if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 };
+            let left = self.size[0].saturating_sub(width + aside + 6);
+            canvas.paste(&self.small, [left, self.size[1].saturating_sub(height + 6)]);
+        }
+    }
+}

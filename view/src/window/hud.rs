@@ -1,0 +1,149 @@
+//! What is written over the picture of a window: status, help, joint sliders. Functions of what they show, on a canvas.
+
+use super::keys;
+use crate::control::Speed;
+use crate::stage::{Canvas, Shown, Snapshot};
+use embedded_graphics::mono_font::MonoFont;
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13};
+
+const FONT: &MonoFont<'_> = &FONT_7X13;
+const SMALL: &MonoFont<'_> = &FONT_6X10;
+const WHITE: [u8; 3] = [240; 3];
+const GREY: [u8; 3] = [170; 3];
+const YELLOW: [u8; 3] = [255, 210, 60];
+const BLUE: [u8; 3] = [80, 150, 240];
+const DARK: [u8; 3] = [20, 22, 26];
+
+/// Width of the panel of sliders \[pixels\].
+pub(super) const SLIDERS: i32 = 210;
+/// Height of a slider with its name \[pixels\].
+const ROW: i32 = 26;
+/// Where the first slider is, from the top of the panel \[pixels\].
+const TOP: i32 = 22;
+
+fn int(n: usize) -> i32 {
+    i32::try_from(n).unwrap_or(i32::MAX)
+}
+
+/// Time, speed, what is shown, in the upper left corner.
+pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, view: &str, frames_per_second: f64) {
+    let env = match shown {
+        Shown::All => 0,
+        Shown::One(env) => env,
+    };
+    let run = &snapshot.run;
+    let time = snapshot.envs.get(env).map_or(0.0, |env| env.look.time);
+    let wanted = match run.speed {
+        Speed::Free => "free".into(),
+        Speed::Times(factor) => format!("{factor}x"),
+    };
+    let measured = run.measured_speed.map_or_else(String::new, |speed| format!(", {speed:.2}x"));
+    let which = match shown {
+        Shown::All => format!("{} environments", snapshot.envs.len()),
+        Shown::One(env) => format!("environment {env} of {}", snapshot.envs.len()),
+    };
+    let state = if run.paused { "paused".into() } else { format!("speed {wanted}{measured}") };
+    let mut lines = vec![format!("{time:9.3} s   step {}   {state}", run.steps), format!("{which}   {view}")];
+    lines.push(format!("{frames_per_second:.0} pictures per second   H: help"));
+    let color = if run.paused { YELLOW } else { WHITE };
+    canvas.text(&lines.join("\n"), [8, 6], FONT, color);
+    let diverged = snapshot.envs.iter().filter(|env| env.look.diverged.is_some()).count();
+    let mut below = 6 + 3 * 13 + 8;
+    if diverged > 0 {
+        canvas.text(&format!("{diverged} environments diverged"), [8, below], FONT, YELLOW);
+        below += 18;
+    }
+    if let Some(refused) = &run.refused {
+        canvas.text(&format!("not done: {refused}"), [8, below], SMALL, YELLOW);
+    }
+}
+
+/// Lines in the lower left corner.
+pub(super) fn note(canvas: &mut Canvas, lines: &[String]) {
+    let height = int(canvas.dimensions()[1]);
+    canvas.text(&lines.join("\n"), [8, height - 13 * int(lines.len()) - 6], FONT, WHITE);
+}
+
+/// All keys, in the middle.
+pub(super) fn help(canvas: &mut Canvas) {
+    let lines = keys::help();
+    let [width, height] = canvas.dimensions().map(int);
+    let rows = int(lines.len().div_ceil(2));
+    let [w, h] = [640, rows * 15 + 34];
+    let [x, y] = [((width - w) / 2).max(0), ((height - h) / 2).max(0)];
+    canvas.fill([x, y], [w, h], DARK, 225);
+    canvas.text("Keys and mouse", [x + 12, y + 8], FONT, YELLOW);
+    for (index, [keys, text]) in lines.iter().enumerate() {
+        let (column, row) = (int(index) / rows.max(1), int(index) % rows.max(1));
+        let [left, top] = [x + 12 + column * 315, y + 28 + row * 15];
+        canvas.text(keys, [left, top], SMALL, WHITE);
+        canvas.text(text, [left + 84, top], SMALL, GREY);
+    }
+}
+
+/// Which joints have sliders: their places among the names of joints.
+pub(super) fn driven(snapshot: &Snapshot) -> Vec<usize> {
+    snapshot.names.joints.iter().enumerate().filter(|(_, joint)| joint.driven).map(|(k, _)| k).collect()
+}
+
+/// The ends of a slider; joints without limits turn once around.
+fn ends(joint: &[f64; 4]) -> [f64; 2] {
+    let (low, high) = (joint[2], joint[3]);
+    if low.is_finite() && high.is_finite() && high > low {
+        [low, high]
+    } else {
+        [-std::f64::consts::PI, std::f64::consts::PI]
+    }
+}
+
+/// Sliders of the joints of environment `env`, along the right side, from number `first` on.
+pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, first: usize) {
+    let [width, height] = canvas.dimensions().map(int);
+    let left = width - SLIDERS;
+    canvas.fill([left, 0], [SLIDERS, height], DARK, 170);
+    canvas.text(&format!("Joints, environment {env}"), [left + 8, 5], SMALL, YELLOW);
+    let Some(stage) = snapshot.envs.get(env) else { return };
+    for (row, joint) in driven(snapshot).into_iter().skip(first).enumerate() {
+        let top = TOP + ROW * int(row);
+        let Some((name, values)) = snapshot.names.joints.get(joint).zip(stage.joints.get(joint)) else { return };
+        if top + ROW > height {
+            return;
+        }
+        let [position, target, ..] = *values;
+        let short = name.name.rsplit('/').next().unwrap_or(&name.name);
+        canvas.text(&format!("{short:<20.20} {position:+.3}"), [left + 8, top], SMALL, WHITE);
+        let [low, high] = ends(values);
+        let place = |value: f64| {
+            left + 8
+                + ((value - low) / (high - low) * f64::from(SLIDERS - 16)).clamp(0.0, f64::from(SLIDERS - 16)) as i32
+        };
+        canvas.fill([left + 8, top + 15], [SLIDERS - 16, 4], GREY, 110);
+        canvas.fill([place(position) - 1, top + 13], [3, 8], BLUE, 255);
+        canvas.fill([place(target) - 1, top + 12], [3, 10], YELLOW, 255);
+    }
+}
+
+/// The slider at a pixel of a canvas of this width: number of the joint, and the target there.
+pub(super) fn slider_at(
+    snapshot: &Snapshot,
+    env: usize,
+    first: usize,
+    width: usize,
+    [x, y]: [f64; 2],
+) -> Option<(usize, f64)> {
+    let left = f64::from(int(width) - SLIDERS);
+    let row = (y - f64::from(TOP)) / f64::from(ROW);
+    if x < left || row < 0.0 {
+        return None;
+    }
+    let joint = *driven(snapshot).get(first + row as usize)?;
+    Some((joint, slider_value(snapshot, env, joint, width, x)?))
+}
+
+/// The target that a slider has where the mouse is, beside it too.
+pub(super) fn slider_value(snapshot: &Snapshot, env: usize, joint: usize, width: usize, x: f64) -> Option<f64> {
+    let [low, high] = ends(snapshot.envs.get(env)?.joints.get(joint)?);
+    let left = f64::from(int(width) - SLIDERS) + 8.0;
+    let share = ((x - left) / f64::from(SLIDERS - 16)).clamp(0.0, 1.0);
+    Some(low + share * (high - low))
+}

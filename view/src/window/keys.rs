@@ -1,0 +1,182 @@
+//! Keys of the window: one table, from which the keys are obeyed and the help is written.
+
+/// A key, by what is printed on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Key {
+    /// A letter, in lower case, a digit or a sign.
+    Char(char),
+    /// Escape.
+    Escape,
+    /// Tab.
+    Tab,
+    /// Backspace.
+    Backspace,
+    /// Home.
+    Home,
+    /// The first of the function keys.
+    F1,
+    /// Arrow.
+    Left,
+    /// Arrow.
+    Right,
+    /// Arrow.
+    Up,
+    /// Arrow.
+    Down,
+    /// Page up.
+    PageUp,
+    /// Page down.
+    PageDown,
+}
+
+/// What a key does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    Pause,
+    Steps(u32),
+    Slower,
+    Faster,
+    RealTime,
+    FreeSpeed,
+    Reset,
+    NextEnv,
+    PreviousEnv,
+    AllEnvs,
+    NextCamera,
+    FreeView,
+    Overview,
+    Follow,
+    Fly([i8; 3]),
+    Sensors,
+    Contacts,
+    Frames,
+    JointAxes,
+    Masses,
+    Names,
+    Trails,
+    Collisions,
+    Visuals,
+    Panel,
+    Sliders,
+    Help,
+    Unselect,
+}
+
+/// A key and what it does.
+#[derive(Debug)]
+pub(crate) struct Binding {
+    pub(crate) key: Key,
+    pub(crate) action: Action,
+    /// What the help says; empty where the binding before says it too.
+    pub(crate) help: &'static str,
+}
+
+const fn key(key: Key, action: Action, help: &'static str) -> Binding {
+    Binding { key, action, help }
+}
+
+/// All keys.
+pub(crate) const TABLE: &[Binding] = &[
+    key(Key::F1, Action::Help, "this help"),
+    key(Key::Char('h'), Action::Help, "this help"),
+    key(Key::Char(' '), Action::Pause, "pause, go on"),
+    key(Key::Char('.'), Action::Steps(1), "one step, then pause"),
+    key(Key::Char(','), Action::Steps(10), "ten steps, then pause"),
+    key(Key::Char('-'), Action::Slower, "half as fast"),
+    key(Key::Char('='), Action::Faster, "twice as fast"),
+    key(Key::Char('+'), Action::Faster, "twice as fast"),
+    key(Key::Char('1'), Action::RealTime, "real time"),
+    key(Key::Char('0'), Action::FreeSpeed, "as fast as can be"),
+    key(Key::Backspace, Action::Reset, "reset what is shown"),
+    key(Key::PageDown, Action::NextEnv, "next environment"),
+    key(Key::PageUp, Action::PreviousEnv, "previous environment"),
+    key(Key::Char('g'), Action::AllEnvs, "all environments in their grid"),
+    key(Key::Char('v'), Action::NextCamera, "look through the next camera sensor"),
+    key(Key::Char('b'), Action::FreeView, "look freely again"),
+    key(Key::Home, Action::Overview, "look at everything"),
+    key(Key::Char('x'), Action::Follow, "follow what is selected"),
+    key(Key::Char('w'), Action::Fly([1, 0, 0]), "fly ahead"),
+    key(Key::Char('s'), Action::Fly([-1, 0, 0]), "fly back"),
+    key(Key::Char('a'), Action::Fly([0, -1, 0]), "fly to the left"),
+    key(Key::Char('d'), Action::Fly([0, 1, 0]), "fly to the right"),
+    key(Key::Char('e'), Action::Fly([0, 0, 1]), "fly up"),
+    key(Key::Char('q'), Action::Fly([0, 0, -1]), "fly down"),
+    key(Key::Up, Action::Fly([1, 0, 0]), "fly ahead"),
+    key(Key::Down, Action::Fly([-1, 0, 0]), "fly back"),
+    key(Key::Left, Action::Fly([0, -1, 0]), "fly to the left"),
+    key(Key::Right, Action::Fly([0, 1, 0]), "fly to the right"),
+    key(Key::Char('o'), Action::Sensors, "what sensors show"),
+    key(Key::Char('c'), Action::Contacts, "contact forces"),
+    key(Key::Char('f'), Action::Frames, "frames of links"),
+    key(Key::Char('j'), Action::JointAxes, "axes of joints"),
+    key(Key::Char('m'), Action::Masses, "centres of mass"),
+    key(Key::Char('t'), Action::Names, "names"),
+    key(Key::Char('l'), Action::Trails, "trails"),
+    key(Key::Char('k'), Action::Collisions, "collision shapes"),
+    key(Key::Char('u'), Action::Visuals, "visual shapes"),
+    key(Key::Char('i'), Action::Panel, "colour, depth, mask, normals of a camera"),
+    key(Key::Tab, Action::Sliders, "joint sliders"),
+    key(Key::Escape, Action::Unselect, "select nothing, close the help"),
+];
+
+/// What the mouse does.
+pub(crate) const MOUSE: &[[&str; 2]] = &[
+    ["drag", "turn about the middle"],
+    ["right drag", "move"],
+    ["middle drag", "look around"],
+    ["wheel", "nearer, farther"],
+    ["click", "select"],
+    ["Ctrl + drag", "pull a body with a spring"],
+];
+
+/// What a key does.
+pub(crate) fn action(key: Key) -> Option<Action> {
+    TABLE.iter().find(|binding| binding.key == key).map(|binding| binding.action)
+}
+
+/// What is printed on a key.
+pub(crate) fn label(key: Key) -> String {
+    match key {
+        Key::Char(' ') => "Space".into(),
+        Key::Char(letter) => letter.to_uppercase().to_string(),
+        Key::PageUp => "Page up".into(),
+        Key::PageDown => "Page down".into(),
+        other => format!("{other:?}"),
+    }
+}
+
+/// The lines of the help: keys that do the same are on one line.
+pub(crate) fn help() -> Vec<[String; 2]> {
+    let mut lines: Vec<(Action, [String; 2])> = Vec::new();
+    for binding in TABLE {
+        match lines.iter_mut().find(|(action, _)| *action == binding.action) {
+            Some((_, [keys, _])) => *keys += &format!(", {}", label(binding.key)),
+            None => lines.push((binding.action, [label(binding.key), binding.help.into()])),
+        }
+    }
+    let mouse = MOUSE.iter().map(|line| line.map(String::from));
+    lines.into_iter().map(|(_, line)| line).chain(mouse).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_key_does_one_thing_and_the_help_names_it() {
+        let keys: HashSet<Key> = TABLE.iter().map(|binding| binding.key).collect();
+        assert_eq!(keys.len(), TABLE.len(), "a key is there twice");
+        let help = help();
+        for binding in TABLE {
+            let said = |[keys, text]: &[String; 2]| {
+                text == binding.help && keys.split(", ").any(|key| key == label(binding.key))
+                    || keys.contains(&label(binding.key)) && text == binding.help
+            };
+            assert!(help.iter().any(said), "{binding:?} is not in the help");
+        }
+        assert_eq!(action(Key::Char(' ')), Some(Action::Pause));
+        assert_eq!(action(Key::Char('~')), None);
+    }
+}

@@ -1,0 +1,235 @@
+//! A native window onto a simulation that runs.
+
+mod app;
+mod hud;
+mod keys;
+#[cfg(test)]
+mod tests;
+mod x11;
+
+pub use app::{App, Input, Modifiers};
+pub use keys::Key;
+
+use crate::control::{Command, Speed, Viewer, Viewing, Wants};
+use crate::stage::Canvas;
+use sim::SimulationManager;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+use x11::{Failure, Happened, Screened};
+
+/// A window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WindowCfg {
+    /// What is written over it.
+    pub title: String,
+    /// Pixels per row, rows.
+    pub size: [usize; 2],
+    /// The X display, such as `:0`; that of the variable `DISPLAY` where `None`.
+    pub display: Option<String>,
+    /// How fast simulated time passes once it is open; `None` leaves it as it is.
+    pub speed: Option<Speed>,
+    /// Threads that draw; half of the machine's, at least one, where `None`. The others step.
+    pub threads: Option<usize>,
+}
+
+impl Default for WindowCfg {
+    fn default() -> Self {
+        Self { title: "Kinetoscope".into(), size: [960, 540], display: None, speed: Some(Speed::REAL), threads: None }
+    }
+}
+
+/// Why there is no window.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WindowError {
+    /// There is no display, or it cannot be reached.
+    #[error(
+        "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
+         desktops have too (XWayland), or run without a window: the examples with --headless",
+        shown(.display), shown(.wayland)
+    )]
+    NoDisplay {
+        /// What was tried and what came of it.
+        reason: String,
+        /// The variable `DISPLAY`.
+        display: Option<String>,
+        /// The variable `WAYLAND_DISPLAY`.
+        wayland: Option<String>,
+    },
+    /// The operating system gives no thread.
+    #[error("no window can be opened: no thread for it: {0}")]
+    Thread(String),
+}
+
+fn shown(variable: &Option<String>) -> String {
+    variable.as_ref().map_or_else(|| "not set".into(), |value| format!("{value:?}"))
+}
+
+/// How a window ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Closed {
+    /// The user closed it, or [`Window::close`] did.
+    ByUser,
+    /// The simulation was dropped.
+    WithSimulation,
+    /// The display was lost; the simulation went on.
+    DisplayLost(String),
+}
+
+/// A handle of an open window. Dropping it closes nothing: the window stays until the user closes it, the simulation is
+/// dropped, or [`close`](Self::close).
+#[derive(Clone, Debug)]
+pub struct Window {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    close: AtomicBool,
+    number: AtomicU32,
+    closed: Mutex<Option<Closed>>,
+    ended: Condvar,
+}
+
+impl Window {
+    /// Whether it is open.
+    pub fn is_open(&self) -> bool {
+        self.closed().is_none()
+    }
+
+    /// How it ended; `None` while it is open.
+    pub fn closed(&self) -> Option<Closed> {
+        self.shared.closed.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The window's number on its X display, for programs that take pictures of windows.
+    pub fn number(&self) -> u32 {
+        self.shared.number.load(Ordering::Acquire)
+    }
+
+    /// Asks it to close, and does not wait.
+    pub fn close(&self) {
+        self.shared.close.store(true, Ordering::Release);
+    }
+
+    /// Waits until it is closed, up to `timeout`: how it ended, `None` where it is still open.
+    pub fn wait(&self, timeout: Duration) -> Option<Closed> {
+        let closed = self.shared.closed.lock().unwrap_or_else(PoisonError::into_inner);
+        let open = |closed: &mut Option<Closed>| closed.is_none();
+        let waited = self.shared.ended.wait_timeout_while(closed, timeout, open);
+        waited.unwrap_or_else(PoisonError::into_inner).0.clone()
+    }
+}
+
+/// Opens windows onto a simulation.
+pub trait OpenWindow {
+    /// Opens a window of 960 by 540 pixels in which time passes as it does outside; see
+    /// [`open_window_with`](Self::open_window_with).
+    ///
+    /// # Errors
+    /// As [`open_window_with`](Self::open_window_with).
+    fn open_window(&mut self) -> Result<Window, WindowError> {
+        self.open_window_with(WindowCfg::default())
+    }
+
+    /// Opens a window, on a thread of its own: it is drawn while `update` steps, and `update` waits where the user pauses.
+    /// When it is closed, or its display is lost, the simulation goes on, as fast as it can. There may be several, one
+    /// after the other or at the same time.
+    ///
+    /// # Errors
+    /// [`WindowError::NoDisplay`] where there is none.
+    fn open_window_with(&mut self, cfg: WindowCfg) -> Result<Window, WindowError>;
+}
+
+impl OpenWindow for SimulationManager {
+    fn open_window_with(&mut self, cfg: WindowCfg) -> Result<Window, WindowError> {
+        let (opened, result) = mpsc::channel();
+        let shared = Arc::new(Shared::default());
+        let window = Window { shared: Arc::clone(&shared) };
+        let viewer = self.viewer(Wants::default());
+        let run = move || {
+            let screen = match Screened::open(&cfg.title, cfg.size, cfg.display.as_deref()) {
+                Ok(screen) => screen,
+                Err(failure) => return drop(opened.send(Err(no_display(&failure)))),
+            };
+            shared.number.store(screen.number(), Ordering::Release);
+            if let Some(speed) = cfg.speed {
+                viewer.send(Command::SetSpeed(speed));
+            }
+            // Whoever opened it waits for this.
+            let _ = opened.send(Ok(()));
+            let closed = match show(screen, &viewer, &cfg, &shared) {
+                Ok(closed) => closed,
+                Err(failure) => Closed::DisplayLost(failure.to_string()),
+            };
+            // The simulation is free before anybody hears of the end.
+            drop(viewer);
+            *shared.closed.lock().unwrap_or_else(PoisonError::into_inner) = Some(closed);
+            shared.ended.notify_all();
+        };
+        let thread = std::thread::Builder::new().name("kinetoscope-window".into());
+        thread.spawn(run).map_err(|error| WindowError::Thread(error.to_string()))?;
+        match result.recv() {
+            Ok(Ok(())) => Ok(window),
+            Ok(Err(error)) => Err(error),
+            Err(_) => Err(WindowError::Thread("it ended before the window was there".into())),
+        }
+    }
+}
+
+fn no_display(failure: &Failure) -> WindowError {
+    let variable = |name: &str| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned());
+    let (display, wayland) = (variable("DISPLAY"), variable("WAYLAND_DISPLAY"));
+    WindowError::NoDisplay { reason: failure.to_string(), display, wayland }
+}
+
+/// Longest time between two looks at what the user does.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Shows snapshots until something ends it.
+fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared) -> Result<Closed, Failure> {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or((cores / 2).max(1)));
+    let mut canvas = Canvas::default();
+    let (mut last, mut wants) = (0, Wants::default());
+    let mut outdated = true;
+    // Before the first key, which would do nothing where nothing is shown.
+    if let Some(snapshot) = viewer.newest() {
+        last = snapshot.number;
+        app.show(snapshot);
+    }
+    loop {
+        for happened in screen.poll()? {
+            match happened {
+                Happened::Input(input) => app.handle(input),
+                Happened::Exposed => {}
+                Happened::Close => return Ok(Closed::ByUser),
+            }
+            outdated = true;
+        }
+        if shared.close.load(Ordering::Acquire) {
+            return Ok(Closed::ByUser);
+        }
+        if viewer.is_over() {
+            return Ok(Closed::WithSimulation);
+        }
+        if app.wants() != wants {
+            wants = app.wants();
+            viewer.set_wants(wants);
+        }
+        for command in app.take_commands() {
+            viewer.send(command);
+        }
+        if let Some(snapshot) = viewer.wait(last, LOOK) {
+            last = snapshot.number;
+            app.show(snapshot);
+            outdated = true;
+        }
+        if outdated || app.moves() {
+            app.draw(&mut canvas, Instant::now());
+            screen.present(&canvas)?;
+            outdated = false;
+        }
+    }
+}

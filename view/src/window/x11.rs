@@ -1,0 +1,306 @@
+//! A window of an X server, by the protocol itself: no C library, so nothing but an error comes of a lost connection.
+
+use super::app::{Input, Modifiers};
+use super::keys::Key;
+use crate::stage::Canvas;
+use x11rb::connection::{Connection, RequestConnection as _};
+use x11rb::errors::{ConnectionError, ReplyError, ReplyOrIdError};
+use x11rb::protocol::Event;
+use x11rb::protocol::xproto::{
+    AtomEnum, ConnectionExt as _, CreateGCAux, CreateWindowAux, EventMask, ImageFormat, ImageOrder, KeyButMask,
+    PropMode, Screen, Window, WindowClass,
+};
+use x11rb::rust_connection::RustConnection;
+use x11rb::wrapper::ConnectionExt as _;
+
+x11rb::atom_manager! {
+    Atoms: AtomsCookie {
+        WM_PROTOCOLS,
+        WM_DELETE_WINDOW,
+        _NET_WM_NAME,
+        UTF8_STRING,
+    }
+}
+
+/// A window, its size and its keys.
+#[derive(Debug)]
+pub(super) struct Screened {
+    connection: RustConnection,
+    window: Window,
+    gc: u32,
+    atoms: Atoms,
+    depth: u8,
+    /// Where red, green and blue are in a pixel \[bits\].
+    shifts: [u32; 3],
+    most_significant_first: bool,
+    size: [usize; 2],
+    keys: Keys,
+    /// Pixels as the server has them.
+    pixels: Vec<u8>,
+}
+
+/// What happened.
+#[derive(Debug)]
+pub(super) enum Happened {
+    Input(Input),
+    /// Something lay over the window.
+    Exposed,
+    /// The user wants it closed.
+    Close,
+}
+
+/// The connection was lost, or the server refused something.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failure {
+    #[error("{0}")]
+    Connect(#[from] x11rb::errors::ConnectError),
+    #[error("the connection to the display was lost: {0}")]
+    Lost(#[from] ConnectionError),
+    #[error("the display refuses: {0}")]
+    Reply(#[from] ReplyError),
+    #[error("the display refuses: {0}")]
+    Id(#[from] ReplyOrIdError),
+    #[error("the display shows no 8-bit red, green and blue in pixels of 32 bits")]
+    Colors,
+}
+
+/// Larger pictures are drawn coarser: more than this takes longer than a thirtieth of a second \[pixels\].
+const MOST_PIXELS: usize = 1920 * 1200;
+
+impl Screened {
+    /// Opens a window of about `size` pixels on a display, that of the variable `DISPLAY` where `None`.
+    pub(super) fn open(title: &str, size: [usize; 2], display: Option<&str>) -> Result<Self, Failure> {
+        let (connection, number) = x11rb::connect(display)?;
+        let screen = &connection.setup().roots[number];
+        let (depth, shifts) = colors(&connection, screen)?;
+        let [width, height] = size.map(|n| u16::try_from(n.clamp(1, 16_000)).unwrap_or(u16::MAX));
+        let window = connection.generate_id()?;
+        let events = EventMask::EXPOSURE
+            | EventMask::STRUCTURE_NOTIFY
+            | EventMask::KEY_PRESS
+            | EventMask::KEY_RELEASE
+            | EventMask::BUTTON_PRESS
+            | EventMask::BUTTON_RELEASE
+            | EventMask::POINTER_MOTION
+            | EventMask::FOCUS_CHANGE;
+        let aux = CreateWindowAux::new().event_mask(events).background_pixel(screen.black_pixel);
+        let (root, visual) = (screen.root, screen.root_visual);
+        connection.create_window(
+            depth,
+            window,
+            root,
+            0,
+            0,
+            width,
+            height,
+            0,
+            WindowClass::INPUT_OUTPUT,
+            visual,
+            &aux,
+        )?;
+        let atoms = Atoms::new(&connection)?.reply()?;
+        let text = title.as_bytes();
+        connection.change_property8(PropMode::REPLACE, window, AtomEnum::WM_NAME, AtomEnum::STRING, text)?;
+        connection.change_property8(PropMode::REPLACE, window, atoms._NET_WM_NAME, atoms.UTF8_STRING, text)?;
+        let class = b"kinetoscope\0Kinetoscope\0";
+        connection.change_property8(PropMode::REPLACE, window, AtomEnum::WM_CLASS, AtomEnum::STRING, class)?;
+        let close = [atoms.WM_DELETE_WINDOW];
+        connection.change_property32(PropMode::REPLACE, window, atoms.WM_PROTOCOLS, AtomEnum::ATOM, &close)?;
+        let gc = connection.generate_id()?;
+        connection.create_gc(gc, window, &CreateGCAux::new().graphics_exposures(0))?;
+        connection.map_window(window)?;
+        let keys = Keys::of(&connection)?;
+        connection.flush()?;
+        let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
+        let size = [usize::from(width), usize::from(height)];
+        let pixels = Vec::new();
+        Ok(Self { connection, window, gc, atoms, depth, shifts, most_significant_first, size, keys, pixels })
+    }
+
+    /// How many pixels of the window a pixel of the picture covers, along each side.
+    fn coarseness(&self) -> usize {
+        (1..).find(|k| (self.size[0] / k).max(1) * (self.size[1] / k).max(1) <= MOST_PIXELS).unwrap_or(1)
+    }
+
+    /// Size of the picture that is to be drawn.
+    pub(super) fn picture_size(&self) -> [usize; 2] {
+        let k = self.coarseness();
+        self.size.map(|n| n.div_ceil(k).max(1))
+    }
+
+    /// The number of the window on its display.
+    pub(super) fn number(&self) -> u32 {
+        self.window
+    }
+
+    /// What happened since this was asked last.
+    pub(super) fn poll(&mut self) -> Result<Vec<Happened>, Failure> {
+        let mut happened: Vec<Happened> = Vec::new();
+        while let Some(event) = self.connection.poll_for_event()? {
+            let next = self.meaning(&event);
+            // Of many places of the mouse the last one counts.
+            if let (Some(Happened::Input(Input::Move(to))), Some(Happened::Input(Input::Move(last)))) =
+                (&next, happened.last_mut())
+            {
+                *last = *to;
+            } else {
+                happened.extend(next);
+            }
+        }
+        Ok(happened)
+    }
+
+    fn meaning(&mut self, event: &Event) -> Option<Happened> {
+        let scale = self.coarseness() as f64;
+        let at = |x: i16, y: i16| [f64::from(x) / scale, f64::from(y) / scale];
+        let held = |state: KeyButMask| Modifiers {
+            shift: state.contains(KeyButMask::SHIFT),
+            ctrl: state.contains(KeyButMask::CONTROL),
+        };
+        Some(match event {
+            Event::Expose(_) => Happened::Exposed,
+            Event::ConfigureNotify(event) => {
+                let size = [event.width, event.height].map(|n| usize::from(n).max(1));
+                if size == self.size {
+                    return None;
+                }
+                self.size = size;
+                Happened::Input(Input::Resize(self.picture_size()))
+            }
+            Event::ClientMessage(event) => {
+                let asks = event.format == 32 && event.data.as_data32()[0] == self.atoms.WM_DELETE_WINDOW;
+                return asks.then_some(Happened::Close);
+            }
+            Event::DestroyNotify(event) if event.window == self.window => Happened::Close,
+            Event::KeyPress(event) => {
+                Happened::Input(Input::Press(self.keys.get(event.detail, held(event.state).shift)?))
+            }
+            Event::KeyRelease(event) => {
+                Happened::Input(Input::Release(self.keys.get(event.detail, held(event.state).shift)?))
+            }
+            Event::ButtonPress(event) => Happened::Input(match event.detail {
+                4 => Input::Wheel(1.0, at(event.event_x, event.event_y)),
+                5 => Input::Wheel(-1.0, at(event.event_x, event.event_y)),
+                button => Input::ButtonPress(button, at(event.event_x, event.event_y), held(event.state)),
+            }),
+            Event::ButtonRelease(event) if !(4..=7).contains(&event.detail) => {
+                Happened::Input(Input::ButtonRelease(event.detail, at(event.event_x, event.event_y)))
+            }
+            Event::MotionNotify(event) => Happened::Input(Input::Move(at(event.event_x, event.event_y))),
+            Event::FocusOut(_) => Happened::Input(Input::FocusLost),
+            _ => return None,
+        })
+    }
+
+    /// Shows a picture.
+    pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), Failure> {
+        let (k, [width, height], [columns, rows]) = (self.coarseness(), self.size, canvas.dimensions());
+        let line = 4 * width;
+        // What one request may hold, without its head.
+        let most = self.connection.maximum_request_bytes().saturating_sub(64);
+        let band = (most / line).clamp(1, height);
+        for top in (0..height).step_by(band) {
+            let band = band.min(height - top);
+            self.pixels.clear();
+            for y in top..top + band {
+                let row = (y / k).min(rows.saturating_sub(1));
+                let from = &canvas.bytes()[4 * row * columns..4 * (row + 1) * columns];
+                for x in 0..width {
+                    let rgb = &from[4 * (x / k).min(columns.saturating_sub(1))..];
+                    let pixel = (0..3).fold(0, |pixel, c| pixel | u32::from(rgb[c]) << self.shifts[c]);
+                    let bytes = if self.most_significant_first { pixel.to_be_bytes() } else { pixel.to_le_bytes() };
+                    self.pixels.extend(bytes);
+                }
+            }
+            let [width, band] = [width, band].map(|n| u16::try_from(n).unwrap_or(u16::MAX));
+            let top = i16::try_from(top).unwrap_or(i16::MAX);
+            let (format, window, gc) = (ImageFormat::Z_PIXMAP, self.window, self.gc);
+            self.connection.put_image(format, window, gc, width, band, 0, top, 0, self.depth, &self.pixels)?;
+        }
+        self.connection.flush()?;
+        Ok(())
+    }
+}
+
+impl Drop for Screened {
+    fn drop(&mut self) {
+        // Where the connection is lost the window is gone anyway.
+        let _ = self.connection.destroy_window(self.window);
+        let _ = self.connection.flush();
+    }
+}
+
+/// Depth of the screen, and where the colours are in its pixels.
+fn colors(connection: &RustConnection, screen: &Screen) -> Result<(u8, [u32; 3]), Failure> {
+    let depth = screen.root_depth;
+    let formats = &connection.setup().pixmap_formats;
+    let wide = formats.iter().any(|format| format.depth == depth && format.bits_per_pixel == 32);
+    let visuals = screen.allowed_depths.iter().flat_map(|depth| &depth.visuals);
+    let visual = visuals.filter(|_| wide).find(|visual| visual.visual_id == screen.root_visual);
+    let masks = visual.map(|visual| [visual.red_mask, visual.green_mask, visual.blue_mask]).ok_or(Failure::Colors)?;
+    let byte = |mask: u32| mask != 0 && mask >> mask.trailing_zeros() == 0xff;
+    if masks.into_iter().all(byte) { Ok((depth, masks.map(u32::trailing_zeros))) } else { Err(Failure::Colors) }
+}
+
+/// What is printed on keys.
+#[derive(Debug)]
+struct Keys {
+    first: u8,
+    each: usize,
+    signs: Vec<u32>,
+}
+
+impl Keys {
+    fn of(connection: &RustConnection) -> Result<Self, Failure> {
+        let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
+        let count = last.saturating_sub(first).saturating_add(1);
+        let mapping = connection.get_keyboard_mapping(first, count)?.reply()?;
+        Ok(Self { first, each: usize::from(mapping.keysyms_per_keycode), signs: mapping.keysyms })
+    }
+
+    /// The key of a code; with shift the upper sign, where there is one.
+    fn get(&self, code: u8, shift: bool) -> Option<Key> {
+        let at = usize::from(code.checked_sub(self.first)?) * self.each;
+        let signs = self.signs.get(at..at + self.each)?;
+        let upper = signs.get(1).copied().filter(|sign| shift && *sign != 0);
+        key_of(upper.or(signs.first().copied())?)
+    }
+}
+
+/// The key of a sign. Source: the X protocol's `keysymdef.h`, whose first 256 signs are Latin-1.
+fn key_of(sign: u32) -> Option<Key> {
+    Some(match sign {
+        0x20..=0x7e => Key::Char(char::from_u32(sign)?.to_ascii_lowercase()),
+        0xff08 => Key::Backspace,
+        0xff09 => Key::Tab,
+        0xff1b => Key::Escape,
+        0xff50 | 0xff95 => Key::Home,
+        0xff51 | 0xff96 => Key::Left,
+        0xff52 | 0xff97 => Key::Up,
+        0xff53 | 0xff98 => Key::Right,
+        0xff54 | 0xff99 => Key::Down,
+        0xff55 | 0xff9a => Key::PageUp,
+        0xff56 | 0xff9b => Key::PageDown,
+        0xffab => Key::Char('+'),
+        0xffad => Key::Char('-'),
+        0xffbe => Key::F1,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_are_keys() {
+        let of = [0x20, 0x41, 0x61, 0x2e, 0xffbe, 0xff1b, 0xffab].map(key_of);
+        let keys =
+            [Key::Char(' '), Key::Char('a'), Key::Char('a'), Key::Char('.'), Key::F1, Key::Escape, Key::Char('+')];
+        assert_eq!(of, keys.map(Some));
+        assert_eq!(key_of(0xffe1), None, "shift alone is no key");
+        let keys = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
+        assert_eq!([keys.get(8, false), keys.get(8, true)], [Some(Key::Char('=')), Some(Key::Char('+'))]);
+        assert_eq!([keys.get(9, true), keys.get(7, false), keys.get(10, false)], [Some(Key::Char('a')), None, None]);
+    }
+}

@@ -1,0 +1,265 @@
+//! The window on a real X server without a screen (Xvfb): what is on the display is what was drawn, windows are opened and
+//! closed again and again, and the loss of the display ends the window, not the program.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use scene::Pose;
+use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use view::window::App;
+use view::{Canvas, Closed, OpenWindow, Speed, Viewing, Wants, Window, WindowCfg, WindowError};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT, KeyButMask,
+    KeyPressEvent,
+};
+use x11rb::rust_connection::RustConnection;
+
+/// What is not there by then does not come.
+const LONG: Duration = Duration::from_secs(30);
+const SIZE: [usize; 2] = [480, 270];
+/// Below the status, which counts pictures per second \[pixels\].
+const BELOW_STATUS: usize = 70;
+
+/// An X server of its own.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// `None` where there is no Xvfb; in CI that is a failure. `cargo xtask test` installs it.
+    fn start() -> Option<Self> {
+        let command = ["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"];
+        let started = Command::new("Xvfb").args(command).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let Ok(mut server) = started else {
+            assert!(std::env::var_os("CI").is_none(), "Xvfb is not there; cargo xtask test installs it");
+            eprintln!("note: without Xvfb no window is opened (cargo xtask test installs it)");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some(Self { server, name: format!(":{}", number.trim()) })
+    }
+
+    fn cfg(&self) -> WindowCfg {
+        WindowCfg { size: SIZE, display: Some(self.name.clone()), threads: Some(1), ..WindowCfg::default() }
+    }
+
+    fn connect(&self) -> RustConnection {
+        x11rb::connect(Some(&self.name)).unwrap().0
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+fn simulation() -> SimulationManager {
+    let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.01, threads: Some(1), ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(0.4),
+        init_pose: Pose::translation(0.0, 0.0, 0.2),
+        rgba: [0.8, 0.1, 0.1, 1.0],
+        ..Default::default()
+    })
+    .unwrap();
+    sim
+}
+
+/// A simulation that a thread steps until it is told to stop.
+struct Running {
+    steps: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<SimulationManager>,
+}
+
+impl Running {
+    fn start(mut sim: SimulationManager) -> Self {
+        let (steps, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+        let (count, ends) = (Arc::clone(&steps), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            while !ends.load(Ordering::SeqCst) {
+                sim.update(1);
+                count.fetch_add(1, Ordering::SeqCst);
+            }
+            sim
+        });
+        Self { steps, stop, thread }
+    }
+
+    /// Steps that are done.
+    fn steps(&self) -> u64 {
+        self.steps.load(Ordering::SeqCst)
+    }
+
+    fn end(self) -> SimulationManager {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.join().unwrap()
+    }
+}
+
+/// The upper left of the whole display, as red, green and blue.
+fn screenshot(connection: &RustConnection, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
+    let root = connection.setup().roots[0].root;
+    let image = connection.get_image(ImageFormat::Z_PIXMAP, root, 0, 0, width as u16, height as u16, !0).unwrap();
+    // Xvfb's pixels of 24 bits: blue, green, red, nothing.
+    image.reply().unwrap().data.chunks_exact(4).map(|p| [p[2], p[1], p[0]]).collect()
+}
+
+fn pixels(canvas: &Canvas) -> Vec<[u8; 3]> {
+    canvas.bytes().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+fn until(what: &str, mut is: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !is() {
+        assert!(start.elapsed() < LONG, "never: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// The code of a key by its sign.
+fn code(connection: &RustConnection, sign: u32) -> u8 {
+    let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
+    let mapping = connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
+    let each = usize::from(mapping.keysyms_per_keycode);
+    let place = mapping.keysyms.chunks(each).position(|signs| signs[0] == sign).unwrap();
+    first + place as u8
+}
+
+fn press(connection: &RustConnection, window: u32, sign: u32) {
+    let event = KeyPressEvent {
+        response_type: KEY_PRESS_EVENT,
+        detail: code(connection, sign),
+        sequence: 0,
+        time: 0,
+        root: connection.setup().roots[0].root,
+        event: window,
+        child: 0,
+        root_x: 0,
+        root_y: 0,
+        event_x: 0,
+        event_y: 0,
+        state: KeyButMask::default(),
+        same_screen: true,
+    };
+    connection.send_event(false, window, EventMask::KEY_PRESS, event).unwrap();
+    connection.flush().unwrap();
+}
+
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+fn ended(window: &Window) -> Closed {
+    window.wait(LONG).expect("it ends")
+}
+
+/// Windows of one process, one after the other: all of it is one test, because threads are counted.
+#[test]
+fn a_window_shows_obeys_and_goes() {
+    let Some(mut display) = Display::start() else { return };
+    let mut sim = simulation();
+
+    // What is on the display is what was drawn.
+    let window = sim.open_window_with(display.cfg()).unwrap();
+    let connection = display.connect();
+    let viewer = sim.viewer(Wants::default());
+    let mut expected = Canvas::default();
+    let mut app = App::new(SIZE, 2);
+    app.show(viewer.newest().unwrap());
+    app.draw(&mut expected, Instant::now());
+    let (from, expected) = (BELOW_STATUS * SIZE[0], pixels(&expected));
+    until("the display shows what was drawn", || screenshot(&connection, SIZE)[from..] == expected[from..]);
+    let red = expected[from..].iter().filter(|p| p[0] > 90 && p[1] < p[0] / 2).count();
+    assert!(red > 200, "cubes are in the picture: {red}");
+    // The control: another view is another picture.
+    let mut other = Canvas::default();
+    let mut eye = app.eye();
+    eye.orbit([40.0, 0.0], SIZE[1]);
+    app.look_from(eye);
+    app.draw(&mut other, Instant::now());
+    assert_ne!(pixels(&other)[from..], expected[from..]);
+
+    // A key: the space bar pauses, and lets go on.
+    let run = Running::start(sim);
+    let paused = |is: bool| viewer.newest().is_some_and(|snapshot| snapshot.run.paused == is);
+    press(&connection, window.number(), 0x20);
+    until("it pauses", || paused(true));
+    press(&connection, window.number(), 0x20);
+    until("it goes on", || paused(false));
+    // As fast as can be.
+    press(&connection, window.number(), 0x30);
+    until("it is as fast as can be", || viewer.newest().is_some_and(|snapshot| snapshot.run.speed == Speed::Free));
+    let mut sim = run.end();
+
+    // Sizes that nobody wants: the window stays, and shows something down to its last pixel, where a new size leaves black.
+    const SCREEN: [usize; 2] = [1280, 800];
+    for size in [[1u32, 1], [9000, 7000], [480, 270]] {
+        let aux = ConfigureWindowAux::new().width(size[0]).height(size[1]);
+        connection.configure_window(window.number(), &aux).unwrap();
+        connection.flush().unwrap();
+        sim.update(5);
+        let [column, row] = [0, 1].map(|k| SCREEN[k].min(size[k] as usize) - 1);
+        let last = row * SCREEN[0] + column;
+        until("it is drawn at this size", || screenshot(&connection, SCREEN)[last] != [0; 3]);
+        assert!(window.is_open(), "{size:?}: {:?}", window.closed());
+    }
+
+    // Closed by the user, as window managers do it.
+    let atom = |name: &[u8]| connection.intern_atom(false, name).unwrap().reply().unwrap().atom;
+    let data = [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0];
+    let event = ClientMessageEvent::new(32, window.number(), atom(b"WM_PROTOCOLS"), data);
+    connection.send_event(false, window.number(), EventMask::NO_EVENT, event).unwrap();
+    connection.flush().unwrap();
+    assert_eq!(ended(&window), Closed::ByUser);
+
+    // Opened and closed again: no thread stays.
+    drop(viewer);
+    let before = threads();
+    for _ in 0..20 {
+        let window = sim.open_window_with(display.cfg()).unwrap();
+        sim.update(1);
+        window.close();
+        assert_eq!(ended(&window), Closed::ByUser);
+    }
+    until("the threads of windows end", || threads() <= before);
+
+    // The simulation ends the window.
+    let mut short = simulation();
+    let window = short.open_window_with(display.cfg()).unwrap();
+    drop(short);
+    assert_eq!(ended(&window), Closed::WithSimulation);
+
+    // The display is lost while the window is open and the simulation is paused by it: it goes on.
+    let window = sim.open_window_with(display.cfg()).unwrap();
+    let viewer = sim.viewer(Wants::default());
+    press(&connection, window.number(), 0x20);
+    let run = Running::start(sim);
+    until("it pauses", || viewer.newest().is_some_and(|snapshot| snapshot.run.paused));
+    drop(viewer);
+    display.server.kill().unwrap();
+    assert!(matches!(ended(&window), Closed::DisplayLost(_)), "{:?}", window.closed());
+    let held = run.steps();
+    until("it goes on", || run.steps() > held + 10);
+    let mut sim = run.end();
+
+    // And there is no display any more.
+    let error = sim.open_window_with(display.cfg()).unwrap_err();
+    assert!(matches!(error, WindowError::NoDisplay { .. }));
+    let text = error.to_string();
+    for word in ["DISPLAY", "WAYLAND_DISPLAY", "--headless"] {
+        assert!(text.contains(word), "{text}");
+    }
+    sim.update(10);
+}
