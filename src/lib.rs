@@ -4,6 +4,7 @@
 pub mod assets;
 
 pub use ndarray;
+pub use record;
 pub use scene;
 pub use sensors;
 pub use sim;
@@ -11,6 +12,7 @@ pub use sim;
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
     pub use crate::assets;
+    pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use scene::Pose;
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, RasterCfg,

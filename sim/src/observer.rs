@@ -66,6 +66,8 @@ impl<O> fmt::Debug for ObserverId<O> {
 pub(crate) struct Observers {
     seats: Vec<Seat>,
     next: u64,
+    /// Physics steps that were done since the simulation was made.
+    pub(crate) steps: u64,
 }
 
 struct Seat {
@@ -83,6 +85,8 @@ impl fmt::Debug for Observers {
 impl SimulationManager {
     /// Adds an observer. It is told of what happens from now on.
     pub fn add_observer<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
+        // What was written before is told to those who were there.
+        self.tell_written();
         let number = self.observers.next;
         self.observers.next += 1;
         self.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });
@@ -144,6 +148,7 @@ impl SimulationManager {
     pub(crate) fn step_observed(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
         if self.observers.seats.is_empty() {
             step(self, steps);
+            self.observers.steps += u64::from(steps);
             return steps;
         }
         self.tell_written();
@@ -156,6 +161,7 @@ impl SimulationManager {
         let first = waits.iter().map(|(_, wait)| *wait).min().unwrap_or(u64::MAX);
         let block = u32::try_from(first).unwrap_or(u32::MAX).min(steps);
         step(self, block);
+        self.observers.steps += u64::from(block);
         for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
             self.tell(*number, &Moment::Stepped);
         }
