@@ -75,6 +75,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("[INFO]: Setup complete...");
     println!("{}\n{}\n{}", sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
 
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 1000);
     let mut noise: Vec<Random> =
         (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
@@ -112,6 +113,7 @@ fn run(args: &Args) -> launcher::Result {
         write_pictures(&mut sim, camera, out)?;
         println!("Pictures written to {}", out.display());
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&report(
         &sim,
         robot,

@@ -58,6 +58,7 @@ fn run(args: &Args) -> launcher::Result {
 
     println!("Starting simulation...");
     let phases = phases(&sim, robot, args.swap_hand)?;
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, PHASE * phases.len() as u64);
     let mut finished = Vec::new();
     let mut step = 0;
@@ -82,6 +83,7 @@ fn run(args: &Args) -> launcher::Result {
     for (env, reason) in sim.diverged() {
         eprintln!("environment {} diverged: {reason}", env.0);
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

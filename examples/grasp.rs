@@ -103,6 +103,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).get_pose());
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
 
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
@@ -181,6 +182,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     if let Some(out) = &args.launcher.out {
         stage::write(&mut sim, &[], [4.2, -4.8, 3.6], [0.4, 0.1, 0.0], &out.join("grasp_all.png"))?;
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

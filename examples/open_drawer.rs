@@ -108,6 +108,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     }
     let stands = scatter(&mut sim, cabinet)?;
 
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)
@@ -165,6 +166,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     if let Some(out) = &args.launcher.out {
         stage::write(&mut sim, &[], [4.2, -5.2, 3.6], [0.4, 0.0, 0.0], &out.join("open_drawer_all.png"))?;
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

@@ -70,6 +70,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", sim.sensor(camera)?);
     let out = args.launcher.out_folder(args.save || args.draw)?;
 
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut drawing, mut images) = (0, Duration::ZERO, 0);
     let mut files: Vec<String> = Vec::new();
@@ -112,6 +113,7 @@ fn run(args: &Args) -> launcher::Result {
         let [low, high] = bounds.unwrap_or([*p, *p]);
         Some([[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))])
     });
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

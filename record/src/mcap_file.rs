@@ -298,6 +298,9 @@ pub fn recover(path: impl AsRef<Path>) -> Result<u64> {
     let left = part_of(path);
     let bytes = fs::read(&left).map_err(|error| RecordError::file(&left, error))?;
     let malformed = |what: String| RecordError::Malformed { path: left.clone(), what };
+    if !bytes.starts_with(mcap::MAGIC) {
+        return Err(malformed("nothing of it can be read: this is no MCAP file".into()));
+    }
     let (part, file) = PartFile::create_as(path, left.with_extension("recovered"), false)?;
     let give_up = |error: McapError| {
         part.discard();

@@ -125,6 +125,12 @@ const TABLE: &[Run] = &[
     // Drawers that are stuck: the control of the run above.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
+    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
+    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng"),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 100 --record {out}/run_camera"),
+    run_of("add_sensors_on_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/add_sensors.npz"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.mp4"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",
