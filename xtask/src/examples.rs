@@ -42,6 +42,9 @@ const TABLE: &[Run] = &[
         "--headless --num-envs 2 --steps 400 --arm-urdf {robots}/rokae_description/urdf/SR5.urdf \
          --hand-urdf {robots}/inspire_hand/DFQ_left_hand.urdf --arm-joints joint[1-6] --hand-joints L_.*",
     ),
+    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.mp4"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
     run_of(
@@ -55,6 +58,7 @@ const TABLE: &[Run] = &[
         "--headless --steps 1 --attach-sensor --attach-link ee_link --width 160 --height 120 --out {out}/attached",
     ),
     run_of("create_sensor", &[2], "--headless --steps 1 --attach-sensor --attach-link no_such_link --out {out}/none"),
+    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng"),
     run_of("create_sensor", &[2], "--headless --steps 1 --width 0 --out {out}/none"),
     run_of(
         "create_sensor",
@@ -84,6 +88,7 @@ const TABLE: &[Run] = &[
         &[0],
         "--headless --num-envs 1 --steps 400 --reset-every 0 --out {out}/mjcf_sensors --robot quadruped/quadruped.xml",
     ),
+    run_of("add_sensors_on_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/add_sensors.npz"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --payload=-1"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --robot sr5/SR5.urdf"),
     run_of("run_ray_caster", &[0], "--headless --steps 300 --out {out}/ray_caster --report {out}/ray_caster.json"),
@@ -108,6 +113,7 @@ const TABLE: &[Run] = &[
         &[0],
         "--headless --num-envs 2 --steps 100 --save --draw --camera-id 1 --out {out}/camera --report {out}/camera.json",
     ),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 100 --record {out}/run_camera"),
     run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
     run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
     trial_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json", enough_succeeded),
@@ -125,12 +131,6 @@ const TABLE: &[Run] = &[
     // Drawers that are stuck: the control of the run above.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
-    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
-    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng"),
-    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 100 --record {out}/run_camera"),
-    run_of("add_sensors_on_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/add_sensors.npz"),
-    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.mp4"),
-    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",
