@@ -77,6 +77,7 @@ fn run(args: &Args) -> launcher::Result {
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 1000);
     let mut noise: Vec<Random> =
         (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
@@ -114,6 +115,7 @@ fn run(args: &Args) -> launcher::Result {
         write_pictures(&mut sim, camera, out)?;
         println!("Pictures written to {}", out.display());
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&report(
         &sim,
         robot,

@@ -60,6 +60,7 @@ fn run(args: &Args) -> launcher::Result {
     let phases = phases(&sim, robot, args.swap_hand)?;
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, PHASE * phases.len() as u64);
     let mut finished = Vec::new();
     let mut step = 0;
@@ -84,6 +85,7 @@ fn run(args: &Args) -> launcher::Result {
     for (env, reason) in sim.diverged() {
         eprintln!("environment {} diverged: {reason}", env.0);
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

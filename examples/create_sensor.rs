@@ -106,6 +106,7 @@ fn run(args: &Args) -> launcher::Result {
     };
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, POSITION_2_EVERY);
     let mut album = Album { out, raw: args.raw, files: Vec::new(), drawing: Duration::ZERO, images: 0 };
     let mut step = 0;
@@ -140,6 +141,7 @@ fn run(args: &Args) -> launcher::Result {
         "{step} steps x {} environments, pictures included: {rate:.0} environment steps per second\n",
         sim.num_envs()
     );
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

@@ -101,6 +101,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
@@ -180,6 +181,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         rate,
         overview: ("grasp_all.png", [4.2, -4.8, 3.6], [0.4, 0.1, 0.0]),
     };
+    recording.finish(&mut sim)?;
     trial::conclude(&args.launcher, &mut sim, count)
 }
 

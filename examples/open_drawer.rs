@@ -106,6 +106,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)
@@ -164,6 +165,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         rate,
         overview: ("open_drawer_all.png", [4.2, -5.2, 3.6], [0.4, 0.0, 0.0]),
     };
+    recording.finish(&mut sim)?;
     trial::conclude(&args.launcher, &mut sim, count)
 }
 

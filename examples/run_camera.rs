@@ -72,6 +72,7 @@ fn run(args: &Args) -> launcher::Result {
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut drawing, mut images) = (0, Duration::ZERO, 0);
     let mut files: Vec<String> = Vec::new();
@@ -114,6 +115,7 @@ fn run(args: &Args) -> launcher::Result {
         let [low, high] = bounds.unwrap_or([*p, *p]);
         Some([[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))])
     });
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

@@ -60,6 +60,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", sim.sensor(frames)?);
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 1000);
     let count = sim.sensor(frames)?.target_frame_names().len();
     let mut step = 0;
@@ -86,6 +87,7 @@ fn run(args: &Args) -> launcher::Result {
         stage::write(&mut sim, &markers, eye, [0.0, 0.0, 0.35], &file)?;
         println!("Picture written to {}", file.display());
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

@@ -99,6 +99,7 @@ fn run(args: &Args) -> launcher::Result {
     let scene = Scene { ball, terrain, scanner };
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 1000);
     let mut step = 0;
     while !progress.stop(step) {
@@ -135,6 +136,7 @@ fn run(args: &Args) -> launcher::Result {
         stage::write(&mut sim, &markers, [1.3 * reach, 1.6 * reach, 1.2 * reach], [0.6, 0.7, -0.5], &file)?;
         println!("Picture written to {}", file.display());
     }
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

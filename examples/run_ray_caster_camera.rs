@@ -65,6 +65,7 @@ fn run(args: &Args) -> launcher::Result {
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 200);
     let (mut step, mut stepping, mut files) = (0, Duration::ZERO, Vec::new());
     let (mut pictures, mut seen) = (0, 0);
@@ -119,6 +120,7 @@ fn run(args: &Args) -> launcher::Result {
         "{pictures} images of {} x {}: {images_per_second:.0} per second, stepping included",
         args.width, args.height
     );
+    recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

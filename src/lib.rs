@@ -4,6 +4,7 @@
 pub mod assets;
 
 pub use ndarray;
+pub use record;
 pub use scene;
 pub use sensors;
 pub use sim;
@@ -12,6 +13,7 @@ pub use view;
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
     pub use crate::assets;
+    pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use scene::Pose;
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Placement,
@@ -35,7 +37,5 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
-    pub use view::{
-        OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
-    };
+    pub use view::{OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError};
 }

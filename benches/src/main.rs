@@ -13,6 +13,7 @@ mod models;
 mod mujoco_batch;
 mod randomize;
 mod rays;
+mod record;
 mod rival;
 mod row;
 mod startup;
@@ -31,6 +32,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("mujoco-batch", mujoco_batch::run),
     ("camera", camera::run),
     ("rays", rays::run),
+    ("record", record::run),
     ("trace", trace::run),
     ("contacts", contacts::run),
     ("ik", ik::run),
@@ -53,7 +55,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, trace, contacts, ik, randomize, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, trace, contacts, ik, randomize, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

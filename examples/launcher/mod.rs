@@ -74,6 +74,10 @@ pub(crate) struct Launcher {
     /// File for the report, as JSON
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
+    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .apng for the first camera, a folder for
+    /// PNG files of all cameras
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
 }
 
 /// Where physics runs.
@@ -220,6 +224,16 @@ impl Launcher {
         Ok(())
     }
 
+    /// Begins to record to the file of `--record`.
+    ///
+    /// # Errors
+    /// The file cannot be written, or has no place for anything of this example.
+    pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
+        let record = |path: &PathBuf| sim.record(RecorderCfg::new(path));
+        let recorder = self.record.as_ref().map(record).transpose().map_err(|error| format!("--record {error}"))?;
+        Ok(Recording { recorder })
+    }
+
     /// The folder of `--out`, else the one that the example runs in; made where it is `wanted`.
     ///
     /// # Errors
@@ -241,6 +255,26 @@ impl Launcher {
         let text = serde_json::to_string_pretty(report)? + "\n";
         std::fs::write(path, text).map_err(|e| format!("--report {}: {e}", path.display()))?;
         println!("Report written to {}", path.display());
+        Ok(())
+    }
+}
+
+/// What `--record` has begun, if anything.
+#[derive(Debug)]
+pub(crate) struct Recording {
+    recorder: Option<RecorderId>,
+}
+
+impl Recording {
+    /// Ends the recording: the file is whole.
+    ///
+    /// # Errors
+    /// It could not be written.
+    pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
+        if let Some(recorder) = self.recorder {
+            let recorded = sim.finish_recording(recorder).map_err(|error| format!("--record {error}"))?;
+            println!("Recorded to {recorded}");
+        }
         Ok(())
     }
 }

@@ -170,6 +170,10 @@ impl Sensor for FrameTransformer {
         self.sampler.due_in(step)
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// The axes of all frames.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let axes = |p: [f64; 3], q: [f64; 4]| Marker::axes(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0.2);

@@ -151,6 +151,10 @@ impl Sensor for Imu {
         self.sampler.due_in(step)
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// Its frame, and an arrow of the acceleration that it reads, 1 m for 20 m/s²: at rest upwards.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (p, q, a) = (self.pos_w(), self.quat_w(), self.lin_acc_b());

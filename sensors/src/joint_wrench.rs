@@ -143,6 +143,10 @@ impl Sensor for JointWrench {
         self.sampler.due_in(step)
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) where they are measured.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (forces, torques) = (self.forces(), self.torques());

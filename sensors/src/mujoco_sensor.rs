@@ -101,6 +101,10 @@ impl Sensor for MujocoSensor {
     fn due_in(&self, step: &[u64]) -> u64 {
         self.sampler.due_in(step)
     }
+
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
 }
 
 /// A summary of several lines.

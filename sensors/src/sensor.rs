@@ -3,6 +3,7 @@
 use crate::crew::Crew;
 use crate::error::SensorError;
 use crate::ray::RayAssets;
+use crate::sampling::Sampled;
 use crate::schedule::Schedule;
 use nalgebra::Vector3;
 use scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
@@ -97,6 +98,12 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1
+    }
+
+    /// Its numbers with their channels, for who knows nothing of its type, such as a recorder; `None` for a sensor without a
+    /// [`Sampler`](crate::Sampler).
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        None
     }
 }
 

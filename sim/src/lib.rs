@@ -23,6 +23,7 @@ pub mod inertia;
 pub mod inspect;
 pub mod interactive_scene;
 pub mod kinematics;
+mod listing;
 mod look;
 mod manager;
 pub mod mj;

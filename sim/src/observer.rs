@@ -66,8 +66,8 @@ impl<O> fmt::Debug for ObserverId<O> {
 pub(crate) struct Observers {
     seats: Vec<Seat>,
     next: u64,
-    /// Physics steps so far.
-    steps: u64,
+    /// Physics steps that were done since the simulation was made.
+    pub(crate) steps: u64,
 }
 
 struct Seat {
@@ -85,6 +85,8 @@ impl fmt::Debug for Observers {
 impl SimulationManager {
     /// Adds an observer. It is told of what happens from now on.
     pub fn add_observer<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
+        // What was written before is told to those who were there.
+        self.tell_written();
         let number = self.observers.next;
         self.observers.next += 1;
         self.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });

@@ -263,6 +263,33 @@ impl SensorList {
         self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
 
+    /// Their names, in the order in which they were added.
+    pub(crate) fn uids(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|entry| entry.uid.as_str())
+    }
+
+    /// The sensor of that name, whatever its type.
+    pub(crate) fn called(&self, uid: &str) -> Result<&dyn Sensor> {
+        let entry = self.entry_called(uid)?;
+        entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))
+    }
+
+    /// Physics steps until the next measurement of the sensor of that name.
+    pub(crate) fn due_in(&self, uid: &str, simulation: &Simulation) -> Result<u64> {
+        let entry = self.entry_called(uid)?;
+        let mut clocks = Vec::with_capacity(simulation.batch.num_envs());
+        gather::gather_clocks(simulation, self.substeps, &mut clocks);
+        Ok(entry.running().map_or(u64::MAX, |slot| slot.due_in(&clocks).max(1)))
+    }
+
+    fn entry_called(&self, uid: &str) -> Result<&Entry> {
+        self.entries.iter().find(|entry| entry.uid == uid).ok_or_else(|| Error::UnknownName {
+            what: "sensor",
+            name: uid.into(),
+            candidates: self.uids().map(String::from).collect(),
+        })
+    }
+
     /// The place of a sensor in the list.
     ///
     /// # Panics

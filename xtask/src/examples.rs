@@ -49,6 +49,9 @@ const TABLE: &[Run] = &[
     ),
     run_of("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
     run_of("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
+    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.mp4"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
     run_of(
@@ -62,6 +65,7 @@ const TABLE: &[Run] = &[
         "--headless --steps 1 --attach-sensor --attach-link ee_link --width 160 --height 120 --out {out}/attached",
     ),
     run_of("create_sensor", &[2], "--headless --steps 1 --attach-sensor --attach-link no_such_link --out {out}/none"),
+    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng"),
     run_of("create_sensor", &[2], "--headless --steps 1 --width 0 --out {out}/none"),
     run_of(
         "create_sensor",
@@ -91,6 +95,7 @@ const TABLE: &[Run] = &[
         &[0],
         "--headless --num-envs 1 --steps 400 --reset-every 0 --out {out}/mjcf_sensors --robot quadruped/quadruped.xml",
     ),
+    run_of("add_sensors_on_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/add_sensors.npz"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --payload=-1"),
     run_of("add_sensors_on_robot", &[2], "--headless --steps 1 --robot sr5/SR5.urdf"),
     run_of("run_ray_caster", &[0], "--headless --steps 300 --out {out}/ray_caster --report {out}/ray_caster.json"),
@@ -115,6 +120,7 @@ const TABLE: &[Run] = &[
         &[0],
         "--headless --num-envs 2 --steps 100 --save --draw --camera-id 1 --out {out}/camera --report {out}/camera.json",
     ),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 100 --record {out}/run_camera"),
     run_of("run_camera", &[2], "--headless --steps 1 --camera-id 7"),
     run_of("run_camera", &[2], "--headless --steps 1 --width 0"),
     trial_of(

@@ -1,5 +1,5 @@
 //! A Python with MuJoCo of the wheel's version, for what is compared with other programs: rivals of the benchmarks, and
-//! MuJoCo's own renderer as a judge of our pictures.
+//! MuJoCo's own renderer as a judge of our pictures; and another one, with readers of our recordings.
 
 use crate::run::{Cmd, Outcome, Repo};
 use crate::wheel;
@@ -7,6 +7,12 @@ use std::path::{Path, PathBuf};
 
 /// Names the python to benchmarks and tests; without it they leave out what needs it, with a message.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
+
+/// Names the python to the tests of recordings; without it they leave out what needs it, with a message.
+pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
+
+/// Who reads our recordings.
+const READERS: &[&str] = &["numpy==2.4.6", "mcap==1.6.0", "mcap-ros2-support==0.6.0", "pillow==13.0.0"];
 
 /// What MuJoCo's renderer draws through.
 pub(crate) const OPENGL: Module = Module { name: "OpenGL", packages: &["PyOpenGL==3.1.10"] };
@@ -55,6 +61,23 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
         return Some(python);
     }
     eprintln!("note: no python with mujoco {} could be made", wheel::VERSION);
+    None
+}
+
+/// The python of another virtual environment below the target folder, with readers of recordings that nobody here wrote;
+/// `None`, with a note, where it cannot be made.
+pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
+    let venv = repo.target.join("readers-venv");
+    let python = venv.join("bin/python");
+    let is_ready = || Cmd::new(&python).args(["-c", "import numpy, mcap, mcap_ros2, PIL"]).quiet().succeeds();
+    if is_ready() {
+        return Some(python);
+    }
+    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run();
+    if made.is_ok_and(|()| pip_install(&python, READERS).is_ok()) && is_ready() {
+        return Some(python);
+    }
+    eprintln!("note: no python with {} could be made", READERS.join(" "));
     None
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 /// The unsafe wall: generated bindings, and the one module that calls them.
 const UNSAFE_MAY_STAND_IN: [&str; 2] = ["mujoco-sys/src/lib.rs", "sim/src/mj/"];
 /// Crates that forbid unsafe code as a whole.
-const FORBID_UNSAFE: [&str; 3] = ["scene/src/lib.rs", "sensors/src/lib.rs", "view/src/lib.rs"];
+const FORBID_UNSAFE: [&str; 4] = ["scene/src/lib.rs", "sensors/src/lib.rs", "record/src/lib.rs", "view/src/lib.rs"];
 const MAX_LINES: usize = 800;
 /// First folders of absolute paths that exist on one machine only.
 const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
@@ -324,9 +324,10 @@ mod tests {
 
     #[test]
     fn crates_that_must_forbid_unsafe_code_are_named() {
-        assert_eq!(missing_forbid(&[]).len(), 2);
+        assert_eq!(missing_forbid(&[]).len(), 3);
         let mut files = file("scene/src/lib.rs", "//! Doc.\n#![forbid(unsafe_code)]\n");
         files.extend(file("sensors/src/lib.rs", "// #![forbid(unsafe_code)]\n"));
+        files.extend(file("record/src/lib.rs", "#![forbid(unsafe_code)]\n"));
         assert_eq!(missing_forbid(&files), ["sensors/src/lib.rs: must say #![forbid(unsafe_code)]"]);
     }
 

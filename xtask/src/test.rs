@@ -22,7 +22,11 @@ pub(crate) struct TestArgs {
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
     // MuJoCo's own renderer is a judge of our pictures where both have the same MuJoCo.
     let judged = args.mujoco == Some(Line::Wheel);
-    let extras: &[Need] = if judged { &[Need::Xvfb, Need::Pip, Need::Venv, Need::OsMesa] } else { &[Need::Xvfb] };
+    // Readers that nobody here wrote are judges of our recordings.
+    let extras: &[Need] = match judged {
+        true => &[Need::Xvfb, Need::Pip, Need::Venv, Need::OsMesa],
+        false => &[Need::Xvfb, Need::Pip, Need::Venv],
+    };
     let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras })?;
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
     let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args));
@@ -37,6 +41,11 @@ pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
             None if in_ci() => return Err(Failure::new("MuJoCo's renderer, a judge of our pictures, is not there")),
             None => eprintln!("note: pictures are not compared with those of MuJoCo's renderer"),
         }
+    }
+    match python::with_readers(repo) {
+        Some(python) => cargo = cargo.env(python::READERS_VARIABLE, python),
+        None if in_ci() => return Err(Failure::new("the readers of recordings, their judges, are not there")),
+        None => eprintln!("note: recordings are not read by other programs"),
     }
     cargo.run()
 }

@@ -65,6 +65,10 @@ impl Sensor for ContactSensor {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let forces = self.net_forces_w();

@@ -318,6 +318,10 @@ impl Sensor for RayCasterCamera {
         self.sampler.due_in(step)
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let taken = self.shown.taken.get(env);

@@ -217,6 +217,10 @@ impl Sensor for RayCaster {
         self.sampler.due_in(step)
     }
 
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        Some(self)
+    }
+
     /// Red balls where rays hit, as in Isaac Lab; none where they miss.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let hits = self.shown.points.index_axis(Axis(0), env);

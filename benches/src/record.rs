@@ -1,0 +1,108 @@
+//! What recording costs: a simulation with a camera whose pictures somebody reads, with and without a recorder.
+//!
+//! Both sides step the same arms and read the same pictures; ours writes them to an MCAP file too, colour as PNG, depth as
+//! it is, with the states of every picture. A block counts until everything is given to the file.
+
+use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::row::Row;
+use crate::{Outcome, Settings};
+use kinetoscope::prelude::*;
+use std::time::{Duration, Instant};
+
+const ENVS: usize = 16;
+const SIDE: usize = 128;
+/// Steps per second, and between two pictures: 30 Hz.
+const RATE: u32 = 240;
+const PICTURE_EVERY: u32 = 8;
+/// Less than 5 % slower.
+const WANTED: f64 = 0.95;
+/// A recording of this many steps is begun anew: some hundred megabytes.
+const RESTART: u32 = 4000;
+
+struct Arms {
+    sim: SimulationManager,
+    camera: SensorId<Camera>,
+    recorder: Option<RecorderId>,
+    folder: Option<tempfile::TempDir>,
+    step: u32,
+}
+
+impl Arms {
+    fn new(recorded: bool) -> Outcome<Self> {
+        let dt = 1.0 / f64::from(RATE);
+        let cfg = SimulationManagerCfg { num_envs: ENVS, physics_dt: dt, ..Default::default() };
+        let mut sim = SimulationManager::new(cfg)?;
+        let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf")?);
+        sim.add_robot(RobotCfg { uid: "arm".into(), urdf, ..Default::default() })?;
+        let camera = sim.add_sensor(
+            "camera",
+            CameraCfg {
+                width: SIDE,
+                height: SIDE,
+                intrinsics: Intrinsics::Fovy { radians: 0.9 },
+                channels: Channels { color: true, depth: true, ..Channels::default() },
+                update_period: f64::from(PICTURE_EVERY) * dt,
+                extrinsics: Extrinsics {
+                    placement: Placement::LookAt { eye: [1.5, 1.0, 1.0], target: [0.2, 0.0, 0.4], up: [0.0, 0.0, 1.0] },
+                    ..Extrinsics::default()
+                },
+                ..CameraCfg::default()
+            },
+        )?;
+        let folder = if recorded { Some(tempfile::tempdir()?) } else { None };
+        Ok(Self { sim, camera, recorder: None, folder, step: 0 })
+    }
+}
+
+impl Side for Arms {
+    fn restart(&mut self) -> Outcome<()> {
+        if let Some(recorder) = self.recorder.take() {
+            self.sim.finish_recording(recorder)?;
+        }
+        self.sim.reset(None)?;
+        self.step = 0;
+        if let Some(folder) = &self.folder {
+            let path = folder.path().join("run.mcap");
+            let cfg = RecorderCfg { every: PICTURE_EVERY.into(), overwrite: true, ..RecorderCfg::new(path) };
+            self.recorder = Some(self.sim.record(cfg)?);
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let start = Instant::now();
+        for _ in 0..steps {
+            self.sim.update(1);
+            self.step += 1;
+            if self.step.is_multiple_of(PICTURE_EVERY) {
+                self.sim.sensor(self.camera)?.pictures()?;
+            }
+        }
+        if let Some(recorder) = self.recorder {
+            self.sim.observer_mut(recorder)?.catch_up();
+        }
+        Ok(start.elapsed())
+    }
+
+    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+        let arm = self.sim.robot_id("arm")?;
+        Ok(Some(self.sim.robot(arm).get_qpos().into_iter().collect()))
+    }
+}
+
+pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+    let mut threads = 0;
+    let times = in_both_orders(|order| {
+        let (mut ours, mut rival) = order.create(|| Arms::new(true), || Arms::new(false))?;
+        threads = ours.sim.threads();
+        let plan = Plan { seconds: settings.seconds / 2.0, restart_after: RESTART };
+        let times = measure(plan, &mut [&mut ours, &mut rival]);
+        if let Some(recorder) = ours.recorder.take() {
+            eprintln!("  {}", ours.sim.finish_recording(recorder)?);
+        }
+        times
+    })?;
+    let case = format!("{ENVS} envs, camera {SIDE} x {SIDE} RGB-D at 30 Hz");
+    let row = Row::new("record", case, "env-steps/s", threads, times.rate(0, ENVS));
+    Ok(vec![row.against("without recording", times.rate(1, ENVS), times.ratio(0, 1)).wanted(WANTED)])
+}

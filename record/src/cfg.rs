@@ -1,0 +1,53 @@
+//! What a recorder is, before it exists.
+
+use crate::format::Format;
+use crate::topic::Topic;
+use sim::EnvId;
+use std::path::PathBuf;
+
+/// Configuration of a recorder: plain data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecorderCfg {
+    /// The file, or for [`Format::Pictures`] the folder.
+    pub path: PathBuf,
+    /// How it is written; `None` for what the end of the name says: `.mcap`, `.npz`, `.apng`, nothing for a folder of pictures.
+    pub format: Option<Format>,
+    /// What is recorded.
+    pub topics: Vec<Topic>,
+    /// Of which environments; `None` for all.
+    pub envs: Option<Vec<EnvId>>,
+    /// Physics steps from one row of states, targets and poses to the next. Sensors are recorded whenever they measure.
+    pub every: u64,
+    /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
+    /// written, the simulation waits too.
+    pub packets: usize,
+    /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
+    /// has left.
+    pub overwrite: bool,
+}
+
+impl RecorderCfg {
+    /// Everything that the format can hold, in all environments, at every step.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self { path: path.into(), ..Self::default() }
+    }
+
+    /// The same with these topics.
+    pub fn with_topics(self, topics: impl IntoIterator<Item = Topic>) -> Self {
+        Self { topics: topics.into_iter().collect(), ..self }
+    }
+}
+
+impl Default for RecorderCfg {
+    fn default() -> Self {
+        Self {
+            path: "recording.mcap".into(),
+            format: None,
+            topics: vec![Topic::Everything],
+            envs: None,
+            every: 1,
+            packets: 8,
+            overwrite: false,
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! What can be wrong with a recording.
+
+use crate::format::Format;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A result of this crate.
+pub type Result<T, E = RecordError> = std::result::Result<T, E>;
+
+/// A recording cannot be begun, or not be finished.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// There is a file of that name.
+    #[error("{path}: there is such a file already; choose another name, or set `overwrite`")]
+    Exists {
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// A recording that was killed has left a file.
+    #[error(
+        "{part}: an earlier recording was not finished; record::recover makes a whole file of it, or set `overwrite`"
+    )]
+    Unfinished {
+        /// What it left.
+        part: PathBuf,
+    },
+    /// The end of the name is of no format.
+    #[error(
+        "{path}: nothing is recorded as .{end}; known are .mcap, .npz, .apng, and a name without end for a folder of PNG files"
+    )]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The end of its name.
+        end: String,
+    },
+    /// The format has no place for something that was asked for by name.
+    #[error("{path}: {} has no place for {topic}", .format.name())]
+    NoPlace {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
+        /// What has no place in it.
+        topic: String,
+    },
+    /// There is nothing to record.
+    #[error("{path}: there is nothing to record for {}", .format.name())]
+    Nothing {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
+    },
+    /// More than one picture at a time for a file that shows one.
+    #[error(
+        "{path}: an animation shows one camera in one environment; these are {found}: choose a topic and an environment"
+    )]
+    TooMany {
+        /// The file.
+        path: PathBuf,
+        /// What was chosen.
+        found: String,
+    },
+    /// Something is not called so.
+    #[error("there is no {what} {name:?}{}", known(.candidates))]
+    UnknownName {
+        /// What was looked for.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The names there are.
+        candidates: Vec<String>,
+    },
+    /// A sensor that tells nobody its numbers.
+    #[error("sensor {sensor:?} cannot be recorded: its type says nothing of its channels (Sensor::sampled)")]
+    Unreadable {
+        /// Its name.
+        sensor: String,
+    },
+    /// An environment that does not exist, or is named twice.
+    #[error("environment {env} is not one of {count}, or is named twice")]
+    Env {
+        /// Its index.
+        env: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A number of the configuration is out of range.
+    #[error("{field} is {value}: it must be at least {least}")]
+    OutOfRange {
+        /// Which.
+        field: &'static str,
+        /// Its value.
+        value: u64,
+        /// The least one.
+        least: u64,
+    },
+    /// Something that is recorded is not there any more, or has another shape.
+    #[error("{path}: {stream} is not what it was when the recording began: something was added to the scene")]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// What has changed.
+        stream: String,
+    },
+    /// The file cannot be written.
+    #[error("{path}: {error}{}", left(.kept))]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: Arc<std::io::Error>,
+        /// What was written until then, where it can be read.
+        kept: Option<PathBuf>,
+    },
+    /// The simulation said no.
+    #[error("{0}")]
+    Sim(Arc<sim::Error>),
+    /// What is read is not a recording of this program, or not whole.
+    #[error("{path}: {what}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+impl From<sim::Error> for RecordError {
+    fn from(error: sim::Error) -> Self {
+        Self::Sim(Arc::new(error))
+    }
+}
+
+impl RecordError {
+    /// A file that cannot be written or read.
+    pub(crate) fn file(path: &std::path::Path, error: std::io::Error) -> Self {
+        Self::File { path: path.into(), error: Arc::new(error), kept: None }
+    }
+}
+
+fn known(candidates: &[String]) -> String {
+    if candidates.is_empty() { String::new() } else { format!("; known are {}", candidates.join(", ")) }
+}
+
+fn left(kept: &Option<PathBuf>) -> String {
+    kept.as_ref().map_or_else(String::new, |kept| format!("; what was recorded until then is in {}", kept.display()))
+}

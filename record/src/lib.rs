@@ -1,0 +1,50 @@
+//! Writes what happens in a simulation to files, without losing anything silently.
+//!
+//! ```text
+//! SimulationManager -> Recorder (an observer) -> pool of packets -> thread of the file -> mcap | npz | png | apng
+//!                      topic: what is read                          format: how it is written
+//! ```
+//!
+//! A [`Recorder`] is told of steps, copies what is due into a packet of a bounded pool, and a thread of its own writes the
+//! packets in their order. When all packets are on their way, the simulation waits for one, and [`Recorded`] says how often
+//! and how long.
+//!
+//! ```no_run
+//! use record::{Record, RecorderCfg, Topic};
+//! use sim::{SimulationManager, SimulationManagerCfg};
+//!
+//! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+//! let recorder = sim.record(RecorderCfg::new("run.mcap"))?;
+//! sim.update(100);
+//! println!("{}", sim.finish_recording(recorder)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod cfg;
+mod clock;
+mod error;
+mod file;
+mod format;
+mod mcap_file;
+mod npy;
+mod npz;
+mod packet;
+mod picture;
+mod recorder;
+pub mod replay;
+mod ros;
+mod source;
+mod stream;
+mod topic;
+mod writer;
+mod zip;
+
+pub use cfg::RecorderCfg;
+pub use error::{RecordError, Result};
+pub use format::Format;
+pub use mcap_file::recover;
+pub use packet::{Event, EventKind};
+pub use recorder::{Record, Recorded, Recorder, RecorderId};
+pub use stream::{Element, Kind, Part, Stream};
+pub use topic::Topic;

@@ -1,0 +1,77 @@
+//! Arrays as NumPy keeps them in files: version 1.0 of its `.npy` format, as `numpy.lib.format` describes it.
+
+use crate::stream::Element;
+use std::fmt::Write as _;
+
+/// The data begin at a multiple of 64 bytes.
+const ALIGN: usize = 64;
+/// Magic, version, length of the header.
+const FIXED: usize = 10;
+const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
+
+impl Element {
+    /// How NumPy names the type in a file: byte order, kind and bytes.
+    pub(crate) fn descr(self) -> &'static str {
+        match self {
+            Self::U8 => "|u1",
+            Self::I32 => "<i4",
+            Self::F32 => "<f4",
+            Self::F64 => "<f8",
+        }
+    }
+}
+
+/// What stands before the numbers of an array in C order; `None` for more axes than the format has room for.
+pub(crate) fn header(element: Element, shape: &[usize]) -> Option<Vec<u8>> {
+    let mut axes = String::new();
+    for (k, length) in shape.iter().enumerate() {
+        // Writing to a text does not fail. Python writes (2,) and (2, 3).
+        let _ = write!(axes, "{}{length}", if k == 0 { "" } else { ", " });
+    }
+    if shape.len() == 1 {
+        axes.push(',');
+    }
+    let mut text = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({axes}), }}", element.descr());
+    // One byte is for the line's end.
+    let whole = (FIXED + text.len() + 1).next_multiple_of(ALIGN);
+    text.extend(std::iter::repeat_n(' ', whole - FIXED - text.len() - 1));
+    text.push('\n');
+    let length = u16::try_from(text.len()).ok()?;
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend_from_slice(&length.to_le_bytes());
+    bytes.extend_from_slice(text.as_bytes());
+    Some(bytes)
+}
+
+/// An array that [`header`] stands before: its type as in a file, its shape, its bytes.
+pub(crate) fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
+    let rest = bytes.strip_prefix(MAGIC)?;
+    let (length, rest) = rest.split_first_chunk::<2>()?;
+    let (text, data) = rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
+    let text = std::str::from_utf8(text).ok()?;
+    let after = |key: &str| text.split_once(key).map(|(_, rest)| rest);
+    let descr = after("'descr': '")?.split('\'').next()?;
+    let axes = after("'shape': (")?.split(')').next()?;
+    let shape = axes.split(',').map(str::trim).filter(|axis| !axis.is_empty()).map(|axis| axis.parse().ok());
+    Some((descr, shape.collect::<Option<Vec<usize>>>()?, data))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_are_those_that_numpy_writes() {
+        // What numpy.save writes for zeros((2,), float64) and zeros((2, 3, 4), float32), without the data.
+        let one = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }";
+        let header_of_one = header(Element::F64, &[2]).unwrap();
+        assert_eq!(&header_of_one[..one.len()], one);
+        assert_eq!((header_of_one.len(), header_of_one.last()), (128, Some(&b'\n')));
+        let three = header(Element::F32, &[2, 3, 4]).unwrap();
+        assert!(String::from_utf8_lossy(&three).contains("'<f4', 'fortran_order': False, 'shape': (2, 3, 4), }"));
+        assert_eq!(parse(&three), Some(("<f4", vec![2, 3, 4], &[][..])));
+        assert_eq!(parse(&header_of_one).unwrap().1, [2]);
+        assert_eq!(parse(&one[..20]), None);
+    }
+}

@@ -1,0 +1,147 @@
+//! What travels from the simulation to the thread of the file.
+
+use crate::stream::{Element, Stream};
+
+/// Something that happened to environments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// What.
+    pub kind: EventKind,
+    /// To which environments, in ascending order.
+    pub env_ids: Vec<usize>,
+    /// Simulation time of each of them afterwards \[s\].
+    pub times: Vec<f64>,
+    /// Physics steps of the simulation since the recording began.
+    pub step: u64,
+    /// The time of the recording \[s\].
+    pub at: f64,
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EventKind {
+    /// Environments were reset.
+    Reset,
+    /// Somebody wrote to the state of environments.
+    Written,
+}
+
+impl EventKind {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reset => "reset",
+            Self::Written => "written",
+        }
+    }
+}
+
+/// Room for one row of everything that is recorded.
+#[derive(Debug)]
+pub(crate) struct Packet {
+    /// Physics steps of the simulation since the recording began.
+    pub(crate) step: u64,
+    pub(crate) event: Option<Event>,
+    /// One for each stream.
+    pub(crate) blocks: Vec<Block>,
+}
+
+/// Room for one row of a stream, of all its environments.
+#[derive(Debug)]
+pub(crate) struct Block {
+    /// Whether there is something in it.
+    pub(crate) used: bool,
+    /// Simulation time of capture \[s\], for each environment.
+    pub(crate) times: Vec<f64>,
+    /// The same on the clock of the recording, which goes on over a reset \[s\].
+    pub(crate) stamps: Vec<f64>,
+    /// Which environments have something new.
+    pub(crate) fresh: Vec<bool>,
+    pub(crate) values: Values,
+}
+
+/// Numbers of one type.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    U8(Vec<u8>),
+    I32(Vec<i32>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+}
+
+impl Packet {
+    /// Empty, with room for the streams.
+    pub(crate) fn new(streams: &[Stream]) -> Self {
+        Self { step: 0, event: None, blocks: streams.iter().map(Block::new).collect() }
+    }
+
+    /// Forgets what is in it, and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.event = None;
+        self.blocks.iter_mut().for_each(Block::clear);
+    }
+}
+
+impl Block {
+    fn new(stream: &Stream) -> Self {
+        let (envs, numbers) = (stream.env_ids.len(), stream.env_ids.len() * stream.width());
+        let values = match stream.element {
+            Element::U8 => Values::U8(Vec::with_capacity(numbers)),
+            Element::I32 => Values::I32(Vec::with_capacity(numbers)),
+            Element::F32 => Values::F32(Vec::with_capacity(numbers)),
+            Element::F64 => Values::F64(Vec::with_capacity(numbers)),
+        };
+        let (times, stamps) = (Vec::with_capacity(envs), Vec::with_capacity(envs));
+        Self { used: false, times, stamps, fresh: Vec::with_capacity(envs), values }
+    }
+
+    fn clear(&mut self) {
+        self.used = false;
+        self.times.clear();
+        self.stamps.clear();
+        self.fresh.clear();
+        match &mut self.values {
+            Values::U8(values) => values.clear(),
+            Values::I32(values) => values.clear(),
+            Values::F32(values) => values.clear(),
+            Values::F64(values) => values.clear(),
+        }
+    }
+}
+
+impl Values {
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::U8(values) => values.len(),
+            Self::I32(values) => values.len(),
+            Self::F32(values) => values.len(),
+            Self::F64(values) => values.len(),
+        }
+    }
+
+    /// Appends a range of them as bytes, lowest first.
+    pub(crate) fn put(&self, range: std::ops::Range<usize>, out: &mut Vec<u8>) {
+        match self {
+            Self::U8(values) => out.extend_from_slice(&values[range]),
+            Self::I32(values) => values[range].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes())),
+            Self::F32(values) => values[range].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes())),
+            Self::F64(values) => values[range].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes())),
+        }
+    }
+
+    /// The states among them; nothing where they are of another type.
+    pub(crate) fn states(&self) -> &[f64] {
+        if let Self::F64(values) = self { values } else { &[] }
+    }
+
+    /// The bytes among them; nothing where they are of another type.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        if let Self::U8(values) = self { values } else { &[] }
+    }
+
+    /// The numbers of pictures among them; nothing where they are of another type.
+    pub(crate) fn floats(&self) -> &[f32] {
+        if let Self::F32(values) = self { values } else { &[] }
+    }
+}

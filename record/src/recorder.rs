@@ -1,0 +1,486 @@
+//! The observer that records.
+
+use crate::cfg::RecorderCfg;
+use crate::clock::Clock;
+use crate::error::{RecordError, Result};
+use crate::file::{PartFile, Storage};
+use crate::format::Format;
+use crate::mcap_file::McapFile;
+use crate::npz::NpzFile;
+use crate::packet::{Event, EventKind, Packet};
+use crate::picture::{Animation, PictureFolder};
+use crate::source::Source;
+use crate::stream::{Kind, Stream};
+use crate::topic::Topic;
+use crate::writer::{self, Failure, Sink};
+use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager, Snapshot};
+use std::fmt;
+use std::fs::File;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Handle of a recorder; valid for the manager that it records.
+pub type RecorderId = ObserverId<Recorder>;
+
+/// Recording, as methods of a simulation.
+pub trait Record {
+    /// Begins a recording: states as they are now, then whatever is due.
+    ///
+    /// # Errors
+    /// A name that is not known, a file that exists or cannot be written, a format that has no place for what is asked for.
+    fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId>;
+
+    /// Ends a recording: the file is whole, and has its name, when this returns.
+    ///
+    /// # Errors
+    /// The file could not be written, something that is recorded has changed its shape, a sensor failed.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded>;
+}
+
+impl Record for SimulationManager {
+    fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId> {
+        let recorder = Recorder::start(self, cfg, &mut |file| Box::new(file))?;
+        Ok(self.add_observer(recorder))
+    }
+
+    #[track_caller]
+    fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded> {
+        self.remove_observer(recorder)?.finish()
+    }
+}
+
+/// What came of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorded {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// How large it is \[bytes\].
+    pub bytes: u64,
+    /// How often something was due, or happened, and was recorded.
+    pub packets: u64,
+    /// How often the simulation had to wait because everything before was not written yet.
+    pub waits: u64,
+    /// How long it waited in all.
+    pub waited: Duration,
+    /// Sensors that [`Topic::Everything`] has left out, because their types say nothing of their channels.
+    pub left_out: Vec<String>,
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.bytes as f64 / 1e6;
+        write!(f, "{}: {} rows, {size:.1} MB; ", self.path.display(), self.packets)?;
+        match self.waits {
+            0 => f.write_str("the simulation never waited for it")?,
+            waits => {
+                write!(f, "the simulation waited for it {waits} times, {:.2} s in all", self.waited.as_secs_f64())?
+            }
+        }
+        if !self.left_out.is_empty() {
+            write!(f, "; left out, because nobody knows their channels: {}", self.left_out.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+/// Copies what is due into packets, which a thread of its own writes to a file.
+///
+/// [`Record::record`] makes one. Dropped without [`finish`](Self::finish), it ends the recording too; only nobody learns what
+/// went wrong.
+pub struct Recorder {
+    cfg: RecorderCfg,
+    sources: Vec<Source>,
+    clock: Clock,
+    full: Option<SyncSender<Packet>>,
+    free: Receiver<Packet>,
+    /// Empty ones that are here already.
+    spare: Vec<Packet>,
+    thread: Option<JoinHandle<Result<u64, Failure>>>,
+    failed: Arc<AtomicBool>,
+    failure: Option<RecordError>,
+    recorded: Recorded,
+}
+
+impl fmt::Debug for Recorder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Recorder").field("cfg", &self.cfg).field("recorded", &self.recorded).finish_non_exhaustive()
+    }
+}
+
+/// Puts something between a recording and its file.
+pub(crate) type Wrap<'w> = &'w mut dyn FnMut(File) -> Box<dyn Storage>;
+
+impl Recorder {
+    pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, wrap: Wrap<'_>) -> Result<Self> {
+        let format = cfg.format.map_or_else(|| Format::of_path(&cfg.path), Ok)?;
+        for (field, value, least) in [("every", cfg.every, 1), ("packets", cfg.packets as u64, 2)] {
+            if value < least {
+                return Err(RecordError::OutOfRange { field, value, least });
+            }
+        }
+        let (sources, left_out) = resolve(sim, &cfg, format)?;
+        let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
+        let sink = open(sim, &cfg, format, &streams, wrap)?;
+        Self::begin(sim, cfg, sources, left_out, sink)
+    }
+
+    /// Begins to record into `sink`.
+    fn begin(
+        sim: &SimulationManager,
+        cfg: RecorderCfg,
+        sources: Vec<Source>,
+        left_out: Vec<String>,
+        sink: Box<dyn Sink>,
+    ) -> Result<Self> {
+        let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
+        let (full, filled) = sync_channel(cfg.packets);
+        let (empty, free) = channel();
+        for _ in 0..cfg.packets {
+            // The other end is in this function.
+            let _ = empty.send(Packet::new(&streams));
+        }
+        let failed = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&failed);
+        let work = move || writer::run(sink, &streams, &filled, &empty, &flag);
+        let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
+        let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
+        let clock = Clock::new(sim.cfg().physics_dt, sim.steps(), &sim.time());
+        let recorded = Recorded { path: cfg.path.clone(), left_out, ..Recorded::default() };
+        let mut recorder = Self {
+            cfg,
+            sources,
+            clock,
+            full: Some(full),
+            free,
+            spare: Vec::new(),
+            thread: Some(thread),
+            failed,
+            failure: None,
+            recorded,
+        };
+        let all: Vec<usize> = (0..sim.num_envs()).collect();
+        recorder.take(sim, None, &all);
+        Ok(recorder)
+    }
+
+    /// What is recorded.
+    pub fn streams(&self) -> impl Iterator<Item = &Stream> {
+        self.sources.iter().map(|source| &source.stream)
+    }
+
+    /// What came of it so far; its size is known at the end.
+    pub fn so_far(&self) -> &Recorded {
+        &self.recorded
+    }
+
+    /// Whether the recording has stopped because something went wrong; [`finish`](Self::finish) says what.
+    pub fn has_failed(&self) -> bool {
+        self.failure.is_some() || self.failed.load(Ordering::Relaxed)
+    }
+
+    /// Waits until the file has got everything that was recorded so far. These waits are not counted.
+    pub fn catch_up(&mut self) {
+        while self.spare.len() < self.cfg.packets {
+            // Where the thread is gone there is nothing to wait for.
+            let Ok(packet) = self.free.recv() else { return };
+            self.spare.push(packet);
+        }
+    }
+
+    /// Ends the recording: as [`Record::finish_recording`].
+    ///
+    /// # Errors
+    /// As [`Record::finish_recording`].
+    pub fn finish(mut self) -> Result<Recorded> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<Recorded> {
+        self.full = None;
+        let Some(thread) = self.thread.take() else { return Ok(self.recorded.clone()) };
+        let path = &self.cfg.path;
+        let written = thread.join().unwrap_or_else(|_| {
+            Err(Failure { error: std::io::Error::other("the thread that writes has panicked"), kept: None })
+        });
+        match (self.failure.take(), written) {
+            (Some(RecordError::Changed { stream, .. }), _) => Err(RecordError::Changed { path: path.clone(), stream }),
+            (Some(failure), _) => Err(failure),
+            (None, Ok(bytes)) => {
+                self.recorded.bytes = bytes;
+                Ok(self.recorded.clone())
+            }
+            (None, Err(Failure { error, kept })) => {
+                Err(RecordError::File { path: path.clone(), error: Arc::new(error), kept })
+            }
+        }
+    }
+
+    /// Records what is due, and everything that is there at any time in environments `renewed`.
+    fn take(&mut self, sim: &SimulationManager, event: Option<Event>, renewed: &[usize]) {
+        if self.has_failed() {
+            return;
+        }
+        let Some(mut packet) = self.packet() else { return };
+        let steps = sim.steps();
+        let times = sim.time();
+        let mut used = event.is_some();
+        packet.step = self.clock.step(steps);
+        packet.event = event;
+        for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
+            let due = source.sensor.is_some() || source.due_at <= steps || !renewed.is_empty();
+            if !due {
+                continue;
+            }
+            if let Err(error) = source.read(sim, &times, renewed, block) {
+                return self.fail(error);
+            }
+            if source.sensor.is_none() && source.due_at <= steps {
+                source.due_at = steps + self.cfg.every;
+            }
+            let clock = &self.clock;
+            let stamps = source.stream.env_ids.iter().zip(&block.times).map(|(env, time)| clock.stamp(*env, *time));
+            block.stamps.extend(stamps);
+            used |= block.used;
+        }
+        if !used {
+            packet.clear();
+            self.spare.push(packet);
+            return;
+        }
+        self.recorded.packets += 1;
+        if let Some(full) = &self.full {
+            // There is room for all packets. Where the thread is gone, `end` says why.
+            let _ = full.send(packet);
+        }
+    }
+
+    /// An empty packet, as soon as there is one.
+    fn packet(&mut self) -> Option<Packet> {
+        if let Some(packet) = self.spare.pop() {
+            return Some(packet);
+        }
+        match self.free.try_recv() {
+            Ok(packet) => Some(packet),
+            Err(TryRecvError::Disconnected) => None,
+            Err(TryRecvError::Empty) => {
+                let start = Instant::now();
+                let packet = self.free.recv().ok();
+                self.recorded.waits += 1;
+                self.recorded.waited += start.elapsed();
+                packet
+            }
+        }
+    }
+
+    /// Something happened to environments.
+    fn happened(&mut self, sim: &SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
+        let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
+        let (steps, times) = (sim.steps(), sim.time());
+        self.clock.restarted(&envs, &times, steps);
+        self.recount(sim);
+        let of: Vec<usize> = match &self.cfg.envs {
+            Some(wanted) => envs.into_iter().filter(|env| wanted.contains(&EnvId(*env))).collect(),
+            None => envs,
+        };
+        if of.is_empty() {
+            return;
+        }
+        let times = of.iter().map(|env| times[*env]).collect();
+        let (step, at) = (self.clock.step(steps), self.clock.now(steps));
+        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at }), &of);
+    }
+
+    fn recount(&mut self, sim: &SimulationManager) {
+        for source in &mut self.sources {
+            if let Err(error) = source.recount(sim) {
+                return self.fail(error);
+            }
+        }
+    }
+
+    /// Breaks the recording off; what was wrong first is said.
+    fn fail(&mut self, error: RecordError) {
+        self.failure.get_or_insert(error);
+        self.failed.store(true, Ordering::Relaxed);
+    }
+
+    /// The scene was compiled anew: what is recorded must still be there.
+    fn compiled(&mut self, sim: &SimulationManager) {
+        let format = self.cfg.format.map_or_else(|| Format::of_path(&self.cfg.path), Ok);
+        match format.and_then(|format| resolve(sim, &self.cfg, format)) {
+            Ok((now, _)) => {
+                let gone = self.sources.iter().find(|was| !now.iter().any(|now| now.stream == was.stream));
+                if let Some(gone) = gone {
+                    let (path, stream) = (self.cfg.path.clone(), gone.stream.name.clone());
+                    return self.fail(RecordError::Changed { path, stream });
+                }
+            }
+            Err(error) => return self.fail(error),
+        }
+        self.recount(sim);
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // Nobody is left to be told.
+        let _ = self.end();
+    }
+}
+
+impl Observer for Recorder {
+    fn due_in(&self, sim: &SimulationManager) -> u64 {
+        if self.has_failed() {
+            return u64::MAX;
+        }
+        let now = sim.steps();
+        let wait = |source: &Source| match &source.sensor {
+            Some(uid) => sim.sensor_due_in(uid).unwrap_or(u64::MAX),
+            None => source.due_at.saturating_sub(now).max(1),
+        };
+        self.sources.iter().map(wait).min().unwrap_or(u64::MAX)
+    }
+
+    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
+        match moment {
+            Moment::Stepped => self.take(sim, None, &[]),
+            Moment::Reset { env_ids } => self.happened(sim, EventKind::Reset, env_ids),
+            Moment::Written { env_ids } => self.happened(sim, EventKind::Written, env_ids),
+            Moment::Compiled => self.compiled(sim),
+            _ => {}
+        }
+    }
+}
+
+/// What the topics of a configuration mean in a simulation, and the sensors that were left out.
+fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result<(Vec<Source>, Vec<String>)> {
+    let count = sim.num_envs();
+    let mut envs: Vec<usize> = match &cfg.envs {
+        Some(envs) => envs.iter().map(|env| env.0).collect(),
+        None => (0..count).collect(),
+    };
+    envs.sort_unstable();
+    let twice = envs.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+    if let Some(env) = twice.or_else(|| envs.iter().copied().find(|env| *env >= count)) {
+        return Err(RecordError::Env { env, count });
+    }
+    let (mut sources, mut left_out): (Vec<Source>, _) = (Vec::new(), Vec::new());
+    for topic in &cfg.topics {
+        let found = match topic {
+            Topic::Everything => everything(sim, &envs, format, &mut left_out)?,
+            Topic::JointStates(uid) => vec![Source::joint_states(sim, uid, &envs)?],
+            Topic::Targets(uid) => vec![Source::targets(sim, uid, &envs)?],
+            Topic::LinkPoses(uid) => vec![Source::link_poses(sim, uid, &envs)?],
+            Topic::ObjectPose(uid) => vec![Source::object_pose(sim, uid, &envs)?],
+            Topic::MjcfState(uid) => vec![Source::mjcf_state(sim, uid, &envs)?],
+            Topic::Sensor(uid) => Source::sensor(sim, uid, &envs)?,
+            Topic::Channel { sensor, channel } => vec![Source::picture(sim, sensor, channel, &envs)?],
+        };
+        let any = !found.is_empty();
+        let before = sources.len();
+        let held = found.into_iter().filter(|source| format.holds(&source.stream)).collect::<Vec<_>>();
+        if any && held.is_empty() {
+            return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
+        }
+        for source in held {
+            if !sources[..before].iter().any(|known| known.stream.name == source.stream.name) {
+                sources.push(source);
+            }
+        }
+    }
+    if sources.is_empty() {
+        return Err(RecordError::Nothing { path: cfg.path.clone(), format });
+    }
+    let pictures: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
+    if format == Format::Apng && pictures != 1 {
+        let names: Vec<String> = sources
+            .iter()
+            .map(|Source { stream, .. }| format!("{} in {} environments", stream.name, stream.env_ids.len()))
+            .collect();
+        return Err(RecordError::TooMany { path: cfg.path.clone(), found: names.join(", ") });
+    }
+    Ok((sources, left_out))
+}
+
+/// Everything that there is and the format has a place for.
+fn everything(
+    sim: &SimulationManager,
+    envs: &[usize],
+    format: Format,
+    left_out: &mut Vec<String>,
+) -> Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for uid in sim.jointed_uids() {
+        for of in [Source::joint_states, Source::targets, Source::link_poses] {
+            sources.push(of(sim, uid, envs)?);
+        }
+    }
+    for uid in sim.rigid_object_uids() {
+        sources.push(Source::object_pose(sim, uid, envs)?);
+    }
+    for uid in sim.mjcf_uids() {
+        sources.push(Source::mjcf_state(sim, uid, envs)?);
+    }
+    for uid in sim.sensor_uids() {
+        match Source::sensor(sim, uid, envs) {
+            Ok(found) => sources.extend(found),
+            Err(RecordError::Unreadable { sensor }) => left_out.push(sensor),
+            Err(error) => return Err(error),
+        }
+    }
+    sources.retain(|source| format.holds(&source.stream) && source.stream.width() > 0);
+    if format == Format::Apng {
+        // The first camera, in the first environment that it looks into.
+        sources.truncate(1);
+        sources.iter_mut().for_each(Source::keep_first);
+    }
+    Ok(sources)
+}
+
+/// The file of a format.
+fn open(
+    sim: &SimulationManager,
+    cfg: &RecorderCfg,
+    format: Format,
+    streams: &[Stream],
+    wrap: Wrap<'_>,
+) -> Result<Box<dyn Sink>> {
+    if format == Format::Pictures {
+        return Ok(Box::new(PictureFolder::create(&cfg.path, cfg.overwrite)?));
+    }
+    let (part, file) = PartFile::create(&cfg.path, cfg.overwrite)?;
+    let storage = wrap(file);
+    let sink: Result<Box<dyn Sink>> = match format {
+        Format::Mcap => {
+            let file = McapFile::create(part, storage, streams, &sim.env_origins());
+            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
+        }
+        Format::Npz => {
+            let start: Option<Snapshot> = Some(sim.snapshot(None)?);
+            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, start.as_ref());
+            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
+        }
+        Format::Apng | Format::Pictures => {
+            let shape = streams.iter().find_map(|stream| match stream.kind {
+                Kind::Picture { height, width, .. } => Some([width, height]),
+                _ => None,
+            });
+            // `resolve` has seen to it that there is a picture.
+            let shape = shape.ok_or_else(|| RecordError::Nothing { path: cfg.path.clone(), format })?;
+            let file = Animation::create(part, storage, shape);
+            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
+        }
+    };
+    sink
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

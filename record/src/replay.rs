@@ -1,0 +1,356 @@
+//! Recorded actions run again: do they give the recorded states, bit for bit?
+//!
+//! ```no_run
+//! use record::{Record, RecorderCfg};
+//! use sim::{SimulationManager, SimulationManagerCfg};
+//!
+//! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+//! let recorder = sim.record(RecorderCfg::new("run.npz"))?;
+//! sim.update(100);
+//! sim.finish_recording(recorder)?;
+//! println!("{}", record::replay::verify(&mut sim, "run.npz")?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use crate::error::{RecordError, Result};
+use crate::npy;
+use crate::npz::{ABOUT, START};
+use crate::packet::{Block, Packet};
+use crate::source::Source;
+use crate::zip;
+use ndarray::{ArrayView2, ArrayView3};
+use serde_json::Value;
+use sim::{EnvId, SimulationManager, Snapshot};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// What came of running recorded actions again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// Physics steps that were done again until the end, or until the first difference.
+    pub steps: u64,
+    /// Recorded numbers that were found again, bit for bit.
+    pub numbers: u64,
+    /// Where it first differs, if it does.
+    pub difference: Option<Difference>,
+}
+
+/// Where a recording and its repetition first differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Physics steps after the beginning of the recording.
+    pub step: u64,
+    /// The environment.
+    pub env: usize,
+    /// The array, such as `arm/joint_states/positions`.
+    pub array: String,
+    /// Which number of the environment's row.
+    pub column: usize,
+    /// What was recorded.
+    pub recorded: f64,
+    /// What came instead.
+    pub found: f64,
+    /// Whether somebody wrote to the state of the environment at that step: what was written is no action.
+    pub written: bool,
+}
+
+impl Verdict {
+    /// Whether everything was found again.
+    pub fn is_same(&self) -> bool {
+        self.difference.is_none()
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.difference {
+            None => write!(f, "the same in {} steps: {} numbers, bit for bit", self.steps, self.numbers),
+            Some(Difference { step, env, array, column, recorded, found, written }) => {
+                write!(f, "first different at step {step} in environment {env}: {array}, column {column}, ")?;
+                write!(f, "was {recorded:e}, now {found:e}")?;
+                if *written {
+                    f.write_str("; somebody wrote to the state there, which is no action")?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// An archive that was read.
+struct Archive {
+    path: PathBuf,
+    about: Value,
+    start: Snapshot,
+    arrays: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
+}
+
+/// The state streams, by the ends of their names.
+const STATES: [(&str, Of); 4] = [
+    ("/joint_states", Source::joint_states),
+    ("/link_poses", Source::link_poses),
+    ("/pose", Source::object_pose),
+    ("/state", Source::mjcf_state),
+];
+const TARGETS: &str = "/targets";
+
+type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
+
+/// Puts `sim`, which must be built as the recorded one, into the state in which a NumPy archive begins, does the recorded
+/// actions again, and compares the states after every step with the recorded ones. Resets are done again too. The archive
+/// must hold the targets of every robot and the controls of every MJCF part that move something, at every step
+/// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1).
+///
+/// What nobody recorded is not repeated: external wrenches, welds, gains, poses of kinematic objects; the first difference
+/// says when they mattered.
+///
+/// # Errors
+/// The file is no such archive, or not whole; it is of another scene, another MuJoCo or another time step.
+pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Verdict> {
+    let archive = Archive::read(path.as_ref())?;
+    let dt = sim.cfg().physics_dt;
+    if archive.about["physics_dt"].as_f64() != Some(dt) {
+        let recorded = &archive.about["physics_dt"];
+        return Err(archive.malformed(format!("recorded with physics_dt {recorded}; this simulation has {dt}")));
+    }
+    sim.restore_with_properties(&archive.start, None)?;
+    let (mut states, mut targets) = (Vec::new(), Vec::new());
+    for stream in archive.about["streams"].as_array().into_iter().flatten() {
+        let name = stream["name"].as_str().unwrap_or_default();
+        let envs = stream["env_ids"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+        let envs: Vec<usize> = envs.filter_map(|env| usize::try_from(env).ok()).collect();
+        if let Some(env) = envs.iter().copied().find(|env| *env >= sim.num_envs()) {
+            return Err(RecordError::Env { env, count: sim.num_envs() });
+        }
+        if let Some(uid) = name.strip_suffix(TARGETS) {
+            targets.push(Source::targets(sim, uid, &envs)?);
+        }
+        for (end, of) in STATES {
+            if let Some(uid) = name.strip_suffix(end) {
+                states.push(of(sim, uid, &envs)?);
+            }
+        }
+    }
+    let Some(first) = states.first() else {
+        return Err(archive.malformed("it has no states to compare with".into()));
+    };
+    let steps = archive.steps(&first.stream.name)?.to_vec();
+    for source in states.iter().chain(&targets) {
+        if archive.steps(&source.stream.name)? != steps {
+            return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
+        }
+        archive.check(source, steps.len())?;
+    }
+    if steps.windows(2).any(|pair| pair[1] - pair[0] > 1.0) {
+        return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
+    }
+    Repetition { archive, states, targets, steps }.run(sim)
+}
+
+/// Everything that a repetition needs.
+struct Repetition {
+    archive: Archive,
+    states: Vec<Source>,
+    targets: Vec<Source>,
+    /// The step of every row.
+    steps: Vec<f64>,
+}
+
+impl Repetition {
+    fn run(mut self, sim: &mut SimulationManager) -> Result<Verdict> {
+        let mut verdict = Verdict { steps: 0, numbers: 0, difference: None };
+        let mut row = 0;
+        while row < self.steps.len() {
+            let step = self.steps[row];
+            if step > verdict.steps as f64 {
+                self.act(sim, row)?;
+                sim.update(1);
+                verdict.steps += 1;
+            }
+            // What happens at a step has rows of its own behind that of the step.
+            let last = row + self.steps[row..].iter().take_while(|other| **other == step).count() - 1;
+            if !self.compare(sim, row, &[], &mut verdict)? {
+                return Ok(verdict);
+            }
+            if last > row {
+                let (reset, written) = self.archive.events(step)?;
+                if !reset.is_empty() {
+                    sim.reset(Some(&reset))?;
+                }
+                if !self.compare(sim, last, &written, &mut verdict)? {
+                    return Ok(verdict);
+                }
+            }
+            row = last + 1;
+        }
+        Ok(verdict)
+    }
+
+    /// Sets the targets of a row.
+    fn act(&self, sim: &mut SimulationManager, row: usize) -> Result<()> {
+        let Self { archive, states, targets, .. } = self;
+        for source in targets {
+            let Some(uid) = source.stream.name.strip_suffix(TARGETS) else { continue };
+            let id = sim.jointed_id(uid)?;
+            let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
+            let of = |part: &str| archive.rows(&format!("{}/{part}", source.stream.name), row);
+            let (positions, velocities, efforts) = (of("positions")?, of("velocities")?, of("efforts")?);
+            sim.robot_mut(id).set_qpos(positions, None, Some(&envs))?;
+            sim.robot_mut(id).set_qvel(velocities, None, Some(&envs))?;
+            sim.robot_mut(id).set_qf(efforts, None, Some(&envs))?;
+        }
+        for source in states {
+            let Some(uid) = source.stream.name.strip_suffix("/state") else { continue };
+            let id = sim.mjcf_id(uid)?;
+            let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
+            let controls = archive.rows(&format!("{}/controls", source.stream.name), row)?;
+            sim.mjcf_part_mut(id).set_ctrl(controls, None, Some(&envs))?;
+        }
+        Ok(())
+    }
+
+    /// Compares all states with those of a row; gives whether they are the same.
+    fn compare(
+        &mut self,
+        sim: &SimulationManager,
+        row: usize,
+        written: &[EnvId],
+        verdict: &mut Verdict,
+    ) -> Result<bool> {
+        let times = sim.time();
+        for source in &mut self.states {
+            let mut packet = Packet::new(std::slice::from_ref(&source.stream));
+            let Some(block) = packet.blocks.first_mut() else { continue };
+            source.read(sim, &times, &[], block)?;
+            if let Some(difference) = difference(&self.archive, source, block, row, written)? {
+                verdict.difference = Some(Difference { step: verdict.steps, ..difference });
+                return Ok(false);
+            }
+            verdict.numbers += block.values.len() as u64;
+        }
+        Ok(true)
+    }
+}
+
+/// The first number of a stream that is not that of the archive.
+fn difference(
+    archive: &Archive,
+    source: &Source,
+    block: &Block,
+    row: usize,
+    written: &[EnvId],
+) -> Result<Option<Difference>> {
+    let stream = &source.stream;
+    let width = stream.width();
+    let mut first = 0;
+    for part in &stream.parts {
+        let array = crate::npz::member(stream, &part.name);
+        let recorded = archive.rows(&array, row)?;
+        for (k, &env) in stream.env_ids.iter().enumerate() {
+            for column in 0..part.width() {
+                let found = block.values.states().get(k * width + first + column).copied().unwrap_or(f64::NAN);
+                let recorded = recorded[(k, column)];
+                if recorded.to_bits() != found.to_bits() {
+                    let written = written.contains(&EnvId(env));
+                    return Ok(Some(Difference { step: 0, env, array, column, recorded, found, written }));
+                }
+            }
+        }
+        first += part.width();
+    }
+    Ok(None)
+}
+
+impl Archive {
+    fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|error| RecordError::file(path, error))?;
+        let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
+        let members =
+            zip::parse(&bytes).ok_or_else(|| malformed("this is no NumPy archive of a recorder, or is damaged"))?;
+        let member = |name: &str| members.iter().find(|(known, _)| *known == name).map(|(_, data)| *data);
+        let about = member(ABOUT).and_then(|about| serde_json::from_slice(about).ok());
+        let about: Value = about.ok_or_else(|| malformed("it does not say what is in it (recording.json)"))?;
+        let start = member(START).ok_or_else(|| malformed("it has no state to begin with (start.snapshot)"))?;
+        let mut file = tempfile::NamedTempFile::new().map_err(|error| RecordError::file(path, error))?;
+        file.write_all(start).and_then(|()| file.flush()).map_err(|error| RecordError::file(file.path(), error))?;
+        let start = Snapshot::load(file.path())?;
+        let mut arrays = BTreeMap::new();
+        for (name, data) in &members {
+            let Some(name) = name.strip_suffix(".npy") else { continue };
+            // Pictures are not compared.
+            let Some(("<f8" | "<i4" | "|u1", ..)) = npy::parse(data) else { continue };
+            let wanted = name.starts_with("events/") || npy::parse(data).is_some_and(|(descr, ..)| descr == "<f8");
+            let Some((descr, shape, data)) = npy::parse(data).filter(|_| wanted) else { continue };
+            let numbers: Vec<f64> = match descr {
+                "<f8" => data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect(),
+                "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect(),
+                _ => data.iter().map(|byte| f64::from(*byte)).collect(),
+            };
+            if shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis)) != Some(numbers.len()) {
+                return Err(malformed(&format!("{name} has not as many numbers as its shape says")));
+            }
+            arrays.insert(name.to_string(), (shape, numbers));
+        }
+        Ok(Self { path: path.into(), about, start, arrays })
+    }
+
+    fn malformed(&self, what: String) -> RecordError {
+        RecordError::Malformed { path: self.path.clone(), what }
+    }
+
+    fn array(&self, name: &str) -> Result<&(Vec<usize>, Vec<f64>)> {
+        self.arrays.get(name).ok_or_else(|| self.malformed(format!("there is no array {name}")))
+    }
+
+    fn steps(&self, stream: &str) -> Result<&[f64]> {
+        Ok(&self.array(&format!("{stream}/step"))?.1)
+    }
+
+    /// Checks that the arrays of a stream have the shapes that they have in this simulation.
+    fn check(&self, source: &Source, rows: usize) -> Result<()> {
+        for part in &source.stream.parts {
+            let name = crate::npz::member(&source.stream, &part.name);
+            let shape = [&[rows, source.stream.env_ids.len()][..], &part.shape].concat();
+            let found = &self.array(&name)?.0;
+            if *found != shape {
+                return Err(self.malformed(format!("{name} has shape {found:?}; here it would be {shape:?}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// A row of an array, one line for each environment.
+    fn rows(&self, name: &str, row: usize) -> Result<ArrayView2<'_, f64>> {
+        let (shape, numbers) = self.array(name)?;
+        let [rows, envs, ..] = shape[..] else { return Err(self.malformed(format!("{name} has no environments"))) };
+        let width = shape[2..].iter().product();
+        let all = ArrayView3::from_shape((rows, envs, width), numbers);
+        all.ok()
+            .filter(|all| row < all.dim().0)
+            .map(|all| all.index_axis_move(ndarray::Axis(0), row))
+            .ok_or_else(|| self.malformed(format!("{name} has no row {row}")))
+    }
+
+    /// The environments that were reset, and those that were written to, at a step.
+    fn events(&self, step: f64) -> Result<(Vec<EnvId>, Vec<EnvId>)> {
+        let of = |name: &str| Ok::<_, RecordError>(&self.array(&format!("events/{name}"))?.1);
+        let (steps, envs, kinds) = (of("step")?, of("env")?, of("kind")?);
+        let (mut reset, mut written) = (Vec::new(), Vec::new());
+        for ((at, env), kind) in steps.iter().zip(envs).zip(kinds) {
+            if *at == step {
+                // Negative numbers become 0: no recorder writes them.
+                let to = if *kind == 0.0 { &mut reset } else { &mut written };
+                to.push(EnvId(*env as usize));
+            }
+        }
+        reset.sort_unstable();
+        reset.dedup();
+        Ok((reset, written))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

@@ -1,0 +1,137 @@
+use super::*;
+use crate::cfg::RecorderCfg;
+use crate::recorder::Record;
+use sim::{LinkId, MjcfCfg, RobotCfg, SimulationManagerCfg, UrdfCfg, WrenchFrame};
+use std::fs::File;
+
+const STEPS: u32 = 40;
+
+fn arms() -> SimulationManager {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/sr5/SR5.urdf");
+    sim.add_robot(RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(urdf), ..Default::default() }).unwrap();
+    let pusher = r#"<mujoco><worldbody><body name="slider"><joint name="x" type="slide" axis="1 0 0"/>
+        <geom size="0.1" pos="3 0 1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
+    sim.add_mjcf(MjcfCfg::text("pusher", pusher)).unwrap();
+    sim
+}
+
+/// Targets that change at every step, otherwise in each environment; a reset on the way.
+fn drive(sim: &mut SimulationManager, mut at_step: impl FnMut(&mut SimulationManager, u32)) {
+    let (arm, pusher) = (sim.robot_id("arm").unwrap(), sim.mjcf_id("pusher").unwrap());
+    for step in 0..STEPS {
+        let targets = ndarray::Array2::from_shape_fn((2, sim.robot(arm).dof()), |(env, joint)| {
+            0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin()
+        });
+        sim.robot_mut(arm).set_qpos(&targets, None, None).unwrap();
+        sim.mjcf_part_mut(pusher).set_ctrl(&ndarray::array![[f64::from(step)]], None, None).unwrap();
+        at_step(sim, step);
+        sim.update(1);
+        if step == 25 {
+            sim.reset(Some(&[EnvId(1)])).unwrap();
+        }
+    }
+}
+
+fn recording(path: &Path, at_step: impl FnMut(&mut SimulationManager, u32)) {
+    let mut sim = arms();
+    // Somewhere, not at the initial state.
+    sim.update(7);
+    let recorder = sim.record(RecorderCfg::new(path)).unwrap();
+    drive(&mut sim, at_step);
+    sim.finish_recording(recorder).unwrap();
+}
+
+#[test]
+fn recorded_actions_give_the_recorded_states_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    recording(&path, |_, _| ());
+    let mut sim = arms();
+    let verdict = verify(&mut sim, &path).unwrap();
+    assert!(verdict.is_same(), "{verdict}");
+    // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's three.
+    let arm = sim.robot(sim.robot_id("arm").unwrap());
+    let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
+    assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)));
+}
+
+#[test]
+fn what_was_done_otherwise_is_found_at_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    // A push that is no action, before step 12 of environment 1.
+    let path = folder.path().join("pushed.npz");
+    recording(&path, |sim, step| {
+        let arm = sim.robot_id("arm").unwrap();
+        let mut force = ndarray::Array3::zeros((1, 1, 3));
+        force[(0, 0, 0)] = if step == 12 { 5.0 } else { 0.0 };
+        let tip = LinkId(sim.robot(arm).link_names().len() - 1);
+        let (torque, env) = (ndarray::Array3::zeros((1, 1, 3)), [EnvId(1)]);
+        sim.robot_mut(arm).set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[tip]), Some(&env)).unwrap();
+    });
+    let verdict = verify(&mut arms(), &path).unwrap();
+    let difference = verdict.difference.unwrap();
+    assert_eq!((difference.step, difference.env, difference.written), (13, 1, false), "{difference:?}");
+
+    // A joint that somebody moved by hand before step 20.
+    let path = folder.path().join("written.npz");
+    recording(&path, |sim, step| {
+        if step == 20 {
+            let arm = sim.robot_id("arm").unwrap();
+            let row = sim.robot(arm).get_qpos().row(0).mapv(|q| q + 0.01);
+            let row = row.insert_axis(ndarray::Axis(0));
+            sim.robot_mut(arm).write_qpos(&row, None, Some(&[EnvId(0)])).unwrap();
+        }
+    });
+    let difference = verify(&mut arms(), &path).unwrap().difference.unwrap();
+    assert_eq!((difference.step, difference.env, difference.written), (20, 0, true), "{difference:?}");
+}
+
+/// The same archive with one recorded target changed.
+fn with_another_target(path: &Path, row: usize, to: &Path) {
+    let bytes = std::fs::read(path).unwrap();
+    let mut archive = zip::Archive::new(File::create(to).unwrap());
+    let mut changed = 0;
+    for (name, data) in zip::parse(&bytes).unwrap() {
+        let mut data = data.to_vec();
+        if name == "arm/targets/positions.npy" {
+            let (_, shape, numbers) = npy::parse(&data).unwrap();
+            let at = data.len() - numbers.len() + 8 * row * shape[1] * shape[2];
+            let old = f64::from_le_bytes(*data[at..].first_chunk().unwrap());
+            data[at..at + 8].copy_from_slice(&(old + 1e-9).to_le_bytes());
+            changed += 1;
+        }
+        archive.add(name, b"", &mut &data[..]).unwrap();
+    }
+    archive.finish().unwrap();
+    assert_eq!(changed, 1);
+}
+
+#[test]
+fn a_changed_target_is_found_at_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("run.npz"), folder.path().join("other.npz"));
+    recording(&path, |_, _| ());
+    with_another_target(&path, 17, &other);
+    let difference = verify(&mut arms(), &other).unwrap().difference.unwrap();
+    // Row 17 is that of step 17: its target acted in that step.
+    assert_eq!((difference.step, difference.env), (17, 0), "{difference:?}");
+    assert!(difference.array.starts_with("arm/joint_states/"), "{difference:?}");
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    recording(&path, |_, _| ());
+    let mut other = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let error = verify(&mut other, &path).unwrap_err().to_string();
+    assert!(error.contains("scene"), "{error}");
+    let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.002, ..Default::default() };
+    let error = verify(&mut SimulationManager::new(cfg).unwrap(), &path).unwrap_err().to_string();
+    assert!(error.contains("physics_dt"), "{error}");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let error = verify(&mut arms(), &path).unwrap_err().to_string();
+    assert!(error.contains("damaged"), "{error}");
+}

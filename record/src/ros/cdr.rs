@@ -1,0 +1,99 @@
+//! Bytes of messages: the Common Data Representation of the OMG (formal/02-06-51, chapter 15), little-endian, as ROS 2 uses it.
+
+/// What stands before every message: little-endian, no options.
+const HEADER: [u8; 4] = [0, 1, 0, 0];
+
+/// A message in the making. Every number stands at a multiple of its size, counted from behind the header.
+#[derive(Debug, Default)]
+pub(crate) struct Cdr(Vec<u8>);
+
+impl Cdr {
+    /// Begins a message, in the memory of the one before.
+    pub(crate) fn begin(&mut self) {
+        self.0.clear();
+        self.0.extend_from_slice(&HEADER);
+    }
+
+    /// The message.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        &self.0
+    }
+
+    fn align(&mut self, size: usize) {
+        let end = (self.0.len() - HEADER.len()).next_multiple_of(size) + HEADER.len();
+        self.0.resize(end, 0);
+    }
+
+    pub(crate) fn u8(&mut self, number: u8) {
+        self.0.push(number);
+    }
+
+    pub(crate) fn u32(&mut self, number: u32) {
+        self.align(4);
+        self.0.extend_from_slice(&number.to_le_bytes());
+    }
+
+    pub(crate) fn i32(&mut self, number: i32) {
+        self.align(4);
+        self.0.extend_from_slice(&number.to_le_bytes());
+    }
+
+    pub(crate) fn f64(&mut self, number: f64) {
+        self.align(8);
+        self.0.extend_from_slice(&number.to_le_bytes());
+    }
+
+    /// Numbers of a fixed count.
+    pub(crate) fn f64s(&mut self, numbers: &[f64]) {
+        numbers.iter().for_each(|number| self.f64(*number));
+    }
+
+    /// The count of what follows.
+    pub(crate) fn count(&mut self, count: usize) {
+        // No message of a recording is longer than 4 GiB: pictures and states are far below.
+        self.u32(u32::try_from(count).unwrap_or(u32::MAX));
+    }
+
+    /// A text, with the zero that ends it.
+    pub(crate) fn text(&mut self, text: &str) {
+        self.count(text.len() + 1);
+        self.0.extend_from_slice(text.as_bytes());
+        self.0.push(0);
+    }
+
+    /// A list of numbers.
+    pub(crate) fn list(&mut self, numbers: &[f64]) {
+        self.count(numbers.len());
+        self.f64s(numbers);
+    }
+
+    /// A list of bytes.
+    pub(crate) fn blob(&mut self, bytes: &[u8]) {
+        self.count(bytes.len());
+        self.0.extend_from_slice(bytes);
+    }
+
+    /// A list of bytes that `put` appends.
+    pub(crate) fn blob_of(&mut self, count: usize, put: impl FnOnce(&mut Vec<u8>)) {
+        self.count(count);
+        put(&mut self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_aligned_from_behind_the_header() {
+        let mut cdr = Cdr::default();
+        cdr.begin();
+        cdr.u8(7);
+        cdr.u32(1);
+        cdr.f64(0.0);
+        cdr.text("a");
+        cdr.list(&[]);
+        let expected = [&[0, 1, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0][..], &[0; 8], &[2, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 0, 0]];
+        assert_eq!(cdr.bytes(), expected.concat());
+    }
+}

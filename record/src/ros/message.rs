@@ -1,0 +1,157 @@
+//! The messages, field by field.
+
+use super::cdr::Cdr;
+
+/// When and where something was measured.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stamp<'a> {
+    /// Time \[ns\].
+    pub(crate) nanos: u64,
+    /// The frame in which it is told.
+    pub(crate) frame: &'a str,
+}
+
+const NANOS: u64 = 1_000_000_000;
+/// The level of a log's information.
+const INFO: u8 = 20;
+/// The numbers of a point are of this type.
+const FLOAT32: u8 = 7;
+
+fn time(to: &mut Cdr, nanos: u64) {
+    to.i32(i32::try_from(nanos / NANOS).unwrap_or(i32::MAX));
+    to.u32((nanos % NANOS) as u32);
+}
+
+fn header(to: &mut Cdr, stamp: Stamp<'_>) {
+    time(to, stamp.nanos);
+    to.text(stamp.frame);
+}
+
+/// `[w, x, y, z]` in the order of ROS.
+fn quaternion(to: &mut Cdr, wxyz: &[f64]) {
+    if let [w, x, y, z] = wxyz {
+        to.f64s(&[*x, *y, *z, *w]);
+    }
+}
+
+/// `sensor_msgs/msg/JointState`: `rows` are positions, velocities and efforts, one after the other.
+pub(crate) fn joint_state(to: &mut Cdr, stamp: Stamp<'_>, names: &[String], rows: &[f64]) {
+    header(to, stamp);
+    to.count(names.len());
+    names.iter().for_each(|name| to.text(name));
+    for row in rows.chunks(names.len().max(1)) {
+        to.list(row);
+    }
+}
+
+/// `tf2_msgs/msg/TFMessage`: poses `[x, y, z, qw, qx, qy, qz]` of `frames`, whose names get `prefix`.
+pub(crate) fn transforms(to: &mut Cdr, stamp: Stamp<'_>, prefix: &str, frames: &[String], poses: &[f64]) {
+    to.count(frames.len());
+    for (frame, pose) in frames.iter().zip(poses.chunks_exact(7)) {
+        header(to, stamp);
+        to.text(&format!("{prefix}{frame}"));
+        to.f64s(&pose[..3]);
+        quaternion(to, &pose[3..]);
+    }
+}
+
+/// `sensor_msgs/msg/CompressedImage` of a PNG file.
+pub(crate) fn compressed_image(to: &mut Cdr, stamp: Stamp<'_>, png: &[u8]) {
+    header(to, stamp);
+    to.text("png");
+    to.blob(png);
+}
+
+/// `sensor_msgs/msg/Image` of `bytes` bytes per row that `put` appends.
+pub(crate) fn image(
+    to: &mut Cdr,
+    stamp: Stamp<'_>,
+    encoding: &str,
+    (height, width, bytes): (usize, usize, usize),
+    put: impl FnOnce(&mut Vec<u8>),
+) {
+    header(to, stamp);
+    to.count(height);
+    to.count(width);
+    to.text(encoding);
+    to.u8(0);
+    to.count(bytes);
+    to.blob_of(height * bytes, put);
+}
+
+/// `sensor_msgs/msg/CameraInfo` of a lens without distortion; `k` are the nine numbers of its matrix.
+pub(crate) fn camera_info(to: &mut Cdr, stamp: Stamp<'_>, (height, width): (usize, usize), k: &[f64]) {
+    header(to, stamp);
+    to.count(height);
+    to.count(width);
+    to.text("plumb_bob");
+    to.list(&[0.0; 5]);
+    to.f64s(k);
+    to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    for row in k.chunks_exact(3) {
+        to.f64s(row);
+        to.f64(0.0);
+    }
+    // Neither binned nor a part of a larger picture.
+    (0..6).for_each(|_| to.u32(0));
+    to.u8(0);
+}
+
+/// `sensor_msgs/msg/Imu`: orientation w x y z, angular velocity and acceleration in its own axes.
+pub(crate) fn imu(to: &mut Cdr, stamp: Stamp<'_>, wxyz: &[f64], angular: &[f64], acceleration: &[f64]) {
+    // All zero: not known.
+    const COVARIANCE: [f64; 9] = [0.0; 9];
+    header(to, stamp);
+    quaternion(to, wxyz);
+    to.f64s(&COVARIANCE);
+    to.f64s(angular);
+    to.f64s(&COVARIANCE);
+    to.f64s(acceleration);
+    to.f64s(&COVARIANCE);
+}
+
+/// `sensor_msgs/msg/PointCloud2`: the finite ones of points of three numbers.
+pub(crate) fn points(to: &mut Cdr, stamp: Stamp<'_>, points: &[f64]) {
+    let finite = || points.chunks_exact(3).filter(|point| point.iter().all(|x| x.is_finite()));
+    let count = finite().count();
+    header(to, stamp);
+    to.u32(1);
+    to.count(count);
+    to.count(3);
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        to.text(name);
+        to.count(4 * k);
+        to.u8(FLOAT32);
+        to.u32(1);
+    }
+    to.u8(0);
+    to.u32(12);
+    to.count(12 * count);
+    to.blob_of(12 * count, |bytes| {
+        finite().flatten().for_each(|x| bytes.extend_from_slice(&(*x as f32).to_le_bytes()));
+    });
+    to.u8(1);
+}
+
+/// `std_msgs/msg/Float64MultiArray` of a shape.
+pub(crate) fn numbers(to: &mut Cdr, label: &str, shape: &[usize], values: &[f64]) {
+    to.count(shape.len());
+    for (k, length) in shape.iter().enumerate() {
+        to.text(label);
+        to.count(*length);
+        to.count(shape[k..].iter().product());
+    }
+    to.u32(0);
+    to.list(values);
+}
+
+/// `rcl_interfaces/msg/Log`.
+pub(crate) fn log(to: &mut Cdr, nanos: u64, name: &str, message: &str) {
+    time(to, nanos);
+    to.u8(INFO);
+    to.text(name);
+    to.text(message);
+    to.text("");
+    to.text("");
+    to.u32(0);
+}

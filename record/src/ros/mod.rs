@@ -1,0 +1,14 @@
+//! ROS 2 messages: what they are called and made of, and their bytes.
+//!
+//! The names and the order of the fields are those of the ROS packages `builtin_interfaces`, `geometry_msgs`, `rcl_interfaces`,
+//! `sensor_msgs`, `std_msgs` and `tf2_msgs`; the bytes are little-endian CDR.
+
+mod cdr;
+mod message;
+mod schema;
+
+pub(crate) use cdr::Cdr;
+pub(crate) use message::{
+    Stamp, camera_info, compressed_image, image, imu, joint_state, log, numbers, points, transforms,
+};
+pub(crate) use schema::Schema;

@@ -1,0 +1,98 @@
+//! What messages are made of, as ROS 2 describes them.
+
+/// The types of messages that are recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Schema {
+    CameraInfo,
+    CompressedImage,
+    Float64MultiArray,
+    Image,
+    Imu,
+    JointState,
+    Log,
+    PointCloud2,
+    TfMessage,
+}
+
+const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
+const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
+const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
+const TRANSFORM: (&str, &str) =
+    ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n");
+const TRANSFORM_STAMPED: (&str, &str) = (
+    "geometry_msgs/TransformStamped",
+    "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
+);
+const REGION: (&str, &str) = (
+    "sensor_msgs/RegionOfInterest",
+    "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+);
+const POINT_FIELD: (&str, &str) =
+    ("sensor_msgs/PointField", "string name\nuint32 offset\nuint8 datatype\nuint32 count\n");
+const LAYOUT: (&str, &str) = ("std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n");
+const DIMENSION: (&str, &str) = ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n");
+
+impl Schema {
+    /// Its name.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
+            Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
+            Self::Float64MultiArray => "std_msgs/msg/Float64MultiArray",
+            Self::Image => "sensor_msgs/msg/Image",
+            Self::Imu => "sensor_msgs/msg/Imu",
+            Self::JointState => "sensor_msgs/msg/JointState",
+            Self::Log => "rcl_interfaces/msg/Log",
+            Self::PointCloud2 => "sensor_msgs/msg/PointCloud2",
+            Self::TfMessage => "tf2_msgs/msg/TFMessage",
+        }
+    }
+
+    /// Its fields, then those of the types in it.
+    pub(crate) fn text(self) -> String {
+        let (own, others): (&str, &[(&str, &str)]) = match self {
+            Self::CameraInfo => (
+                "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\n\
+                 float64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\n\
+                 sensor_msgs/RegionOfInterest roi\n",
+                &[HEADER, TIME, REGION],
+            ),
+            Self::CompressedImage => ("std_msgs/Header header\nstring format\nuint8[] data\n", &[HEADER, TIME]),
+            Self::Float64MultiArray => ("std_msgs/MultiArrayLayout layout\nfloat64[] data\n", &[LAYOUT, DIMENSION]),
+            Self::Image => (
+                "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\n\
+                 uint32 step\nuint8[] data\n",
+                &[HEADER, TIME],
+            ),
+            Self::Imu => (
+                "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n\
+                 float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n\
+                 float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n\
+                 float64[9] linear_acceleration_covariance\n",
+                &[HEADER, TIME, QUATERNION, VECTOR],
+            ),
+            Self::JointState => (
+                "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+                &[HEADER, TIME],
+            ),
+            Self::Log => (
+                "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\n\
+                 string function\nuint32 line\n",
+                &[TIME],
+            ),
+            Self::PointCloud2 => (
+                "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\n\
+                 bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
+                &[HEADER, TIME, POINT_FIELD],
+            ),
+            Self::TfMessage => (
+                "geometry_msgs/TransformStamped[] transforms\n",
+                &[TRANSFORM_STAMPED, HEADER, TIME, TRANSFORM, VECTOR, QUATERNION],
+            ),
+        };
+        let line = "=".repeat(80);
+        let other = |(name, fields): &(&str, &str)| format!("{line}\nMSG: {name}\n{fields}");
+        std::iter::once(own.to_string()).chain(others.iter().map(other)).collect()
+    }
+}

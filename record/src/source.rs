@@ -1,0 +1,412 @@
+//! Where the numbers of a stream come from.
+
+use crate::error::{RecordError, Result};
+use crate::packet::{Block, Values};
+use crate::stream::{Element, Kind, Part, Stream};
+use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
+use sensors::camera::channel::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
+use sensors::camera::{CameraConvention, Channel};
+use sensors::{Camera, Imu, RayCaster, RayCasterCamera, Sampled, Sensor};
+use sim::{MjcfId, ObjectId, RobotId, SimulationManager};
+use std::any::Any;
+
+/// One stream and where it comes from.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) stream: Stream,
+    what: What,
+    /// The sensor that says when there is something new; `None` for what is there at every step.
+    pub(crate) sensor: Option<String>,
+    /// The row of the source's arrays of every environment of the stream.
+    rows: Vec<usize>,
+    /// Measurements of every row until now, for sensors.
+    counts: Vec<u64>,
+    /// Simulation time of every row when it was read last \[s\], for what is there at every step.
+    last: Vec<f64>,
+    /// Steps of the simulation at which it is due.
+    pub(crate) due_at: u64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum What {
+    JointStates(RobotId),
+    Targets(RobotId),
+    LinkPoses(RobotId),
+    ObjectPose(ObjectId),
+    MjcfState(MjcfId),
+    Picture { uid: String, channel: &'static str },
+    Lens(String),
+    Numbers(String),
+    Points(String),
+}
+
+/// Channels that are pictures with a calibration, as the two kinds of camera have them.
+const RAY_CAMERA: [(&str, Element, usize); 4] = [
+    (Depth::NAME, Element::F32, 1),
+    (Distance::NAME, Element::F32, 1),
+    (Normal::NAME, Element::F32, 3),
+    (Mask::NAME, Element::I32, 1),
+];
+const CAMERA: [(&str, Element, usize); 7] = [
+    (Color::NAME, Element::U8, 4),
+    (Depth::NAME, Element::F32, 1),
+    (Distance::NAME, Element::F32, 1),
+    (Mask::NAME, Element::I32, 1),
+    (Normal::NAME, Element::F32, 3),
+    (ShadingNormal::NAME, Element::F32, 3),
+    (Position::NAME, Element::F32, 3),
+];
+
+impl Source {
+    fn new(name: String, kind: Kind, element: Element, parts: Vec<Part>, envs: &[usize], what: What) -> Self {
+        let stream = Stream { name, kind, element, parts, env_ids: envs.to_vec() };
+        let (rows, n) = (envs.to_vec(), envs.len());
+        Self { stream, what, sensor: None, rows, counts: vec![0; n], last: vec![f64::NAN; n], due_at: 0 }
+    }
+
+    pub(crate) fn joint_states(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        Self::joints(sim, uid, envs, "joint_states", What::JointStates)
+    }
+
+    pub(crate) fn targets(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        Self::joints(sim, uid, envs, "targets", What::Targets)
+    }
+
+    fn joints(
+        sim: &SimulationManager,
+        uid: &str,
+        envs: &[usize],
+        topic: &str,
+        what: fn(RobotId) -> What,
+    ) -> Result<Self> {
+        let id = sim.jointed_id(uid)?;
+        let names = sim.robot(id).joint_names().to_vec();
+        let parts = ["positions", "velocities", "efforts"].map(|part| Part::new(part, [names.len()])).to_vec();
+        Ok(Self::new(format!("{uid}/{topic}"), Kind::Joints { names }, Element::F64, parts, envs, what(id)))
+    }
+
+    pub(crate) fn link_poses(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        let id = sim.jointed_id(uid)?;
+        let frames: Vec<String> = sim.robot(id).link_names().iter().map(|link| format!("{uid}/{link}")).collect();
+        let parts = vec![Part::new("", [frames.len(), 7])];
+        let name = format!("{uid}/link_poses");
+        Ok(Self::new(name, Kind::Poses { frames }, Element::F64, parts, envs, What::LinkPoses(id)))
+    }
+
+    pub(crate) fn object_pose(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        let what = What::ObjectPose(sim.rigid_object_id(uid)?);
+        let kind = Kind::Poses { frames: vec![uid.into()] };
+        Ok(Self::new(format!("{uid}/pose"), kind, Element::F64, vec![Part::new("", [1, 7])], envs, what))
+    }
+
+    pub(crate) fn mjcf_state(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        let id = sim.mjcf_id(uid)?;
+        let part = sim.mjcf_part(id);
+        let widths = [part.get_qpos().ncols(), part.get_qvel().ncols(), part.get_ctrl().ncols()];
+        let names = ["positions", "velocities", "controls"];
+        let parts = names.iter().zip(widths).map(|(name, width)| Part::new(name, [width])).collect();
+        Ok(Self::new(format!("{uid}/state"), Kind::Numbers, Element::F64, parts, envs, What::MjcfState(id)))
+    }
+
+    /// Everything that a sensor measures.
+    pub(crate) fn sensor(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Vec<Self>> {
+        let sensor = sim.sensor_called(uid)?;
+        let any: &dyn Any = sensor;
+        let mut sources = Vec::new();
+        if any.is::<Camera>() || any.is::<RayCasterCamera>() {
+            for (channel, ..) in channels(any) {
+                sources.push(Self::picture(sim, uid, channel, envs)?);
+            }
+            let shape = image_shape(any);
+            let kind = Kind::Lens { camera: uid.into(), height: shape.0, width: shape.1 };
+            let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
+            let lens = Self::new(format!("{uid}/lens"), kind, Element::F64, parts, envs, What::Lens(uid.into()));
+            sources.push(lens.of_sensor(uid, sensor));
+        } else if let Some(caster) = any.downcast_ref::<RayCaster>() {
+            let rays = caster.num_rays();
+            let parts = vec![Part::new("hits", [rays, 3]), Part::new("distances", [rays])];
+            let points = What::Points(uid.into());
+            sources.push(Self::new(uid.into(), Kind::Points, Element::F64, parts, envs, points).of_sensor(uid, sensor));
+        } else if let Some(sampled) = sensor.sampled() {
+            let kind = if any.is::<Imu>() { Kind::Imu } else { Kind::Numbers };
+            let sampler = sampled.sampler();
+            let part = |channel| Part::new(channel, [sampler.values(channel).ncols()]);
+            let parts = sampler.channels().map(part).collect();
+            let numbers = What::Numbers(uid.into());
+            sources.push(Self::new(uid.into(), kind, Element::F64, parts, envs, numbers).of_sensor(uid, sensor));
+        } else {
+            return Err(RecordError::Unreadable { sensor: uid.into() });
+        }
+        sources.retain(|source| !source.rows.is_empty());
+        Ok(sources)
+    }
+
+    /// One channel of a camera.
+    pub(crate) fn picture(sim: &SimulationManager, uid: &str, channel: &str, envs: &[usize]) -> Result<Self> {
+        let sensor = sim.sensor_called(uid)?;
+        let known = channels(sensor);
+        // Aliases are the cameras' own.
+        let own = sensors::camera::Channels::from_names(&[channel]).map(|one| one.names()).unwrap_or_default();
+        let found = known.iter().find(|(name, ..)| own.contains(name));
+        let &(name, element, components) = found.ok_or_else(|| RecordError::UnknownName {
+            what: "channel",
+            name: format!("{uid}/{channel}"),
+            candidates: known.iter().map(|(name, ..)| format!("{uid}/{name}")).collect(),
+        })?;
+        let (height, width) = image_shape(sensor);
+        let shape = if components == 1 { vec![height, width] } else { vec![height, width, components] };
+        let kind = Kind::Picture { camera: uid.into(), channel: name.into(), height, width };
+        let what = What::Picture { uid: uid.into(), channel: name };
+        let stream = format!("{uid}/{name}");
+        Ok(Self::new(stream, kind, element, vec![Part::new("", shape)], envs, what).of_sensor(uid, sensor))
+    }
+
+    /// The same of a sensor, which may not be in all environments.
+    fn of_sensor(mut self, uid: &str, sensor: &dyn Sensor) -> Self {
+        self.sensor = Some(uid.into());
+        let any: &dyn Any = sensor;
+        if let Some(camera) = any.downcast_ref::<Camera>() {
+            let place = |env: &usize| camera.env_ids().iter().position(|seen| seen == env).map(|row| (row, *env));
+            (self.rows, self.stream.env_ids) = self.stream.env_ids.iter().filter_map(place).unzip();
+            self.counts.truncate(self.rows.len());
+            self.last.truncate(self.rows.len());
+        }
+        // What it has measured before is not new.
+        self.count(sensor);
+        self
+    }
+
+    /// Counts measurements; gives whether those of each row are more, or others, than before.
+    fn count(&mut self, sensor: &dyn Sensor) -> Vec<bool> {
+        let any: &dyn Any = sensor;
+        let counts = match (any.downcast_ref::<Camera>(), sensor.sampled()) {
+            (Some(camera), _) => Some(camera.frame_counts()),
+            (None, sampled) => sampled.map(|sampled| sampled.sample_counts()),
+        };
+        let now = |row: &usize| counts.and_then(|counts| counts.get(*row).copied()).unwrap_or(0);
+        let rows = self.rows.iter().map(now);
+        self.counts.iter_mut().zip(rows).map(|(count, now)| std::mem::replace(count, now) != now).collect()
+    }
+
+    /// Counts measurements again after something happened: what sensors show then is no measurement.
+    pub(crate) fn recount(&mut self, sim: &SimulationManager) -> Result<()> {
+        if let Some(uid) = self.sensor.clone() {
+            self.count(sim.sensor_called(&uid)?);
+        }
+        Ok(())
+    }
+
+    /// Leaves out all environments but the first.
+    pub(crate) fn keep_first(&mut self) {
+        self.stream.env_ids.truncate(1);
+        self.rows.truncate(1);
+        self.counts.truncate(1);
+        self.last.truncate(1);
+    }
+
+    /// Copies what there is now. `times` are the simulation times of all environments; `renewed` are environments whose state
+    /// is another one, whatever their time.
+    pub(crate) fn read(
+        &mut self,
+        sim: &SimulationManager,
+        times: &[f64],
+        renewed: &[usize],
+        block: &mut Block,
+    ) -> Result<()> {
+        if let Some(uid) = &self.sensor {
+            let sensor = sim.sensor_called(uid)?;
+            block.fresh = self.count(sensor);
+            if !block.fresh.contains(&true) {
+                return Ok(());
+            }
+            let stamps = stamps(sensor, &self.stream.kind);
+            block.times.extend(self.rows.iter().map(|row| stamps.get(*row).copied().unwrap_or(f64::NAN)));
+        } else {
+            let now = self.stream.env_ids.iter().map(|env| times[*env]);
+            block.times.extend(now);
+            for ((env, last), now) in self.stream.env_ids.iter().zip(&mut self.last).zip(&block.times) {
+                // One that is put aside stands still.
+                let moved = std::mem::replace(last, *now) != *now;
+                block.fresh.push(moved || renewed.binary_search(env).is_ok());
+            }
+        }
+        self.copy(sim, &mut block.values)?;
+        let wanted = self.rows.len() * self.stream.width();
+        if block.values.len() != wanted {
+            return Err(self.changed());
+        }
+        block.used = true;
+        Ok(())
+    }
+
+    fn changed(&self) -> RecordError {
+        RecordError::Changed { path: Default::default(), stream: self.stream.name.clone() }
+    }
+
+    fn copy(&self, sim: &SimulationManager, values: &mut Values) -> Result<()> {
+        match &self.what {
+            What::JointStates(id) => {
+                let robot = sim.robot(*id);
+                self.join(values, &[robot.get_qpos().view(), robot.get_qvel().view(), robot.get_qf().view()]);
+            }
+            What::Targets(id) => {
+                let robot = sim.robot(*id);
+                let targets = [robot.get_target_qpos(), robot.get_target_qvel(), robot.get_target_qf()];
+                self.join(values, &[targets[0].view(), targets[1].view(), targets[2].view()]);
+            }
+            What::LinkPoses(id) => self.put(values, &sim.robot(*id).get_link_poses()),
+            What::ObjectPose(id) => self.put(values, &sim.rigid_object(*id).get_pose()),
+            What::MjcfState(id) => {
+                let part = sim.mjcf_part(*id);
+                self.join(values, &[part.get_qpos().view(), part.get_qvel().view(), part.get_ctrl().view()]);
+            }
+            What::Picture { uid, channel } => self.copy_picture(sim.sensor_called(uid)?, channel, values)?,
+            What::Lens(uid) => {
+                let any: &dyn Any = sim.sensor_called(uid)?;
+                let lenses = if let Some(camera) = any.downcast_ref::<Camera>() {
+                    Some((camera.intrinsic_matrices(), camera.pose_w(CameraConvention::Ros)))
+                } else {
+                    let camera = any.downcast_ref::<RayCasterCamera>();
+                    camera.map(|camera| (camera.intrinsic_matrices(), camera.pose_w(CameraConvention::Ros)))
+                };
+                let (intrinsics, poses) = lenses.ok_or_else(|| self.changed())?;
+                let rows = intrinsics.len_of(Axis(0));
+                let flat = intrinsics.into_shape_with_order((rows, 9)).map_err(|_| self.changed())?;
+                self.join(values, &[flat.view(), poses.view()]);
+            }
+            What::Numbers(uid) => {
+                let sensor = sim.sensor_called(uid)?;
+                let sampler = sensor.sampled().ok_or_else(|| self.changed())?.sampler();
+                if !sampler.channels().eq(self.stream.parts.iter().map(|part| part.name.as_str())) {
+                    return Err(self.changed());
+                }
+                let all: Vec<ArrayView2<'_, f64>> = sampler.channels().map(|channel| sampler.values(channel)).collect();
+                self.join(values, &all);
+            }
+            What::Points(uid) => {
+                let any: &dyn Any = sim.sensor_called(uid)?;
+                let caster = any.downcast_ref::<RayCaster>().ok_or_else(|| self.changed())?;
+                let (hits, distances) = (caster.hits(), caster.distances());
+                for &row in self.rows.iter().filter(|row| **row < distances.nrows()) {
+                    if let Values::F64(values) = values {
+                        values.extend(hits.index_axis(Axis(0), row));
+                        values.extend(distances.row(row));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn copy_picture(&self, sensor: &dyn Sensor, channel: &str, values: &mut Values) -> Result<()> {
+        let any: &dyn Any = sensor;
+        if let Some(camera) = any.downcast_ref::<Camera>() {
+            let pictures = camera.pictures().map_err(sim_error(self))?;
+            macro_rules! put {
+                ($($Channel:ident),*) => {
+                    match channel {
+                        $(_ if channel == $Channel::NAME => {
+                            let picture = <$Channel as Listed>::of(pictures).ok_or_else(|| self.changed())?;
+                            self.put(values, &picture);
+                        })*
+                        _ => return Err(self.changed()),
+                    }
+                };
+            }
+            put!(Color, Depth, Distance, Mask, Normal, ShadingNormal, Position);
+        } else {
+            let camera = any.downcast_ref::<RayCasterCamera>().ok_or_else(|| self.changed())?;
+            match channel {
+                _ if channel == Depth::NAME => self.put(values, &camera.depth()),
+                _ if channel == Distance::NAME => self.put(values, &camera.distance()),
+                _ if channel == Normal::NAME => self.put(values, &camera.normal()),
+                _ if channel == Mask::NAME => self.put(values, &camera.mask()),
+                _ => return Err(self.changed()),
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of tables beside each other.
+    fn join(&self, values: &mut Values, tables: &[ArrayView2<'_, f64>]) {
+        let Values::F64(values) = values else { return };
+        for &row in &self.rows {
+            for table in tables.iter().filter(|table| row < table.nrows()) {
+                values.extend(table.row(row));
+            }
+        }
+    }
+
+    /// The rows of an array.
+    fn put<T: Number, S: Data<Elem = T>, D: Dimension>(&self, values: &mut Values, array: &ArrayBase<S, D>) {
+        let Some(values) = T::of(values) else { return };
+        let width = self.stream.width();
+        match array.as_slice() {
+            Some(all) => {
+                let rows = self.rows.iter().filter_map(|row| all.get(row * width..(row + 1) * width));
+                rows.for_each(|row| values.extend_from_slice(row));
+            }
+            None => {
+                let all: Vec<T> = array.iter().copied().collect();
+                let rows = self.rows.iter().filter_map(|row| all.get(row * width..(row + 1) * width));
+                rows.for_each(|row| values.extend_from_slice(row));
+            }
+        }
+    }
+}
+
+/// A number that [`Values`] hold.
+trait Number: Copy {
+    fn of(values: &mut Values) -> Option<&mut Vec<Self>>;
+}
+
+macro_rules! number {
+    ($($number:ty: $Variant:ident),*) => {$(
+        impl Number for $number {
+            fn of(values: &mut Values) -> Option<&mut Vec<Self>> {
+                if let Values::$Variant(values) = values { Some(values) } else { None }
+            }
+        }
+    )*};
+}
+
+number!(u8: U8, i32: I32, f32: F32, f64: F64);
+
+/// When a sensor measured what it shows, for all of its rows \[s\].
+fn stamps(sensor: &dyn Sensor, kind: &Kind) -> Vec<f64> {
+    let any: &dyn Any = sensor;
+    if let Some(camera) = any.downcast_ref::<Camera>() {
+        return camera.stamps().to_vec();
+    }
+    let stamps = |sampled: &dyn Sampled| match kind {
+        // Accelerations are those of the beginning of the step.
+        Kind::Imu => sampled.force_stamps().to_vec(),
+        _ => sampled.stamps().to_vec(),
+    };
+    sensor.sampled().map(stamps).unwrap_or_default()
+}
+
+/// The pictures that a sensor draws.
+fn channels(sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
+    match sensor.downcast_ref::<Camera>() {
+        Some(camera) => {
+            let wanted = camera.channels().names();
+            CAMERA.into_iter().filter(|(name, ..)| wanted.contains(name)).collect()
+        }
+        None if sensor.is::<RayCasterCamera>() => RAY_CAMERA.to_vec(),
+        None => Vec::new(),
+    }
+}
+
+/// Rows and pixels per row.
+fn image_shape(sensor: &dyn Any) -> (usize, usize) {
+    let camera = sensor.downcast_ref::<Camera>().map(Camera::image_shape);
+    camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
+}
+
+fn sim_error(source: &Source) -> impl Fn(sensors::SensorError) -> RecordError + '_ {
+    move |error| {
+        let sensor = source.sensor.clone().unwrap_or_default();
+        RecordError::from(sim::Error::Sensor { sensor, error: Box::new(error) })
+    }
+}

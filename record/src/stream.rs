@@ -1,0 +1,98 @@
+//! What a file is told of the numbers that it gets.
+
+/// Numbers that are recorded together: their names, shapes and meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stream {
+    /// Such as `arm/joint_states` or `camera/color`.
+    pub name: String,
+    /// What they mean.
+    pub kind: Kind,
+    /// The type of the numbers.
+    pub element: Element,
+    /// The quantities, one after the other in a row.
+    pub parts: Vec<Part>,
+    /// The environments, one row each.
+    pub env_ids: Vec<usize>,
+}
+
+impl Stream {
+    /// Numbers in the row of an environment.
+    pub fn width(&self) -> usize {
+        self.parts.iter().map(Part::width).sum()
+    }
+}
+
+/// One quantity of a stream.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Such as `positions`; empty where the stream has one quantity only, which is called as the stream.
+    pub name: String,
+    /// Its shape in one environment.
+    pub shape: Vec<usize>,
+}
+
+impl Part {
+    pub(crate) fn new(name: &str, shape: impl Into<Vec<usize>>) -> Self {
+        Self { name: name.into(), shape: shape.into() }
+    }
+
+    /// How many numbers it has in one environment.
+    pub fn width(&self) -> usize {
+        self.shape.iter().product()
+    }
+}
+
+/// The type of the numbers of a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Element {
+    /// Bytes.
+    U8,
+    /// Whole numbers.
+    I32,
+    /// Numbers of pictures.
+    F32,
+    /// Numbers of states.
+    F64,
+}
+
+/// What the numbers of a stream mean.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Positions, velocities and efforts, of joints or wanted of them.
+    Joints {
+        /// Names of the joints.
+        names: Vec<String>,
+    },
+    /// Poses in the environment, rows `[x, y, z, qw, qx, qy, qz]` \[m\].
+    Poses {
+        /// Names of what is there.
+        frames: Vec<String>,
+    },
+    /// A picture, row by row from the top left.
+    Picture {
+        /// The camera.
+        camera: String,
+        /// What it shows.
+        channel: String,
+        /// Rows.
+        height: usize,
+        /// Pixels per row.
+        width: usize,
+    },
+    /// The intrinsic matrix of a camera \[pixels\] and its pose in the environment, Ros axes.
+    Lens {
+        /// The camera.
+        camera: String,
+        /// Rows of its pictures.
+        height: usize,
+        /// Pixels per row of its pictures.
+        width: usize,
+    },
+    /// An inertial measurement unit; the quantities are called as its channels.
+    Imu,
+    /// Points in the environment \[m\], then distances \[m\]; infinite for a miss.
+    Points,
+    /// Numbers of a sensor.
+    Numbers,
+}

@@ -1,0 +1,42 @@
+//! What can be recorded.
+
+/// Something that can be recorded, by name.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Topic {
+    /// Everything below that the simulation has when the recording begins and the format has a place for.
+    Everything,
+    /// Positions, velocities and efforts of the joints of the robot or articulation of this name.
+    JointStates(String),
+    /// Targets of positions, velocities and efforts of its joints: the actions.
+    Targets(String),
+    /// Poses of its links.
+    LinkPoses(String),
+    /// The pose of the rigid object of this name.
+    ObjectPose(String),
+    /// Positions, velocities and controls of the MJCF part of this name.
+    MjcfState(String),
+    /// All channels of the sensor of this name, whenever it measures; of cameras and ray casters that draw pictures also the
+    /// lens and the pose.
+    Sensor(String),
+    /// One channel of a camera, such as `depth`, without lens and pose.
+    Channel {
+        /// The camera.
+        sensor: String,
+        /// The channel; aliases such as `rgb` are known.
+        channel: String,
+    },
+}
+
+impl Topic {
+    /// Everything about the joints of a robot: [`JointStates`](Self::JointStates), [`Targets`](Self::Targets) and
+    /// [`LinkPoses`](Self::LinkPoses).
+    pub fn robot(uid: &str) -> [Self; 3] {
+        [Self::JointStates(uid.into()), Self::Targets(uid.into()), Self::LinkPoses(uid.into())]
+    }
+
+    /// One channel of a camera.
+    pub fn channel(sensor: impl Into<String>, channel: impl Into<String>) -> Self {
+        Self::Channel { sensor: sensor.into(), channel: channel.into() }
+    }
+}

@@ -1,0 +1,86 @@
+//! The thread that writes: packets in, a file out.
+
+use crate::packet::Packet;
+use crate::stream::Stream;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
+/// What is written may be read by others after this long at the latest.
+const FLUSH_EVERY: Duration = Duration::from_millis(500);
+
+/// A file of some format on its way.
+pub(crate) trait Sink: Send {
+    /// Writes what is in a packet.
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()>;
+
+    /// Brings what was written to where a killed process leaves it.
+    fn flush(&mut self) -> io::Result<()>;
+
+    /// Makes the file whole and gives it its name; returns its size \[bytes\].
+    fn finish(&mut self, streams: &[Stream]) -> io::Result<u64>;
+
+    /// After an error: takes away what nobody can read, and says where the rest is.
+    fn give_up(&mut self) -> Option<PathBuf>;
+}
+
+/// Why a file was not finished, and where what can be read of it is.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) error: io::Error,
+    pub(crate) kept: Option<PathBuf>,
+}
+
+/// Writes packets until nobody sends any more, then finishes the file. After an error, packets go back unwritten, and
+/// `failed` is set; if it was set by the recorder, the file is not finished.
+pub(crate) fn run(
+    mut sink: Box<dyn Sink>,
+    streams: &[Stream],
+    full: &Receiver<Packet>,
+    free: &Sender<Packet>,
+    failed: &Arc<AtomicBool>,
+) -> Result<u64, Failure> {
+    let mut result = Ok(());
+    let mut flushed = Instant::now();
+    let mut dirty = false;
+    loop {
+        let wait = if dirty { FLUSH_EVERY.saturating_sub(flushed.elapsed()) } else { Duration::MAX };
+        let received = match wait {
+            Duration::MAX => full.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            wait => full.recv_timeout(wait),
+        };
+        match received {
+            Ok(mut packet) => {
+                if !dirty {
+                    flushed = Instant::now();
+                }
+                if result.is_ok() {
+                    result = sink.write(streams, &packet);
+                    dirty = true;
+                }
+                packet.clear();
+                // The recorder is gone when it does not take it back.
+                let _ = free.send(packet);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+        if dirty && result.is_ok() && flushed.elapsed() >= FLUSH_EVERY {
+            result = sink.flush();
+            dirty = false;
+        }
+        if result.is_err() {
+            dirty = false;
+            failed.store(true, Ordering::Relaxed);
+        }
+    }
+    // The recorder too may have found that the file cannot become what was asked for.
+    if result.is_ok() && failed.load(Ordering::Relaxed) {
+        result = Err(io::Error::other("the recording was broken off"));
+    }
+    let size = result.and_then(|()| sink.finish(streams));
+    size.map_err(|error| Failure { error, kept: sink.give_up() })
+}

@@ -1,0 +1,97 @@
+//! Processes that are killed while they record: what is older than a second can be read.
+
+use super::support::{World, messages, of};
+use kinetoscope::prelude::*;
+use kinetoscope::record;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Set in child processes only: the file to record to.
+const FILE: &str = "KINETOSCOPE_TEST_RECORD_TO";
+/// How many processes are killed; by hand more.
+const KILLS: &str = "KINETOSCOPE_TEST_KILLS";
+
+/// Records until it is killed, and says which steps it has done.
+#[test]
+fn scenario_records_for_ever() {
+    let Some(path) = std::env::var_os(FILE) else { return };
+    let mut world = World::new(2, 1);
+    world.sim.record(RecorderCfg::new(path)).unwrap();
+    for step in 0.. {
+        world.step(step);
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "done {}", step + 1).unwrap();
+        out.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Kills a process that has recorded for that long. Gives the steps that it had done one second before.
+fn kill_after(path: &Path, life: Duration) -> u64 {
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "kill::scenario_records_for_ever", "--nocapture", "--test-threads=1"])
+        .env(FILE, path)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let (mut begun, mut done) = (None, Vec::new());
+    for line in lines {
+        let now = Instant::now();
+        let Some(steps) = line.unwrap().strip_prefix("done ").and_then(|steps| steps.parse::<u64>().ok()) else {
+            continue;
+        };
+        done.push((now, steps));
+        if now.duration_since(*begun.get_or_insert(now)) >= life {
+            break;
+        }
+    }
+    // SIGKILL, on Unix.
+    child.kill().unwrap();
+    let end = Instant::now();
+    child.wait().unwrap();
+    let old = done.iter().filter(|(time, _)| end.duration_since(*time) >= Duration::from_secs(1));
+    old.map(|(_, steps)| *steps).max().unwrap_or(0)
+}
+
+#[test]
+fn what_is_older_than_a_second_survives_a_kill() {
+    let kills: u32 = std::env::var(KILLS).ok().and_then(|count| count.parse().ok()).unwrap_or(3);
+    let folder = tempfile::tempdir().unwrap();
+    let dt = World::new(1, 1).sim.cfg().physics_dt;
+    for kill in 0..kills {
+        let path = folder.path().join(format!("{kill}.mcap"));
+        // Spread over the half second between two flushes, wherever they are.
+        let life = Duration::from_millis(1300 + u64::from(kill) * 379 % 1000);
+        let old = kill_after(&path, life);
+        assert!(old > 0, "it had done nothing a second before the end");
+        assert!(!path.exists(), "what was killed has not the name of a whole file");
+        assert!(path.with_extension("mcap.part").exists());
+        let count = record::recover(&path).unwrap();
+        assert!(!path.with_extension("mcap.part").exists());
+        let all = messages(&path);
+        assert_eq!(all.len() as u64, count);
+        for env in 0..2 {
+            let states = of(&all, &format!("/env_{env}/arm/joint_states"));
+            let steps: Vec<u64> = states.iter().map(|m| (m.time as f64 / 1e9 / dt).round() as u64).collect();
+            assert!(steps.iter().copied().eq(0..steps.len() as u64), "every step, in order");
+            let last = steps.last().copied().unwrap_or(0);
+            println!("kill {kill} after {life:?}: step {last} is readable, {old} was done a second before");
+            assert!(last >= old, "step {old} was done a second before the end; the file ends with {last}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_recording_is_not_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    assert!(record::recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
+    std::fs::write(folder.path().join("run.mcap.part"), "something else").unwrap();
+    let error = record::recover(&path).unwrap_err().to_string();
+    assert!(error.contains("nothing of it can be read"), "{error}");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["run.mcap.part"]);
+}

@@ -1,0 +1,9 @@
+//! Recordings: what is in the files, held against the simulation and read by readers that nobody here wrote.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod contents;
+mod kill;
+mod pictures;
+mod readers;
+mod refused;
+mod support;

@@ -1,0 +1,96 @@
+//! Folders of pictures, and animations.
+
+use super::support::{PICTURE_EVERY, World};
+use kinetoscope::ndarray::Axis;
+use kinetoscope::prelude::*;
+use std::io::BufReader;
+use std::path::Path;
+
+const STEPS: u32 = 4 * PICTURE_EVERY;
+
+/// Records, and keeps colour and depth of environment 1.
+fn recorded(cfg: RecorderCfg) -> (Recorded, Vec<Vec<u8>>, Vec<Vec<f32>>) {
+    let mut world = World::new(2, 2);
+    let recorder = world.sim.record(cfg).unwrap();
+    let (mut colors, mut depths) = (Vec::new(), Vec::new());
+    for step in 0..STEPS {
+        world.step(step);
+        if (step + 1) % PICTURE_EVERY == 0 {
+            let camera = world.sim.sensor(world.camera).unwrap();
+            let color = camera.color().unwrap().index_axis(Axis(0), 1).to_owned();
+            colors.push(color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).collect());
+            depths.push(camera.depth().unwrap().index_axis(Axis(0), 1).iter().copied().collect());
+        }
+    }
+    (world.sim.finish_recording(recorder).unwrap(), colors, depths)
+}
+
+fn png(path: &Path) -> image::DynamicImage {
+    image::open(path).unwrap()
+}
+
+#[test]
+fn a_folder_has_every_picture_to_the_last_bit_and_depth_to_the_millimetre() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pictures");
+    let (_, colors, depths) = recorded(RecorderCfg::new(&path));
+    for env in ["env_0", "env_1"] {
+        assert_eq!(std::fs::read_dir(path.join("camera/color").join(env)).unwrap().count(), colors.len());
+        assert_eq!(std::fs::read_dir(path.join("camera/depth").join(env)).unwrap().count(), depths.len());
+    }
+    let mut seen = 0;
+    for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
+        let picture = png(&path.join(format!("camera/color/env_1/{k:06}.png")));
+        assert_eq!(picture.to_rgb8().as_raw(), color);
+        let picture = png(&path.join(format!("camera/depth/env_1/{k:06}.png")));
+        for (found, depth) in picture.as_luma16().unwrap().iter().zip(depth) {
+            let metres = f32::from(*found) / 1000.0;
+            // Half a millimetre of rounding, and that of f32 at some metres.
+            let same = if depth.is_finite() { (metres - depth).abs() < 0.000_501 } else { *found == 0 };
+            assert!(same, "{found} mm for {depth} m");
+            seen += u32::from(depth.is_finite());
+        }
+    }
+    assert!(seen > 100, "the camera sees something in {seen} pixels");
+    assert!(!path.join("camera/mask").exists(), "a mask is not a picture that people look at");
+}
+
+#[test]
+fn an_animation_has_every_frame_at_its_time() {
+    use image::AnimationDecoder;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.apng");
+    let cfg = RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) };
+    let (recorded, colors, _) = recorded(cfg);
+    assert_eq!(recorded.bytes, path.metadata().unwrap().len());
+    let decoder = image::codecs::png::PngDecoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).unwrap();
+    let frames = decoder.apng().unwrap().into_frames().collect_frames().unwrap();
+    assert_eq!(frames.len(), colors.len());
+    for (frame, color) in frames.iter().zip(&colors) {
+        let (numerator, denominator) = frame.delay().numer_denom_ms();
+        // Five steps of 10 ms.
+        assert_eq!(numerator, 50 * denominator);
+        let shown: Vec<u8> = frame.buffer().pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        assert_eq!(&shown, color);
+    }
+    assert_ne!(colors[0], colors[3], "something moves");
+}
+
+#[test]
+fn an_animation_shows_one_camera_in_one_environment() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.apng");
+    let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
+    let error = World::new(2, 1).sim.record(cfg).unwrap_err();
+    assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
+    assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
+    // Without a topic, the first of each is taken.
+    let mut world = World::new(2, 1);
+    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+    let streams: Vec<_> =
+        world.sim.observer(recorder).unwrap().streams().map(|s| (s.name.clone(), s.env_ids.clone())).collect();
+    assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
+    // A recording without a frame is no file.
+    assert!(world.sim.finish_recording(recorder).is_err());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

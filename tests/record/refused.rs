@@ -1,0 +1,110 @@
+//! Recordings that cannot be begun, and what is said.
+
+use super::support::World;
+use kinetoscope::prelude::*;
+use std::fs;
+
+fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
+    let error = World::new(1, 1).sim.record(cfg).unwrap_err();
+    let text = error.to_string();
+    (error, text)
+}
+
+#[test]
+fn files_that_are_there_stay_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.npz", "run.apng"] {
+        let path = folder.path().join(name);
+        fs::write(&path, "precious").unwrap();
+        let (error, text) = refusal(RecorderCfg::new(&path));
+        assert!(matches!(error, RecordError::Exists { .. }) && text.contains(name), "{text}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
+        // Replaced, if it may be, at the end.
+        let mut world = World::new(1, 1);
+        let recorder = world.sim.record(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) }).unwrap();
+        (0..6).for_each(|step| world.step(step));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
+        world.sim.finish_recording(recorder).unwrap();
+        assert_ne!(fs::read(&path).unwrap(), b"precious");
+    }
+    let pictures = folder.path().join("pictures");
+    fs::create_dir(&pictures).unwrap();
+    fs::write(pictures.join("one"), "precious").unwrap();
+    assert!(matches!(refusal(RecorderCfg::new(&pictures)).0, RecordError::Exists { .. }));
+}
+
+#[test]
+fn a_recording_that_was_killed_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("run.mcap.part"), "precious").unwrap();
+    let (error, text) = refusal(RecorderCfg::new(folder.path().join("run.mcap")));
+    assert!(matches!(error, RecordError::Unfinished { .. }) && text.contains("recover"), "{text}");
+    assert_eq!(fs::read_to_string(folder.path().join("run.mcap.part")).unwrap(), "precious");
+}
+
+#[test]
+fn folders_where_nothing_can_be_written_are_an_error_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    // Not even an administrator writes below a file.
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    for name in ["run.mcap", "run.npz", "run.apng", "pictures"] {
+        for place in [file.join(name), folder.path().join("missing").join(name)] {
+            if name == "pictures" && place.starts_with(folder.path().join("missing")) {
+                continue; // Folders of pictures are made.
+            }
+            let (error, text) = refusal(RecorderCfg::new(&place));
+            assert!(matches!(error, RecordError::File { .. }) && text.contains(name), "{text}");
+        }
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was left");
+}
+
+#[test]
+fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let with = |topic| RecorderCfg::new(&path).with_topics([topic]);
+    for (cfg, words) in [
+        (with(Topic::JointStates("amr".into())), vec!["amr", "arm"]),
+        (with(Topic::Sensor("camra".into())), vec!["camra", "camera"]),
+        (with(Topic::ObjectPose("cub".into())), vec!["cub", "cube"]),
+        (with(Topic::channel("camera", "dept")), vec!["camera/dept", "camera/depth"]),
+        (with(Topic::channel("camera", "normal")), vec!["camera/normal", "camera/depth"]),
+        (with(Topic::channel("imu", "depth")), vec!["imu/depth"]),
+        (RecorderCfg { every: 0, ..RecorderCfg::new(&path) }, vec!["every", "at least 1"]),
+        (RecorderCfg { packets: 1, ..RecorderCfg::new(&path) }, vec!["packets", "at least 2"]),
+        (RecorderCfg { envs: Some(vec![EnvId(3)]), ..RecorderCfg::new(&path) }, vec!["environment 3"]),
+        (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..RecorderCfg::new(&path) }, vec!["twice"]),
+        (RecorderCfg { topics: vec![], ..RecorderCfg::new(&path) }, vec!["nothing to record"]),
+        (RecorderCfg::new(folder.path().join("run.mp4")), vec![".mp4", ".mcap", ".npz", ".apng"]),
+        (
+            RecorderCfg::new(folder.path().join("run.apng")).with_topics([Topic::JointStates("arm".into())]),
+            vec!["no place", "JointStates"],
+        ),
+    ] {
+        let (_, text) = refusal(cfg);
+        assert!(words.iter().all(|word| text.contains(word)), "{text}: {words:?}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
+}
+
+#[test]
+fn what_is_recorded_must_stay_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut world = World::new(1, 1);
+    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+    world.step(0);
+    let ball = RigidObjectCfg { uid: "ball".into(), shape: ObjectShape::Sphere { radius: 0.1 }, ..Default::default() };
+    // Another object changes nothing of what is recorded.
+    world.sim.add_rigid_object(ball).unwrap();
+    world.step(1);
+    assert!(!world.sim.observer(recorder).unwrap().has_failed());
+    // A second robot has joints, which the sensor of all joints now measures.
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
+    world.step(2);
+    let error = world.sim.finish_recording(recorder).unwrap_err();
+    assert!(matches!(&error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+}
