@@ -45,7 +45,7 @@ JSON: SI units, quaternions w x y z, gravity (0, 0, -9.81). `links` and `joints`
 x y z qw qx qy qz in the world; `com` of a link is in its frame, `inertia` about the centre of mass in link axes, `axis` in
 the frame of the joint. `mass_matrix` and `gravity_torque` have one row per joint of `joint_names`; `columns` names all rows,
 with --floating-base first base.vx .. base.wz (velocity of the root in world axes, angular velocity in its own axes),
-and last those of floating and planar joints. null where there is no value.
+and last those of floating and planar joints. An MJCF file's armature is in `mass_matrix`. null where there is no value.
 
 Exit code: 0 loaded, 1 loaded with warnings (something was repaired, ignored or missing), 2 refused.";
 
@@ -97,6 +97,12 @@ fn cfg(args: &Args) -> Result<InspectCfg, String> {
     if let Some(mjcf) = files.iter().find(|file| is_mjcf(file)) {
         if files.len() > 1 {
             return Err(format!("{} is a whole robot: an MJCF file stands alone", mjcf.display()));
+        }
+        if let Some((name, _)) = args.package.first() {
+            let file = mjcf.display();
+            return Err(format!(
+                "--package {name}: {file} is an MJCF file, which has no package:// addresses; leave it out"
+            ));
         }
         let mjcf = Some(MjcfFile::new(mjcf));
         return Ok(InspectCfg { mjcf, floating_base, qpos, ..Default::default() });

@@ -445,14 +445,15 @@ fn people_see_a_tree_tables_and_warnings() {
 
 /// Two joints in one body, a spring-less pendulum that starts at 30 degrees, a follower by a line and one by a curve.
 const MJCF: &str = r#"<mujoco><compiler angle="degree" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="2"/>
-  <body name="bar" pos="0 0 1"><joint name="turn" axis="0 0 1"/><joint name="swing" axis="0 1 0" ref="30" range="-90 90"/>
+  <body name="bar" pos="0 0 1"><joint name="turn" axis="0 0 1" armature="0.02"/>
+    <joint name="swing" axis="0 1 0" ref="30" range="-90 90" armature="0.3"/>
     <inertial pos="0.5 0 0" mass="3" diaginertia="0.01 0.02 0.02"/></body>
   <body name="line"><joint name="line" axis="0 0 1"/><inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body>
   <body name="curve"><joint name="curve" axis="0 0 1"/><inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body>
   </body></worldbody><equality><joint joint1="line" joint2="turn" polycoef="0.1 2 0 0 0"/>
   <joint joint1="curve" joint2="turn" polycoef="0.1 0 3 0 0"/></equality></mujoco>"#;
 
-/// MuJoCo with the file alone says what masses do: the matrix of `mj_fullM`, and `qfrc_bias` at rest.
+/// MuJoCo with the file alone says what masses do: the matrix of `mj_fullM`, which holds rotor inertias too, and `qfrc_bias` at rest.
 #[test]
 fn robots_of_mjcf_files() {
     use kinetoscope::sim::mj::{Data, compile};
@@ -473,6 +474,8 @@ fn robots_of_mjcf_files() {
     }
     assert!(close(&numbers(&json["gravity_torque"]), data.qfrc_bias(), 1e-12), "{}", json["gravity_torque"]);
     assert!(data.qfrc_bias()[1].abs() > 10.0 && json["total_mass"].as_f64().unwrap() == 6.0);
+    // The control: the rotor of the swing is about as heavy as what it swings, 0.02 + 3 · 0.5².
+    assert!((matrix[5] - (0.3 + 0.02 + 0.75)).abs() < 1e-12, "{matrix:?}");
     // Followers cannot be put elsewhere.
     let (_, json) = report(&[&file, "--qpos", "turn=0.4,curve=0.2"]);
     assert!(close(&numbers(&json["qpos"]), &qpos, 1e-12));
@@ -485,6 +488,7 @@ fn robots_of_mjcf_files() {
     for (args, says) in [
         (vec![file.as_str(), SR5], "stands alone"),
         (vec!["no_such_file.xml"], "no_such_file.xml"),
+        (vec![file.as_str(), "--package", "mine=."], "--package mine"),
         (vec![&folder.write("torn.xml", "<mujoco><worldbody>"), "--floating-base"], "torn.xml"),
     ] {
         let run = run(&args);

@@ -29,13 +29,20 @@ impl ModelArgs {
     /// What the files are, by their names.
     ///
     /// # Errors
-    /// An MJCF file is not alone.
+    /// An MJCF file is not alone, or packages are named for one.
     pub(crate) fn files(&self) -> Result<Files> {
         let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
         match files.iter().position(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xml"))) {
             None => {
                 let packages = self.package.iter().cloned().collect();
                 Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }))
+            }
+            Some(0) if files.len() == 1 && !self.package.is_empty() => {
+                let (file, name) = (files[0].display(), &self.package[0].0);
+                Err(format!(
+                    "--package {name}: {file} is an MJCF file, which has no package:// addresses; leave it out"
+                )
+                .into())
             }
             Some(0) if files.len() == 1 => Ok(Files::Mjcf(files[0].clone())),
             Some(at) => {

@@ -139,6 +139,9 @@ pub struct SensorContext {
     pub scene: Option<Arc<RenderScene>>,
     /// What environments see whose looks are their own, where there are any; there for the same sensors.
     pub own_scenes: Vec<OwnScene>,
+    /// Whether the sensor was there before and is built again for a scene that has changed: what it could only be refused for
+    /// when it was added is no error then.
+    pub rebuilt: bool,
     /// What ray casters have built for the assets of the scene, shared by all of them.
     pub ray_assets: RayAssets,
     /// How many threads a sensor may use; 0 counts as 1.

@@ -40,6 +40,8 @@ pub enum DiagnosticKind {
     InitialOverlap,
     /// The initial position was outside the joint's limits and was moved to the nearest one.
     InitialPositionClamped,
+    /// A joint that follows others starts where they put it, beyond its own limits.
+    FollowerStartsBeyondLimits,
     /// A position was given for a joint that follows another one elsewhere.
     MimicPositionIgnored,
     /// A unit axis was expected; the axis was normalised.
@@ -78,6 +80,7 @@ impl DiagnosticKind {
             Self::ActuatorUnstable => "actuator-unstable",
             Self::InitialOverlap => "initial-overlap",
             Self::InitialPositionClamped => "initial-position-clamped",
+            Self::FollowerStartsBeyondLimits => "follower-starts-beyond-limits",
             Self::MimicPositionIgnored => "mimic-position-ignored",
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",

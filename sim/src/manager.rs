@@ -333,6 +333,7 @@ impl SimulationManager {
             engine_sensors: self.contents.engine_sensors(),
             scene,
             own_scenes,
+            rebuilt: false,
             ray_assets: self.ray_assets.clone(),
             threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
             crew: self.crew.clone(),

@@ -152,7 +152,7 @@ impl SensorList {
         solve(simulation, all, &envs);
         gather::gather(simulation, self.substeps, all, &mut self.state);
         for entry in &mut self.entries {
-            let context = SensorContext { name: entry.uid.as_str().into(), ..context.clone() };
+            let context = SensorContext { name: entry.uid.as_str().into(), rebuilt: true, ..context.clone() };
             entry.slot = (entry.build)(&context).map(|sensor| {
                 let mut slot = SensorSlot::new(sensor, entry.requires, entry.lazy, context.num_envs);
                 slot.reset(&envs, &self.state);

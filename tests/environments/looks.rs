@@ -469,6 +469,19 @@ fn patterns_for_what_nobody_sees_are_refused() {
         [0, 1, 2].map(|env| distances.row(env).iter().filter(|d| d.is_finite()).count())
     };
     assert_eq!(hit(&sim, ghost), [0, 9, 0]);
-    // What the pattern of two named from the start is only what could be seen then.
-    assert_eq!(hit(&sim, both), [0, 0, 0]);
+    // The same for the pattern of two, which was there before: when it was built makes no difference.
+    assert_eq!(hit(&sim, both), [0, 9, 0]);
+    let late = sim.add_sensor("late", rays("ghost|cube")).unwrap();
+    assert_eq!(hit(&sim, late), [0, 9, 0]);
+    // Nor does it that sensors are built again, be it when nobody sees the ghost.
+    sim.add_rigid_object(object("first", ObjectShape::cube(0.1), [8.0, 8.0, 0.05])).unwrap();
+    assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
+    sim.reset_properties(ALL).unwrap();
+    sim.add_rigid_object(object("second", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
+    assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 0, 0]));
+    show(&mut sim);
+    assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
+    // Control: a new sensor is refused still, once nobody sees the ghost.
+    sim.reset_properties(ALL).unwrap();
+    assert!(sim.add_sensor("refused", rays("ghost")).is_err());
 }

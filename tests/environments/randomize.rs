@@ -290,6 +290,45 @@ fn a_drawn_gain_that_is_what_was_below_it_is_drawn() {
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, nominal));
 }
 
+/// A draw is known by its record: it stays drawn where it is the nominal value, and through types of drives in which it does
+/// not act or is written in another unit.
+#[test]
+fn a_drawn_gain_is_drawn_whatever_its_value_and_the_type_of_its_drive() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(2, 1) }).unwrap();
+    let id = sim.add_robot(lever(dir.path())).unwrap();
+    let start = sim.snapshot(ALL).unwrap();
+    sim.robot_mut(id).set_stiffness(&array![[200.0]], None, ALL).unwrap();
+    let set = sim.snapshot(ALL).unwrap();
+    let draw = |value| Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Set([value; 2]));
+    let kp = |sim: &SimulationManager| [0, 1].map(|env| get(sim, env, Property::Stiffness, "lever/hinge")[0]);
+    // 500 is nominal.
+    for value in [500.0, 501.0] {
+        sim.randomize(&draw(value), Some(&[EnvId(1)])).unwrap();
+        sim.restore(&set, ALL).unwrap();
+        assert_eq!(kp(&sim), [200.0, value]);
+        assert_eq!(sim.robot(id).get_stiffness(), array![[200.0], [value]]);
+    }
+    // Undrawn where it is nominal, too.
+    sim.randomize(&draw(500.0), Some(&[EnvId(1)])).unwrap();
+    sim.reset_properties(ALL).unwrap();
+    sim.restore(&set, ALL).unwrap();
+    assert_eq!(kp(&sim), [200.0; 2]);
+    sim.randomize(&draw(300.0), Some(&[EnvId(1)])).unwrap();
+    for (drive_type, passes) in [(DriveType::None, [0.0; 2]), (DriveType::Force, [200.0, 300.0])] {
+        sim.robot_mut(id).set_drive_type(drive_type, None, ALL).unwrap();
+        assert_eq!(kp(&sim), passes);
+    }
+    for drive_type in [DriveType::None, DriveType::Acceleration] {
+        sim.robot_mut(id).set_drive_type(drive_type, None, ALL).unwrap();
+        assert_ne!(kp(&sim)[0], 200.0, "control: the one that is not drawn changes");
+        sim.restore(&start, ALL).unwrap();
+        assert_eq!(kp(&sim), [500.0, 300.0], "{drive_type:?}");
+        assert_eq!(sim.robot(id).get_stiffness(), array![[500.0], [300.0]]);
+        sim.restore(&set, ALL).unwrap();
+    }
+}
+
 /// Everything at once.
 fn all_properties() -> Randomization {
     Randomization::new()

@@ -65,17 +65,41 @@ impl Judge {
     }
 }
 
+/// For every joint the column of what it follows, multiplier and offset (itself, 1 and 0 where it follows nothing), as the file
+/// says: position = multiplier * position(joint) + offset, one after the other where a follower is followed.
+fn followed(urdf: &Path, names: &[String]) -> Vec<(JointIndex, f64, f64)> {
+    let text = std::fs::read_to_string(urdf).unwrap();
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let mimic = |name: &str| {
+        let joints = document.root_element().children().filter(|node| node.has_tag_name("joint"));
+        let mut mimics = joints.filter(|node| node.attribute("name") == Some(name));
+        let mimic = mimics.next()?.children().find(|node| node.has_tag_name("mimic"))?;
+        let number = |of: &str, else_: f64| mimic.attribute(of).map_or(else_, |text| text.parse().unwrap());
+        Some((mimic.attribute("joint").unwrap(), number("multiplier", 1.0), number("offset", 0.0)))
+    };
+    let of = |name: &String| {
+        let (mut at, mut ratio, mut offset) = (name.as_str(), 1.0, 0.0);
+        while let Some((driver, multiplier, constant)) = mimic(at) {
+            (at, ratio, offset) = (driver, ratio * multiplier, ratio * constant + offset);
+        }
+        (JointIndex(names.iter().position(|name| name == at).unwrap()), ratio, offset)
+    };
+    names.iter().map(of).collect()
+}
+
 /// Every link and the Jacobian of a tool on `tip` at random positions, the robot standing somewhere and turned.
 fn check(name: &str, urdf: &Path, tip: &str) {
     let base = Pose::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.4, -1.1, 0.3));
     let (sim, id) = simulation(1, RobotCfg { init_pose: base, ..arm(urdf) });
     let (robot, mut judge) = (sim.robot(id), Judge::of(urdf));
     let (links, names) = (robot.link_names(), robot.joint_names().to_vec());
+    let drivers = followed(urdf, &names);
     let tcp = Pose::new(Vector3::new(0.07, -0.02, 0.11), Vector3::new(0.3, 0.2, -0.4));
     let (mut worst, mut apart_jacobian, mut elsewhere, mut moved) = ((0.0_f64, 0.0_f64), 0.0_f64, 0.0_f64, 0.0_f64);
     let start = judge.pose(judge.body(tip, links[0]));
     for row in random_qpos(&sim, id, 20, 61).rows() {
-        judge.put(&names, &row.to_vec());
+        let there: Vec<f64> = drivers.iter().map(|&(driver, ratio, offset)| ratio * row[driver.0] + offset).collect();
+        judge.put(&names, &there);
         let qpos = row.to_owned().insert_axis(Axis(0));
         let ours = robot.compute_link_fk(&qpos, None).unwrap();
         for (k, link) in links.iter().enumerate() {
@@ -88,7 +112,7 @@ fn check(name: &str, urdf: &Path, tip: &str) {
         moved = moved.max(errors(&frame, &start).0);
         let ours = robot.jacobian(Tip::of_link(tip).with_tcp(tcp), Some(qpos.view()), None).unwrap();
         for (tool, far) in [(tcp, &mut apart_jacobian), (Pose::identity(), &mut elsewhere)] {
-            let theirs = judge.jacobian(body, (frame * tool).translation.vector.into(), &names, &robot.mimic_drivers());
+            let theirs = judge.jacobian(body, (frame * tool).translation.vector.into(), &names, &drivers);
             for joint in 0..names.len() {
                 for first in [0, 3] {
                     let theirs = base.rotation * Vector3::from_fn(|k, _| theirs[(first + k, joint)]);
@@ -110,10 +134,20 @@ fn check(name: &str, urdf: &Path, tip: &str) {
 }
 
 #[test]
+fn followers_are_those_of_the_file() {
+    let urdf = assets::path("revo1_left/revo1_left.urdf").unwrap();
+    let names = simulation(1, arm(&urdf));
+    let names = names.0.robot(names.1).joint_names().to_vec();
+    let follow = followed(&urdf, &names).into_iter().enumerate().filter(|(k, (driver, ..))| driver.0 != *k);
+    assert_eq!(follow.map(|(_, (_, ratio, offset))| (ratio, offset)).filter(|&of| of == (1.05, 0.0)).count(), 5);
+}
+
+#[test]
 fn links_and_jacobians_are_those_of_mujocos_reader() {
     let asset = |name: &str| assets::path(name).unwrap();
     for (name, urdf, tip) in [
         ("SR5", asset("sr5/SR5.urdf"), "ee_link"),
+        // The one with followers: five.
         ("hand", asset("revo1_left/revo1_left.urdf"), "left_index_dist"),
         ("seven axes", file("seven_axes.urdf"), "link8"),
         ("six axes", file("six_axes.urdf"), "tool0"),

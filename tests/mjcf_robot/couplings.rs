@@ -3,6 +3,7 @@
 use super::{empty, robot};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::KinematicsError;
 
 /// A drive, a finger on either side, and a third joint; `%` are the equalities.
 const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="palm"><geom size="0.03" mass="1"/>
@@ -145,4 +146,58 @@ fn followers_by_curves_start_on_them() {
         let qpos = sim.robot(id).get_qpos();
         assert!((qpos[(0, 0)] - starts[0]).abs() + (qpos[(0, 1)] - starts[1]).abs() < 1e-14, "{equalities}: {qpos}");
     }
+}
+
+/// left - ref = (crank - ref)⁴ on a crank without limits, or with a factor on one that has them: 1e100⁴ is no number, and a
+/// start beyond the follower's own limits is said.
+#[test]
+fn starts_beyond_limits_are_said_and_endless_ones_refused() {
+    let quartic = r#"<joint joint1="left" joint2="crank" polycoef="0 0 0 0 1"/>"#;
+    let unlimited = HAND.replace('%', quartic).replacen(r#"range="-1 1" ref="0.1""#, r#"ref="0.1""#, 1);
+    let starts = |at: f64| {
+        let mut sim = empty(1);
+        let cfg = RobotCfg { init_qpos: vec![("crank".into(), at)], ..robot("hand", &unlimited) };
+        sim.add_robot(cfg).map(|id| {
+            let said = sim
+                .diagnostics()
+                .iter()
+                .filter(|d| d.kind == kinetoscope::sim::DiagnosticKind::FollowerStartsBeyondLimits);
+            let said: Vec<String> = said.map(|d| d.message.clone()).collect();
+            (sim.robot(id).get_qpos()[(0, 1)], said)
+        })
+    };
+    let error = starts(1e100).unwrap_err().to_string();
+    assert!(error.contains("\"left\" is inf"), "{error}");
+    // -0.2 + 1.5⁴ = 4.8625, beyond 2.
+    let (left, said) = starts(1.6).unwrap();
+    assert!((left - 4.8625).abs() < 1e-12 && said.len() == 1, "{left} {said:?}");
+    assert!(
+        said[0].contains("\"left\"") && said[0].contains("4.8625") && said[0].contains("-2.0000 .. 2.0000"),
+        "{said:?}"
+    );
+    // Control: 1.2⁴ - 0.2 = 1.87 is inside.
+    assert_eq!(starts(1.3).unwrap().1, Vec::<String>::new());
+}
+
+/// What follows by a curve would have to move with what is searched: refused, where it moves the frame.
+#[test]
+fn inverse_kinematics_refuses_followers_by_curves() {
+    let parabola = r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#;
+    let mut sim = empty(1);
+    let id = sim.add_robot(robot("hand", &HAND.replace('%', parabola))).unwrap();
+    let robot = sim.robot(id);
+    let ik = |link: &str| {
+        let target = robot.compute_link_fk(&robot.get_qpos(), None).unwrap();
+        let index = robot.link_names().iter().position(|name| *name == link).unwrap();
+        let target = target.index_axis(kinetoscope::ndarray::Axis(1), index).to_owned();
+        robot.compute_ik(&target, Tip::of_link(link), &IkCfg::default(), None, None)
+    };
+    let error = ik("left").unwrap_err();
+    let Error::Kinematics { error, .. } = error else { panic!("{error}") };
+    assert!(
+        matches!(&*error, KinematicsError::CurveFollower { joint, link } if joint == "left" && link == "left"),
+        "{error}"
+    );
+    // Controls: neither its driver's own link nor another is moved by it.
+    assert!(ik("crank").unwrap().success[0] && ik("other").unwrap().success[0]);
 }

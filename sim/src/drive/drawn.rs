@@ -80,29 +80,42 @@ impl Kind {
 }
 
 impl DriveState {
-    /// What is drawn of a gain; nothing where the gain was set to something else since.
+    /// What is drawn of a gain. The record says so, whatever the gain is now: a passive joint has none.
     fn drawn_gain(&self, drive: usize, kind: Kind) -> Option<Drawn> {
-        let now = kind.gain(&self.gains[drive]);
-        self.drawn[drive][kind as usize].filter(|drawn| drawn.value.to_bits() == now.to_bits())
+        self.drawn[drive][kind as usize]
     }
 
-    /// Draws gains (in torque units) and the effort limit of a drive, those that are given. What becomes nominal is no longer
-    /// drawn.
+    /// Draws gains (in torque units) and the effort limit of a drive, those that are given: also to what they are, or to the
+    /// nominal value.
     pub(crate) fn draw_gains(&mut self, drive: usize, values: [Option<f64>; 3]) {
-        let initial = self.table().drives[drive].initial;
         for (kind, value) in Kind::ALL.into_iter().zip(values) {
             if let Some(value) = value {
-                self.draw(drive, kind, value, value.to_bits() != kind.gain(&initial).to_bits());
+                self.draw(drive, kind, value);
             }
+        }
+    }
+
+    /// Gains and the effort limit of a drive become those that the model starts with, and are drawn no longer.
+    pub(crate) fn become_nominal(&mut self, drive: usize) {
+        let initial = self.table().drives[drive].initial;
+        for kind in Kind::ALL {
+            let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
+            let nominal = kind.gain(&initial);
+            if nominal.to_bits() != kind.gain(&gains).to_bits() {
+                kind.put(nominal, &mut gains, &mut setting);
+                self.gains.put(drive, gains);
+                self.settings.put(drive, setting);
+            }
+            self.undraw(drive, kind);
         }
     }
 
     /// One of them is drawn as it was, whatever is below it: also its very value, which stays then when that changes.
     pub(crate) fn redraw_gain(&mut self, drive: usize, kind: usize, value: f64) {
-        self.draw(drive, Kind::ALL[kind], value, true);
+        self.draw(drive, Kind::ALL[kind], value);
     }
 
-    fn draw(&mut self, drive: usize, kind: Kind, value: f64, is_drawn: bool) {
+    fn draw(&mut self, drive: usize, kind: Kind, value: f64) {
         let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
         let before = self.drawn_gain(drive, kind);
         let instead_of = before.map_or(kind.set_to(&gains, &setting), |drawn| drawn.instead_of);
@@ -110,7 +123,7 @@ impl DriveState {
         self.gains.put(drive, gains);
         self.settings.put(drive, setting);
         let mut drawn = self.drawn[drive];
-        drawn[kind as usize] = is_drawn.then_some(Drawn { value, instead_of });
+        drawn[kind as usize] = Some(Drawn { value, instead_of });
         self.drawn.put(drive, drawn);
     }
 
@@ -133,13 +146,23 @@ impl DriveState {
         self.undraw(drive, Kind::MaxEffort);
     }
 
+    /// Changes what stiffness and damping of a drive mean: those that were set keep their numbers, those that are drawn what
+    /// they are in torque units.
+    pub(crate) fn set_drive_type(&mut self, drive: usize, drive_type: DriveType, inertia: Option<f64>) {
+        let (gains, setting) = self.without_drawn(drive);
+        self.gains.put(drive, gains);
+        self.settings.put(drive, setting);
+        self.set(drive, |old| *old = Setting { drive_type, inertia: inertia.or(old.inertia), ..*old });
+        self.set_below_drawn(drive, self.gains[drive], self.settings[drive]);
+    }
+
     fn undraw(&mut self, drive: usize, kind: Kind) {
         let mut drawn = self.drawn[drive];
         drawn[kind as usize] = None;
         self.drawn.put(drive, drawn);
     }
 
-    /// The gains and the effort limit of a drive that are drawn, and not set to something else since.
+    /// The gains and the effort limit of a drive that are drawn.
     pub(crate) fn drawn_values(&self, drive: usize) -> [Option<f64>; 3] {
         Kind::ALL.map(|kind| self.drawn_gain(drive, kind).map(|drawn| drawn.value))
     }

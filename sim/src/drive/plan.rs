@@ -54,7 +54,7 @@ pub enum PlanError {
     /// A key of the start positions is wrong.
     #[error("init_qpos: {0}")]
     InitialPattern(#[source] PatternError),
-    /// A start position is not finite.
+    /// A start position is not finite: one that is given, or one that follows from it.
     #[error("init_qpos of joint {joint:?} is {value}, not a finite number")]
     InitialValue {
         /// The joint.
@@ -175,6 +175,9 @@ pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])
 }
 
+/// Limits are written with few digits: a hair's breadth is not worth a warning \[rad or m\].
+const SLACK: f64 = 1e-6;
+
 /// A driver may only go where every joint that mimics it may follow.
 fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
     for i in 0..plans.len() {
@@ -185,8 +188,6 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
         let Some(d) = plans.iter().position(|p| p.joint == driver) else { continue };
         let ends = limit.map(|end| (end - offset) / multiplier);
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        // Limits are written with few digits: a hair's breadth is not worth a warning.
-        const SLACK: f64 = 1e-6;
         let [old_low, old_high] = plans[d].usable;
         if low <= old_low + SLACK && high >= old_high - SLACK {
             continue;
@@ -237,7 +238,22 @@ fn set_initial_positions(
     }
     for i in (0..plans.len()).filter(|&i| follows(&plans[i])).collect::<Vec<_>>() {
         let of_plan = |joint| plans.iter().find(|plan| plan.joint == joint).map_or(0.0, |plan| plan.initial);
-        plans[i].initial = followed(description, &of_plan, plans[i].joint);
+        let (joint, initial) = (description.joint(plans[i].joint), followed(description, &of_plan, plans[i].joint));
+        if !initial.is_finite() {
+            return Err(PlanError::InitialValue { joint: joint.name.clone(), value: initial });
+        }
+        plans[i].initial = initial;
+        let Some([low, high]) = plans[i].limit else { continue };
+        if initial < low - SLACK || initial > high + SLACK {
+            diagnostics.push(Diagnostic::new(
+                DiagnosticKind::FollowerStartsBeyondLimits,
+                joint.source.clone(),
+                format!(
+                    "joint {:?}: it starts at {initial:.4}, where what it follows puts it, outside of {low:.4} .. {high:.4}",
+                    joint.name
+                ),
+            ));
+        }
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! What a robot is, before MuJoCo sees it: the tree, mass properties, dynamics at a position, and everything odd.
 //!
 //! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
-//! convex hulls included, and finds the same warnings. Masses and dynamics are those of the files, computed by
+//! convex hulls included, and finds the same warnings but those of where a simulation starts; of an MJCF file, those that
+//! compiling the scene gives are not among them. Masses and dynamics are those of the files, computed by
 //! [`dynamics`](crate::dynamics): nothing is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
 
 mod report;
@@ -220,7 +221,8 @@ fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Res
     let (_, mut diagnostics) =
         planned.map_err(|error| Error::Plan { robot: (&description.name).into(), error: Box::new(error) })?;
     // Where a simulation starts is no property of the files.
-    diagnostics.retain(|d| d.kind != DiagnosticKind::InitialPositionClamped);
+    let of_start = [DiagnosticKind::InitialPositionClamped, DiagnosticKind::FollowerStartsBeyondLimits];
+    diagnostics.retain(|d| !of_start.contains(&d.kind));
     Ok(diagnostics)
 }
 

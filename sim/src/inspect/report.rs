@@ -34,7 +34,8 @@ pub struct Report {
     /// them `base.vx` to `base.wz`: the velocity of the root's origin in world axes, then the angular velocity in the
     /// axes of the root. After them, for each floating joint six, for each planar joint three (`.vx`, `.vy`, `.wz`).
     pub columns: Vec<String>,
-    /// Joint-space inertia at `qpos`; mimic joints are coordinates of their own.
+    /// Joint-space inertia at `qpos`, with the rotor inertias (`armature`) of an MJCF file on the diagonal; mimic joints are
+    /// coordinates of their own.
     pub mass_matrix: Vec<Vec<f64>>,
     /// The generalized force that holds the robot still at `qpos`, gravity being (0, 0, -9.81) m/s².
     pub gravity_torque: Vec<f64>,
@@ -123,6 +124,11 @@ impl Report {
         let columns: Vec<String> =
             base.chain(joint_names.iter().cloned()).chain(free_joint_columns(description)).collect();
         let poses = kinematics.link_poses();
+        let mut mass_matrix = kinematics.mass_matrix();
+        for (id, joint) in description.drivable_joints() {
+            let column = kinematics.columns(id).start;
+            mass_matrix[(column, column)] += joint.defaults.map_or(0.0, |file| file.armature);
+        }
         Self {
             robot: description.name.clone(),
             files: cfg.files().map(|file| file.display().to_string()).collect(),
@@ -133,7 +139,7 @@ impl Report {
             joint_names,
             qpos,
             columns,
-            mass_matrix: kinematics.mass_matrix().row_iter().map(|r| r.iter().copied().collect()).collect(),
+            mass_matrix: mass_matrix.row_iter().map(|r| r.iter().copied().collect()).collect(),
             gravity_torque: kinematics.gravity_torque(gravity).iter().copied().collect(),
             warnings: diagnostics.iter().map(Warning::new).collect(),
         }

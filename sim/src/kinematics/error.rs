@@ -36,6 +36,17 @@ pub enum KinematicsError {
         /// The joints of the robot that move it, those that others follow instead of the followers.
         movers: Vec<String>,
     },
+    /// A joint that moves the link follows by a curve, which the search does not know.
+    #[error(
+        "joint {joint:?}, which moves link {link:?}, is held on a curve by an equality of its MJCF file; inverse kinematics \
+         knows followers by a line only: name a link that it does not move, or a part whose joints it does not follow"
+    )]
+    CurveFollower {
+        /// The follower.
+        joint: String,
+        /// The link.
+        link: String,
+    },
     /// A number of a configuration is out of range.
     #[error("{field} is {value}; {expected}")]
     OutOfRange {

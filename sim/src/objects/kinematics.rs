@@ -1,6 +1,6 @@
 //! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
 
-use crate::description::{JointId, JointKind, LinkId};
+use crate::description::{FileDrive, JointId, JointKind, LinkId};
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};
@@ -197,7 +197,8 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// Unknown part, link or environment; wrong shape; a number that is not finite, or out of its range; a quaternion
-    /// of length zero; a part that ends in several links, or none of whose joints moves the frame. A target that cannot
+    /// of length zero; a part that ends in several links, or none of whose joints moves the frame; a joint that an equality of an
+    /// MJCF file holds on a curve, where it would have to move with those that are searched. A target that cannot
     /// be reached is no error.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn compute_ik<'n>(
@@ -229,6 +230,10 @@ impl Robot<'_> {
             .collect();
         if free.is_empty() {
             return Err(self.nothing_moves(&chain, of, link));
+        }
+        if let Some(column) = self.curve_follower(&chain, &free.iter().map(|&k| columns[k]).collect::<Vec<_>>()) {
+            let (joint, link) = (self.joint_names()[column].clone(), self.description().link(link).name.clone());
+            return Err(self.kinematics_error(KinematicsError::CurveFollower { joint, link }));
         }
         let mut variable_of = vec![None; self.dof()];
         free.iter().enumerate().for_each(|(variable, &k)| variable_of[columns[k]] = Some(variable));
@@ -346,6 +351,18 @@ impl Robot<'_> {
                 _ => return Ok(end),
             }
         }
+    }
+
+    /// A joint that moves the end of the chain, follows by a curve, and is either to be found itself or follows what is.
+    fn curve_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
+        let (description, plans) = (self.description(), self.data.plans());
+        let column_of = |joint: JointId| plans.iter().position(|plan| plan.joint == joint);
+        (0..plans.len()).filter(|&column| chain.is_moved_by(column)).find(|&column| {
+            let Some(defaults) = description.joint(plans[column].joint).defaults else { return false };
+            let FileDrive::Coupled(curve) = defaults.drive else { return false };
+            let driver = curve.and_then(|curve| curve.joint).map(|joint| description.mimic_driver(joint).0);
+            free.contains(&column) || driver.and_then(column_of).is_some_and(|driver| free.contains(&driver))
+        })
     }
 
     fn nothing_moves(&self, chain: &Chain, of: String, link: LinkId) -> Error {

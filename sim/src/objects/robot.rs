@@ -505,7 +505,8 @@ impl<'a> Robot<'a> {
     }
 }
 
-/// A robot, to command and to write.
+/// A robot, to command and to write. Positions and velocities are its state; accelerations
+/// ([`get_qacc`](Robot::get_qacc)) follow from it and from forces, and cannot be written.
 #[derive(Debug)]
 pub struct RobotMut<'a> {
     pub(super) data: &'a Arc<RobotData>,

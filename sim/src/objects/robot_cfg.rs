@@ -36,8 +36,8 @@ pub struct RobotCfg {
     ///   ranges: [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator of which that is not the whole.
     /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive,
     ///   and starts where that curve is for the start of the joint that it follows, whatever [`init_qpos`](Self::init_qpos)
-    ///   says of itself; kinematics take it for a joint of its own, so that [`compute_ik`](crate::Robot::compute_ik) should not be
-    ///   asked to move it. Where several equalities are of one joint, or they go in a circle, it starts at its own `ref`.
+    ///   says of itself; kinematics take it for a joint of its own, and [`compute_ik`](crate::Robot::compute_ik) refuses to
+    ///   move it or what it follows. Where several equalities are of one joint, or they go in a circle, it starts at its own `ref`.
     /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
     /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits, also those that
     ///   collide in pairs with what stands in the file's world alone; friction and softness of such pairs are not kept.

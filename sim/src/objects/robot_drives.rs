@@ -6,7 +6,7 @@
 
 use crate::compile::JointIndexing;
 use crate::drive::plan::{PlanError, effective_inertias};
-use crate::drive::table::{DriveActuator, DriveState, Realization, Setting};
+use crate::drive::table::{DriveActuator, DriveState, Realization};
 use crate::drive::{ActuatorModel, DelayedPd, DriveType};
 use crate::env::Env;
 use crate::error::{Error, Result};
@@ -116,7 +116,8 @@ impl RobotMut<'_> {
     }
 
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
-    /// `env_ids` (all where `None`). Their numbers stay, and so does everything else. With `None` a drive gives nothing but
+    /// `env_ids` (all where `None`). Their numbers stay, and so does everything else; gains that were drawn
+    /// ([`randomize`](crate::SimulationManager::randomize)) stay what they are in torque units. With `None` a drive gives nothing but
     /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the
     /// inertia that the joint feels at the robot's initial positions, with the masses of the files and payloads: those that
     /// were drawn for an environment do not count. Nothing warns where that makes an explicit model
@@ -139,9 +140,7 @@ impl RobotMut<'_> {
             self.simulation.batch.write(env, |env| {
                 for &(_, joint, drive) in &drives {
                     let inertia = inertias.as_ref().map(|inertias| inertias[joint]);
-                    let change =
-                        |old: &mut Setting| *old = Setting { drive_type, inertia: inertia.or(old.inertia), ..*old };
-                    env.drives.set(drive, change);
+                    env.drives.set_drive_type(drive, drive_type, inertia);
                 }
             });
         }

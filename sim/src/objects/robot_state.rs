@@ -53,6 +53,8 @@ impl Robot<'_> {
     }
 
     /// The joints of a control part that follow no other joint, in the order of its patterns.
+    /// The joints of a control part that follow no other joint, in the order of its patterns: what elsewhere is asked for with
+    /// `remove_mimic`.
     ///
     /// # Errors
     /// There is no such part; the error lists those there are.
@@ -71,7 +73,8 @@ impl Robot<'_> {
 /// Joints.
 impl Robot<'_> {
     /// Accelerations of the joints that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
-    /// before the first one. A write to the state leaves them as they are until the next step.
+    /// before the first one. They are what the solver makes of positions, velocities and forces, and no state: there is nothing
+    /// to write them with, and a write to the state leaves them as they are until the next step.
     ///
     /// With integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the velocity in
     /// the step, (v' - v) / h. They are not where something acts on the velocity after the solver: the viscous damping of

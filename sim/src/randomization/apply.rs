@@ -22,6 +22,8 @@ pub(crate) struct Made {
     model: Option<Model>,
     /// Of each drive: proportional and derivative gain, effort limit, where they are drawn anew.
     gains: Vec<(usize, [Option<f64>; 3])>,
+    /// Whether they become nominal instead, and are drawn no longer.
+    nominal_gains: bool,
     /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
     damping: Vec<f64>,
     /// As [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows) takes them, of the model.
@@ -51,20 +53,12 @@ impl Maker {
         let values = |property: Property| &properties.values[property as usize];
         let places = &properties.tables.get(Property::Stiffness).places;
         let gains = places.iter().enumerate().map(|(element, &drive)| {
-            let now = env.drives.gains[drive];
-            let gains = [
-                (Property::Stiffness, now.kp),
-                (Property::DriveDamping, now.kd),
-                (Property::MaxEffort, now.max_effort),
-            ];
-            let drawn = |(of, now): (Property, f64)| {
-                let value = values(of)[element];
-                (properties.is_asked(of, element) || value.to_bits() != now.to_bits()).then_some(value)
-            };
+            let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
+            let drawn = |of: Property| properties.is_asked(of, element).then(|| values(of)[element]);
             (drive, gains.map(drawn))
         });
         let rows = drives.rows(model.as_ref().unwrap_or(env.data().model()));
-        Ok(Made { model, gains: gains.collect(), damping, rows })
+        Ok(Made { model, gains: gains.collect(), nominal_gains: properties.nominal_gains, damping, rows })
     }
 
     /// Writes what differs from the nominal values; gives whether constants follow from it.
@@ -158,6 +152,9 @@ impl Made {
     /// Gives it to the environment.
     pub(crate) fn give(self, env: &mut Env) {
         for (drive, gains) in self.gains {
+            if self.nominal_gains {
+                env.drives.become_nominal(drive);
+            }
             env.drives.draw_gains(drive, gains);
         }
         env.drives.set_damping(&self.damping);

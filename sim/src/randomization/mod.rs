@@ -238,6 +238,7 @@ impl SimulationManager {
     pub fn reset_properties(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.change(env_ids, |_, properties| {
             properties.values = Property::ALL.map(|property| properties.tables.get(property).nominal.clone());
+            properties.nominal_gains = true;
             Ok(())
         })
     }

@@ -22,6 +22,8 @@ pub struct Properties {
     pub(super) values: [Vec<f64>; Property::ALL.len()],
     /// Gains that were drawn or set here, by property and element: what is drawn is so also where it is what was before.
     asked: BTreeSet<(Property, usize)>,
+    /// Whether gains are to be nominal and drawn no longer, but for those that are asked for.
+    pub(super) nominal_gains: bool,
 }
 
 impl Properties {
@@ -43,7 +45,7 @@ impl Properties {
                 None => table.nominal.clone(),
             }
         });
-        Self { tables: Arc::clone(tables), values, asked: BTreeSet::new() }
+        Self { tables: Arc::clone(tables), values, asked: BTreeSet::new(), nominal_gains: false }
     }
 
     /// Whether a gain was drawn or set here.

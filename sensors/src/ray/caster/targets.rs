@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::select::{at_least_one, matching};
 use crate::sensor::SensorContext;
-use scene::{OwnScene, RenderScene};
+use scene::RenderScene;
 use serde::{Deserialize, Serialize};
 
 /// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
@@ -13,8 +13,8 @@ pub enum HitTargets {
     /// What is welded to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
     StaticOnly,
     /// What these patterns name: links `uid/link` (or `link` alone), objects by their uid, geoms of the world by their name
-    /// (`ground`). Regular expressions that must match the whole name, of something that can be seen in some environment when
-    /// the sensor is built.
+    /// (`ground`). Regular expressions that must match the whole name. What is invisible is hit wherever an environment shows
+    /// it; a pattern for nothing that some environment shows when the sensor is added is refused.
     Named(Vec<String>),
     /// Everything that can be seen.
     Everything {
@@ -45,7 +45,7 @@ impl HitTargets {
         let in_groups =
             |instance: &scene::Instance| 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
         let named = match self {
-            Self::Named(patterns) => Some(names(scene, patterns, &context.own_scenes, in_groups)?),
+            Self::Named(patterns) => Some(names(scene, patterns, context, in_groups)?),
             _ => None,
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
@@ -65,23 +65,34 @@ impl HitTargets {
     }
 }
 
-/// Which instances the patterns name. Those that can be hit in no environment, since they are in no group that is hit or
-/// invisible in all of them, have no name to match: a pattern for nothing else is an error, not a ray caster that misses
-/// everything.
+/// Which instances the patterns name. What is in no group that is hit has no name to match.
+///
+/// A new sensor is refused where a pattern is only for what no environment shows: it would miss everything. One that was there
+/// before is not: what is shown may have changed since, and may change again.
 fn names(
     scene: &RenderScene,
     patterns: &[String],
-    own_scenes: &[OwnScene],
+    context: &SensorContext,
     in_groups: impl Fn(&scene::Instance) -> bool,
 ) -> Result<Vec<bool>, SensorError> {
-    let seen_by_some = |index: usize| {
-        let own = own_scenes.iter().filter_map(|own| own.0.as_deref());
-        std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
+    let names_of = |may_be_hit: &dyn Fn(usize) -> bool| {
+        let instances = scene.instances().iter().enumerate().filter(|(index, i)| in_groups(i) && may_be_hit(*index));
+        let mut names: Vec<String> = instances.map(|(_, i)| i.name.to_string()).filter(|n| !n.is_empty()).collect();
+        names.sort();
+        names.dedup();
+        names
     };
-    let can_be_hit = scene.instances().iter().enumerate().filter(|(index, i)| in_groups(i) && seen_by_some(*index));
-    let mut names: Vec<String> = can_be_hit.map(|(_, i)| i.name.to_string()).filter(|n| !n.is_empty()).collect();
-    names.sort();
-    names.dedup();
+    if !context.rebuilt {
+        let shown = names_of(&|index| {
+            let own = context.own_scenes.iter().filter_map(|own| own.0.as_deref());
+            std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
+        });
+        at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &shown)?;
+        for pattern in patterns {
+            matching(pattern, &shown, "thing to hit")?;
+        }
+    }
+    let names = names_of(&|_| true);
     at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &names)?;
     let mut named = vec![false; names.len()];
     for pattern in patterns {
