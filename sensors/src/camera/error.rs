@@ -164,6 +164,14 @@ pub enum CameraError {
         /// What is wrong with it.
         problem: &'static str,
     },
+    /// A thing that is nowhere has no box.
+    #[error("the pose of the thing with mask id {id} in environment {env} is not finite: it has no box")]
+    ThingPose {
+        /// The environment.
+        env: usize,
+        /// The mask id.
+        id: i32,
+    },
     /// The pictures of all environments do not fit into memory.
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \

@@ -326,9 +326,7 @@ impl Camera {
     ///
     /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Draw`].
     pub fn pictures(&self) -> Result<&Pictures, SensorError> {
-        if let Some(row) = self.captures.world_from_parent.iter().position(Option::is_none) {
-            return Err(CameraError::NothingCaptured { env: self.env_ids[row] }.into());
-        }
+        (0..self.env_ids.len()).try_for_each(|row| self.must_have_captured(row))?;
         let canvas = self.drawn.get_or_init(|| self.draw());
         match &canvas.failure {
             Some(failure) => Err(failure.clone().into()),
@@ -746,6 +744,12 @@ impl Camera {
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
         act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
+    }
+
+    /// Fails before the first reset or update of a row, when poses of things are not known yet.
+    pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
+        let captured = self.captures.world_from_parent[row].is_some();
+        captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids[row] })
     }
 
     /// The view of a row that was captured.

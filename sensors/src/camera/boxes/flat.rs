@@ -25,8 +25,10 @@ pub struct Box2d {
     pub id: i32,
     /// Around the pixels that see it; `None` where none does.
     pub tight: Option<PixelBox>,
-    /// Around all of it between the near and the far plane, whatever hides it, clipped to the picture. For exact shapes and
-    /// the vertices of meshes, not for pixels; level of detail is not looked at. `None` where it is beside the picture.
+    /// Around all of it that is in the frustum (between the near and the far plane, within the edges of the picture),
+    /// whatever hides it: of shapes and the triangles of meshes, not of pixels; level of detail is not looked at. Exact for
+    /// what is wholly in the frustum; what is round and cut is a polyhedron with 256 edges around, inside by 7.5e-5 of its
+    /// radius at most. `None` where all of it is outside.
     pub loose: Option<PixelBox>,
     /// How many pixels see it.
     pub visible_pixels: usize,
@@ -44,7 +46,6 @@ impl Segmentation {
         let row = camera.row(env)?;
         camera.must_be_pinhole("boxes in the picture")?;
         let mask = camera.mask()?;
-        let (height, width) = camera.image_shape();
         let mut boxes = Boxes::new(self, level);
         for ((v, u), &id) in mask.index_axis(Axis(0), row).indexed_iter() {
             boxes.see(id, [u, v]);
@@ -58,7 +59,7 @@ impl Segmentation {
                 }
             }
         });
-        Ok(boxes.finish([width as f64, height as f64]))
+        Ok(boxes.finish())
     }
 }
 
@@ -106,16 +107,16 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    /// Something reaches from smallest to largest u, then v.
+    /// Something in the picture reaches from smallest to largest u, then v.
     fn reach(&mut self, mask_id: i32, extent: [[f64; 2]; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         let before = growing.whole.unwrap_or(extent);
         growing.whole = Some([0, 1].map(|k| [before[k][0].min(extent[k][0]), before[k][1].max(extent[k][1])]));
     }
 
-    fn finish(self, size: [f64; 2]) -> Vec<Box2d> {
+    fn finish(self) -> Vec<Box2d> {
         let loose = |[u, v]: [[f64; 2]; 2]| {
-            let (min, max) = ([u[0].max(0.0), v[0].max(0.0)], [u[1].min(size[0]), v[1].min(size[1])]);
+            let (min, max) = ([u[0], v[0]], [u[1], v[1]]);
             (min[0] < max[0] && min[1] < max[1]).then_some(PixelBox { min, max })
         };
         let boxes = self.list.into_iter().map(|Growing { id, pixels, seen, whole }| {

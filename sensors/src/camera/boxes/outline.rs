@@ -1,11 +1,11 @@
-//! Where in the picture a thing is, as if nothing else were there and the picture had no edges.
+//! Where in the picture a thing is, as if nothing else were there.
 
 use super::support::reach;
 use crate::visibility::View;
 use scene::shape::Plane;
 use scene::{Instance, PoseF32, Shape};
 
-/// Edges around a circle of what is cut by the near or the far plane and has no corners of its own: the polygon is inside of
+/// Edges around a circle of what is cut by a side of the frustum and has no corners of its own: the polygon is inside of
 /// the circle by 1 - cos(pi / 256) of its radius at most, 7.5e-5.
 const SEGMENTS: usize = 256;
 
@@ -60,8 +60,8 @@ impl Extent {
     }
 }
 
-/// Smallest and largest u, then v, of the picture \[pixels\] of what an instance has between the near and the far plane, not
-/// clipped to the picture; `None` where that is nothing.
+/// Smallest and largest u, then v, of the picture \[pixels\] of what an instance has in the frustum: between the near and the
+/// far plane and the four edges of the picture; `None` where that is nothing.
 pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &PoseF32) -> Option<[[f64; 2]; 2]> {
     let pose = view.world_from_camera.inverse_times(world_from_instance);
     let seen =
@@ -75,16 +75,45 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
     if !(high >= near && low <= far) {
         return None;
     }
-    let mut extent = Extent::NONE;
+    let ([fx, fy], [cx, cy]) = ([view.fx, view.fy].map(f64::from), [view.cx, view.cy].map(f64::from));
+    let size = [view.width as f64, view.height as f64];
+    let pixels = |Extent([x, y]): Extent| [x.map(|x| fx * x + cx), y.map(|y| fy * y + cy)];
     let endless = matches!(shape, Shape::Plane(Plane { half }) if half.contains(&0.0));
     if low > near && high < far && !endless {
+        let mut extent = Extent::NONE;
         whole(&mut extent, shape, &seen);
-    } else {
-        cut(&mut extent, shape, &seen, [near, far], view);
+        let found = pixels(extent);
+        let beside = |axis: usize| !(found[axis][0] < size[axis] && found[axis][1] > 0.0);
+        if beside(0) || beside(1) {
+            return None;
+        }
+        if (0..2).all(|axis| found[axis][0] >= 0.0 && found[axis][1] <= size[axis]) {
+            return Some(found);
+        }
     }
-    let ([fx, fy], [cx, cy]) = ([view.fx, view.fy].map(f64::from), [view.cx, view.cy].map(f64::from));
-    let [x, y] = extent.0;
-    (x[0] <= x[1]).then(|| [x.map(|x| fx * x + cx), y.map(|y| fy * y + cy)])
+    // The extremes of what is left of a thing are not those of the thing.
+    let mut cutter = Cutter { sides: sides(view), polygon: Vec::new(), rest: Vec::new(), extent: Extent::NONE };
+    cutter.shape(shape, &seen, view);
+    let [x, _] = cutter.extent.0;
+    (x[0] <= x[1]).then(|| {
+        // Rounding only: polygons end at the edges.
+        let found = pixels(cutter.extent);
+        [0, 1].map(|axis| found[axis].map(|x| x.clamp(0.0, size[axis])))
+    })
+}
+
+/// The six sides of the frustum as [a, b, c, d]: a x + b y + c z + d is not negative on the inside, in the optical frame.
+fn sides(view: &View) -> [[f64; 4]; 6] {
+    let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
+    let (near, far) = (f64::from(view.near), f64::from(view.far));
+    [
+        [0.0, 0.0, 1.0, -near],
+        [0.0, 0.0, -1.0, far],
+        [fx, 0.0, cx, 0.0],
+        [-fx, 0.0, view.width as f64 - cx, 0.0],
+        [0.0, fy, cy, 0.0],
+        [0.0, -fy, view.height as f64 - cy, 0.0],
+    ]
 }
 
 /// Whether the camera is on the side of a plane that is seen.
@@ -131,41 +160,65 @@ fn rectangle([x, y]: [f64; 2]) -> [[f64; 3]; 4] {
     [[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]]
 }
 
-/// What a shape has between two depths, of its triangles.
-fn cut(extent: &mut Extent, shape: &Shape, seen: &Seen, range: [f64; 2], view: &View) {
-    let of_mesh = |extent: &mut Extent, positions: &[[f32; 3]], triangles: &[[u32; 3]]| {
-        for triangle in triangles {
-            let corners = triangle.map(|k| positions.get(k as usize).copied().unwrap_or_default());
-            polygon(extent, &corners.map(|p| seen.point(p.map(f64::from))), range);
-        }
-    };
-    match shape {
-        Shape::Plane(Plane { half }) => {
-            let half = half.map(|half| if half == 0.0 { horizon(view, seen, range[1]) } else { f64::from(half) });
-            polygon(extent, &rectangle(half).map(|p| seen.point(p)), range);
-        }
-        Shape::Mesh(s) => of_mesh(extent, s.mesh.positions(), s.mesh.triangles()),
-        Shape::HeightField(s) => of_mesh(extent, s.mesh().positions(), s.mesh().triangles()),
-        _ => {
-            let mesh = shape.tessellate(SEGMENTS);
-            of_mesh(extent, &mesh.positions, &mesh.triangles);
-        }
-    }
+/// Cuts what is on the surface of shapes to the frustum, and measures it.
+struct Cutter {
+    sides: [[f64; 4]; 6],
+    /// What is left of a polygon, and what is left of that behind one more side.
+    polygon: Vec<[f64; 3]>,
+    rest: Vec<[f64; 3]>,
+    extent: Extent,
 }
 
-/// The corners of what a convex polygon has between two depths: its own, and where its edges cross them.
-fn polygon(extent: &mut Extent, corners: &[[f64; 3]], range: [f64; 2]) {
-    for (k, a) in corners.iter().enumerate() {
-        if (range[0]..=range[1]).contains(&a[2]) {
-            extent.point(*a);
-        }
-        let b = corners[(k + 1) % corners.len()];
-        for z in range {
-            let (before, after) = (a[2] - z, b[2] - z);
-            if before * after < 0.0 {
-                let share = before / (before - after);
-                extent.point([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), z]);
+impl Cutter {
+    fn shape(&mut self, shape: &Shape, seen: &Seen, view: &View) {
+        match shape {
+            Shape::Plane(Plane { half }) => {
+                let far = f64::from(view.far);
+                let half = half.map(|half| if half == 0.0 { horizon(view, seen, far) } else { f64::from(half) });
+                self.polygon(&rectangle(half).map(|p| seen.point(p)));
             }
+            Shape::Mesh(s) => self.triangles(s.mesh.positions(), s.mesh.triangles(), seen),
+            Shape::HeightField(s) => self.triangles(s.mesh().positions(), s.mesh().triangles(), seen),
+            _ => {
+                let mesh = shape.tessellate(SEGMENTS);
+                self.triangles(&mesh.positions, &mesh.triangles, seen);
+            }
+        }
+    }
+
+    fn triangles(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]], seen: &Seen) {
+        for triangle in triangles {
+            let corners = triangle.map(|k| positions.get(k as usize).copied().unwrap_or_default());
+            self.polygon(&corners.map(|p| seen.point(p.map(f64::from))));
+        }
+    }
+
+    /// What a convex polygon has in the frustum: side after side, the corners within it and where edges cross it
+    /// (Sutherland and Hodgman, "Reentrant polygon clipping", 1974).
+    fn polygon(&mut self, corners: &[[f64; 3]]) {
+        self.polygon.clear();
+        self.polygon.extend_from_slice(corners);
+        for [a, b, c, d] in self.sides {
+            let within = |p: &[f64; 3]| a * p[0] + b * p[1] + c * p[2] + d;
+            self.rest.clear();
+            for (k, p) in self.polygon.iter().enumerate() {
+                let q = &self.polygon[(k + 1) % self.polygon.len()];
+                let (here, there) = (within(p), within(q));
+                if here >= 0.0 {
+                    self.rest.push(*p);
+                }
+                if here * there < 0.0 {
+                    let share = here / (here - there);
+                    self.rest.push([0, 1, 2].map(|i| p[i] + share * (q[i] - p[i])));
+                }
+            }
+            std::mem::swap(&mut self.polygon, &mut self.rest);
+            if self.polygon.is_empty() {
+                return;
+            }
+        }
+        for p in &self.polygon {
+            self.extent.point(*p);
         }
     }
 }
@@ -185,14 +238,15 @@ mod tests {
     use scene::Material;
     use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
 
+    /// A picture so wide that nothing here reaches its edges, but for what is to.
     fn view() -> View {
         View {
-            width: 640,
-            height: 480,
+            width: 8640,
+            height: 8480,
             fx: 500.0,
             fy: 520.0,
-            cx: 310.5,
-            cy: 250.25,
+            cx: 4310.5,
+            cy: 4250.25,
             near: 0.1,
             far: 20.0,
             world_from_camera: PoseF32::IDENTITY,
@@ -216,7 +270,7 @@ mod tests {
             let found = of(Sphere { radius: radius as f32 }, &pose([0.4, 0.3, -1.0], at)).unwrap();
             let radius = f64::from(radius as f32);
             let end = |x: f64, sign: f64| (x.atan2(at[2]) + sign * (radius / x.hypot(at[2])).asin()).tan();
-            for (axis, (f, c)) in [(500.0, 310.5), (520.0, 250.25)].into_iter().enumerate() {
+            for (axis, (f, c)) in [(500.0, 4310.5), (520.0, 4250.25)].into_iter().enumerate() {
                 for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
                     let expected = f * end(at[axis], sign) + c;
                     // The pose is in single precision: 1e-7 of metres, magnified by f / z and by the slant.
@@ -257,7 +311,7 @@ mod tests {
                     if z < 0.1 {
                         continue;
                     }
-                    for (axis, value) in [500.0 * x / z + 310.5, 520.0 * y / z + 250.25].into_iter().enumerate() {
+                    for (axis, value) in [500.0 * x / z + 4310.5, 520.0 * y / z + 4250.25].into_iter().enumerate() {
                         let [low, high] = &mut extremes[axis];
                         (*low, *high) = (low.min(value), high.max(value));
                     }
@@ -287,14 +341,54 @@ mod tests {
         assert_eq!(of(Plane { half: [1.0, 1.0] }, &pose([0.0; 3], [0.0, 0.0, 2.0])), None, "from behind");
     }
 
-    /// A camera 1 m above the ground that looks ahead sees it up to its far plane, 20 m away: v = cy + fy / 20, without end
-    /// to the sides and below.
+    /// A camera 1 m above the ground that looks ahead sees it up to its far plane, 20 m away: v = cy + fy / 20, and to the
+    /// edges of the picture to the sides and below.
     #[test]
     fn endless_planes_end_at_the_far_plane() {
         // z of the plane is up, which is -y of the camera.
         let ground = PoseF32 { rotation: [[1., 0., 0.], [0., 0., -1.], [0., 1., 0.]], translation: [0.0, 1.0, 0.0] };
         let [u, v] = of(Plane::INFINITE, &ground).unwrap();
-        assert!((v[0] - (250.25 + 520.0 / 20.0)).abs() < 1e-3, "{v:?}");
-        assert!(v[1] > 480.0 && u[0] < 0.0 && u[1] > 640.0);
+        assert!((v[0] - (4250.25 + 520.0 / 20.0)).abs() < 1e-3, "{v:?}");
+        assert_eq!((v[1], u), (8480.0, [0.0, 8640.0]), "to the edges of the picture");
+    }
+
+    fn narrow() -> View {
+        View { width: 640, height: 480, fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, ..view() }
+    }
+
+    /// A strip askew, 1 m before the camera, between the lines u + v = s ± 500 w sqrt(2): what is in the picture of it is a
+    /// triangle (or a strip) at its upper left corner, however long it is.
+    #[test]
+    fn a_strip_across_a_corner_ends_where_it_leaves_the_picture() {
+        let half_width = 0.01f32;
+        let wide = 500.0 * f64::from(half_width) * 2f64.sqrt();
+        let strip = |s: f64| {
+            // Along (1, -1), through the middle of the line u + v = s; its z looks at the camera.
+            let middle = [0.5 * s, 0.5 * s];
+            let h = std::f32::consts::FRAC_1_SQRT_2;
+            let at = [((middle[0] - 320.0) / 500.0) as f32, ((middle[1] - 240.0) / 500.0) as f32, 1.0];
+            let pose = PoseF32 { rotation: [[h, -h, 0.0], [-h, -h, 0.0], [0.0, 0.0, -1.0]], translation: at };
+            outline(&narrow(), &Instance::new(Plane { half: [5.0, half_width] }, Material::default(), 1), &pose)
+        };
+        let [u, v] = strip(30.0).unwrap();
+        for found in [u, v] {
+            // Single precision of the pose: 1e-7 of 1 m and of 5 m at a slant, 500 pixels.
+            assert!(found[0] == 0.0 && (found[1] - 30.0 - wide).abs() < 1e-3, "{u:?} {v:?}");
+        }
+        // Beside the corner: the ends of the strip are left and above, their rectangle is the whole picture.
+        assert_eq!(strip(-30.0), None);
+    }
+
+    /// A rod that passes the eye on its right, from behind: 0.1 m aside and 0.02 m thick, 1 m of it ahead. Its near end is
+    /// seen at x / z = 0.09, the last of it that is in the picture at its right edge; at the near plane, 5 mm away, x / z is 22.
+    #[test]
+    fn what_passes_the_eye_has_the_height_it_has_in_the_picture() {
+        let view = View { near: 0.005, ..narrow() };
+        let rod = Instance::new(Box { half: [0.01, 0.01, 1.0] }, Material::default(), 1);
+        let [u, v] = outline(&view, &rod, &PoseF32::from_translation([0.1, 0.0, 0.0])).unwrap();
+        assert!((u[0] - (320.0 + 500.0 * 0.09)).abs() < 1e-3 && u[1] == 640.0, "{u:?}");
+        // It leaves where 500 * 0.09 / z = 320; there it is 500 * 0.01 / z high.
+        let half = 320.0 / 9.0;
+        assert!((v[0] - (240.0 - half)).abs() < 1e-2 && (v[1] - (240.0 + half)).abs() < 1e-2, "{v:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! Boxes in the environment.
 
 use super::support::reach;
+use crate::camera::error::CameraError;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
@@ -50,11 +51,12 @@ impl Segmentation {
     ///
     /// # Errors
     ///
-    /// An environment that the camera does not see, or has not captured yet.
+    /// An environment that the camera does not see; [`NothingCaptured`](CameraError::NothingCaptured) before the first reset
+    /// or update; [`ThingPose`](CameraError::ThingPose) for a thing whose pose is not finite.
     pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
         let row = camera.row(env)?;
-        camera.view(env)?;
-        Ok(camera.shot_of(row, |rasterizer, shot| {
+        camera.must_have_captured(row)?;
+        camera.shot_of(row, |rasterizer, shot| {
             let drawn =
                 |instance: &Instance| matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil);
             let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
@@ -72,8 +74,15 @@ impl Segmentation {
                 let ends = min.iter().chain(&max).all(|x| x.is_finite());
                 ends.then_some(Box3d { id, pose, min, max })
             };
-            self.segments(level).iter().filter_map(|segment| of(segment.id)).collect()
-        }))
+            let lost = |(instance, place): &(&Instance, &PoseF32)| {
+                let known = self.segment_of(level, instance.mask_id) != Self::UNKNOWN;
+                known && !place.rotation.iter().flatten().chain(&place.translation).all(|x| x.is_finite())
+            };
+            if let Some((instance, _)) = all.clone().find(lost) {
+                return Err(CameraError::ThingPose { env, id: instance.mask_id }.into());
+            }
+            Ok(self.segments(level).iter().filter_map(|segment| of(segment.id)).collect())
+        })
     }
 }
 

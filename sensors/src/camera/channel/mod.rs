@@ -148,6 +148,7 @@ macro_rules! channels {
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
             /// The channels of these names, which may be aliases (`rgb`, `distance_to_image_plane`, `normals`...).
+            /// All of Isaac's names of segmentations are the mask, ids of links; see [`Mask`] for instances and classes.
             ///
             /// # Errors
             ///

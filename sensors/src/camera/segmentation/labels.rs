@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// Something that has a mask id of its own: a link of a robot, a rigid object, a geom of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thing {
-    /// What the mask channel says, never 0.
+    /// What the mask channel says, from 1 on.
     pub id: i32,
     /// The robot, the object, the geom of the world.
     pub object: String,
@@ -73,7 +73,7 @@ impl SegmentationCfg {
 pub struct Segment {
     /// Its number in segmented pictures, never 0.
     pub id: i32,
-    /// The object, `object/link`, or the class.
+    /// The object, `object/link`, or the class. Two segments may have one name where two things have; ids are their own.
     pub name: String,
     /// Its class; of an object whose links have several, that of the first.
     pub class: String,
@@ -114,7 +114,7 @@ impl Segmentation {
     ///
     /// # Errors
     ///
-    /// [`CameraError::MaskId`] for a mask id that is 0 or given twice; [`SensorError::Pattern`] for a pattern that is no
+    /// [`CameraError::MaskId`] for a mask id that is 0, negative or given twice, or whose class has no name; [`SensorError::Pattern`] for a pattern that is no
     /// regular expression or matches nothing (with the nearest names), and a thing that two patterns match.
     pub fn new(things: impl IntoIterator<Item = Thing>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
         let mut things: Vec<Thing> = things.into_iter().collect();
@@ -123,14 +123,23 @@ impl Segmentation {
         if let Some(nothing) = things.iter().find(|thing| thing.id == 0) {
             return wrong(nothing.id, "means that nothing was hit");
         }
+        if let Some(negative) = things.iter().find(|thing| thing.id < 0) {
+            return wrong(negative.id, "is negative; ids count from 1, and -1 is what is not known");
+        }
         if let Some(pair) = things.windows(2).find(|pair| pair[0].id == pair[1].id) {
             return wrong(pair[0].id, "is given twice");
         }
         label(&mut things, &cfg.labels)?;
-        let by = |key: fn(&Thing) -> String, numbered: bool| level(&things, key, numbered);
-        let levels =
-            [by(|thing| thing.object.clone(), false), by(Thing::name, false), by(|thing| thing.class.clone(), true)];
-        Ok(Self { levels })
+        if let Some(nameless) = things.iter().find(|thing| thing.class.is_empty()) {
+            return wrong(nameless.id, "has a class without a name");
+        }
+        // Links of one object are one instance. Things without links stay apart whatever they are called: a geom of the world
+        // may have the name of a robot.
+        let alone = |thing: &Thing| thing.link.is_none().then_some(thing.id);
+        let instances = level(&things, |thing| (thing.object.clone(), alone(thing)), false);
+        let links = level(&things, |thing| (thing.name(), Some(thing.id)), false);
+        let classes = level(&things, |thing| (thing.class.clone(), None), true);
+        Ok(Self { levels: [instances, links, classes] })
     }
 
     /// What there is on a level: which id means what.
@@ -188,14 +197,16 @@ fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), Sensor
     Ok(())
 }
 
-/// Things that share a key are one segment, whose id is their first mask id, or a number from 1 on.
-fn level(things: &[Thing], key: fn(&Thing) -> String, numbered: bool) -> Level {
+/// Things that share a key, which begins with the name, are one segment, whose id is their first mask id, or a number from 1
+/// on.
+fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), numbered: bool) -> Level {
     let mut level = Level::default();
-    let mut known: HashMap<String, usize> = HashMap::new();
+    let mut known: HashMap<(String, Option<i32>), usize> = HashMap::new();
     for thing in things {
-        let name = key(thing);
+        let key = key(thing);
+        let name = key.0.clone();
         let segments = &mut level.segments;
-        let index = *known.entry(name.clone()).or_insert(segments.len());
+        let index = *known.entry(key).or_insert(segments.len());
         if index == segments.len() {
             let id = if numbered { index as i32 + 1 } else { thing.id };
             segments.push(Segment { id, name, class: thing.class.clone(), mask_ids: Vec::new() });
@@ -292,6 +303,27 @@ mod tests {
         let cfg = SegmentationCfg::default();
         let of = |things: Vec<Thing>| Segmentation::new(things, &cfg).unwrap_err().to_string();
         assert_eq!(of(vec![thing(0, "a", None, "b")]), "mask id 0 means that nothing was hit");
+        let said = of(vec![thing(-1, "a", None, "b")]);
+        assert_eq!(said, "mask id -1 is negative; ids count from 1, and -1 is what is not known");
+        assert_eq!(of(vec![thing(4, "a", None, "")]), "mask id 4 has a class without a name");
+        let nameless = Segmentation::new(things(), &SegmentationCfg::labeled(&[("table", "")])).unwrap_err();
+        assert_eq!(nameless.to_string(), "mask id 5 has a class without a name");
         assert_eq!(of(vec![thing(3, "a", None, "b"), thing(3, "c", None, "b")]), "mask id 3 is given twice");
+    }
+
+    #[test]
+    fn things_of_one_name_stay_apart() {
+        let twins = [
+            thing(1, "arm", None, "world"),
+            thing(2, "arm", Some("base"), "robot"),
+            thing(3, "arm", Some("tip"), "robot"),
+            thing(4, "arm/tip", None, "object"),
+            thing(5, "arm", None, "world"),
+        ];
+        let all = Segmentation::new(twins, &SegmentationCfg::default()).unwrap();
+        let of = |level| [1, 2, 3, 4, 5].map(|id| all.segment_of(level, id));
+        assert_eq!(of(SegmentLevel::Instance), [1, 2, 2, 4, 5]);
+        assert_eq!(of(SegmentLevel::Link), [1, 2, 3, 4, 5]);
+        assert_eq!(of(SegmentLevel::Semantic), [1, 2, 2, 3, 1]);
     }
 }

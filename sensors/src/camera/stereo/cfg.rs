@@ -6,6 +6,7 @@ use crate::camera::channel::Channels;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Extrinsics, Placement, Poses};
 use crate::camera::intrinsics::Intrinsics;
+use crate::camera::renderer::Renderer;
 use crate::error::SensorError;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -69,6 +70,10 @@ impl Default for StereoCameraCfg {
     }
 }
 
+/// Between the seeds of paths of the eyes: 2^32 over the golden ratio, far from the small steps between seeds that people
+/// choose.
+const RIGHT_SEED: u32 = 0x9e37_79b9;
+
 /// How the eyes of a pair stand to each other and to what places them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rig {
@@ -94,7 +99,7 @@ impl StereoCameraCfg {
         Ok(Rig { left_from_right, origin_from_left })
     }
 
-    /// The eyes as cameras of their own: left, right.
+    /// The eyes as cameras of their own: left, right. Where paths are traced, the right one has a seed of its own.
     ///
     /// # Errors
     ///
@@ -111,6 +116,12 @@ impl StereoCameraCfg {
             intrinsics: self.intrinsics_right.unwrap_or(self.camera.intrinsics),
             channels: self.channels_right.unwrap_or(self.camera.channels),
             extrinsics: at(left * left_from_right),
+            renderer: match self.camera.renderer {
+                Renderer::RayTraced { samples, max_bounces, denoise, seed } => {
+                    Renderer::RayTraced { samples, max_bounces, denoise, seed: seed.wrapping_add(RIGHT_SEED) }
+                }
+                other => other,
+            },
             ..self.camera.clone()
         };
         Ok([CameraCfg { extrinsics: at(left), ..self.camera.clone() }, right])
@@ -133,7 +144,8 @@ impl SensorCfg for StereoCameraCfg {
     /// A place of the right eye that is none, and what is wrong with either eye as a [`CameraCfg`].
     fn build(&self, context: &SensorContext) -> Result<StereoCamera, SensorError> {
         let [left, right] = self.eyes()?;
-        // Whatever is random must not be the same in both eyes.
+        // Noise and dropout are drawn by the name of the sensor: they must not be the same in both eyes. That of paths is by
+        // the seed of the renderer, which `eyes` makes another one.
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
         Ok(StereoCamera::new(left.build(context)?, right.build(&other)?, self.rig()?))

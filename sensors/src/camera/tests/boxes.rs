@@ -1,8 +1,8 @@
 //! Boxes around things, held against brute force over pictures and against closed forms.
 
 use super::super::{
-    Box2d, Camera, CameraCfg, Channels, Extrinsics, Frame, Intrinsics, Placement, RasterCfg, Rasterizer, SegmentLevel,
-    Segmentation, SegmentationCfg, Thing,
+    Box2d, Camera, CameraCfg, CameraError, Channels, Extrinsics, Frame, Intrinsics, Placement, RasterCfg, Rasterizer,
+    SegmentLevel, Segmentation, SegmentationCfg, Thing,
 };
 use super::scenes::{Random, every_shape, random};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -157,6 +157,43 @@ fn half_of_a_wall_behind_a_screen_is_hidden() {
     assert_eq!(boxes[1].loose.map(|b| b.max), Some([96.0, 72.0]), "clipped to the picture");
 }
 
+/// Two cubes of one class, the second wholly beside the picture and higher: the class ends where the first cube does.
+#[test]
+fn parts_beside_the_picture_do_not_widen_the_box_of_their_class() {
+    let cube = |id| Instance::new(Box { half: [0.1; 3] }, Material::default(), id);
+    let scene = RenderScene::new(vec![cube(2), cube(4)]).unwrap();
+    let poses = [PoseF32::from_translation([2.0, -0.2, -0.4]), PoseF32::from_translation([2.0, 9.0, 0.5])];
+    let camera = seen(scene.clone(), &poses, [0.0; 3], [1.0, 0.0, 0.0]);
+    let all = table(&scene);
+    let of = |level| all.boxes_2d(level, &camera, 0).unwrap().iter().map(|b| b.loose.unwrap()).collect::<Vec<_>>();
+    let (class, things) = (of(SegmentLevel::Semantic), of(SegmentLevel::Instance));
+    assert_eq!(class, things);
+    // Corners of the front are 1.9 m away, of the back 2.1 m; y points left, z up.
+    let expected = [48.0 + 80.0 * 0.1 / 2.1, 36.0 + 84.0 * 0.3 / 2.1, 48.0 + 80.0 * 0.3 / 1.9, 36.0 + 84.0 * 0.5 / 1.9];
+    let found = [class[0].min, class[0].max].concat();
+    assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}, {expected:?}");
+}
+
+#[test]
+fn there_are_no_boxes_before_a_capture_and_none_of_things_that_are_nowhere() {
+    let scene =
+        Arc::new(RenderScene::new(vec![Instance::new(Sphere { radius: 0.2 }, Material::default(), 3)]).unwrap());
+    let context = SensorContext {
+        num_envs: 1,
+        dt: 0.01,
+        scene: Some(Arc::clone(&scene)),
+        threads: 1,
+        ..SensorContext::default()
+    };
+    let early = super::stage::cfg().build(&context).unwrap();
+    let error = table(&scene).boxes_3d(SegmentLevel::Link, &early, 0).unwrap_err();
+    assert_eq!(error, CameraError::NothingCaptured { env: 0 }.into());
+    let nowhere = PoseF32::from_translation([0.0, f32::NAN, 0.0]);
+    let camera = seen((*scene).clone(), &[nowhere], [0.0; 3], [1.0, 0.0, 0.0]);
+    let error = table(&scene).boxes_3d(SegmentLevel::Link, &camera, 0).unwrap_err();
+    assert_eq!(error, CameraError::ThingPose { env: 0, id: 3 }.into());
+}
+
 #[test]
 fn what_is_beside_the_picture_has_no_box() {
     let ball = |id| Instance::new(Sphere { radius: 0.2 }, Material::default(), id);
@@ -228,7 +265,8 @@ fn solid_boxes_are_the_closed_form_in_the_links_own_frame() {
             assert!((Point3::from(*corner) - expected).norm() < 2e-6, "{corner:?}");
         }
         let diagonal = Vector3::from(found.size()).norm();
-        assert!((Point3::from(corners[7]) - Point3::from(corners[0])).norm() - diagonal < 1e-9);
+        let across = (Point3::from(corners[7]) - Point3::from(corners[0])).norm();
+        assert!((across - diagonal).abs() < 1e-9, "{across}, {diagonal}");
         let middle = nalgebra::center(&Point3::from(corners[0]), &Point3::from(corners[7]));
         assert!((Point3::from(found.center()) - middle).norm() < 1e-12);
         // Whatever is seen of the link is in it.

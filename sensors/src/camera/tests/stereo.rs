@@ -1,11 +1,12 @@
 //! Pairs of eyes, held against cameras that stand alone and against the geometry of pairs.
 
 use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Placement,
+    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, Renderer,
     StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, state, tip};
 use crate::error::SensorError;
+use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::array;
@@ -213,6 +214,29 @@ fn it_is_lazy_as_a_camera_and_computes_only_what_is_new() {
     let env = |map: &ndarray::ArrayView3<'_, f32>, k| map.index_axis(ndarray::Axis(0), k).to_owned();
     assert_eq!(env(&after, 0), env(&before.view(), 0));
     assert_ne!(env(&after, 1), env(&before.view(), 1));
+}
+
+/// Both eyes at one place see the same, bit for bit; what is random is not the same in both.
+#[test]
+fn noise_is_not_the_same_in_both_eyes() {
+    let one_place = |camera: CameraCfg| {
+        let stereo = of(&StereoCameraCfg { camera, left_to_right_pos: [0.0; 3], ..pair() }, &context(1));
+        let all = |eye: &Camera| -> (Vec<f32>, Vec<u8>) {
+            (eye.depth().unwrap().iter().copied().collect(), eye.color().unwrap().iter().copied().collect())
+        };
+        [all(stereo.left()), all(stereo.right())]
+    };
+    let [left, right] = one_place(cfg());
+    assert!(left == right, "the control: without noise they are the same");
+    let noise = [("depth".to_string(), NoiseCfg::white(0.05))].into();
+    let [left, right] = one_place(CameraCfg { noise, ..cfg() });
+    let hits = left.0.iter().filter(|z| z.is_finite()).count();
+    let same = left.0.iter().zip(&right.0).filter(|(a, b)| a.is_finite() && a == b).count();
+    assert!(hits > 500 && same < hits / 100, "{same} of {hits}");
+    let renderer = Renderer::RayTraced { samples: 2, max_bounces: 2, denoise: false, seed: 3 };
+    let [left, right] = one_place(CameraCfg { renderer, ..cfg() });
+    assert_eq!(left.0, right.0, "depth has no noise of paths");
+    assert_ne!(left.1, right.1);
 }
 
 #[test]
