@@ -52,7 +52,6 @@ impl Robot<'_> {
         self.data.plans().get(joint.0).is_some_and(|plan| plan.actuator.is_some())
     }
 
-    /// The joints of a control part that follow no other joint, in the order of its patterns.
     /// The joints of a control part that follow no other joint, in the order of its patterns: what elsewhere is asked for with
     /// `remove_mimic`.
     ///
