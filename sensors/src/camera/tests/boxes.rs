@@ -266,7 +266,8 @@ fn solid_boxes_are_the_closed_form_in_the_links_own_frame() {
         }
         let diagonal = Vector3::from(found.size()).norm();
         let across = (Point3::from(corners[7]) - Point3::from(corners[0])).norm();
-        assert!((across - diagonal).abs() < 1e-9, "{across}, {diagonal}");
+        // Two corners, each rounded as above.
+        assert!((across - diagonal).abs() < 4e-6, "{across}, {diagonal}");
         let middle = nalgebra::center(&Point3::from(corners[0]), &Point3::from(corners[7]));
         assert!((Point3::from(found.center()) - middle).norm() < 1e-12);
         // Whatever is seen of the link is in it.
