@@ -42,7 +42,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
 
     let (scene, poses) = boxed(&still, &shot)?;
     let inside = View::look_at(SIZE, 0.9, [1.2, -1.1, 1.1], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0])?;
-    let shot = Shot { scene: &scene, poses: &poses, view: &inside, lights: None, lens: None };
+    let shot = Shot { scene: &scene, poses: &poses, view: &inside, lights: None, lens: None, before: None };
     let color = Channels { color: true, ..Channels::default() };
     let renderer = Renderer::RayTraced { samples: 1, max_bounces: 4, denoise: false, seed: 0 };
     let paths = pixels / seconds(settings, renderer, color, &shot)?;

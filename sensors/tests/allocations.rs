@@ -4,7 +4,9 @@ use scene::mesh::TriMesh;
 use scene::shape::{Capsule, Mesh, Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
 use sensors::camera::lens::Equidistant;
-use sensors::camera::{Channels, Frame, LensRays, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
+use sensors::camera::{
+    Before, Channels, Frame, LensRays, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot,
+};
 use sensors::visibility::View;
 use sensors::{Crew, ScopedThreads, Threads};
 use std::sync::Arc;
@@ -29,15 +31,7 @@ fn scene() -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-const FOUR: Channels = Channels {
-    color: true,
-    depth: true,
-    mask: true,
-    normal: true,
-    distance: false,
-    shading_normal: false,
-    position: false,
-};
+const FOUR: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::NONE };
 
 fn view(size: [usize; 2]) -> View {
     View::look_at(size, 0.9, [2.2, -1.4, 1.2], [0., 0., 0.], [0., 0., 1.]).expect("a good view")
@@ -77,6 +71,25 @@ fn pictures_by_rays_allocate_nothing() {
         let mut draw = || rasterizer.render(&scene, &poses, &view, &mut frame).expect("a good frame");
         draw();
         let allocations = allocation_counter::measure(|| (0..2).for_each(|_| draw())).count_total;
+        assert_eq!(allocations, 0, "{renderer:?}");
+    }
+}
+
+/// Every channel there is, of things that moved since the picture before.
+#[test]
+fn albedo_and_flow_allocate_nothing() {
+    let (scene, poses) = scene();
+    let view = view([96, 64]);
+    let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
+    let before = Some(Before { poses: &moved, view: &view });
+    for renderer in [Renderer::Raster, Renderer::FastRayTraced] {
+        let mut frame = Frame::new(view.width, view.height, Channels::ALL);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.renderer = renderer;
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before };
+        let mut draw = || rasterizer.render_shot(&shot, &mut frame.as_mut()).expect("a good frame");
+        draw();
+        let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
         assert_eq!(allocations, 0, "{renderer:?}");
     }
 }
@@ -128,7 +141,7 @@ fn frames_through_a_lens_allocate_nothing() {
         let mut frame = Frame::new(size[0], size[1], FOUR);
         let mut rasterizer = Rasterizer::default();
         rasterizer.renderer = renderer;
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: Some(&rays) };
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: Some(&rays), before: None };
         let mut draw = || rasterizer.render_shot(&shot, &mut frame.as_mut()).expect("a good frame");
         draw();
         let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
@@ -160,7 +173,7 @@ fn batches_allocate_nothing_on_any_thread() {
         let crew = Crew::new(Arc::<Counting>::clone(&counting));
         let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(crew);
         let mut frames = vec![Frame::new(view.width, view.height, FOUR); frames];
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None };
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
         let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
         let mut draw = || {
             rasterizer.render(&mut jobs).expect("good frames");

@@ -36,7 +36,7 @@ fn pictures_allocate_nothing() {
         width: 64,
         height: 48,
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
-        channels: Channels::ALL,
+        channels: Channels { flow: false, ..Channels::ALL },
         ..CameraCfg::default()
     };
     let noise = NoiseCfg { std: 0.1, bias_std: 0.1, bias_walk: 0.1, resolution: 0.01 };

@@ -70,6 +70,8 @@ fn updates_allocate_nothing() {
             extrinsics: Extrinsics { parent: Some("m/rod".into()), ..Extrinsics::default() },
             ..CameraCfg::default()
         };
+        let late = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
+        sim.add_sensor("late", late).unwrap();
         let camera = sim.add_sensor("camera", camera).unwrap();
         assert_eq!(allocations(&mut sim), 0, "{threads} threads, every kind of sensor");
         let captured = sim.sensor(camera).unwrap();

@@ -5,15 +5,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, from_wxyz, from_xyz_rpy};
 
 const ALL: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..NONE };
-const NONE: Channels = Channels {
-    color: false,
-    depth: false,
-    distance: false,
-    mask: false,
-    normal: false,
-    shading_normal: false,
-    position: false,
-};
+const NONE: Channels = Channels::NONE;
 
 fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, ObjectId) {
     let cfg = SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() };

@@ -1,6 +1,8 @@
 //! When cameras capture, and when they draw.
 
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::channel::Depth;
+use kinetoscope::sensors::camera::imperfection::DepthNoise;
 
 fn sim(num_envs: usize) -> (SimulationManager, ObjectId) {
     let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs, ..Default::default() }).unwrap();
@@ -76,6 +78,25 @@ fn a_picture_shows_the_instant_it_was_due_at() {
 /// `update(n)` is n times `update(1)`, pictures included.
 #[test]
 fn many_steps_at_once_give_the_same_pictures() {
+    let noise = [("depth".to_string(), NoiseCfg { std: 0.01, bias_walk: 0.1, ..Default::default() })];
+    let imperfections = Imperfections { depth_noise: Some(DepthNoise::default()), ..Default::default() };
+    let troubled = CameraCfg {
+        latency_steps: 4,
+        history_length: 2,
+        dropout: 0.2,
+        noise: noise.into(),
+        imperfections,
+        ..below(0.03)
+    };
+    let late = |stride: u32| {
+        let (mut sim, _) = sim(1);
+        let id = sim.add_sensor("camera", troubled.clone()).unwrap();
+        (0..36 / stride).for_each(|_| sim.update(stride));
+        let camera = sim.sensor(id).unwrap();
+        (camera.depth().unwrap().to_owned(), camera.history::<Depth>().unwrap().to_owned(), camera.stamps()[0])
+    };
+    assert_eq!(late(36), late(1));
+    assert_eq!(late(12), late(1));
     let pictures = |stride: u32| {
         let (mut sim, _) = sim(1);
         let id = sim.add_sensor("camera", below(0.03)).unwrap();
@@ -106,4 +127,29 @@ fn a_reset_is_seen_at_once_and_alone() {
     assert_eq!(camera.frame_counts().to_vec(), [0, 2]);
     sim.update(5);
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 3]);
+}
+
+/// Steps are 10 ms, pictures two steps apart and three steps late: after 20 steps, the newest to be seen is that of step 16.
+/// What somebody writes is seen at once.
+#[test]
+fn a_late_camera_sees_the_ball_where_it_was() {
+    let (mut sim, _) = sim(2);
+    let id = sim.add_sensor("camera", CameraCfg { latency_steps: 3, history_length: 4, ..below(0.02) }).unwrap();
+    sim.update(20);
+    let camera = sim.sensor(id).unwrap();
+    let depth = camera.depth().unwrap();
+    assert!(near(depth[(1, 15, 15)], gap(16)), "{}", depth[(1, 15, 15)]);
+    assert!(!near(gap(20) as f32, gap(16)), "the control: a ball without delay is elsewhere");
+    assert!((camera.stamps()[1] - 0.16).abs() < 1e-12);
+    let history = camera.history::<Depth>().unwrap();
+    assert_eq!(history.dim(), (2, 4, 32, 32));
+    for (age, step) in [16, 14, 12, 10].into_iter().enumerate() {
+        assert!(near(history[(1, age, 15, 15)], gap(step)), "{age}");
+    }
+    assert_eq!(camera.frame_counts().to_vec(), [8, 8]);
+    sim.reset(Some(&[EnvId(0)])).unwrap();
+    let camera = sim.sensor(id).unwrap();
+    assert!(near(camera.depth().unwrap()[(0, 15, 15)], gap(0)));
+    assert!(near(camera.depth().unwrap()[(1, 15, 15)], gap(16)));
+    assert_eq!((camera.history_filled(0).unwrap(), camera.history_filled(1).unwrap()), (0, 4));
 }

@@ -2,6 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
+use kinetoscope::sensors::camera::imperfection::{Holes, ShotNoise, Vignetting};
 use kinetoscope::sensors::ray::{HitTargets, RayPattern};
 use kinetoscope::sensors::{Channel, RayCasterCfg, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
 use serde::{Deserialize, Serialize};
@@ -192,6 +193,33 @@ fn sensors_have_all_their_fields() {
         origin: StereoOrigin::Left,
     };
     assert_eq!(*only::<StereoCameraCfg>(&scene), expected);
+
+    let scene = read(
+        "[entities.s]\ntype = \"camera\"\nlatency_steps = 2\nhistory_length = 3\ndropout = 0.1\nnoise.depth.std = 0.01\n\
+         noise.rgb = { std = 2, resolution = 4 }\nimperfections.vignetting.strength = 0.5\nimperfections.shot_noise = {}\n\
+         imperfections.holes = { baseline = -0.05 }",
+    );
+    let expected = CameraCfg {
+        latency_steps: 2,
+        history_length: 3,
+        dropout: 0.1,
+        noise: [
+            ("depth".to_string(), NoiseCfg::white(0.01)),
+            ("rgb".to_string(), NoiseCfg { std: 2.0, resolution: 4.0, ..Default::default() }),
+        ]
+        .into(),
+        imperfections: Imperfections {
+            vignetting: Some(Vignetting { strength: 0.5 }),
+            shot_noise: Some(ShotNoise::default()),
+            holes: Some(Holes { baseline: -0.05, ..Default::default() }),
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    assert_eq!(*only::<CameraCfg>(&scene), expected);
+    let unknown = "[entities.s]\ntype = \"camera\"\nimperfections.vigneting = {}";
+    let error = SceneCfg::from_toml(unknown, "scene.toml", &EntityTypes::default()).unwrap_err().to_string();
+    assert!(error.contains("vigneting") && error.contains("`vignetting`"), "{error}");
 }
 
 /// A sensor that the library has never heard of: how high bodies are above a level.

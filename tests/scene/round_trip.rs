@@ -41,6 +41,15 @@ fn every_kind() -> SceneCfg {
         .with("joints", JointStateCfg { joints: Some(vec!["LF.*".into()]), ..Default::default() })
         .with("wrench", JointWrenchCfg { links: vec!["LF_SHANK".into()], ..Default::default() })
         .with("hills", TerrainCfg { heights: array![[third, -0.0], [1e-300, 0.1]], ..Default::default() })
+        .with(
+            "late camera",
+            CameraCfg {
+                latency_steps: 3,
+                noise: [("depth".to_string(), NoiseCfg::white(third))].into(),
+                imperfections: Imperfections { depth_noise: Some(Default::default()), ..Default::default() },
+                ..Default::default()
+            },
+        )
         .with("eye", RayCasterCameraCfg { max_distance: third, ..Default::default() })
         .with(
             "lidar",

@@ -96,6 +96,7 @@ impl<'s> Ours<'s> {
             view,
             lights: Some(&lights[i * lamps..(i + 1) * lamps]),
             lens: None,
+            before: None,
         };
         let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())

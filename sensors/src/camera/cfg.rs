@@ -176,6 +176,8 @@ impl SensorCfg for CameraCfg {
             return Err(CameraError::View(RenderError::Samples { samples: self.raster.samples }).into());
         }
         self.renderer.validate().map_err(CameraError::View)?;
+        self.check_flow()?;
+        self.check_lens()?;
         let lens = Lens::new(self)?;
         let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
@@ -192,6 +194,23 @@ impl SensorCfg for CameraCfg {
 }
 
 impl CameraCfg {
+    /// Flow is of two pictures that follow each other.
+    fn check_flow(&self) -> Result<(), CameraError> {
+        let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
+        if self.channels.flow && past { Err(CameraError::FlowOfThePast) } else { Ok(()) }
+    }
+
+    /// What is only right where rays are straight lines of the picture.
+    fn check_lens(&self) -> Result<(), CameraError> {
+        let what = [
+            ("the channel flow", self.channels.flow),
+            ("vignetting", self.imperfections.vignetting.is_some()),
+            ("holes of structured light", self.imperfections.holes.is_some()),
+        ];
+        let wrong = what.into_iter().find(|(_, wanted)| *wanted && !self.lens.is_pinhole());
+        wrong.map_or(Ok(()), |(what, _)| Err(CameraError::PinholeOnly { what, lens: self.lens.name() }))
+    }
+
     /// The rays of the lens in every row.
     fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
         if !self.lens.is_pinhole() && !self.renderer.sees_by_rays() {

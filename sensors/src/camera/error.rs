@@ -143,6 +143,19 @@ pub enum CameraError {
         /// What it would be in a rectified pair.
         expected: String,
     },
+    /// Something that is only known of pictures without a lens.
+    #[error("{what}: only of a pinhole camera; this one has the lens {lens}")]
+    PinholeOnly {
+        /// What was asked for.
+        what: &'static str,
+        /// The lens.
+        lens: &'static str,
+    },
+    /// Flow of a camera whose pictures come late, get lost, or are kept.
+    #[error(
+        "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"
+    )]
+    FlowOfThePast,
     /// A mask id that no thing can have.
     #[error("mask id {id} {problem}")]
     MaskId {

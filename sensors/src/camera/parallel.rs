@@ -209,7 +209,7 @@ mod tests {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
         let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
         let mut frame = Frame::new(32, 32, Channels::ALL);
-        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None };
+        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, before: None };
         let jobs = [(shot, frame.as_mut())];
         // Without shadow maps, whose cost is that of many more pixels.
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };

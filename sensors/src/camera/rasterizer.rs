@@ -74,6 +74,17 @@ pub struct Shot<'a> {
     pub lights: Option<&'a [Light]>,
     /// The rays of a lens, instead of the view's focal lengths and principal point; `None` is a pinhole.
     pub lens: Option<&'a LensRays>,
+    /// What the picture before showed, for [`Flow`](super::channel::Flow); nothing else looks at it.
+    pub before: Option<Before<'a>>,
+}
+
+/// What the picture before showed.
+#[derive(Clone, Copy, Debug)]
+pub struct Before<'a> {
+    /// Where each instance was: world from instance.
+    pub poses: &'a [PoseF32],
+    /// The camera.
+    pub view: &'a View,
 }
 
 /// Draws frames, one at a time; keeps its scratch memory. Use one per thread.
@@ -148,7 +159,7 @@ impl Rasterizer {
         view: &View,
         frame: &mut Frame,
     ) -> Result<(), RenderError> {
-        self.render_shot(&Shot { scene, poses, view, lights: None, lens: None }, &mut frame.as_mut())
+        self.render_shot(&Shot { scene, poses, view, lights: None, lens: None, before: None }, &mut frame.as_mut())
     }
 
     /// Draws the channels that `frame` has, into borrowed memory.

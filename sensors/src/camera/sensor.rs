@@ -3,6 +3,7 @@
 use super::captures::Captures;
 use super::cfg::{CameraCfg, DepthMiss};
 use super::channel::{Channels, FrameMut, Listed, PictureView, Pictures};
+use super::earlier::Earlier;
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
 use super::faults::Faults;
@@ -63,6 +64,8 @@ pub struct Camera {
     tickets: Vec<Ticket>,
     /// What is late, and what was; `None` for a camera that has none of it.
     memory: Option<Box<Memory>>,
+    /// Where flow is measured.
+    earlier: Option<Earlier>,
     frame_counts: Array1<u64>,
     /// Rows that are due, between updates without meaning: its memory is kept.
     due: Vec<usize>,
@@ -140,6 +143,7 @@ impl Sensor for Camera {
                 for &row in &due {
                     self.frame_counts[row] += 1;
                 }
+                self.keep_earlier(&due);
                 self.capture(&due, state);
             }
             Some(mut memory) => {
@@ -164,6 +168,7 @@ impl Sensor for Camera {
             if let Some(memory) = &mut self.memory {
                 memory.reset(row);
             }
+            self.earlier.iter_mut().for_each(|earlier| earlier.forget(row));
         }
         self.capture(&rows, state);
         Ok(())
@@ -221,6 +226,7 @@ impl Camera {
         let mount = Mount { parent_from_camera, pixels };
         let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
         let captures = Captures::new(rows, &scene, tickets[0]);
+        let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.share_assets(&context.ray_assets);
@@ -241,6 +247,7 @@ impl Camera {
             captures,
             tickets,
             memory,
+            earlier,
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
@@ -518,6 +525,12 @@ impl Camera {
         }
     }
 
+    /// Refuses what is only known of pictures without a lens.
+    pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
+        let lens = self.rays.lens();
+        if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
+    }
+
     /// The lens of a row, in front of its pixels.
     fn optics_of(&self, row: usize) -> Option<Optics> {
         match self.rays.row(row) {
@@ -580,6 +593,14 @@ impl Camera {
         }
     }
 
+    /// What some rows show now is what the pictures before showed, from now on.
+    fn keep_earlier(&mut self, rows: &[usize]) {
+        let Self { earlier, captures, .. } = self;
+        if let Some(earlier) = earlier {
+            rows.iter().for_each(|&row| earlier.keep(row, &captures.poses));
+        }
+    }
+
     /// Shows what there is to see in some environments; the state was checked.
     fn capture(&mut self, rows: &[usize], state: &SceneState) {
         for &row in rows {
@@ -588,6 +609,8 @@ impl Camera {
             if let Some(memory) = &mut self.memory {
                 memory.refresh(row, state.step[env]);
             }
+            let view = self.view_of(row);
+            self.earlier.iter_mut().for_each(|earlier| earlier.capture(row, view));
         }
         self.outdate(rows);
         self.draw_if_eager();
@@ -691,11 +714,12 @@ impl Camera {
         }));
         tickets.clear();
         let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
-        for (((_, place), frame), view) in places.zip(frames).zip(&*views) {
+        for (((row, place), frame), view) in places.zip(frames).zip(&*views) {
             let poses = row_of(&captures.poses, place);
             let lights = Some(row_of(&captures.lights, place));
             let scene = captures.scenes[place].0.as_deref().unwrap_or(&self.scene);
-            jobs.push((Shot { scene, poses, view, lights, lens: look(place).1 }, frame));
+            let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
+            jobs.push((Shot { scene, poses, view, lights, lens: look(place).1, before }, frame));
             tickets.push(captures.tickets[place]);
         }
         let result = rasterizer.render(&mut jobs);
@@ -721,7 +745,7 @@ impl Camera {
         let view = &self.view_of(row);
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row) })
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
     }
 
     /// The view of a row that was captured.

@@ -105,10 +105,11 @@ impl Brush {
             draw(tile, item);
         }
         tile.settle();
-        let wants_detail = frame.wants(Stage::Detail);
+        let wanted = [Stage::Detail, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
+        let [wants_detail, wants_albedo, wants_flow] = wanted;
         // A pixel's rays need it where only shared things are at hand.
         let shade_stack = RefCell::new(shade_stack);
-        let context = plan.context(shot, projection, &shade_stack, wants_detail);
+        let context = plan.context(shot, projection, &shade_stack, wanted);
         let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
         if veils {
             veiled.copy(tile);
@@ -118,7 +119,7 @@ impl Brush {
         }
         let size = [projection.width, projection.height];
         let wants_color = frame.wants(Stage::Color);
-        let wants_geometry = wants_detail || frame.wants(Stage::Geometry);
+        let wants_geometry = wanted.contains(&true) || frame.wants(Stage::Geometry);
         let mut pixels = PixelGroup::default();
         for (block, row, [x, y]) in groups(tile, size) {
             let at = tile.samples(block, 0) + row * LANES;
@@ -134,6 +135,12 @@ impl Brush {
             write(frame, Stage::Geometry, &pixels, [x, y], size, top);
             if wants_detail {
                 write(frame, Stage::Detail, &pixels, [x, y], size, top);
+            }
+            if wants_flow {
+                write(frame, Stage::Flow, &pixels, [x, y], size, top);
+            }
+            if wants_albedo {
+                write(frame, Stage::Albedo, &pixels, [x, y], size, top);
             }
         }
         if !wants_color {

@@ -1,13 +1,15 @@
 //! Sixteen samples: which instances they see, and what each channel makes of it.
 
-use super::shade::{Lighting, shade, sky};
+use super::moves::Moves;
+use super::shade::{Lighting, albedo, shade, sky};
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{Ray, Source, surface};
+use super::tone::to_srgb;
 use crate::camera::LensRays;
 use crate::camera::channel::PixelGroup;
 use crate::lanes::{
-    COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, select, select_i, splat, splat_i, splat_u, store,
+    COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, max, min, select, select_i, splat, splat_i, splat_u, store,
 };
 use crate::visibility::Projection;
 use crate::visibility::raster::Placed;
@@ -31,6 +33,10 @@ pub(crate) struct Context<'a> {
     pub(crate) pixel: f32,
     /// Whether channels of [`Stage::Detail`](crate::camera::channel::Stage::Detail) are wanted.
     pub(crate) detail: bool,
+    /// Whether channels of [`Stage::Albedo`](crate::camera::channel::Stage::Albedo) are wanted.
+    pub(crate) albedo: bool,
+    /// Where channels of [`Stage::Flow`](crate::camera::channel::Stage::Flow) are wanted.
+    pub(crate) moves: Option<&'a Moves>,
 }
 
 impl<'a> Context<'a> {
@@ -128,7 +134,7 @@ fn resolve_lanes<S: Simd>(
     // What a number along a ray means for depths.
     let forward = context.lens.is_none_or(LensRays::is_forward);
     let ray = bent.map(|ray| Ray { direction: ray, forward });
-    let view = if colors.is_some() { direction.scale(1.0 / length) } else { direction };
+    let view = if colors.is_some() || context.albedo { direction.scale(1.0 / length) } else { direction };
     let nothing = splat_u(s, NOTHING);
     let missed = ids.simd_eq(nothing);
     let mut along = splat(s, f32::INFINITY);
@@ -138,6 +144,13 @@ fn resolve_lanes<S: Simd>(
     let mut mask = splat_i(s, 0);
     if colors.is_some() && missed.any_true() {
         color = sky(s, context.lighting, view);
+    }
+    // Kept in memory, where they are wanted: registers are for what everybody wants.
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
+        pixels.albedo = [[0; 4]; LANES];
+    }
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.moves.is_some()) {
+        pixels.flow = [[f32::INFINITY; LANES]; 2];
     }
     let list: [u32; LANES] = ids.array();
     let mut left = (!missed).to_bitmask();
@@ -159,6 +172,15 @@ fn resolve_lanes<S: Simd>(
                 shading = V3::select(here, at.shading, shading);
                 position = V3::select(here, at.position, position);
             }
+        }
+        if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
+            let [right, down] = moves.of(s, last, at.local, [u, v]);
+            store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
+            store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
+        }
+        if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
+            let base = albedo(s, &source, &at, view, context.pixel, here);
+            store_bytes(s, base, here, &mut pixels.albedo);
         }
         if colors.is_some() {
             let Context { scene, lighting, pixel, .. } = *context;
@@ -185,6 +207,24 @@ fn resolve_lanes<S: Simd>(
             color = V3::select(ray.dot(ray).simd_gt(zero), color, none);
         }
         store_v3(color, colors);
+    }
+}
+
+/// Some linear colours as bytes, opaque.
+#[inline(always)]
+fn store_bytes<S: Simd>(s: S, color: V3<S>, lanes: M<S>, to: &mut [[u8; 4]; LANES]) {
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+    let r = to_srgb(s, min(max(color.x, zero), one)).to_int();
+    let g = to_srgb(s, min(max(color.y, zero), one)).to_int() * (1 << 8);
+    let b = to_srgb(s, min(max(color.z, zero), one)).to_int() * (1 << 16);
+    let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
+    let rgba: [i32; LANES] = rgba.array();
+    let bits = lanes.to_bitmask();
+    for (lane, (to, from)) in to.iter_mut().zip(rgba).enumerate() {
+        if bits >> lane & 1 == 1 {
+            *to = from.to_le_bytes();
+        }
     }
 }
 

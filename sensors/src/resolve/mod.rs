@@ -4,6 +4,7 @@
 
 pub(crate) mod band;
 pub(crate) mod group;
+pub(crate) mod moves;
 pub(crate) mod multisample;
 pub(crate) mod path;
 pub(crate) mod plan;

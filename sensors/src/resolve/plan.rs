@@ -1,6 +1,7 @@
 //! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
 
 use super::group::Context;
+use super::moves::Moves;
 use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_rays::ShadowRays;
@@ -26,6 +27,7 @@ const MAX_SHADOWS: usize = 4;
 pub(crate) struct Plan {
     pub(crate) list: DrawList,
     lighting: Lighting,
+    moves: Moves,
     shadows: Vec<ShadowMap>,
     /// How many of the maps are in use.
     maps: usize,
@@ -51,7 +53,10 @@ pub(crate) struct Style<'a> {
 
 impl Plan {
     pub(crate) fn bytes(&self) -> usize {
-        self.list.bytes() + self.tracer.bytes() + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
+        self.list.bytes()
+            + self.tracer.bytes()
+            + self.moves.bytes()
+            + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
     }
 
     /// Checks a shot and finds what is drawn where. Shadows are not drawn yet, see [`Plan::shadow_bands`].
@@ -77,6 +82,9 @@ impl Plan {
             return Err(RenderError::InstancePose { instance, pose: *pose });
         }
         frame.validate(view.width * view.height)?;
+        if frame.wants(Stage::Flow) {
+            self.moves.prepare(shot)?;
+        }
         let projection = Projection::from(view);
         let wants_color = frame.wants(Stage::Color);
         let multisampled = wants_color && cfg.samples == 4 && !renderer.follows_paths();
@@ -154,13 +162,13 @@ impl Plan {
         (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
 
-    /// What all pixels need; `detail` says whether channels of that stage are wanted.
+    /// What all pixels need; `detail`, `albedo` and `flow` say whether channels of these stages are wanted.
     pub(crate) fn context<'a>(
         &'a self,
         shot: &Shot<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut Stack>,
-        detail: bool,
+        [detail, albedo, flow]: [bool; 3],
     ) -> Context<'a> {
         Context {
             shadow_rays: self.shadow_rays.then_some(ShadowRays { tracer: &self.tracer, stack }),
@@ -173,6 +181,8 @@ impl Plan {
             pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel() as f32),
             lens: shot.lens,
             detail,
+            albedo,
+            moves: flow.then_some(&self.moves),
         }
     }
 }

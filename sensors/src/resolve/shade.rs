@@ -286,7 +286,14 @@ pub(crate) fn shade<S: Simd>(
 
 /// The colour of the surface itself, linear.
 #[inline(always)]
-fn albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
+pub(crate) fn albedo<S: Simd>(
+    s: S,
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> V3<S> {
     let (instance, flat) = (source.instance, source.color);
     let material = &instance.material;
     let Some(image) = material.texture.as_deref() else { return V3::splat(s, flat) };

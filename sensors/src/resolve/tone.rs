@@ -21,6 +21,12 @@ pub(crate) fn encode<S: Simd>(s: S, x: F<S>) -> F<S> {
     } else {
         x
     };
+    to_srgb(s, x)
+}
+
+/// The sRGB byte for a linear intensity in 0..=1, without the tone curve, as a number in 0..=255.
+#[inline(always)]
+pub(crate) fn to_srgb<S: Simd>(s: S, x: F<S>) -> F<S> {
     let r = x.sqrt();
     let y = (((r * -0.309_826 + 0.843_371_8) * r - 0.945_305_94) * r + 1.448_028_3) * r - 0.037_015_604;
     // Near black the standard is a straight line.

@@ -104,6 +104,9 @@ pub enum RenderError {
         /// The renderer.
         renderer: &'static str,
     },
+    /// Flow through a lens.
+    #[error("flow is known of pinhole cameras only; this picture has a lens")]
+    LensFlow,
     /// Rays of a lens that are not those of the picture.
     #[error(
         "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \

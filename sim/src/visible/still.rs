@@ -166,7 +166,14 @@ impl Still {
 
     /// What a rasterizer needs to draw it.
     pub fn shot<'a>(&'a self, view: &'a View) -> Shot<'a> {
-        Shot { scene: self.visible.scene(), poses: &self.poses, view, lights: Some(&self.lights), lens: None }
+        Shot {
+            scene: self.visible.scene(),
+            poses: &self.poses,
+            view,
+            lights: Some(&self.lights),
+            lens: None,
+            before: None,
+        }
     }
 }
 

@@ -39,9 +39,10 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see.
+    /// an environment that the camera does not see; [`PinholeOnly`](crate::CameraError::PinholeOnly).
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
+        camera.must_be_pinhole("boxes in the picture")?;
         let mask = camera.mask()?;
         let (height, width) = camera.image_shape();
         let mut boxes = Boxes::new(self, level);
@@ -99,9 +100,9 @@ impl<'a> Boxes<'a> {
     fn see(&mut self, mask_id: i32, at: [usize; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         growing.pixels += 1;
-        for axis in 0..2 {
-            growing.seen[0][axis] = growing.seen[0][axis].min(at[axis]);
-            growing.seen[1][axis] = growing.seen[1][axis].max(at[axis] + 1);
+        for (axis, x) in at.into_iter().enumerate() {
+            growing.seen[0][axis] = growing.seen[0][axis].min(x);
+            growing.seen[1][axis] = growing.seen[1][axis].max(x + 1);
         }
     }
 

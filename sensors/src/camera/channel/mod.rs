@@ -15,6 +15,8 @@ const LANES: usize = 16;
 pub struct PixelGroup {
     /// Linear or final, as the stage says: final bytes.
     pub color: [[u8; 4]; LANES],
+    /// Colour of the surface itself, final bytes; 0 on a miss.
+    pub albedo: [[u8; 4]; LANES],
     /// Depth along the optical axis \[m\]; +inf on a miss.
     pub depth: [f32; LANES],
     /// Distance from the camera \[m\]; +inf on a miss.
@@ -27,6 +29,8 @@ pub struct PixelGroup {
     pub shading_normal: [[f32; LANES]; 3],
     /// Where the surface is, world frame \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
+    /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
+    pub flow: [[f32; LANES]; 2],
 }
 
 impl Default for PixelGroup {
@@ -34,12 +38,14 @@ impl Default for PixelGroup {
         let v = [[0.0; LANES]; 3];
         Self {
             color: [[0; 4]; LANES],
+            albedo: [[0; 4]; LANES],
             depth: [0.0; LANES],
             distance: [0.0; LANES],
             mask: [0; LANES],
             normal: v,
             shading_normal: v,
             position: v,
+            flow: [[0.0; LANES]; 2],
         }
     }
 }
@@ -51,6 +57,10 @@ pub enum Stage {
     Geometry,
     /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
     Detail,
+    /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
+    Albedo,
+    /// As [`Detail`](Self::Detail), for what needs the picture before.
+    Flow,
     /// After light, transparency and multisampling.
     Color,
 }
@@ -132,6 +142,8 @@ macro_rules! channels {
         impl Channels {
             /// All of them.
             pub const ALL: Self = Self { $($field: true,)* };
+            /// None of them.
+            pub const NONE: Self = Self { $($field: false,)* };
             /// Their names.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
@@ -386,4 +398,9 @@ channels! {
     shading_normal::ShadingNormal,
     /// Where the surface is, world frame \[m\], f32, 3 per pixel; 0 where nothing was hit.
     position::Position,
+    /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+    albedo::Albedo,
+    /// How far what is seen has moved since the picture before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
+    /// was hit and in the first picture.
+    flow::Flow,
 }

@@ -30,7 +30,8 @@ impl StereoCamera {
     /// # Errors
     ///
     /// [`CameraError::NotRectified`] where the eyes are not parallel and side by side, or their lenses differ;
-    /// [`CameraError::ChannelOff`] where the left eye does not measure depth; what reading the depth says.
+    /// [`CameraError::PinholeOnly`]; [`CameraError::ChannelOff`] where the left eye does not measure depth; what reading the
+    /// depth says.
     pub fn disparity(&self) -> Result<ArrayView3<'_, f32>, SensorError> {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
@@ -41,6 +42,7 @@ impl StereoCamera {
     fn baseline(&self) -> Result<f64, CameraError> {
         let t = self.rig.left_from_right.translation.vector;
         let angle = self.rig.left_from_right.rotation.angle();
+        self.left().must_be_pinhole("disparity")?;
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });
         if angle.abs() > ROUNDING {
             return wrong("the angle between the eyes [rad]", angle, "0".into());

@@ -40,7 +40,7 @@ fn bad_views_poses_and_buffers_are_errors() {
     assert!(matches!(draw(&scene, &[squashed], &view), Err(RenderError::InstancePose { .. })));
     let mut short = vec![0.0; 5];
     let mut frame = FrameMut { depth: Some(&mut short), ..FrameMut::default() };
-    let shot = Shot { scene: &scene, poses: &at, view: &view, lights: None, lens: None };
+    let shot = Shot { scene: &scene, poses: &at, view: &view, lights: None, lens: None, before: None };
     let error = Rasterizer::default().render_shot(&shot, &mut frame).unwrap_err();
     assert_eq!(error.to_string(), "the depth buffer has 5 numbers; the picture needs 768");
     let mut three = Rasterizer::new(RasterCfg { samples: 3, ..RasterCfg::default() });

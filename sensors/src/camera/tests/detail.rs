@@ -213,7 +213,7 @@ fn levels_are_the_same_with_every_instruction_set_and_number_of_threads() {
             // New meshes, so that threads meet while levels are made.
             let (scene, poses, view) = veiled();
             let mut frames = vec![Frame::new(view.width, view.height, Channels::ALL); count];
-            let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None };
+            let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
             let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
             ParallelRasterizer::new(ON, threads).render(&mut jobs).unwrap();
             assert!(frames.iter().all(|frame| bits(frame) == expected), "{threads} threads, {count} pictures");

@@ -129,7 +129,7 @@ fn the_number_of_threads_does_not_change_pictures() {
                     .iter()
                     .zip(&mut frames)
                     .map(|((scene, poses, view), frame)| {
-                        (Shot { scene, poses, view, lights: None, lens: None }, frame.as_mut())
+                        (Shot { scene, poses, view, lights: None, lens: None, before: None }, frame.as_mut())
                     })
                     .collect();
                 parallel.render(&mut jobs).unwrap();
@@ -148,7 +148,12 @@ fn shots_that_cannot_be_drawn_do_not_stop_the_others() {
         let mut frames = vec![Frame::new(333, 251, Channels { mask: true, ..Channels::default() }); count];
         let mut jobs: Vec<(Shot<'_>, FrameMut<'_>)> = frames
             .iter_mut()
-            .map(|frame| (Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None }, frame.as_mut()))
+            .map(|frame| {
+                (
+                    Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None },
+                    frame.as_mut(),
+                )
+            })
             .collect();
         for k in [1, count - 1] {
             jobs[k].0.poses = &[];

@@ -28,7 +28,9 @@ fn draw(renderer: Renderer, scene: &RenderScene, poses: &[PoseF32], view: &View,
     let mut rasterizer = Rasterizer::new(RasterCfg::default());
     rasterizer.renderer = renderer;
     let mut frame = Frame::new(view.width, view.height, Channels::ALL);
-    rasterizer.render_shot(&Shot { scene, poses, view, lights: None, lens: rays }, &mut frame.as_mut()).unwrap();
+    rasterizer
+        .render_shot(&Shot { scene, poses, view, lights: None, lens: rays, before: None }, &mut frame.as_mut())
+        .unwrap();
     frame
 }
 
@@ -308,7 +310,7 @@ fn renderers_that_draw_straight_lines_refuse_lenses() {
         let rays = rays_of(lens, pixels, SIZE);
         let mut rasterizer = Rasterizer { renderer, ..Rasterizer::default() };
         let mut frame = Frame::new(SIZE[0], SIZE[1], Channels::ALL);
-        let shot = |view, lens| Shot { scene: &scene, poses: &poses, view, lights: None, lens };
+        let shot = |view, lens| Shot { scene: &scene, poses: &poses, view, lights: None, lens, before: None };
         let error = rasterizer.render_shot(&shot(&view, Some(&rays)), &mut frame.as_mut()).unwrap_err();
         assert_eq!(error, expected);
         // Rays of another picture, or of too few samples.
@@ -376,7 +378,7 @@ fn lens_pictures_have_the_same_bits_on_every_level_and_for_any_number_of_threads
     let view = View::look_at(SIZE, 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7], [0., 0., 1.]).unwrap();
     for (lens, pixels) in all().into_iter().filter(|(lens, _)| !lens.is_pinhole()) {
         let rays = rays_of(lens, pixels, SIZE);
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: Some(&rays) };
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: Some(&rays), before: None };
         for renderer in [Renderer::FastRayTraced, FEW_PATHS] {
             let alone = bits(&draw(renderer, &scene, &poses, &view, Some(&rays)));
             for level in levels() {

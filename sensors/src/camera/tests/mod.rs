@@ -1,12 +1,14 @@
 //! Pictures held against independent judges.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod albedo;
 mod boxes;
 mod calibration;
 mod degenerate;
 mod detail;
 mod determinism;
 mod floors_and_lamps;
+mod flow;
 mod golden;
 mod late;
 mod lens_pictures;

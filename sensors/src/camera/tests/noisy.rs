@@ -3,7 +3,7 @@
 //! Means of n numbers scatter by sigma / sqrt(n), variances by sqrt(2 / n) of themselves, correlations by 1 / sqrt(n): bounds
 //! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
 
-use super::super::{Camera, CameraCfg, Channels, Extrinsics, Placement};
+use super::super::{Camera, CameraCfg, Extrinsics, Placement};
 use super::stage::{BALL, DT, GROUND, SIZE, built, cfg, context, state};
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorContext};
@@ -209,6 +209,6 @@ fn noise_of_nothing_is_nothing() {
     let context = context(1);
     let nothing =
         [("depth", 0.0), ("distance", 0.0), ("color", 0.0)].map(|(name, std)| (name.to_string(), NoiseCfg::white(std)));
-    let camera = built(&CameraCfg { noise: nothing.into(), channels: Channels::ALL, ..cfg() }, &context);
+    let camera = built(&CameraCfg { noise: nothing.into(), ..cfg() }, &context);
     assert_eq!(super::stage::bits(&camera, [0]), super::stage::bits(&built(&cfg(), &context), [0]));
 }

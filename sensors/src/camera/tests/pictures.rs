@@ -13,15 +13,7 @@ pub(super) fn folder() -> Option<PathBuf> {
     std::env::var_os("KINETOSCOPE_PICTURES").map(PathBuf::from)
 }
 
-pub(super) const FOUR: Channels = Channels {
-    color: true,
-    depth: true,
-    mask: true,
-    normal: true,
-    distance: false,
-    shading_normal: false,
-    position: false,
-};
+pub(super) const FOUR: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::NONE };
 
 /// Draws and, where a folder is named, writes the colour, depth, mask and normals as PNG.
 pub(super) fn save(name: &str, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
@@ -94,7 +86,7 @@ fn passed(threads: usize, scene: &RenderScene, poses: &[PoseF32], view: &View) -
         let mut frames = vec![Frame::new(view.width, view.height, FOUR); count];
         let mut best = f64::MAX;
         for _ in 0..40 / count.min(4) {
-            let shot = Shot { scene, poses, view, lights: None, lens: None };
+            let shot = Shot { scene, poses, view, lights: None, lens: None, before: None };
             let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
             let start = Instant::now();
             rasterizer.render(&mut jobs).unwrap();

@@ -205,5 +205,5 @@ fn channels_have_other_names() {
     let error = Channels::from_names(&["depth", "distance_to_image"]).unwrap_err().to_string();
     assert!(error.starts_with("there is no channel \"distance_to_image\"; known are \"distance_to_"), "{error}");
     assert!(Channels::from_names(&["RGB"]).unwrap_err().to_string().contains("\"rgb\""));
-    assert_eq!(Channels::ALL.bytes_per_pixel(), 4 + 4 + 4 + 4 + 12 + 12 + 12);
+    assert_eq!(Channels::ALL.bytes_per_pixel(), 4 + 4 + 4 + 4 + 12 + 12 + 12 + 4 + 8);
 }

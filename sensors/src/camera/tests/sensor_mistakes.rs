@@ -1,6 +1,8 @@
 //! Mistakes are typed errors, and change nothing.
 
+use super::super::lens::Lens;
 use super::super::{CameraCfg, CameraConvention, CameraError, Channels, Extrinsics, Intrinsics, Placement};
+use super::super::{Imperfections, Renderer};
 use super::stage::{bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg};
@@ -37,6 +39,21 @@ fn configurations_are_checked() {
     assert!(matches!(refused(&samples), Camera(CameraError::View(RenderError::Samples { samples: 3 }))));
     assert_eq!(refused(&CameraCfg { channels: Channels::default(), ..cfg() }), CameraError::NoChannels.into());
 
+    let flow = CameraCfg { channels: Channels { flow: true, ..Channels::NONE }, ..cfg() };
+    for past in [
+        CameraCfg { latency_steps: 1, ..flow.clone() },
+        CameraCfg { history_length: 1, ..flow.clone() },
+        CameraCfg { dropout: 0.1, ..flow.clone() },
+    ] {
+        assert_eq!(refused(&past), CameraError::FlowOfThePast.into());
+    }
+    let rays = CameraCfg { lens: Lens::from_name("equidistant").unwrap(), renderer: Renderer::FastRayTraced, ..cfg() };
+    let bent = CameraCfg { channels: flow.channels, ..rays.clone() };
+    assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "the channel flow", lens: "equidistant" }.into());
+    let imperfections = Imperfections { vignetting: Some(Default::default()), ..Default::default() };
+    let bent = CameraCfg { imperfections, ..rays };
+    assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "vignetting", lens: "equidistant" }.into());
+
     let place = |placement| CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..cfg() };
     let nan = Placement::Pose { pos: [0.0, f64::NAN, 0.0], rotation: UnitQuaternion::identity() };
     assert!(matches!(refused(&place(nan)), Camera(CameraError::Pose { .. })));
@@ -65,7 +82,7 @@ fn configurations_are_checked() {
 fn pictures_that_do_not_fit_into_memory_are_refused() {
     let cfg = CameraCfg { width: 8000, height: 8000, ..cfg() };
     let error = cfg.build(&context(100)).unwrap_err();
-    let text = "pictures of 100 environments with 8000 x 8000 pixels of 52 bytes do not fit into memory";
+    let text = "pictures of 100 environments with 8000 x 8000 pixels of 56 bytes do not fit into memory";
     assert!(error.to_string().starts_with(text), "{error}");
 }
 

@@ -76,7 +76,7 @@ pub(super) fn cfg() -> CameraCfg {
         height: SIZE[1],
         intrinsics: LENS,
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
-        channels: Channels::ALL,
+        channels: Channels { flow: false, ..Channels::ALL },
         ..CameraCfg::default()
     }
 }

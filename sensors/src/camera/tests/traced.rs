@@ -140,8 +140,14 @@ fn every_renderer_draws_the_same_bits_with_any_number_of_threads() {
             for count in [1, 3] {
                 let new = |(_, _, v): &(_, _, View)| Frame::new(v.width, v.height, Channels::ALL);
                 let mut frames: Vec<_> = shots[..count].iter().map(new).collect();
-                let shots =
-                    shots.iter().map(|(scene, poses, view)| Shot { scene, poses, view, lights: None, lens: None });
+                let shots = shots.iter().map(|(scene, poses, view)| Shot {
+                    scene,
+                    poses,
+                    view,
+                    lights: None,
+                    lens: None,
+                    before: None,
+                });
                 let mut jobs: Vec<_> = shots.zip(&mut frames).map(|(shot, frame)| (shot, frame.as_mut())).collect();
                 parallel.render(&mut jobs).unwrap();
                 for (k, frame) in frames.iter().enumerate() {
