@@ -72,7 +72,7 @@ impl Painter {
         if let Some(scene) = &self.assembly.scene {
             let groups = look.overlays.groups() | 1 << MARKERS;
             self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });
-            let shot = Shot { scene, poses: &self.assembly.poses, view, lights, lens: None };
+            let shot = Shot { scene, poses: &self.assembly.poses, view, lights, lens: None, before: None };
             let frame = FrameMut { color: Some(canvas.bytes_mut()), ..FrameMut::default() };
             self.rasterizer.render(&mut [(shot, frame)]).map_err(|(_, error)| error)?;
         }
@@ -94,7 +94,7 @@ impl Painter {
         let frame = FrameMut { mask: Some(&mut mask), position: Some(&mut position), ..FrameMut::default() };
         // Details count here, and cost nothing.
         self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.groups(), lod: false, ..self.cfg });
-        let shot = Shot { scene, poses: &self.assembly.poses, view: &pixel, lights: None, lens: None };
+        let shot = Shot { scene, poses: &self.assembly.poses, view: &pixel, lights: None, lens: None, before: None };
         self.rasterizer.render(&mut [(shot, frame)]).ok()?;
         let &(env, instance) = self.assembly.parts.get(usize::try_from(mask[0] - 1).ok()?)?;
         Picked::new(snapshot, env, instance, position)

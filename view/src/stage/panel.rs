@@ -37,7 +37,8 @@ impl Panel {
             (self.frame, self.size) = (Frame::new(size[0], size[1], channels), size);
         }
         let poses = &stage.look.instances;
-        let shot = Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights), lens: None };
+        let shot =
+            Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights), lens: None, before: None };
         if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
             return false;
         }
