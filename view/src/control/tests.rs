@@ -216,29 +216,35 @@ fn what_cannot_be_done_is_said_and_nothing_panics() {
     assert!(one.sim.diverged().is_empty());
 }
 
-/// Steps of 10 ms: it is looked after every one, and at step s it is waited until (s - s0) 10 ms after the step s0 that
-/// the speed was set at, the first one. So 40 steps take 38 steps' time at least. A busy machine may take longer.
+/// Steps of 10 ms: at step s it is waited until (s - s0) 10 ms after the step s0 that the speed was set at, and what was
+/// lost is caught up with or given up. So 40 steps after s0 end 40 steps' time after it was asked for, less the block that
+/// is not looked into (one step in real time, three at four times that). A busy machine may take longer.
 #[test]
 fn real_time_is_not_overtaken() {
     let mut sim = sample(1).sim;
     let viewer = sim.viewer(Wants::default());
-    let start = Instant::now();
-    sim.update(40);
-    let free = start.elapsed();
+    // The best of some, where the machine is busy.
+    let mut free = Duration::MAX;
+    for _ in 0..20 {
+        let start = Instant::now();
+        sim.update(40);
+        free = free.min(start.elapsed());
+    }
     let set = |sim: &mut SimulationManager, speed| {
         viewer.send(Command::SetSpeed(speed));
         step_until(sim, |_| viewer.newest().is_some_and(|snapshot| snapshot.run.speed == speed));
     };
-    set(&mut sim, Speed::REAL);
+    // From before it is asked for: afterwards it may already be late, and would catch up.
     let start = Instant::now();
+    set(&mut sim, Speed::REAL);
     sim.update(40);
     let real = start.elapsed();
     assert!(real >= Duration::from_millis(380), "{real:?}");
-    set(&mut sim, Speed::Times(4.0));
     let start = Instant::now();
-    sim.update(40);
+    set(&mut sim, Speed::Times(4.0));
+    sim.update(200);
     let fast = start.elapsed();
-    assert!(fast >= Duration::from_millis(80), "{fast:?}");
+    assert!(fast >= Duration::from_millis(490), "{fast:?}");
     // The control: without a speed nothing is waited for. (40 steps of one box take some milliseconds.)
     assert!(free < real, "{free:?} {real:?}");
 }
