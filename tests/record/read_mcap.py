@@ -53,7 +53,7 @@ assert (depth.encoding, mask.encoding, depth.step) == ("32FC1", "32SC1", 4 * dep
 numbers = struct.unpack(f"<{depth.width * depth.height}f", bytes(depth.data))
 finite = [x for x in numbers if x != float("inf")]
 color = last["/env_1/camera/color"][1]
-assert color.format == "png" and color.header.frame_id == "env_1/camera"
+assert color.format == "png" and color.header.frame_id == "env_1/sensors/camera"
 picture = Image.open(io.BytesIO(bytes(color.data)))
 assert picture.mode == "RGB" and picture.size == (depth.width, depth.height)
 info = last["/env_1/camera/camera_info"][1]
@@ -74,7 +74,7 @@ print(
             "acceleration": [imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z],
             "orientation": [imu.orientation.w, imu.orientation.x, imu.orientation.y, imu.orientation.z],
             "intrinsics": list(info.k),
-            "camera": pose("env_1/camera", "env_1"),
+            "camera": pose("env_1/sensors/camera", "env_1"),
             "nanoseconds": last["/env_1/arm/joint_states"][0].log_time,
             "depth_shape": [depth.height, depth.width],
             "depth_finite": len(finite),

@@ -38,7 +38,7 @@ impl Sink for Slow {
         Ok(0)
     }
 
-    fn give_up(&mut self) -> Option<PathBuf> {
+    fn kept(&self) -> Option<PathBuf> {
         None
     }
 }
