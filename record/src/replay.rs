@@ -139,18 +139,18 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         return Err(archive.malformed("it has no states to compare with".into()));
     };
     let steps = archive.steps(&first.stream.name)?.to_vec();
-    for source in states.iter().chain(&targets) {
-        if archive.steps(&source.stream.name)? != steps {
-            return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
-        }
-        archive.check(source, steps.len())?;
-    }
     if steps.first() != Some(&0.0) {
         return Err(archive.malformed("its rows do not begin at step 0".into()));
     }
     // One that is no number is in no such order.
     if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
         return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
+    }
+    for source in states.iter().chain(&targets) {
+        if archive.steps(&source.stream.name)? != steps {
+            return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
+        }
+        archive.check(source, steps.len())?;
     }
     for uid in sim.jointed_uids() {
         let moves = sim.robot(sim.jointed_id(uid)?).dof() > 0;
