@@ -121,7 +121,12 @@ fn a_recorder_changes_no_number() {
             assert_eq!(recorded.packets, u64::from(STEPS) + 1);
         }
         let robot = world.sim.robot(world.arm);
-        (robot.get_qpos(), robot.get_qvel(), world.sim.rigid_object(world.cube).get_pose())
+        let physics = (robot.get_qpos(), robot.get_qvel(), world.sim.rigid_object(world.cube).get_pose());
+        let (imu, joints) = (world.sim.sensor(world.imu).unwrap(), world.sim.sensor(world.joints).unwrap());
+        let numbers = (imu.lin_acc_b().to_owned(), imu.sample_counts().to_owned(), joints.efforts().to_owned());
+        let camera = world.sim.sensor(world.camera).unwrap();
+        let pictures = (camera.color().unwrap().to_owned(), camera.depth().unwrap().to_owned());
+        (physics, numbers, pictures)
     });
     assert_eq!(recorded, alone);
 }
