@@ -411,7 +411,7 @@ impl Sampler {
         }
     }
 
-    fn arrived_stamps(&self, which: usize) -> ArrayView1<'_, f64> {
+    fn stamps_arrived(&self, which: usize) -> ArrayView1<'_, f64> {
         if self.arrived.length() == 0 {
             return [&self.stamps, &self.force_stamps][which].view();
         }
@@ -490,12 +490,12 @@ pub trait Sampled {
 
     /// [`stamps`](Self::stamps) of what [`Sampler::arrived`] gives.
     fn arrived_stamps(&self) -> ArrayView1<'_, f64> {
-        self.sampler().arrived_stamps(0)
+        self.sampler().stamps_arrived(0)
     }
 
     /// [`force_stamps`](Self::force_stamps) of what [`Sampler::arrived`] gives.
     fn arrived_force_stamps(&self) -> ArrayView1<'_, f64> {
-        self.sampler().arrived_stamps(1)
+        self.sampler().stamps_arrived(1)
     }
 
     /// Times of past measurements \[s\], newest first, shape \[num_envs, history_length\]; 0 where not filled yet.
