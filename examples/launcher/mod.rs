@@ -78,6 +78,9 @@ pub(crate) struct Launcher {
     /// PNG files of all cameras
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
+    /// Replace the file of --record, and what a recording that was killed has left
+    #[arg(long, requires = "record")]
+    pub(crate) overwrite: bool,
 }
 
 /// Where physics runs.
@@ -229,7 +232,7 @@ impl Launcher {
     /// # Errors
     /// The file cannot be written, or has no place for anything of this example.
     pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-        let record = |path: &PathBuf| sim.record(RecorderCfg::new(path));
+        let record = |path: &PathBuf| sim.record(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) });
         let recorder = self.record.as_ref().map(record).transpose().map_err(|error| format!("--record {error}"))?;
         Ok(Recording { recorder })
     }

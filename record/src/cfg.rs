@@ -19,10 +19,10 @@ pub struct RecorderCfg {
     /// Physics steps from one row of states, targets and poses to the next. Sensors are recorded whenever they measure.
     pub every: u64,
     /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
-    /// written, the simulation waits too.
+    /// written, the simulation waits too. All together may take 16 GiB.
     pub packets: usize,
     /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
-    /// has left.
+    /// has left. Of folders, only those of a recorder are replaced.
     pub overwrite: bool,
 }
 

@@ -18,11 +18,17 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// A recording that was killed has left a file.
-    #[error(
-        "{part}: an earlier recording was not finished; record::recover makes a whole file of it, or set `overwrite`"
-    )]
+    #[error("{part}: an earlier recording was not finished; {}", advice(.recoverable))]
     Unfinished {
         /// What it left.
+        part: PathBuf,
+        /// Whether [`recover`](crate::recover) makes a whole file of it.
+        recoverable: bool,
+    },
+    /// Somebody is recording there.
+    #[error("{part}: another recorder is writing this; choose another name")]
+    Busy {
+        /// What it writes.
         part: PathBuf,
     },
     /// The end of the name is of no format.
@@ -79,6 +85,32 @@ pub enum RecordError {
         /// Its name.
         sensor: String,
     },
+    /// A camera that looks into other environments.
+    #[error("sensor {sensor:?} is in none of the environments that are recorded")]
+    Elsewhere {
+        /// Its name.
+        sensor: String,
+    },
+    /// Two things would have the same name in the file.
+    #[error("{path}: two things that are recorded are called {name:?} there; choose topics, or rename one of them")]
+    SameName {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        name: String,
+    },
+    /// The pool does not fit into memory.
+    #[error(
+        "{packets} packets of {bytes} bytes are more than the {most} bytes that a pool may have; choose fewer packets"
+    )]
+    TooLarge {
+        /// [`RecorderCfg::packets`](crate::RecorderCfg::packets).
+        packets: usize,
+        /// What each of them takes.
+        bytes: u64,
+        /// What all may take.
+        most: u64,
+    },
     /// An environment that does not exist, or is named twice.
     #[error("environment {env} is not one of {count}, or is named twice")]
     Env {
@@ -115,6 +147,16 @@ pub enum RecordError {
         /// What was written until then, where it can be read.
         kept: Option<PathBuf>,
     },
+    /// The recording was broken off.
+    #[error("{error}{}{}", unwritten(.also), left(.kept))]
+    BrokenOff {
+        /// Why.
+        error: Box<RecordError>,
+        /// Why the file could not be written either, if so.
+        also: Option<Arc<std::io::Error>>,
+        /// What was written until then, where it can be read.
+        kept: Option<PathBuf>,
+    },
     /// The simulation said no.
     #[error("{0}")]
     Sim(Arc<sim::Error>),
@@ -143,6 +185,17 @@ impl RecordError {
 
 fn known(candidates: &[String]) -> String {
     if candidates.is_empty() { String::new() } else { format!("; known are {}", candidates.join(", ")) }
+}
+
+fn advice(recoverable: &bool) -> &'static str {
+    match recoverable {
+        true => "record::recover makes a whole file of it, or set `overwrite`",
+        false => "keep what you need of it under another name, delete it, or set `overwrite`",
+    }
+}
+
+fn unwritten(error: &Option<Arc<std::io::Error>>) -> String {
+    error.as_ref().map_or_else(String::new, |error| format!("; nor can the file be written: {error}"))
 }
 
 fn left(kept: &Option<PathBuf>) -> String {

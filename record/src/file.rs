@@ -1,7 +1,7 @@
 //! Files that have their name when they are whole, not before.
 
 use crate::error::{RecordError, Result};
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
@@ -10,56 +10,131 @@ pub(crate) trait Storage: Write + Seek + Send {}
 
 impl<S: Write + Seek + Send> Storage for S {}
 
-/// A file on its way: called `NAME.part` until it is whole.
+/// A file on its way: called `NAME.part` until it is whole. Dropped before, it is taken away, unless somebody can read what
+/// there is of it.
 #[derive(Debug)]
 pub(crate) struct PartFile {
     path: PathBuf,
     part: PathBuf,
     overwrite: bool,
+    /// Locked as long as it is written, so that no other recorder takes it for one that was left.
+    file: File,
+    /// Whether somebody can read what there is.
+    keep: bool,
 }
 
 impl PartFile {
-    /// Begins a file.
+    /// Begins a file; `recoverable`: whether [`recover`](crate::recover) makes something of it where it was left.
     ///
     /// # Errors
-    /// There is a file of that name, or what an earlier recording has left, and neither may be replaced; or the folder does not
-    /// let anybody write.
-    pub(crate) fn create(path: &Path, overwrite: bool) -> Result<(Self, File)> {
+    /// There is a file of that name, or what an earlier recording has left, and neither may be replaced; another recorder
+    /// writes it; or the folder does not let anybody write.
+    pub(crate) fn create(path: &Path, overwrite: bool, recoverable: bool) -> Result<(Self, File)> {
         let part = part_of(path);
-        if !overwrite && part.symlink_metadata().is_ok() {
-            return Err(RecordError::Unfinished { part });
+        if let Some(left) = lock_left(&part)? {
+            // In what is empty nothing is lost: so archives and animations are before they are finished.
+            if !overwrite && left.metadata().is_ok_and(|left| left.len() > 0) {
+                return Err(RecordError::Unfinished { part, recoverable });
+            }
+            remove(&part)?;
         }
         Self::create_as(path, part, overwrite)
     }
 
-    /// As [`create`](Self::create), called `part` on the way, which is replaced if it is there.
+    /// As [`create`](Self::create), called `part` on the way, of which there is none.
     pub(crate) fn create_as(path: &Path, part: PathBuf, overwrite: bool) -> Result<(Self, File)> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });
         }
-        let file = File::create(&part).map_err(|error| RecordError::file(&part, error))?;
-        Ok((Self { path: path.into(), part, overwrite }, file))
+        let begin = || {
+            let file = File::create_new(&part)?;
+            file.try_lock()?;
+            Ok((file.try_clone()?, file))
+        };
+        let (file, mine) = begin().map_err(|error: io::Error| RecordError::file(&part, error))?;
+        Ok((Self { path: path.into(), part, overwrite, file: mine, keep: false }, file))
+    }
+
+    /// What was written can be read, whole or not: it stays.
+    pub(crate) fn keep(&mut self) {
+        self.keep = true;
     }
 
     /// Gives the file its name: it is whole. Gives its size \[bytes\].
-    pub(crate) fn commit(&self) -> io::Result<u64> {
-        if !self.overwrite && self.path.symlink_metadata().is_ok() {
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile"));
+    pub(crate) fn commit(&mut self) -> io::Result<u64> {
+        self.file.sync_all()?;
+        self.keep = true;
+        let bytes = self.file.metadata()?.len();
+        if self.overwrite {
+            fs::rename(&self.part, &self.path)?;
+        } else {
+            rename_new(&self.part, &self.path)?;
         }
-        fs::rename(&self.part, &self.path)?;
-        Ok(self.path.metadata()?.len())
+        sync_folder(&self.path);
+        Ok(bytes)
     }
 
-    /// What was written so far.
-    pub(crate) fn part(&self) -> &Path {
-        &self.part
+    /// What the file is to be called.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
-    /// Takes away what was written: nobody could read it.
-    pub(crate) fn discard(&self) {
-        // It may be gone already; that it cannot be taken away changes nothing of the error that led here.
-        let _ = fs::remove_file(&self.part);
+    /// What was written, where it stays.
+    pub(crate) fn kept(&self) -> Option<PathBuf> {
+        self.keep.then(|| self.part.clone())
     }
+}
+
+impl Drop for PartFile {
+    fn drop(&mut self) {
+        if !self.keep {
+            // That it cannot be taken away changes nothing of the error that led here.
+            let _ = fs::remove_file(&self.part);
+        }
+    }
+}
+
+/// The file that an earlier recording has left, locked; `None` where there is none.
+///
+/// # Errors
+/// A recorder writes it now, or it cannot be opened.
+pub(crate) fn lock_left(part: &Path) -> Result<Option<File>> {
+    let left = match OpenOptions::new().read(true).write(true).open(part) {
+        Ok(left) => left,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(RecordError::file(part, error)),
+    };
+    match left.try_lock() {
+        Ok(()) => Ok(Some(left)),
+        Err(TryLockError::WouldBlock) => Err(RecordError::Busy { part: part.into() }),
+        Err(TryLockError::Error(error)) => Err(RecordError::file(part, error)),
+    }
+}
+
+/// Takes a file away, which may be gone already.
+pub(crate) fn remove(file: &Path) -> Result<()> {
+    match fs::remove_file(file) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(RecordError::file(file, error)),
+        _ => Ok(()),
+    }
+}
+
+/// Renames, but replaces nothing.
+fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+    let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile");
+    match fs::hard_link(from, to) {
+        Ok(()) => fs::remove_file(from),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(exists()),
+        // A disk without links: there, somebody may make the file between the look and the rename.
+        Err(_) if to.symlink_metadata().is_ok() => Err(exists()),
+        Err(_) => fs::rename(from, to),
+    }
+}
+
+/// Brings the name of a file to the disk, where that can be asked for.
+pub(crate) fn sync_folder(file: &Path) {
+    // The file is whole and has its name: that a crash of the machine may still undo the name is no error of it.
+    let _ = File::open(folder_of(file)).and_then(|folder| folder.sync_all());
 }
 
 /// What a file is called until it is whole.
@@ -75,6 +150,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 pub(crate) mod tests {
     use super::*;
     use std::io::SeekFrom;
@@ -105,5 +181,69 @@ pub(crate) mod tests {
         fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
             self.file.seek(to)
         }
+    }
+
+    fn folder() -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.npz");
+        (folder, path)
+    }
+
+    #[test]
+    fn a_whole_file_whose_name_is_taken_is_kept() {
+        let (_folder, path) = folder();
+        let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
+        file.write_all(b"whole").unwrap();
+        fs::write(&path, "precious").unwrap();
+        assert_eq!(part.commit().unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        let kept = part.kept().unwrap();
+        drop(part);
+        assert_eq!((fs::read(&path).unwrap(), fs::read(&kept).unwrap()), (b"precious".to_vec(), b"whole".to_vec()));
+        drop(file);
+        // It is not written over, and what to do is said: there is no way to recover it.
+        fs::remove_file(&path).unwrap();
+        let error = PartFile::create(&path, false, false).unwrap_err().to_string();
+        assert!(error.contains("run.npz.part") && !error.contains("recover"), "{error}");
+        // The control: with its name free, it has it.
+        fs::remove_file(kept).unwrap();
+        let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
+        file.write_all(b"whole").unwrap();
+        assert_eq!((part.commit().unwrap(), fs::read(&path).unwrap()), (5, b"whole".to_vec()));
+        assert!(!part_of(&path).exists());
+    }
+
+    #[test]
+    fn two_recorders_do_not_share_a_file() {
+        let (_folder, path) = folder();
+        let (mut part, mut file) = PartFile::create(&path, true, false).unwrap();
+        file.write_all(b"first").unwrap();
+        for overwrite in [true, false] {
+            let error = PartFile::create(&path, overwrite, false).unwrap_err();
+            assert!(matches!(error, RecordError::Busy { .. }), "{error}");
+        }
+        part.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        drop((part, file));
+        // The control: what nobody writes any more is replaced.
+        fs::write(part_of(&path), "left").unwrap();
+        assert!(matches!(
+            PartFile::create(&path, false, true),
+            Err(RecordError::Exists { .. } | RecordError::Unfinished { .. })
+        ));
+        let (mut part, mut file) = PartFile::create(&path, true, false).unwrap();
+        file.write_all(b"second").unwrap();
+        part.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+    }
+
+    #[test]
+    fn what_a_killed_archive_leaves_is_in_nobodys_way() {
+        let (_folder, path) = folder();
+        fs::write(part_of(&path), "").unwrap();
+        let (mut part, _file) = PartFile::create(&path, false, false).unwrap();
+        part.commit().unwrap();
+        let (part, _file) = PartFile::create(&path, true, false).unwrap();
+        drop(part);
+        assert!(!part_of(&path).exists(), "what nobody can read is taken away");
     }
 }

@@ -7,12 +7,12 @@ use std::path::Path;
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// An MCAP file of ROS 2 messages, which Foxglove and Rerun open; readable up to the last second even if the process is
-    /// killed.
+    /// An MCAP file of ROS 2 messages, which Foxglove and Rerun open. If the process is killed, [`recover`](crate::recover) reads
+    /// what the thread of the file had got half a second before; rows that waited for it are lost.
     Mcap,
     /// A NumPy archive: arrays (T, N, ...), one for each quantity, and their times.
     Npz,
-    /// A folder of PNG files: colour as 8-bit RGB, depth and distance as 16-bit millimetres.
+    /// A folder of PNG files: colour as 8-bit RGB, depth and distance as 16-bit millimetres, and `times.csv` with their times.
     Pictures,
     /// An animated PNG of one camera's colour in one environment.
     Apng,

@@ -6,17 +6,21 @@
 //! | poses of links and objects | `/env_0/tf` | `tf2_msgs/msg/TFMessage`, frames `env_0/arm/link` |
 //! | colour | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
 //! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32SC1`, `32FC3` |
-//! | lens and pose of a camera | `/env_0/camera/camera_info`, `/env_0/tf` | `sensor_msgs/msg/CameraInfo` |
+//! | lens and pose of a camera | `/env_0/camera/camera_info`, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
 //! | IMU | `/env_0/imu` | `sensor_msgs/msg/Imu` |
 //! | ray caster | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2` |
 //! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
 //! | resets, writes | `/events` | `rcl_interfaces/msg/Log` |
 //! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
 //!
-//! Messages have the time of capture, on the clock of the recording (`clock.rs`).
+//! Messages have the time of capture, on the clock of the recording (`clock.rs`): forces, efforts and accelerations of sensors
+//! that of the beginning of the step. The message of joint states of a robot has one time, that of its positions; its efforts
+//! are those of the step that led there.
+//!
+//! Of ray casters, points that hit something are written; NumPy archives have the distances and the misses too.
 
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, Storage, part_of};
+use crate::file::{PartFile, Storage, lock_left, part_of, remove};
 use crate::packet::{Block, Event, Packet};
 use crate::picture::Png;
 use crate::ros::{self, Cdr, Schema, Stamp};
@@ -26,8 +30,7 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use ndarray::Array2;
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Messages that are compressed together \[bytes\].
@@ -118,12 +121,14 @@ fn options() -> WriteOptions {
 }
 
 impl McapFile {
-    /// Begins a file; `origins` are the places of all environments in the world \[m\], (N, 3).
+    /// Begins a file; `origins` are the places of all environments in the world \[m\], (N, 3), and `start` is the time at which
+    /// the recording begins \[s\].
     pub(crate) fn create(
-        part: PartFile,
+        mut part: PartFile,
         storage: Box<dyn Storage>,
         streams: &[Stream],
         origins: &Array2<f64>,
+        start: f64,
     ) -> io::Result<Self> {
         let to = BufWriter::with_capacity(1 << 16, storage);
         let mut writer = options().create(to).map_err(io_error)?;
@@ -150,8 +155,9 @@ impl McapFile {
         let frames: Vec<String> = envs.iter().map(|env| format!("env_{env}")).collect();
         let place = |env: &usize| [origins[(*env, 0)], origins[(*env, 1)], origins[(*env, 2)], 1.0, 0.0, 0.0, 0.0];
         let poses: Vec<f64> = envs.iter().flat_map(place).collect();
-        ros::transforms(&mut cdr, Stamp { nanos: 0, frame: "world" }, "", &frames, &poses);
-        channels.write(&mut writer, places, 0, cdr.bytes())?;
+        ros::transforms(&mut cdr, Stamp { nanos: nanos(start), frame: "world" }, "", &frames, &poses);
+        channels.write(&mut writer, places, nanos(start), cdr.bytes())?;
+        part.keep();
         Ok(Self { part, writer: Some(writer), channels, rows, events, cdr, png: Png::default() })
     }
 
@@ -177,13 +183,16 @@ impl McapFile {
         let states = block.values.states().get(range.clone()).unwrap_or(&[]);
         let home = format!("env_{env}");
         let own = |name: &str| format!("{home}/{name}");
+        // An object may be called as a sensor: their frames are not.
+        let sensors = own("sensors/");
+        let seen_by = |sensor: &str| format!("{sensors}{sensor}");
         let (cdr, in_env) = (&mut self.cdr, Stamp { nanos: at, frame: &home });
         cdr.begin();
         match &stream.kind {
             Kind::Joints { names } => ros::joint_state(cdr, in_env, names, states),
             Kind::Poses { frames } => ros::transforms(cdr, in_env, &own(""), frames, states),
             Kind::Picture { camera, height, width, .. } => {
-                let frame = own(camera);
+                let frame = seen_by(camera);
                 let stamp = Stamp { nanos: at, frame: &frame };
                 if stream.element == Element::U8 {
                     let pixels = block.values.bytes().get(range).unwrap_or(&[]);
@@ -198,10 +207,10 @@ impl McapFile {
             }
             Kind::Lens { camera, height, width } => {
                 let (k, pose) = states.split_at(9.min(states.len()));
-                ros::transforms(cdr, in_env, &own(""), std::slice::from_ref(camera), pose);
+                ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), pose);
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
-                let frame = own(camera);
+                let frame = seen_by(camera);
                 ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k);
             }
             Kind::Imu => {
@@ -212,10 +221,10 @@ impl McapFile {
                     states.get(first..first + width).unwrap_or(&[])
                 };
                 let pose = [part("pos_w"), part("quat_w")].concat();
-                ros::transforms(cdr, in_env, &own(""), std::slice::from_ref(&stream.name), &pose);
+                ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(&stream.name), &pose);
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
-                let frame = own(&stream.name);
+                let frame = seen_by(&stream.name);
                 let stamp = Stamp { nanos: at, frame: &frame };
                 ros::imu(cdr, stamp, part("quat_w"), part("ang_vel_b"), part("lin_acc_b"));
             }
@@ -230,7 +239,7 @@ impl McapFile {
                     rest = after;
                     cdr.begin();
                     ros::numbers(cdr, &part.name, &part.shape, mine);
-                    self.channels.write(writer, *channel, at, cdr.bytes())?;
+                    self.channels.write(writer, *channel, nanos(block.stamp(part, row)), cdr.bytes())?;
                 }
                 return Ok(());
             }
@@ -283,45 +292,67 @@ impl Sink for McapFile {
         self.part.commit()
     }
 
-    fn give_up(&mut self) -> Option<PathBuf> {
-        Some(self.part.part().into())
+    fn kept(&self) -> Option<PathBuf> {
+        self.part.kept()
     }
 }
 
+/// What was made of a recording that was killed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recovered {
+    /// Messages in the file.
+    pub messages: u64,
+    /// What stands in the way of the rest, where that is more than a last chunk that was not written whole: then what was left
+    /// is still there, for other tools.
+    pub damage: Option<String>,
+}
+
 /// Makes a whole file of what a recording has left that was killed: `path` is the name that it was to have. The messages of
-/// all chunks that were written whole are in it, and what is left is taken away. Gives how many messages there are.
+/// all chunks from the beginning that are whole are in it, and what was left is taken away, unless something in it is damaged.
 ///
 /// # Errors
-/// There is no such recording, there is a file called `path` already, or nothing of it can be read.
-pub fn recover(path: impl AsRef<Path>) -> Result<u64> {
+/// There is no such recording, somebody is writing it, there is a file called `path` already, or no message can be read.
+/// What was left is as it was then.
+pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     let path = path.as_ref();
     let left = part_of(path);
-    let bytes = fs::read(&left).map_err(|error| RecordError::file(&left, error))?;
-    let malformed = |what: String| RecordError::Malformed { path: left.clone(), what };
+    let missing = || RecordError::file(&left, io::ErrorKind::NotFound.into());
+    let mut locked = lock_left(&left)?.ok_or_else(missing)?;
+    let mut bytes = Vec::new();
+    locked.read_to_end(&mut bytes).map_err(|error| RecordError::file(&left, error))?;
+    let nothing =
+        |why: String| RecordError::Malformed { path: left.clone(), what: format!("nothing of it can be read: {why}") };
     if !bytes.starts_with(mcap::MAGIC) {
-        return Err(malformed("nothing of it can be read: this is no MCAP file".into()));
+        return Err(nothing("this is no MCAP file".into()));
     }
-    let (part, file) = PartFile::create_as(path, left.with_extension("recovered"), false)?;
-    let give_up = |error: McapError| {
-        part.discard();
-        RecordError::file(path, io_error(error))
-    };
-    let mut writer = options().create(BufWriter::new(file)).map_err(give_up)?;
+    // What an earlier attempt left that was killed is of no use.
+    let on_the_way = left.with_extension("recovered");
+    remove(&on_the_way)?;
+    let (mut part, file) = PartFile::create_as(path, on_the_way, false)?;
+    let failed = |error: McapError| RecordError::file(path, io_error(error));
+    let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
     let messages = mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into());
-    let messages = messages.map_err(|error| {
-        part.discard();
-        malformed(format!("nothing of it can be read: {error}"))
-    })?;
-    let mut count = 0;
-    // The first thing that is not whole is where the process was killed.
-    for message in messages.map_while(std::result::Result::ok) {
-        writer.write(&message).map_err(give_up)?;
-        count += 1;
+    let mut recovered = Recovered { messages: 0, damage: None };
+    for message in messages.map_err(|error| nothing(error.to_string()))? {
+        match message {
+            Ok(message) => writer.write(&message).map_err(failed)?,
+            // Where the process was killed.
+            Err(McapError::UnexpectedEof) => break,
+            Err(error) => {
+                recovered.damage = Some(error.to_string());
+                break;
+            }
+        }
+        recovered.messages += 1;
     }
-    writer.finish().map_err(give_up)?;
-    let file = writer.into_inner().into_inner().map_err(|error| RecordError::file(path, error.into_error()))?;
-    file.sync_all().map_err(|error| RecordError::file(path, error))?;
+    if recovered.messages == 0 {
+        return Err(nothing(recovered.damage.unwrap_or_else(|| "there is no whole message in it".into())));
+    }
+    writer.finish().map_err(failed)?;
+    writer.into_inner().flush().map_err(|error| RecordError::file(path, error))?;
     part.commit().map_err(|error| RecordError::file(path, error))?;
-    fs::remove_file(&left).map_err(|error| RecordError::file(&left, error))?;
-    Ok(count)
+    if recovered.damage.is_none() {
+        remove(&left)?;
+    }
+    Ok(recovered)
 }

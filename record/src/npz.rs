@@ -5,18 +5,21 @@
 //! | `arm/joint_states/positions` | (T, N, joints) | f64, as all states and sensors of numbers |
 //! | `camera/color`, `camera/depth` | (T, N, H, W, 4), (T, N, H, W) | u8, f32 |
 //! | `arm/joint_states/time` | (T, N) | simulation time of capture \[s\] |
+//! | `joints/force_time` | (T, N) | that of efforts and forces, where a sensor measures them at another instant than the rest \[s\] |
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
 //! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written |
 //! | `recording.json` | | time step, environments, names of joints and frames |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
 //! An environment that has nothing new in a row, because its sensor measures at other times, has its last value and time again.
+//! What happens to an environment has a row of its own, of the states of all: where states are recorded every few steps,
+//! those of the others are between two of theirs, with the time that they are of.
 //!
 //! Until the end, rows are in files without a name in the same folder: a killed process leaves nothing.
 
 use crate::file::{PartFile, Storage, folder_of};
 use crate::npy;
-use crate::packet::{Block, EventKind, Packet};
+use crate::packet::{Block, Event, EventKind, Packet};
 use crate::stream::{Element, Kind, Stream};
 use crate::writer::Sink;
 use crate::zip::Archive;
@@ -25,7 +28,7 @@ use sim::Snapshot;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The member that says what the others are.
 pub(crate) const ABOUT: &str = "recording.json";
@@ -39,10 +42,11 @@ pub(crate) struct NpzFile {
     about: Value,
     start: Vec<u8>,
     spools: Vec<Spool>,
-    events: Events,
+    /// The events, one record each: step, environment, kind, time.
+    events: Spool,
 }
 
-/// The rows of a stream, one record each: the step, a time for each environment, then the quantities, each of all
+/// The rows of a stream, one record each: the step, a time or two for each environment, then the quantities, each of all
 /// environments.
 struct Spool {
     file: BufWriter<File>,
@@ -50,13 +54,13 @@ struct Spool {
     record: Vec<u8>,
 }
 
-#[derive(Default)]
-struct Events {
-    steps: Vec<u8>,
-    envs: Vec<u8>,
-    kinds: Vec<u8>,
-    times: Vec<u8>,
-}
+/// Where the numbers of an event stand in its record.
+const EVENT: [(&str, Element, Range<usize>); 4] = [
+    ("step", Element::F64, 0..8),
+    ("env", Element::I32, 8..12),
+    ("kind", Element::U8, 12..13),
+    ("time", Element::F64, 13..21),
+];
 
 impl NpzFile {
     pub(crate) fn create(
@@ -64,27 +68,16 @@ impl NpzFile {
         storage: Box<dyn Storage>,
         streams: &[Stream],
         dt: f64,
-        start: Option<&Snapshot>,
+        start: &Snapshot,
     ) -> io::Result<Self> {
-        let result = Self::open(&part, streams, start);
-        let (spools, start) = result.inspect_err(|_| part.discard())?;
-        let about = about(streams, dt);
-        Ok(Self { part, storage: Some(storage), about, start, spools, events: Events::default() })
-    }
-
-    fn open(part: &PartFile, streams: &[Stream], start: Option<&Snapshot>) -> io::Result<(Vec<Spool>, Vec<u8>)> {
-        let folder = folder_of(part.part());
-        let mut spools = Vec::new();
-        for _ in streams {
-            let file = BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?);
-            spools.push(Spool { file, rows: 0, record: Vec::new() });
-        }
-        let Some(start) = start else { return Ok((spools, Vec::new())) };
+        let folder = folder_of(part.path());
+        let spools = streams.iter().map(|_| Spool::create(folder)).collect::<io::Result<_>>()?;
         // A snapshot is written as a file; this one goes into the archive.
         let scratch = tempfile::tempdir_in(folder)?;
         let path = scratch.path().join(START);
         start.save(&path).map_err(io::Error::other)?;
-        Ok((spools, std::fs::read(path)?))
+        let (start, events) = (std::fs::read(path)?, Spool::create(folder)?);
+        Ok(Self { part, storage: Some(storage), about: about(streams, dt), start, spools, events })
     }
 }
 
@@ -111,17 +104,43 @@ fn about(streams: &[Stream], dt: f64) -> Value {
     })
 }
 
+/// All arrays of a stream.
+pub(crate) fn members(stream: &Stream) -> impl Iterator<Item = String> {
+    let times = ["step", "time"].into_iter().chain(stream.is_mixed().then_some("force_time"));
+    times
+        .map(|name| format!("{}/{name}", stream.name))
+        .chain(stream.parts.iter().map(|part| member(stream, &part.name)))
+}
+
 /// What a quantity is called in the archive.
 pub(crate) fn member(stream: &Stream, part: &str) -> String {
     if part.is_empty() { stream.name.clone() } else { format!("{}/{part}", stream.name) }
 }
 
 impl Spool {
+    fn create(folder: &Path) -> io::Result<Self> {
+        let file = BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?);
+        Ok(Self { file, rows: 0, record: Vec::new() })
+    }
+
+    fn write_event(&mut self, event: &Event) -> io::Result<()> {
+        for (env, time) in event.env_ids.iter().zip(&event.times) {
+            let env = i32::try_from(*env).unwrap_or(i32::MAX);
+            self.file.write_all(&(event.step as f64).to_le_bytes())?;
+            self.file.write_all(&env.to_le_bytes())?;
+            self.file.write_all(&[u8::from(event.kind == EventKind::Written)])?;
+            self.file.write_all(&time.to_le_bytes())?;
+            self.rows += 1;
+        }
+        Ok(())
+    }
+
     fn write(&mut self, stream: &Stream, block: &Block, step: u64) -> io::Result<()> {
         let (rows, width) = (stream.env_ids.len(), stream.width());
         self.record.clear();
         self.record.extend_from_slice(&(step as f64).to_le_bytes());
-        block.times.iter().for_each(|time| self.record.extend_from_slice(&time.to_le_bytes()));
+        let times = block.times.iter().chain(&block.force_times);
+        times.for_each(|time| self.record.extend_from_slice(&time.to_le_bytes()));
         let mut first = 0;
         for part in &stream.parts {
             for row in 0..rows {
@@ -173,7 +192,7 @@ impl Read for Column<'_> {
 }
 
 impl Element {
-    fn bytes(self) -> usize {
+    pub(crate) fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
             Self::I32 | Self::F32 => 4,
@@ -185,12 +204,7 @@ impl Element {
 impl Sink for NpzFile {
     fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
         if let Some(event) = &packet.event {
-            for (env, time) in event.env_ids.iter().zip(&event.times) {
-                self.events.steps.extend_from_slice(&(event.step as f64).to_le_bytes());
-                self.events.envs.extend_from_slice(&i32::try_from(*env).unwrap_or(i32::MAX).to_le_bytes());
-                self.events.kinds.push(u8::from(event.kind == EventKind::Written));
-                self.events.times.extend_from_slice(&time.to_le_bytes());
-            }
+            self.events.write_event(event)?;
         }
         for ((stream, block), spool) in streams.iter().zip(&packet.blocks).zip(&mut self.spools) {
             if block.used {
@@ -213,29 +227,28 @@ impl Sink for NpzFile {
         };
         let about = format!("{:#}\n", self.about);
         archive.add(ABOUT, b"", &mut about.as_bytes())?;
-        if !self.start.is_empty() {
-            archive.add(START, b"", &mut &self.start[..])?;
-        }
-        let count = self.events.kinds.len();
-        for (name, element, data) in [
-            ("step", Element::F64, &self.events.steps),
-            ("env", Element::I32, &self.events.envs),
-            ("kind", Element::U8, &self.events.kinds),
-            ("time", Element::F64, &self.events.times),
-        ] {
-            archive.add(&format!("events/{name}.npy"), &header(element, &[count])?, &mut &data[..])?;
+        archive.add(START, b"", &mut &self.start[..])?;
+        let record = EVENT[3].2.end;
+        for (name, element, range) in EVENT {
+            let head = header(element, &[self.events.rows])?;
+            archive.add(&format!("events/{name}.npy"), &head, &mut self.events.column(range, record)?)?;
         }
         for (stream, spool) in streams.iter().zip(&mut self.spools) {
             let (rows, envs) = (spool.rows, stream.env_ids.len());
             let one = stream.element.bytes();
-            let record = 8 + 8 * envs + envs * stream.width() * one;
+            // One time for each environment, or two.
+            let times = 8 * envs * (1 + usize::from(stream.is_mixed()));
+            let record = 8 + times + envs * stream.width() * one;
             let mut add = |name: String, element, shape: &[usize], range: Range<usize>| {
                 let head = header(element, shape)?;
                 archive.add(&format!("{name}.npy"), &head, &mut spool.column(range, record)?)
             };
             add(format!("{}/step", stream.name), Element::F64, &[rows], 0..8)?;
             add(format!("{}/time", stream.name), Element::F64, &[rows, envs], 8..8 + 8 * envs)?;
-            let mut first = 8 + 8 * envs;
+            if stream.is_mixed() {
+                add(format!("{}/force_time", stream.name), Element::F64, &[rows, envs], 8 + 8 * envs..8 + times)?;
+            }
+            let mut first = 8 + times;
             for part in &stream.parts {
                 let shape = [&[rows, envs][..], &part.shape].concat();
                 let end = first + envs * part.width() * one;
@@ -247,9 +260,7 @@ impl Sink for NpzFile {
         self.part.commit()
     }
 
-    fn give_up(&mut self) -> Option<PathBuf> {
-        self.storage = None;
-        self.part.discard();
-        None
+    fn kept(&self) -> Option<PathBuf> {
+        self.part.kept()
     }
 }

@@ -1,6 +1,6 @@
 //! What travels from the simulation to the thread of the file.
 
-use crate::stream::{Element, Stream};
+use crate::stream::{Element, Part, Stream};
 
 /// Something that happened to environments.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +55,10 @@ pub(crate) struct Block {
     pub(crate) times: Vec<f64>,
     /// The same on the clock of the recording, which goes on over a reset \[s\].
     pub(crate) stamps: Vec<f64>,
+    /// As `times`, of the parts that are of forces, where the others are of another instant; else empty.
+    pub(crate) force_times: Vec<f64>,
+    /// As `stamps`, likewise.
+    pub(crate) force_stamps: Vec<f64>,
     /// Which environments have something new.
     pub(crate) fresh: Vec<bool>,
     pub(crate) values: Values,
@@ -75,6 +79,13 @@ impl Packet {
         Self { step: 0, event: None, blocks: streams.iter().map(Block::new).collect() }
     }
 
+    /// What the row of a stream takes \[bytes\].
+    pub(crate) fn bytes(stream: &Stream) -> u64 {
+        let numbers = stream.width().saturating_mul(stream.element.bytes());
+        // Four times and whether it is fresh.
+        (stream.env_ids.len() as u64).saturating_mul((numbers as u64).saturating_add(33))
+    }
+
     /// Forgets what is in it, and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.event = None;
@@ -92,13 +103,23 @@ impl Block {
             Element::F64 => Values::F64(Vec::with_capacity(numbers)),
         };
         let (times, stamps) = (Vec::with_capacity(envs), Vec::with_capacity(envs));
-        Self { used: false, times, stamps, fresh: Vec::with_capacity(envs), values }
+        let forces = if stream.is_mixed() { envs } else { 0 };
+        let (force_times, force_stamps) = (Vec::with_capacity(forces), Vec::with_capacity(forces));
+        Self { used: false, times, stamps, force_times, force_stamps, fresh: Vec::with_capacity(envs), values }
+    }
+
+    /// The recorded time of a part in a row \[s\].
+    pub(crate) fn stamp(&self, part: &Part, row: usize) -> f64 {
+        let of_forces = self.force_stamps.get(row).filter(|_| part.of_forces);
+        of_forces.copied().unwrap_or(self.stamps[row])
     }
 
     fn clear(&mut self) {
         self.used = false;
         self.times.clear();
         self.stamps.clear();
+        self.force_times.clear();
+        self.force_stamps.clear();
         self.fresh.clear();
         match &mut self.values {
             Values::U8(values) => values.clear(),

@@ -1,15 +1,13 @@
-//! Pictures: files of a folder, and animations.
+//! PNG files, and animations of them.
 
-use crate::error::{RecordError, Result};
 use crate::file::{PartFile, Storage};
 use crate::packet::Packet;
-use crate::stream::{Kind, Stream};
+use crate::stream::Stream;
 use crate::writer::Sink;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
-use std::fs;
 use std::io::{self, BufWriter, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Depths are written in millimetres.
 const PER_METRE: f32 = 1000.0;
@@ -32,7 +30,7 @@ impl Png {
     }
 
     /// Depths \[m\] as 16-bit millimetres: 0 where nothing was hit, 65535 for 65.535 m and more.
-    fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> io::Result<&[u8]> {
+    pub(crate) fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> io::Result<&[u8]> {
         self.pixels.clear();
         for depth in depths {
             self.pixels.extend_from_slice(&millimetres(*depth).to_ne_bytes());
@@ -53,76 +51,6 @@ impl Png {
 fn millimetres(depth: f32) -> u16 {
     // What is beyond becomes the largest number; infinity, where nothing was hit, 0.
     if depth.is_finite() { (depth * PER_METRE).round() as u16 } else { 0 }
-}
-
-/// A folder of PNG files: `camera/color/env_0/000000.png`.
-#[derive(Debug)]
-pub(crate) struct PictureFolder {
-    path: PathBuf,
-    png: Png,
-    /// Pictures of every row of every stream.
-    counts: Vec<Vec<usize>>,
-    bytes: u64,
-}
-
-impl PictureFolder {
-    /// Makes the folder, which must be new or empty.
-    pub(crate) fn create(path: &Path, overwrite: bool) -> Result<Self> {
-        let failed = |error| RecordError::file(path, error);
-        match fs::read_dir(path) {
-            Ok(mut entries) => {
-                if !overwrite && entries.next().is_some() {
-                    return Err(RecordError::Exists { path: path.into() });
-                }
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => fs::create_dir_all(path).map_err(failed)?,
-            Err(error) => return Err(failed(error)),
-        }
-        // That nothing can be written there is said now.
-        tempfile::tempfile_in(path).map_err(failed)?;
-        Ok(Self { path: path.into(), png: Png::default(), counts: Vec::new(), bytes: 0 })
-    }
-}
-
-impl Sink for PictureFolder {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
-        self.counts.resize_with(streams.len(), Vec::new);
-        for ((stream, block), counts) in streams.iter().zip(&packet.blocks).zip(&mut self.counts) {
-            counts.resize(stream.env_ids.len(), 0);
-            let Kind::Picture { height, width, .. } = stream.kind else { continue };
-            for (row, env) in stream.env_ids.iter().enumerate().filter(|(row, _)| block.used && block.fresh[*row]) {
-                let range = row * stream.width()..(row + 1) * stream.width();
-                let file = match block.values.floats().get(range.clone()) {
-                    Some(depths) => self.png.millimetres(depths, [width, height])?,
-                    None => self.png.rgb(block.values.bytes().get(range).unwrap_or(&[]), [width, height])?,
-                };
-                let folder = self.path.join(&stream.name).join(format!("env_{env}"));
-                if counts[row] == 0 {
-                    fs::create_dir_all(&folder)?;
-                }
-                // A picture has its name when it is whole.
-                let (part, path) = (folder.join("next.part"), folder.join(format!("{:06}.png", counts[row])));
-                fs::write(&part, file)?;
-                fs::rename(part, path)?;
-                counts[row] += 1;
-                self.bytes += file.len() as u64;
-            }
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        // Every picture is a file of its own.
-        Ok(())
-    }
-
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
-        Ok(self.bytes)
-    }
-
-    fn give_up(&mut self) -> Option<PathBuf> {
-        Some(self.path.clone())
-    }
 }
 
 /// An animated PNG: the frames are chunks of PNG files, as the third edition of the PNG specification, section 4.9, has them.
@@ -249,10 +177,8 @@ impl Sink for Animation {
         self.part.commit()
     }
 
-    fn give_up(&mut self) -> Option<PathBuf> {
-        self.file = None;
-        self.part.discard();
-        None
+    fn kept(&self) -> Option<PathBuf> {
+        self.part.kept()
     }
 }
 

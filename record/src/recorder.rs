@@ -3,17 +3,18 @@
 use crate::cfg::RecorderCfg;
 use crate::clock::Clock;
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, Storage};
+use crate::file::{PartFile, Storage, part_of};
 use crate::format::Format;
 use crate::mcap_file::McapFile;
-use crate::npz::NpzFile;
+use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
-use crate::picture::{Animation, PictureFolder};
+use crate::picture::Animation;
+use crate::picture_folder::PictureFolder;
 use crate::source::Source;
 use crate::stream::{Kind, Stream};
 use crate::topic::Topic;
 use crate::writer::{self, Failure, Sink};
-use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager, Snapshot};
+use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager};
 use std::fmt;
 use std::fs::File;
 use std::path::PathBuf;
@@ -37,7 +38,8 @@ pub trait Record {
     /// Ends a recording: the file is whole, and has its name, when this returns.
     ///
     /// # Errors
-    /// The file could not be written, something that is recorded has changed its shape, a sensor failed.
+    /// The file could not be written, something that is recorded has changed its shape, a sensor failed. What is whole or can be
+    /// read stays as `NAME.part`, and the error says so.
     ///
     /// # Panics
     /// The handle is of another manager.
@@ -69,7 +71,8 @@ pub struct Recorded {
     pub waits: u64,
     /// How long it waited in all.
     pub waited: Duration,
-    /// Sensors that [`Topic::Everything`] has left out, because their types say nothing of their channels.
+    /// What [`Topic::Everything`] and [`Topic::Sensor`] have left out, with the reason: sensors whose types say nothing of their
+    /// channels or that are in none of the environments, channels that the format has no place for.
     pub left_out: Vec<String>,
 }
 
@@ -84,7 +87,7 @@ impl fmt::Display for Recorded {
             }
         }
         if !self.left_out.is_empty() {
-            write!(f, "; left out, because nobody knows their channels: {}", self.left_out.join(", "))?;
+            write!(f, "; left out: {}", self.left_out.join(", "))?;
         }
         Ok(())
     }
@@ -92,8 +95,8 @@ impl fmt::Display for Recorded {
 
 /// Copies what is due into packets, which a thread of its own writes to a file.
 ///
-/// [`Record::record`] makes one. Dropped without [`finish`](Self::finish), it ends the recording too; only nobody learns what
-/// went wrong.
+/// [`Record::record`] makes one. Dropped without [`finish`](Self::finish), it breaks the recording off: nothing gets the name of
+/// a whole file. What can be read of it (MCAP, folders of pictures) stays as `NAME.part`.
 pub struct Recorder {
     cfg: RecorderCfg,
     sources: Vec<Source>,
@@ -114,6 +117,12 @@ impl fmt::Debug for Recorder {
     }
 }
 
+/// What the packets of a pool may take together \[bytes\]: 16 GiB. What is asked for by mistake is far above.
+const MAX_POOL: u64 = 1 << 34;
+
+/// What a packet takes beside its numbers, about \[bytes\].
+const PACKET: u64 = 256;
+
 /// Puts something between a recording and its file.
 pub(crate) type Wrap<'w> = &'w mut dyn FnMut(File) -> Box<dyn Storage>;
 
@@ -127,6 +136,10 @@ impl Recorder {
         }
         let (sources, left_out) = resolve(sim, &cfg, format)?;
         let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
+        let bytes = streams.iter().map(Packet::bytes).fold(PACKET, u64::saturating_add);
+        if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL {
+            return Err(RecordError::TooLarge { packets: cfg.packets, bytes, most: MAX_POOL });
+        }
         let sink = open(sim, &cfg, format, &streams, wrap)?;
         Self::begin(sim, cfg, sources, left_out, sink)
     }
@@ -167,6 +180,9 @@ impl Recorder {
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
         recorder.take(sim, None, &all);
+        if recorder.failure.is_some() {
+            recorder.end()?;
+        }
         Ok(recorder)
     }
 
@@ -182,12 +198,14 @@ impl Recorder {
 
     /// Whether the recording has stopped because something went wrong; [`finish`](Self::finish) says what.
     pub fn has_failed(&self) -> bool {
-        self.failure.is_some() || self.failed.load(Ordering::Relaxed)
+        // The thread ends when the recorder does, or panics.
+        let ended = self.thread.as_ref().is_none_or(JoinHandle::is_finished);
+        self.failure.is_some() || ended || self.failed.load(Ordering::Relaxed)
     }
 
-    /// Waits until the file has got everything that was recorded so far. These waits are not counted.
+    /// Waits until the file has got everything that was recorded so far, or something went wrong. These waits are not counted.
     pub fn catch_up(&mut self) {
-        while self.spare.len() < self.cfg.packets {
+        while self.spare.len() < self.cfg.packets && !self.has_failed() {
             // Where the thread is gone there is nothing to wait for.
             let Ok(packet) = self.free.recv() else { return };
             self.spare.push(packet);
@@ -207,19 +225,28 @@ impl Recorder {
         let Some(thread) = self.thread.take() else { return Ok(self.recorded.clone()) };
         let path = &self.cfg.path;
         let written = thread.join().unwrap_or_else(|_| {
-            Err(Failure { error: std::io::Error::other("the thread that writes has panicked"), kept: None })
+            let error = std::io::Error::other("the thread that writes has panicked");
+            // What it has left is where it was.
+            let part = part_of(path);
+            Err(Failure { error: Some(error), kept: part.exists().then_some(part) })
         });
-        match (self.failure.take(), written) {
-            (Some(RecordError::Changed { stream, .. }), _) => Err(RecordError::Changed { path: path.clone(), stream }),
-            (Some(failure), _) => Err(failure),
+        let (failure, Failure { error, kept }) = match (self.failure.take(), written) {
             (None, Ok(bytes)) => {
                 self.recorded.bytes = bytes;
-                Ok(self.recorded.clone())
+                return Ok(self.recorded.clone());
             }
+            (Some(failure), Ok(_)) => (failure, Failure { error: None, kept: None }),
+            (Some(failure), Err(written)) => (failure, written),
             (None, Err(Failure { error, kept })) => {
-                Err(RecordError::File { path: path.clone(), error: Arc::new(error), kept })
+                let error = error.unwrap_or_else(|| std::io::Error::other("the recording was broken off"));
+                return Err(RecordError::File { path: path.clone(), error: Arc::new(error), kept });
             }
-        }
+        };
+        let failure = match failure {
+            RecordError::Changed { stream, .. } => RecordError::Changed { path: path.clone(), stream },
+            other => other,
+        };
+        Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(Arc::new), kept })
     }
 
     /// Records what is due, and everything that is there at any time in environments `renewed`.
@@ -234,19 +261,25 @@ impl Recorder {
         packet.step = self.clock.step(steps);
         packet.event = event;
         for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
-            let due = source.sensor.is_some() || source.due_at <= steps || !renewed.is_empty();
-            if !due {
+            let due = source.due_at <= steps;
+            if source.sensor.is_none() && !due && renewed.is_empty() {
                 continue;
             }
-            if let Err(error) = source.read(sim, &times, renewed, block) {
+            if let Err(error) = source.read(sim, &times, renewed, due, block) {
+                // Whoever waits for all packets waits for this one too.
+                packet.clear();
+                self.spare.push(packet);
                 return self.fail(error);
             }
-            if source.sensor.is_none() && source.due_at <= steps {
-                source.due_at = steps + self.cfg.every;
+            if source.sensor.is_none() && due {
+                source.due_at = steps.saturating_add(self.cfg.every);
             }
-            let clock = &self.clock;
-            let stamps = source.stream.env_ids.iter().zip(&block.times).map(|(env, time)| clock.stamp(*env, *time));
-            block.stamps.extend(stamps);
+            let (clock, envs) = (&self.clock, &source.stream.env_ids);
+            let stamps = |times: &[f64], to: &mut Vec<f64>| {
+                to.extend(envs.iter().zip(times).map(|(env, time)| clock.stamp(*env, *time)));
+            };
+            stamps(&block.times, &mut block.stamps);
+            stamps(&block.force_times, &mut block.force_stamps);
             used |= block.used;
         }
         if !used {
@@ -330,7 +363,8 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        // Nobody is left to be told.
+        // Only what is finished has its name. Nobody is left to be told.
+        self.failed.store(true, Ordering::Relaxed);
         let _ = self.end();
     }
 }
@@ -384,15 +418,26 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
             Topic::Channel { sensor, channel } => vec![Source::picture(sim, sensor, channel, &envs)?],
         };
         let any = !found.is_empty();
-        let before = sources.len();
-        let held = found.into_iter().filter(|source| format.holds(&source.stream)).collect::<Vec<_>>();
+        let (held, without): (Vec<_>, Vec<_>) = found.into_iter().partition(|source| format.holds(&source.stream));
         if any && held.is_empty() {
             return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
         }
+        let no_place = |source: &Source| format!("{} ({} has no place for it)", source.stream.name, format.name());
+        left_out.extend(without.iter().map(no_place));
         for source in held {
-            if !sources[..before].iter().any(|known| known.stream.name == source.stream.name) {
-                sources.push(source);
+            match sources.iter().find(|known| known.stream.name == source.stream.name) {
+                None => sources.push(source),
+                // Asked for twice.
+                Some(known) if known.is(&source) => {}
+                Some(_) => return Err(RecordError::SameName { path: cfg.path.clone(), name: source.stream.name }),
             }
+        }
+    }
+    if format == Format::Npz {
+        let mut names: Vec<String> = sources.iter().flat_map(|source| npz::members(&source.stream)).collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(RecordError::SameName { path: cfg.path.clone(), name: pair[0].clone() });
         }
     }
     if sources.is_empty() {
@@ -431,7 +476,9 @@ fn everything(
     for uid in sim.sensor_uids() {
         match Source::sensor(sim, uid, envs) {
             Ok(found) => sources.extend(found),
-            Err(RecordError::Unreadable { sensor }) => left_out.push(sensor),
+            Err(error @ (RecordError::Unreadable { .. } | RecordError::Elsewhere { .. })) => {
+                left_out.push(format!("{uid} ({error})"));
+            }
             Err(error) => return Err(error),
         }
     }
@@ -455,16 +502,16 @@ fn open(
     if format == Format::Pictures {
         return Ok(Box::new(PictureFolder::create(&cfg.path, cfg.overwrite)?));
     }
-    let (part, file) = PartFile::create(&cfg.path, cfg.overwrite)?;
+    let (part, file) = PartFile::create(&cfg.path, cfg.overwrite, format == Format::Mcap)?;
     let storage = wrap(file);
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Mcap => {
-            let file = McapFile::create(part, storage, streams, &sim.env_origins());
+            let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
+            let file = McapFile::create(part, storage, streams, &sim.env_origins(), start);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Npz => {
-            let start: Option<Snapshot> = Some(sim.snapshot(None)?);
-            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, start.as_ref());
+            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, &sim.snapshot(None)?);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Apng | Format::Pictures => {

@@ -103,6 +103,8 @@ type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 /// must hold the targets of every robot and the controls of every MJCF part that move something, at every step
 /// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1).
 ///
+/// Of several rows at a step, where something happened there more than once, the first and the last are compared.
+///
 /// What nobody recorded is not repeated: external wrenches, welds, gains, poses of kinematic objects; the first difference
 /// says when they mattered.
 ///
@@ -137,14 +139,30 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         return Err(archive.malformed("it has no states to compare with".into()));
     };
     let steps = archive.steps(&first.stream.name)?.to_vec();
+    if steps.first() != Some(&0.0) {
+        return Err(archive.malformed("its rows do not begin at step 0".into()));
+    }
+    // One that is no number is in no such order.
+    if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
+        return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
+    }
     for source in states.iter().chain(&targets) {
         if archive.steps(&source.stream.name)? != steps {
             return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
         }
         archive.check(source, steps.len())?;
     }
-    if steps.windows(2).any(|pair| pair[1] - pair[0] > 1.0) {
-        return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
+    for uid in sim.jointed_uids() {
+        let moves = sim.robot(sim.jointed_id(uid)?).dof() > 0;
+        if moves && !targets.iter().any(|source| source.stream.name == format!("{uid}{TARGETS}")) {
+            return Err(archive.malformed(format!("it has no targets of {uid}: record Topic::Targets({uid:?})")));
+        }
+    }
+    for uid in sim.mjcf_uids() {
+        let moves = sim.mjcf_part(sim.mjcf_id(uid)?).get_ctrl().ncols() > 0;
+        if moves && !states.iter().any(|source| source.stream.name == format!("{uid}/state")) {
+            return Err(archive.malformed(format!("it has no controls of {uid}: record Topic::MjcfState({uid:?})")));
+        }
     }
     Repetition { archive, states, targets, steps }.run(sim)
 }
@@ -223,7 +241,7 @@ impl Repetition {
         for source in &mut self.states {
             let mut packet = Packet::new(std::slice::from_ref(&source.stream));
             let Some(block) = packet.blocks.first_mut() else { continue };
-            source.read(sim, &times, &[], block)?;
+            source.read(sim, &times, &[], true, block)?;
             if let Some(difference) = difference(&self.archive, source, block, row, written)? {
                 verdict.difference = Some(Difference { step: verdict.steps, ..difference });
                 return Ok(false);

@@ -6,7 +6,10 @@ use crate::stream::{Element, Kind, Part, Stream};
 use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
 use sensors::camera::channel::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
 use sensors::camera::{CameraConvention, Channel};
-use sensors::{Camera, Imu, RayCaster, RayCasterCamera, Sampled, Sensor};
+use sensors::{
+    ActuatorState, Camera, ContactSensor, Imu, JointState, JointWrench, MujocoSensor, RayCaster, RayCasterCamera,
+    Sensor,
+};
 use sim::{MjcfId, ObjectId, RobotId, SimulationManager};
 use std::any::Any;
 
@@ -121,23 +124,26 @@ impl Source {
             let kind = Kind::Lens { camera: uid.into(), height: shape.0, width: shape.1 };
             let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
             let lens = Self::new(format!("{uid}/lens"), kind, Element::F64, parts, envs, What::Lens(uid.into()));
-            sources.push(lens.of_sensor(uid, sensor));
+            sources.push(lens.of_sensor(uid, sensor)?);
         } else if let Some(caster) = any.downcast_ref::<RayCaster>() {
             let rays = caster.num_rays();
             let parts = vec![Part::new("hits", [rays, 3]), Part::new("distances", [rays])];
             let points = What::Points(uid.into());
-            sources.push(Self::new(uid.into(), Kind::Points, Element::F64, parts, envs, points).of_sensor(uid, sensor));
+            sources
+                .push(Self::new(uid.into(), Kind::Points, Element::F64, parts, envs, points).of_sensor(uid, sensor)?);
         } else if let Some(sampled) = sensor.sampled() {
             let kind = if any.is::<Imu>() { Kind::Imu } else { Kind::Numbers };
             let sampler = sampled.sampler();
-            let part = |channel| Part::new(channel, [sampler.values(channel).ncols()]);
+            let part = |channel| {
+                let of_forces = of_forces(any, channel);
+                Part { of_forces, ..Part::new(channel, [sampler.values(channel).ncols()]) }
+            };
             let parts = sampler.channels().map(part).collect();
             let numbers = What::Numbers(uid.into());
-            sources.push(Self::new(uid.into(), kind, Element::F64, parts, envs, numbers).of_sensor(uid, sensor));
+            sources.push(Self::new(uid.into(), kind, Element::F64, parts, envs, numbers).of_sensor(uid, sensor)?);
         } else {
             return Err(RecordError::Unreadable { sensor: uid.into() });
         }
-        sources.retain(|source| !source.rows.is_empty());
         Ok(sources)
     }
 
@@ -158,11 +164,11 @@ impl Source {
         let kind = Kind::Picture { camera: uid.into(), channel: name.into(), height, width };
         let what = What::Picture { uid: uid.into(), channel: name };
         let stream = format!("{uid}/{name}");
-        Ok(Self::new(stream, kind, element, vec![Part::new("", shape)], envs, what).of_sensor(uid, sensor))
+        Self::new(stream, kind, element, vec![Part::new("", shape)], envs, what).of_sensor(uid, sensor)
     }
 
     /// The same of a sensor, which may not be in all environments.
-    fn of_sensor(mut self, uid: &str, sensor: &dyn Sensor) -> Self {
+    fn of_sensor(mut self, uid: &str, sensor: &dyn Sensor) -> Result<Self> {
         self.sensor = Some(uid.into());
         let any: &dyn Any = sensor;
         if let Some(camera) = any.downcast_ref::<Camera>() {
@@ -171,9 +177,17 @@ impl Source {
             self.counts.truncate(self.rows.len());
             self.last.truncate(self.rows.len());
         }
+        if self.rows.is_empty() {
+            return Err(RecordError::Elsewhere { sensor: uid.into() });
+        }
         // What it has measured before is not new.
         self.count(sensor);
-        self
+        Ok(self)
+    }
+
+    /// Whether another one records the same.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        self.what == other.what && self.stream == other.stream
     }
 
     /// Counts measurements; gives whether those of each row are more, or others, than before.
@@ -205,29 +219,50 @@ impl Source {
     }
 
     /// Copies what there is now. `times` are the simulation times of all environments; `renewed` are environments whose state
-    /// is another one, whatever their time.
+    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`.
     pub(crate) fn read(
         &mut self,
         sim: &SimulationManager,
         times: &[f64],
         renewed: &[usize],
+        due: bool,
         block: &mut Block,
     ) -> Result<()> {
         if let Some(uid) = &self.sensor {
             let sensor = sim.sensor_called(uid)?;
             block.fresh = self.count(sensor);
+            let stamps = Stamps::of(sensor, matches!(self.what, What::Numbers(_)));
+            if !matches!(self.what, What::Numbers(_)) {
+                // What arrives late and is not shown cannot be read as points or a picture: it is no row.
+                for (fresh, row) in block.fresh.iter_mut().zip(&self.rows) {
+                    *fresh &= stamps.is_shown(*row);
+                }
+            }
             if !block.fresh.contains(&true) {
                 return Ok(());
             }
-            let stamps = stamps(sensor, &self.stream.kind);
-            block.times.extend(self.rows.iter().map(|row| stamps.get(*row).copied().unwrap_or(f64::NAN)));
+            let all_forces = !self.stream.parts.is_empty() && self.stream.parts.iter().all(|part| part.of_forces);
+            let times = if all_forces { &stamps.forces } else { &stamps.states };
+            let of_rows = |stamps: &[f64], to: &mut Vec<f64>| {
+                to.extend(self.rows.iter().map(|row| stamps.get(*row).copied().unwrap_or(f64::NAN)));
+            };
+            of_rows(times, &mut block.times);
+            if self.stream.is_mixed() {
+                of_rows(&stamps.forces, &mut block.force_times);
+            }
         } else {
             let now = self.stream.env_ids.iter().map(|env| times[*env]);
             block.times.extend(now);
             for ((env, last), now) in self.stream.env_ids.iter().zip(&mut self.last).zip(&block.times) {
                 // One that is put aside stands still.
-                let moved = std::mem::replace(last, *now) != *now;
-                block.fresh.push(moved || renewed.binary_search(env).is_ok());
+                let fresh = (due && *last != *now) || renewed.binary_search(env).is_ok();
+                if fresh {
+                    *last = *now;
+                }
+                block.fresh.push(fresh);
+            }
+            if !due && !block.fresh.contains(&true) {
+                return Ok(());
             }
         }
         self.copy(sim, &mut block.values)?;
@@ -280,7 +315,8 @@ impl Source {
                 if !sampler.channels().eq(self.stream.parts.iter().map(|part| part.name.as_str())) {
                     return Err(self.changed());
                 }
-                let all: Vec<ArrayView2<'_, f64>> = sampler.channels().map(|channel| sampler.values(channel)).collect();
+                let all: Vec<ArrayView2<'_, f64>> =
+                    sampler.channels().map(|channel| sampler.arrived(channel)).collect();
                 self.join(values, &all);
             }
             What::Points(uid) => {
@@ -372,18 +408,51 @@ macro_rules! number {
 
 number!(u8: U8, i32: I32, f32: F32, f64: F64);
 
-/// When a sensor measured what it shows, for all of its rows \[s\].
-fn stamps(sensor: &dyn Sensor, kind: &Kind) -> Vec<f64> {
-    let any: &dyn Any = sensor;
-    if let Some(camera) = any.downcast_ref::<Camera>() {
-        return camera.stamps().to_vec();
+/// When a sensor captured what is recorded of it, for all of its rows \[s\].
+struct Stamps {
+    /// Positions and velocities.
+    states: Vec<f64>,
+    /// Forces, efforts and accelerations.
+    forces: Vec<f64>,
+    /// What it shows, where that may be something else.
+    shown: Option<Vec<f64>>,
+}
+
+impl Stamps {
+    /// Those of what arrived last, or of what is shown.
+    fn of(sensor: &dyn Sensor, arrived: bool) -> Self {
+        let any: &dyn Any = sensor;
+        if let Some(camera) = any.downcast_ref::<Camera>() {
+            let states = camera.stamps().to_vec();
+            return Self { forces: states.clone(), states, shown: None };
+        }
+        let Some(sampled) = sensor.sampled() else {
+            return Self { states: Vec::new(), forces: Vec::new(), shown: None };
+        };
+        let (states, forces) = (sampled.arrived_stamps().to_vec(), sampled.arrived_force_stamps().to_vec());
+        let shown = (!arrived).then(|| sampled.stamps().to_vec());
+        Self { states, forces, shown }
     }
-    let stamps = |sampled: &dyn Sampled| match kind {
-        // Accelerations are those of the beginning of the step.
-        Kind::Imu => sampled.force_stamps().to_vec(),
-        _ => sampled.stamps().to_vec(),
-    };
-    sensor.sampled().map(stamps).unwrap_or_default()
+
+    /// Whether what arrived last is what the sensor shows.
+    fn is_shown(&self, row: usize) -> bool {
+        self.shown.as_ref().is_none_or(|shown| shown.get(row) == self.states.get(row))
+    }
+}
+
+/// Whether a sensor measures a channel at [`scene::SceneState::force_time`], as its documentation says.
+fn of_forces(sensor: &dyn Any, channel: &str) -> bool {
+    if let Some(engine) = sensor.downcast_ref::<MujocoSensor>() {
+        // All values are one channel: of both kinds, positions have the word.
+        return engine.sensors().iter().all(|sensor| sensor.solved);
+    }
+    match channel {
+        _ if sensor.is::<Imu>() || sensor.is::<JointWrench>() => true,
+        "efforts" => sensor.is::<JointState>(),
+        "forces" => sensor.is::<ActuatorState>(),
+        "pos_w" | "quat_w" => false,
+        _ => sensor.is::<ContactSensor>(),
+    }
 }
 
 /// The pictures that a sensor draws.

@@ -20,6 +20,11 @@ impl Stream {
     pub fn width(&self) -> usize {
         self.parts.iter().map(Part::width).sum()
     }
+
+    /// Whether its parts are of two instants: see [`Part::of_forces`].
+    pub(crate) fn is_mixed(&self) -> bool {
+        self.parts.iter().any(|part| part.of_forces) && !self.parts.iter().all(|part| part.of_forces)
+    }
 }
 
 /// One quantity of a stream.
@@ -29,11 +34,14 @@ pub struct Part {
     pub name: String,
     /// Its shape in one environment.
     pub shape: Vec<usize>,
+    /// Whether a sensor measures it at [`scene::SceneState::force_time`]: forces, efforts and accelerations, which the engine
+    /// solves for at the beginning of the step that leads to positions and velocities.
+    pub of_forces: bool,
 }
 
 impl Part {
     pub(crate) fn new(name: &str, shape: impl Into<Vec<usize>>) -> Self {
-        Self { name: name.into(), shape: shape.into() }
+        Self { name: name.into(), shape: shape.into(), of_forces: false }
     }
 
     /// How many numbers it has in one environment.

@@ -23,14 +23,15 @@ pub(crate) trait Sink: Send {
     /// Makes the file whole and gives it its name; returns its size \[bytes\].
     fn finish(&mut self, streams: &[Stream]) -> io::Result<u64>;
 
-    /// After an error: takes away what nobody can read, and says where the rest is.
-    fn give_up(&mut self) -> Option<PathBuf>;
+    /// After an error: where what was written can be read. What nobody can read is taken away with the sink.
+    fn kept(&self) -> Option<PathBuf>;
 }
 
 /// Why a file was not finished, and where what can be read of it is.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    pub(crate) error: io::Error,
+    /// `None` where the recorder broke it off.
+    pub(crate) error: Option<io::Error>,
     pub(crate) kept: Option<PathBuf>,
 }
 
@@ -79,8 +80,12 @@ pub(crate) fn run(
     }
     // The recorder too may have found that the file cannot become what was asked for.
     if result.is_ok() && failed.load(Ordering::Relaxed) {
-        result = Err(io::Error::other("the recording was broken off"));
+        // What is there can be read as far as it goes.
+        result = sink.flush();
+        if result.is_ok() {
+            return Err(Failure { error: None, kept: sink.kept() });
+        }
     }
     let size = result.and_then(|()| sink.finish(streams));
-    size.map_err(|error| Failure { error, kept: sink.give_up() })
+    size.map_err(|error| Failure { error: Some(error), kept: sink.kept() })
 }

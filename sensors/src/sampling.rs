@@ -97,6 +97,8 @@ pub struct Sampler {
     force_stamps: Array1<f64>,
     /// Both stamps of past measurements.
     stamp_history: History<f64>,
+    /// Both stamps of the measurement that arrived last, with a latency.
+    arrived: History<f64>,
     counts: Array1<u64>,
     /// Step at which the current value was last refreshed: what was captured before does not replace it.
     refreshed: Vec<u64>,
@@ -112,6 +114,8 @@ struct Quantity {
     name: &'static str,
     now: Array2<f64>,
     history: History<f64>,
+    /// The measurement that arrived last, with a latency; without one, that is what is shown.
+    arrived: History<f64>,
 }
 
 /// Stamps stand before the channels of a row.
@@ -141,7 +145,8 @@ impl Sampler {
         let n = context.num_envs;
         let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
-        let rows = Queues::capacity(latency, period).saturating_add(cfg.history_length);
+        let late = usize::from(latency > 0);
+        let rows = Queues::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
         let numbers = rows.saturating_mul(n).saturating_mul(width);
         if numbers > MAX_NUMBERS {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });
@@ -150,6 +155,7 @@ impl Sampler {
             name: channel.name,
             now: Array2::zeros((n, channel.width)),
             history: History::new(n, cfg.history_length, channel.width),
+            arrived: History::new(n, late, channel.width),
         };
         Ok(Self {
             expected: Expected::new(sensor, requires, context),
@@ -159,6 +165,7 @@ impl Sampler {
             stamps: Array1::zeros(n),
             force_stamps: Array1::zeros(n),
             stamp_history: History::new(n, cfg.history_length, STAMPS),
+            arrived: History::new(n, late, STAMPS),
             counts: Array1::zeros(n),
             refreshed: vec![0; n],
             noise,
@@ -238,7 +245,11 @@ impl Sampler {
             self.phases.reset(env, state.step[env]);
             self.counts[env] = 0;
             self.stamp_history.reset(env);
-            self.quantities.iter_mut().for_each(|q| q.history.reset(env));
+            self.arrived.reset(env);
+            for quantity in &mut self.quantities {
+                quantity.history.reset(env);
+                quantity.arrived.reset(env);
+            }
             if let Some(delay) = &mut self.delay {
                 delay.clear(env);
             }
@@ -271,6 +282,10 @@ impl Sampler {
                 noise.disturb(env, &mut self.row[STAMPS..]);
             }
             self.show(env);
+            // Before the first one arrives, it is what a reset shows.
+            if self.arrived.filled(env) == 0 {
+                self.arrive(env);
+            }
         }
         Ok(())
     }
@@ -293,6 +308,18 @@ impl Sampler {
             values = rest;
         }
         self.counts[env] += 1;
+        self.arrive(env);
+    }
+
+    /// Makes the row the measurement that arrived last.
+    fn arrive(&mut self, env: usize) {
+        let (stamps, mut values) = self.row.split_at(STAMPS);
+        self.arrived.push(env, stamps);
+        for quantity in &mut self.quantities {
+            let (mine, rest) = values.split_at(quantity.now.ncols());
+            quantity.arrived.push(env, mine);
+            values = rest;
+        }
     }
 
     /// Makes the row the current values.
@@ -367,6 +394,30 @@ impl Sampler {
         self.quantity(channel).now.view()
     }
 
+    /// Values of the measurement of a channel that arrived last, shape \[num_envs, width\]; before the first one, those of the
+    /// reset. They are the current [`values`](Self::values), except with a latency after somebody wrote to the state: what
+    /// was on its way then arrives, and does not replace them.
+    ///
+    /// # Panics
+    ///
+    /// If the sampler was built without the channel.
+    #[track_caller]
+    pub fn arrived(&self, channel: &str) -> ArrayView2<'_, f64> {
+        let quantity = self.quantity(channel);
+        if self.arrived.length() == 0 {
+            quantity.now.view()
+        } else {
+            quantity.arrived.view().index_axis_move(Axis(1), 0)
+        }
+    }
+
+    fn stamps_arrived(&self, which: usize) -> ArrayView1<'_, f64> {
+        if self.arrived.length() == 0 {
+            return [&self.stamps, &self.force_stamps][which].view();
+        }
+        self.arrived.view().index_axis_move(Axis(2), which).index_axis_move(Axis(1), 0)
+    }
+
     /// Current values of a channel in one environment.
     #[track_caller]
     pub(crate) fn row(&self, channel: &str, env: usize) -> &[f64] {
@@ -435,6 +486,16 @@ pub trait Sampled {
     /// [`SceneState::force_time`].
     fn force_stamps(&self) -> ArrayView1<'_, f64> {
         self.sampler().force_stamps.view()
+    }
+
+    /// [`stamps`](Self::stamps) of what [`Sampler::arrived`] gives.
+    fn arrived_stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().stamps_arrived(0)
+    }
+
+    /// [`force_stamps`](Self::force_stamps) of what [`Sampler::arrived`] gives.
+    fn arrived_force_stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().stamps_arrived(1)
     }
 
     /// Times of past measurements \[s\], newest first, shape \[num_envs, history_length\]; 0 where not filled yet.

@@ -28,6 +28,13 @@ pub(crate) struct Contents {
     pub(crate) apart: Vec<[String; 2]>,
 }
 
+/// Checks that a name can be a part of others, in MJCF and in files: of folders too, and of the frames of recordings.
+pub(crate) fn check_usable(uid: &str) -> Result<()> {
+    let forbidden = |c: char| c == '/' || c == '\\' || c.is_control();
+    let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(forbidden) && uid != "." && uid != "..";
+    if usable { Ok(()) } else { Err(Error::InvalidUid(uid.into())) }
+}
+
 /// Mask id of the ground; links, objects and terrains come after it.
 pub(crate) const GROUND_MASK_ID: i32 = 1;
 
@@ -42,8 +49,7 @@ impl Contents {
         if taken.any(|other| other == uid) {
             return Err(Error::DuplicateUid(uid.into()));
         }
-        let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(|c| c == '/' || c.is_control());
-        if usable { Ok(()) } else { Err(Error::InvalidUid(uid.into())) }
+        check_usable(uid)
     }
 
     /// The first mask id that is not used: ids stay what they are when more is added.

@@ -191,8 +191,10 @@ pub enum Error {
         "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (for objects and terrains, \"world\" and \"ground\" are taken)"
     )]
     DuplicateUid(String),
-    /// A name that cannot be written to MJCF.
-    #[error("the uid {0:?} is not usable: it must have 1 to 64 characters and no slash or control character")]
+    /// A name that cannot be written to MJCF, or be a part of the names of files.
+    #[error(
+        "the uid {0:?} is not usable: it must have 1 to 64 characters, no slash, backslash or control character, and not be a dot or two"
+    )]
     InvalidUid(String),
     /// The environments together are too much to draw.
     #[error("the overview cannot be drawn: {0}; choose fewer environments")]

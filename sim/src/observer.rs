@@ -31,7 +31,7 @@ pub enum Moment {
         env_ids: Vec<EnvId>,
     },
     /// Somebody wrote to the state of environments since the last step: joints, poses, welds, properties that were drawn, a
-    /// snapshot. Told once, right before the next step.
+    /// snapshot. Told once, right before the next step, or before an observer comes or goes.
     Written {
         /// Which, in ascending order.
         env_ids: Vec<EnvId>,
@@ -93,7 +93,7 @@ impl SimulationManager {
         ObserverId { manager: self.serial, number, observer: PhantomData }
     }
 
-    /// Takes an observer away and gives it back.
+    /// Takes an observer away and gives it back. It is told of what was written before.
     ///
     /// # Errors
     /// It was taken away before, or is the one that is being told right now.
@@ -102,6 +102,8 @@ impl SimulationManager {
     /// The handle is of another manager.
     #[track_caller]
     pub fn remove_observer<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
+        self.seat_of(id)?;
+        self.tell_written();
         let index = self.seat_of(id)?;
         let seat = self.observers.seats.remove(index);
         let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);

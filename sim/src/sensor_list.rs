@@ -2,6 +2,7 @@
 
 use crate::capture::{Capture, link_pose};
 use crate::compile::Simulation;
+use crate::contents::check_usable;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
@@ -108,6 +109,7 @@ impl SensorList {
         if self.entries.iter().any(|e| e.uid == uid) {
             return Err(Error::DuplicateUid(uid.into()));
         }
+        check_usable(uid)?;
         let missing = requires.without(gather::AVAILABLE);
         if missing.is_empty() {
             Ok(())

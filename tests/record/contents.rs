@@ -18,6 +18,7 @@ fn messages_say_what_the_simulation_says_when_it_says_it() {
     let mut world = World::new(2, 2);
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     let (mut states, mut targets, mut poses, mut imu, mut depths) = (vec![], vec![], vec![], vec![], vec![]);
+    let mut joint_stamps = vec![];
     let read = |world: &World, states: &mut Vec<_>, targets: &mut Vec<_>, poses: &mut Vec<_>| {
         let robot = world.sim.robot(world.arm);
         states.push((world.sim.time()[1], robot.get_qpos(), robot.get_qvel(), robot.get_qf()));
@@ -28,6 +29,8 @@ fn messages_say_what_the_simulation_says_when_it_says_it() {
     for step in 0..STEPS {
         world.step(step);
         read(&world, &mut states, &mut targets, &mut poses);
+        let joints = world.sim.sensor(world.joints).unwrap();
+        joint_stamps.push((nanos(joints.stamps()[1]), nanos(joints.effort_stamps()[1])));
         if (step + 1) % IMU_EVERY == 0 {
             let seen = world.sim.sensor(world.imu).unwrap();
             imu.push((seen.force_stamps()[1], seen.lin_acc_b().row(1).to_vec()));
@@ -76,7 +79,11 @@ fn messages_say_what_the_simulation_says_when_it_says_it() {
     for (topic, count) in [("color", depths.len()), ("mask", depths.len()), ("camera_info", depths.len())] {
         assert_eq!(of(&all, &format!("/env_0/camera/{topic}")).len(), count, "{topic}");
     }
-    assert_eq!(of(&all, "/env_0/joints/positions").len(), STEPS as usize);
+    let times = |topic: &str| of(&all, topic).iter().map(|message| message.time).collect::<Vec<_>>();
+    let (positions, efforts): (Vec<_>, Vec<_>) = joint_stamps.into_iter().unzip();
+    // Efforts are those of the beginning of the step.
+    assert!(positions.iter().zip(&efforts).all(|(position, effort)| effort < position));
+    assert_eq!((times("/env_1/joints/positions"), times("/env_1/joints/efforts")), (positions, efforts));
 }
 
 fn run(threads: usize, path: &std::path::Path) -> Vec<Message> {
@@ -114,7 +121,12 @@ fn a_recorder_changes_no_number() {
             assert_eq!(recorded.packets, u64::from(STEPS) + 1);
         }
         let robot = world.sim.robot(world.arm);
-        (robot.get_qpos(), robot.get_qvel(), world.sim.rigid_object(world.cube).get_pose())
+        let physics = (robot.get_qpos(), robot.get_qvel(), world.sim.rigid_object(world.cube).get_pose());
+        let (imu, joints) = (world.sim.sensor(world.imu).unwrap(), world.sim.sensor(world.joints).unwrap());
+        let numbers = (imu.lin_acc_b().to_owned(), imu.sample_counts().to_owned(), joints.efforts().to_owned());
+        let camera = world.sim.sensor(world.camera).unwrap();
+        let pictures = (camera.color().unwrap().to_owned(), camera.depth().unwrap().to_owned());
+        (physics, numbers, pictures)
     });
     assert_eq!(recorded, alone);
 }
@@ -150,6 +162,8 @@ fn topics_environments_and_rates_are_chosen() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut world = World::new(3, 1);
+    world.sim.update(3);
+    let start = nanos(world.sim.time()[2]);
     let cfg = RecorderCfg {
         envs: Some(vec![EnvId(2)]),
         every: 4,
@@ -162,6 +176,7 @@ fn topics_environments_and_rates_are_chosen() {
     let all = messages(&path);
     let mut counts = std::collections::BTreeMap::new();
     all.iter().for_each(|message| *counts.entry(message.topic.as_str()).or_insert(0) += 1);
+    assert_eq!(of(&all, "/tf_static")[0].time, start, "known from the beginning, and no earlier");
     // Every fourth step from 0 to 20; nothing happened to the environment.
     let expected = [("/env_2/arm/targets", 6), ("/env_2/camera/color", 4), ("/tf_static", 1)];
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);

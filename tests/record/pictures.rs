@@ -56,6 +56,43 @@ fn a_folder_has_every_picture_to_the_last_bit_and_depth_to_the_millimetre() {
 }
 
 #[test]
+fn a_folder_is_whole_when_it_has_its_name_and_nothing_old_is_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pictures");
+    let part = folder.path().join("pictures.part");
+    let (was, ..) = recorded(RecorderCfg::new(&path));
+    // Masks are asked for with the rest of the camera, and have no place.
+    let mut world = World::new(2, 1);
+    let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
+    let error = world.sim.record(cfg.clone()).unwrap_err();
+    assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+    let recorder = world.sim.record(RecorderCfg { overwrite: true, ..cfg.clone() }).unwrap();
+    assert!(matches!(world.sim.record(RecorderCfg { overwrite: true, ..cfg }), Err(RecordError::Busy { .. })));
+    (0..PICTURE_EVERY).for_each(|step| world.step(step));
+    world.sim.observer_mut(recorder).unwrap().catch_up();
+    assert!(path.join("camera/color/env_0/000003.png").exists() && part.join("camera/color/env_0/000000.png").exists());
+    let time = world.sim.time()[1];
+    let recorded = world.sim.finish_recording(recorder).unwrap();
+    assert!(was.left_out.is_empty() && recorded.left_out.iter().any(|what| what.contains("camera/mask")), "{recorded}");
+    assert!(
+        !part.exists() && !path.join("camera/color/env_0/000001.png").exists(),
+        "one picture, none of the four before"
+    );
+    let times = std::fs::read_to_string(path.join("times.csv")).unwrap();
+    let lines: Vec<&str> = times.lines().collect();
+    assert_eq!((lines.len(), lines[0]), (5, "picture,step,time,recorded_time"));
+    let line = format!("\"camera/color/env_1/000000.png\",{PICTURE_EVERY},{time},{time}");
+    assert!(lines.contains(&line.as_str()), "{times}");
+    // A folder that is no recorder's is not replaced, whatever is allowed.
+    let mine = folder.path().join("mine");
+    std::fs::create_dir(&mine).unwrap();
+    std::fs::write(mine.join("one"), "precious").unwrap();
+    let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&mine) };
+    assert!(matches!(world.sim.record(cfg), Err(RecordError::Exists { .. })));
+    assert!(mine.join("one").exists());
+}
+
+#[test]
 fn an_animation_has_every_frame_at_its_time() {
     use image::AnimationDecoder;
     let folder = tempfile::tempdir().unwrap();

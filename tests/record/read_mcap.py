@@ -36,6 +36,11 @@ def bits(value):
     return value
 
 
+def weighed(numbers):
+    """The sum of numbers, each by its place."""
+    return sum(k * int(x) for k, x in enumerate(numbers, 1))
+
+
 def pose(frame, parent):
     transform = transforms[frame]
     assert transform.header.frame_id == parent, transform.header.frame_id
@@ -53,7 +58,7 @@ assert (depth.encoding, mask.encoding, depth.step) == ("32FC1", "32SC1", 4 * dep
 numbers = struct.unpack(f"<{depth.width * depth.height}f", bytes(depth.data))
 finite = [x for x in numbers if x != float("inf")]
 color = last["/env_1/camera/color"][1]
-assert color.format == "png" and color.header.frame_id == "env_1/camera"
+assert color.format == "png" and color.header.frame_id == "env_1/sensors/camera"
 picture = Image.open(io.BytesIO(bytes(color.data)))
 assert picture.mode == "RGB" and picture.size == (depth.width, depth.height)
 info = last["/env_1/camera/camera_info"][1]
@@ -74,13 +79,13 @@ print(
             "acceleration": [imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z],
             "orientation": [imu.orientation.w, imu.orientation.x, imu.orientation.y, imu.orientation.z],
             "intrinsics": list(info.k),
-            "camera": pose("env_1/camera", "env_1"),
+            "camera": pose("env_1/sensors/camera", "env_1"),
             "nanoseconds": last["/env_1/arm/joint_states"][0].log_time,
             "depth_shape": [depth.height, depth.width],
             "depth_finite": len(finite),
             "depth_range": [min(finite), max(finite)],
-            "mask_sum": sum(struct.unpack(f"<{mask.width * mask.height}i", bytes(mask.data))),
-            "color_sum": sum(picture.tobytes()),
+            "mask_sum": weighed(struct.unpack(f"<{mask.width * mask.height}i", bytes(mask.data))),
+            "color_sum": weighed(picture.tobytes()),
             "rows": counts["/env_1/arm/joint_states"],
             "pictures": counts["/env_1/camera/color"],
         })

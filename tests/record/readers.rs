@@ -67,9 +67,9 @@ fn recorded(path: &Path) -> serde_json::Value {
         "depth_shape": depth.shape(),
         "depth_finite": depth.iter().filter(|x| x.is_finite()).count(),
         "depth_range": range,
-        "mask_sum": mask.iter().map(|x| i64::from(*x)).sum::<i64>(),
-        // Without the opacity.
-        "color_sum": color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).map(u64::from).sum::<u64>(),
+        "mask_sum": mask.iter().zip(1..).map(|(x, k)| i64::from(*x) * k).sum::<i64>(),
+        // Without the opacity; each number by its place, so that none may stand for another.
+        "color_sum": color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).zip(1..).map(|(x, k)| u64::from(x) * k).sum::<u64>(),
         "rows": STEPS + 1,
         "pictures": STEPS / PICTURE_EVERY,
     });

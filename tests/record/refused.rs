@@ -90,6 +90,30 @@ fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
 }
 
 #[test]
+fn sensors_have_names_that_stay_in_the_folder() {
+    for uid in ["/tmp/x", "../x", "..", "a\\b", ""] {
+        let error = World::new(1, 1).sim.add_sensor(uid, JointStateCfg::default()).unwrap_err();
+        assert!(error.to_string().contains("not usable"), "{error}");
+    }
+}
+
+#[test]
+fn archives_that_were_killed_are_in_nobodys_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    // Before its end, there is nothing in it.
+    fs::write(folder.path().join("run.npz.part"), "").unwrap();
+    let mut world = World::new(1, 1);
+    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+    // Two recorders, one file.
+    let error = world.sim.record(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) }).unwrap_err();
+    assert!(matches!(error, RecordError::Busy { .. }), "{error}");
+    world.step(0);
+    world.sim.finish_recording(recorder).unwrap();
+    assert!(path.exists());
+}
+
+#[test]
 fn what_is_recorded_must_stay_what_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.npz");
@@ -106,5 +130,6 @@ fn what_is_recorded_must_stay_what_it_is() {
     world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
     world.step(2);
     let error = world.sim.finish_recording(recorder).unwrap_err();
-    assert!(matches!(&error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+    let RecordError::BrokenOff { error, kept: None, .. } = error else { panic!("{error}") };
+    assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
 }

@@ -9,13 +9,14 @@ use std::path::Path;
 pub(crate) const PICTURE_EVERY: u32 = 5;
 pub(crate) const IMU_EVERY: u32 = 2;
 
-/// An arm that moves, a cube, a camera, an IMU, a ray caster and contact forces.
+/// An arm that moves, a cube, a camera, an IMU and a sensor of joints.
 pub(crate) struct World {
     pub(crate) sim: SimulationManager,
     pub(crate) arm: RobotId,
     pub(crate) cube: ObjectId,
     pub(crate) camera: SensorId<Camera>,
     pub(crate) imu: SensorId<Imu>,
+    pub(crate) joints: SensorId<JointState>,
 }
 
 impl World {
@@ -44,8 +45,8 @@ impl World {
             .unwrap();
         let sampling = SamplingCfg::every(f64::from(IMU_EVERY) * dt);
         let imu = sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("cube") }).unwrap();
-        sim.add_sensor("joints", JointStateCfg::default()).unwrap();
-        Self { sim, arm, cube, camera, imu }
+        let joints = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+        Self { sim, arm, cube, camera, imu, joints }
     }
 
     /// Targets that change at every step, otherwise in each environment.

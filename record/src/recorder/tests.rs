@@ -1,6 +1,13 @@
 use super::*;
 use crate::file::tests::FullDisk;
+use crate::mcap_file::recover;
+use crate::npy;
 use crate::packet::Values;
+use crate::zip;
+use scene::SceneState;
+use sensors::{
+    Channel, ImuCfg, Requires, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
+};
 use sim::{MjcfCfg, SimulationManagerCfg};
 use std::path::Path;
 use std::sync::Mutex;
@@ -38,7 +45,7 @@ impl Sink for Slow {
         Ok(0)
     }
 
-    fn give_up(&mut self) -> Option<PathBuf> {
+    fn kept(&self) -> Option<PathBuf> {
         None
     }
 }
@@ -99,4 +106,279 @@ fn a_full_disk_is_an_error_and_nothing_half_looks_whole() {
         record_to_a_full_disk(&mut falling(2), &path, usize::MAX).unwrap();
         assert!(path.exists());
     }
+}
+
+/// A sensor that says which channels it has for some measurements only.
+#[derive(Clone, Copy)]
+struct FlakyCfg {
+    channel: &'static str,
+    good_for: u64,
+}
+
+#[derive(Debug)]
+struct Flaky {
+    sampler: Sampler,
+    good_for: u64,
+}
+
+impl SensorCfg for FlakyCfg {
+    type Sensor = Flaky;
+
+    fn requires(&self) -> Requires {
+        Requires::NONE
+    }
+
+    fn build(&self, context: &SensorContext) -> std::result::Result<Flaky, SensorError> {
+        let channels = [Channel::new(self.channel, 1)];
+        let sampler = Sampler::new("flaky", self.requires(), context, &SamplingCfg::default(), &channels)?;
+        Ok(Flaky { sampler, good_for: self.good_for })
+    }
+}
+
+impl Sensor for Flaky {
+    fn update(&mut self, state: &SceneState) -> std::result::Result<(), SensorError> {
+        self.sampler.update(state, |_, _| ())
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> std::result::Result<(), SensorError> {
+        self.sampler.reset(env_ids, state, |_, _| ())
+    }
+
+    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> std::result::Result<(), SensorError> {
+        self.sampler.refresh(env_ids, state, |_, _| ())
+    }
+
+    fn sampled(&self) -> Option<&dyn Sampled> {
+        (self.sample_counts()[0] <= self.good_for).then_some(self as &dyn Sampled)
+    }
+}
+
+impl Sampled for Flaky {
+    fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+}
+
+#[test]
+fn after_an_error_nobody_waits_for_ever_and_what_was_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(1);
+    sim.add_sensor("flaky", FlakyCfg { channel: "a", good_for: 5 }).unwrap();
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(5);
+    assert!(!sim.observer(recorder).unwrap().has_failed());
+    sim.update(5);
+    let observer = sim.observer_mut(recorder).unwrap();
+    assert!(observer.has_failed());
+    // This returns.
+    observer.catch_up();
+    let error = sim.finish_recording(recorder).unwrap_err();
+    let RecordError::BrokenOff { error, also, kept } = error else { panic!("{error}") };
+    assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "flaky"), "{error}");
+    assert!(also.is_none() && !path.exists());
+    assert_eq!(kept, Some(part_of(&path)));
+    // Six rows of the ball with three quantities, five of the sensor, the place of the environment.
+    assert_eq!(recover(&path).unwrap().messages, 24);
+}
+
+#[test]
+fn only_what_is_finished_has_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, stays) in [("run.mcap", true), ("run.npz", false)] {
+        let path = folder.path().join(name);
+        let mut sim = falling(1);
+        sim.record(RecorderCfg::new(&path)).unwrap();
+        sim.update(5);
+        drop(sim);
+        assert!(!path.exists(), "{name}");
+        assert_eq!(part_of(&path).exists(), stays, "{name}");
+    }
+    assert_eq!(recover(folder.path().join("run.mcap")).unwrap().messages, 19);
+}
+
+/// Panics at the third packet.
+struct Panics(u32);
+
+impl Sink for Panics {
+    fn write(&mut self, _streams: &[Stream], _packet: &Packet) -> std::io::Result<()> {
+        self.0 += 1;
+        assert!(self.0 < 3, "a test of panics");
+        Ok(())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+
+    fn finish(&mut self, _streams: &[Stream]) -> std::io::Result<u64> {
+        Ok(0)
+    }
+
+    fn kept(&self) -> Option<PathBuf> {
+        None
+    }
+}
+
+#[test]
+fn a_thread_that_panics_is_noticed() {
+    let mut sim = falling(1);
+    let cfg = RecorderCfg { packets: 2, ..RecorderCfg::new("nowhere.mcap") };
+    let (sources, left_out) = resolve(&sim, &cfg, Format::Mcap).unwrap();
+    let recorder = Recorder::begin(&sim, cfg, sources, left_out, Box::new(Panics(0))).unwrap();
+    let recorder = sim.add_observer(recorder);
+    sim.update(20);
+    sim.observer_mut(recorder).unwrap().catch_up();
+    let error = sim.finish_recording(recorder).unwrap_err().to_string();
+    assert!(error.contains("panicked"), "{error}");
+}
+
+/// An array of an archive.
+fn array(path: &Path, name: &str) -> Vec<f64> {
+    let bytes = std::fs::read(path).unwrap();
+    let members = zip::parse(&bytes).unwrap();
+    let (_, data) = members.iter().find(|(known, _)| *known == format!("{name}.npy")).unwrap();
+    let (descr, _, data) = npy::parse(data).unwrap();
+    assert_eq!(descr, "<f8");
+    data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+#[test]
+fn a_late_sensor_is_recorded_as_it_measured_whatever_is_shown_meanwhile() {
+    const LATENCY: usize = 4;
+    const STEPS: usize = 20;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = falling(1);
+    let late = SamplingCfg { latency_steps: LATENCY as u32, ..SamplingCfg::default() };
+    sim.add_sensor("late", ImuCfg { sampling: late, ..ImuCfg::on("ball/ball") }).unwrap();
+    sim.add_sensor("prompt", ImuCfg::on("ball/ball")).unwrap();
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(6);
+    let ball = sim.mjcf_id("ball").unwrap();
+    sim.mjcf_part_mut(ball).write_qpos(&ndarray::array![[0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
+    sim.update((STEPS - 6) as u32);
+    sim.finish_recording(recorder).unwrap();
+    // The judge is a sensor that is not late: every row of the late one is one of its rows, once and in order.
+    for (channel, width) in [("time", 1), ("pos_w", 3), ("lin_vel_b", 3)] {
+        let [late, prompt] = ["late", "prompt"].map(|sensor| array(&path, &format!("{sensor}/{channel}")));
+        assert_eq!(prompt.len(), STEPS * width, "{channel}");
+        assert_eq!(late, prompt[..(STEPS - LATENCY) * width], "{channel}");
+    }
+    let heights: Vec<f64> = array(&path, "late/pos_w").chunks(3).map(|p| p[2]).collect();
+    assert!(heights[5] < 1.5 && heights[6] > 8.0, "what was on its way, then what was written: {heights:?}");
+    let steps = array(&path, "late/step");
+    assert!(steps.iter().copied().eq((LATENCY..STEPS).map(|step| (step + 1) as f64)), "{steps:?}");
+}
+
+#[test]
+fn an_event_is_a_row_of_its_environment_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(2);
+    let dt = sim.cfg().physics_dt;
+    let recorder = sim.record(RecorderCfg { every: 10, ..RecorderCfg::new(&path) }).unwrap();
+    sim.update(5);
+    sim.reset(Some(&[EnvId(1)])).unwrap();
+    sim.update(15);
+    sim.finish_recording(recorder).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let steps = |env: usize| -> Vec<u64> {
+        let topic = format!("/env_{env}/ball/state/positions");
+        let all = mcap::MessageStream::new(&bytes).unwrap().map(std::result::Result::unwrap);
+        let of_topic = all.filter(|message| message.channel.topic == topic);
+        of_topic.map(|message| (message.log_time as f64 / 1e9 / dt).round() as u64).collect()
+    };
+    assert_eq!((steps(0), steps(1)), (vec![0, 10, 20], vec![0, 5, 10, 20]));
+}
+
+#[test]
+fn what_is_written_after_the_last_step_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = falling(1);
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(3);
+    let ball = sim.mjcf_id("ball").unwrap();
+    sim.mjcf_part_mut(ball).write_qpos(&ndarray::array![[0.0, 0.0, 7.0, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
+    sim.finish_recording(recorder).unwrap();
+    let heights: Vec<f64> = array(&path, "ball/state/positions").chunks(7).map(|q| q[2]).collect();
+    assert_eq!((heights.len(), heights[4]), (5, 7.0), "{heights:?}");
+    assert_eq!(array(&path, "events/step"), [3.0]);
+}
+
+#[test]
+fn absurd_numbers_are_errors_or_mean_what_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = falling(1);
+    let error = sim.record(RecorderCfg { packets: usize::MAX, ..RecorderCfg::new(&path) }).unwrap_err();
+    assert!(matches!(error, RecordError::TooLarge { packets: usize::MAX, .. }), "{error}");
+    let recorder = sim.record(RecorderCfg { every: u64::MAX, ..RecorderCfg::new(&path) }).unwrap();
+    sim.update(5);
+    assert_eq!(sim.finish_recording(recorder).unwrap().packets, 1);
+    assert_eq!(array(&path, "ball/state/step"), [0.0]);
+}
+
+#[test]
+fn two_arrays_of_one_name_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (channel, taken) in [("time", true), ("step", true), ("times", false)] {
+        let mut sim = falling(1);
+        sim.add_sensor("own", FlakyCfg { channel, good_for: u64::MAX }).unwrap();
+        let result = sim.record(RecorderCfg::new(folder.path().join(format!("{channel}.npz"))));
+        let refused = matches!(&result, Err(RecordError::SameName { name, .. }) if *name == format!("own/{channel}"));
+        assert_eq!((refused, result.is_err()), (taken, taken), "{result:?}");
+    }
+}
+
+/// Where the chunks of an MCAP file are: records are a byte of their kind, eight of their length, and their data.
+fn chunks(file: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let (mut at, mut chunks) = (mcap::MAGIC.len(), Vec::new());
+    while let Some((kind, rest)) = file[at..].split_first().filter(|(_, rest)| rest.len() >= 8) {
+        let end = at + 9 + u64::from_le_bytes(*rest.first_chunk().unwrap()) as usize;
+        if *kind == mcap::records::op::CHUNK {
+            chunks.push(at..end);
+        }
+        if end >= file.len() {
+            break;
+        }
+        at = end;
+    }
+    chunks
+}
+
+#[test]
+fn damage_in_the_middle_is_told_and_the_rest_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(16);
+    sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(3000);
+    drop(sim);
+    let part = part_of(&path);
+    let whole = std::fs::read(&part).unwrap();
+    let chunks = chunks(&whole);
+    assert!(chunks.len() > 2, "{chunks:?}");
+    // The end is torn in the last chunk: no damage.
+    std::fs::write(&part, &whole[..chunks[chunks.len() - 1].end - 100]).unwrap();
+    let torn = recover(&path).unwrap();
+    assert!(torn.damage.is_none() && torn.messages > 0 && !part.exists(), "{torn:?}");
+    std::fs::remove_file(&path).unwrap();
+    // The second chunk is damaged: what is before is read, the file stays.
+    let mut damaged = whole.clone();
+    let middle = chunks[1].start.midpoint(chunks[1].end);
+    damaged[middle..middle + 64].iter_mut().for_each(|byte| *byte ^= 0x55);
+    std::fs::write(&part, &damaged).unwrap();
+    let recovered = recover(&path).unwrap();
+    assert!(recovered.damage.is_some() && recovered.messages > 0, "{recovered:?}");
+    assert!(recovered.messages < torn.messages, "{recovered:?} {torn:?}");
+    assert_eq!(std::fs::read(&part).unwrap(), damaged);
+    std::fs::remove_file(&path).unwrap();
+    // Not one whole message.
+    std::fs::write(&part, &whole[..200]).unwrap();
+    let error = recover(&path).unwrap_err().to_string();
+    assert!(error.contains("nothing of it can be read"), "{error}");
+    let left: Vec<PathBuf> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(left, [part]);
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::cfg::RecorderCfg;
 use crate::recorder::Record;
+use crate::topic::Topic;
 use sim::{LinkId, MjcfCfg, RobotCfg, SimulationManagerCfg, UrdfCfg, WrenchFrame};
 use std::fs::File;
 
@@ -117,6 +118,48 @@ fn a_changed_target_is_found_at_its_step() {
     // Row 17 is that of step 17: its target acted in that step.
     assert_eq!((difference.step, difference.env), (17, 0), "{difference:?}");
     assert!(difference.array.starts_with("arm/joint_states/"), "{difference:?}");
+}
+
+/// The same archive with one recorded step changed.
+fn with_another_step(path: &Path, row: usize, step: f64, to: &Path) {
+    let bytes = std::fs::read(path).unwrap();
+    let mut archive = zip::Archive::new(File::create(to).unwrap());
+    for (name, data) in zip::parse(&bytes).unwrap() {
+        let mut data = data.to_vec();
+        if name.ends_with("/step.npy") && !name.starts_with("events/") {
+            let at = data.len() - npy::parse(&data).unwrap().2.len() + 8 * row;
+            data[at..at + 8].copy_from_slice(&step.to_le_bytes());
+        }
+        archive.add(name, b"", &mut &data[..]).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+#[test]
+fn what_lacks_actions_or_steps_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("run.npz"), folder.path().join("other.npz"));
+    for (topics, words) in [
+        (vec![Topic::JointStates("arm".into()), Topic::MjcfState("pusher".into())], "no targets of arm"),
+        (vec![Topic::JointStates("arm".into()), Topic::Targets("arm".into())], "no controls of pusher"),
+    ] {
+        let mut sim = arms();
+        let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&path).with_topics(topics) };
+        let recorder = sim.record(cfg).unwrap();
+        sim.update(3);
+        sim.finish_recording(recorder).unwrap();
+        let error = verify(&mut arms(), &path).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    std::fs::remove_file(&path).unwrap();
+    recording(&path, |_, _| ());
+    for (row, step, words) in
+        [(0, 1.0, "step 0"), (5, f64::NAN, "every step"), (5, 9.0, "every step"), (5, 1.0, "every step")]
+    {
+        with_another_step(&path, row, step, &other);
+        let error = verify(&mut arms(), &other).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
 }
 
 #[test]

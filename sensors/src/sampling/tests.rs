@@ -71,6 +71,31 @@ fn a_late_measurement_is_read_exactly_latency_steps_after_its_capture() {
     }
 }
 
+/// What was on its way when somebody wrote to the state arrives one after the other, and is not what is shown.
+#[test]
+fn what_arrives_after_a_refresh_can_be_read_and_is_not_shown() {
+    let mut sampler = sampler(1, &SamplingCfg { latency_steps: 4, ..SamplingCfg::default() });
+    let start = state(&[0]);
+    sampler.reset(&[0], &start, tell(&start)).unwrap();
+    let read =
+        |sampler: &Sampler| (sampler.arrived("b")[(0, 1)], sampler.arrived_stamps()[0], sampler.values("b")[(0, 1)]);
+    for now in 1..=15 {
+        step(&mut sampler, &[now]);
+        if now == 6 {
+            let state = state(&[6]);
+            sampler.refresh(&[0], &state, |_, row| row.fill(100.0)).unwrap();
+        }
+        let captured = now.saturating_sub(4) as f64;
+        let shown = if (6..=10).contains(&now) { 100.0 } else { captured };
+        assert_eq!(read(&sampler), (captured, captured, shown), "step {now}");
+        assert_eq!(sampler.arrived_force_stamps()[0], captured - 0.5);
+    }
+    // Without a latency there is nothing on its way: both are the same.
+    let mut sampler = self::sampler(1, &SamplingCfg::default());
+    step(&mut sampler, &[3]);
+    assert_eq!(read(&sampler), (3.0, 3.0, 3.0));
+}
+
 /// An owner who only updates when something is due sees the same at every step.
 #[test]
 fn captures_and_arrivals_are_due() {
