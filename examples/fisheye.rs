@@ -153,7 +153,7 @@ fn is_called(name: &str, lens: &Lens) -> bool {
 fn examples() -> Vec<Lens> {
     vec![
         Lens::default(),
-        OpenCv { k1: -0.32, k2: 0.13, p1: 0.0005, p2: -0.0003, k3: -0.02, ..OpenCv::default() }.into(),
+        OpenCv { k1: -0.24, k2: 0.08, p1: 0.0005, p2: -0.0003, ..OpenCv::default() }.into(),
         OpenCvFisheye { k1: -0.01, k2: 0.006, k3: -0.004, k4: 0.0006, max_angle: Some(1.6) }.into(),
         Equidistant { max_angle: 1.7 }.into(),
         Equisolid { max_angle: 1.7 }.into(),

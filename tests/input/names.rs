@@ -142,10 +142,15 @@ fn uids_that_differ_in_case_share_nothing() {
 fn odd_uids_work() {
     let dir = tempfile::tempdir().unwrap();
     let mut sim = SimulationManager::new(cfg(1)).unwrap();
-    for uid in ["world", "ground", "a\"b<c>&'", "日本", " ", "..", "%s", "İ", "i̇", "robot"] {
+    for uid in ["world", "ground", "a\"b<c>&'", "日本", " ", "...", "%s", "İ", "i̇", "robot"] {
         let cfg = two_links(dir.path(), uid, "l", "m");
         let id = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
         assert_eq!(sim.robot_id(uid).unwrap(), id);
+    }
+    // Names become parts of paths, of files too.
+    for uid in [".", "..", "a/b", "a\\b", "a\nb", ""] {
+        let error = sim.add_robot(two_links(dir.path(), uid, "l", "m")).unwrap_err();
+        assert!(matches!(error, Error::InvalidUid(_)), "{uid:?}: {error}");
     }
     sim.update(2);
     export_of(&sim, &dir.path().join("out")).unwrap();
