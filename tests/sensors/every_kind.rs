@@ -3,6 +3,7 @@
 use crate::worlds::{cfg, cube};
 use kinetoscope::ndarray::{Array2, ArrayBase, Axis, Data, Dimension};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::ray::pattern::Grid;
 use std::collections::BTreeMap;
 
@@ -19,6 +20,7 @@ struct Ids {
     camera: SensorId<Camera>,
     rays: SensorId<RayCaster>,
     eye: SensorId<RayCasterCamera>,
+    pair: SensorId<StereoCamera>,
     contact: SensorId<ContactSensor>,
     imu: SensorId<Imu>,
     frames: SensorId<FrameTransformer>,
@@ -79,6 +81,21 @@ fn world(threads: usize, seed: u64, sampling: Sampling) -> (SimulationManager, I
         sampling: sampling("distances", 0.01),
         ..Default::default()
     };
+    let SamplingCfg { latency_steps, dropout, history_length, noise, .. } = sampling("depth", 0.01);
+    let one_eye = CameraCfg {
+        width: 64,
+        height: 48,
+        intrinsics: Intrinsics::Fovy { radians: 1.0 },
+        extrinsics: parent("m/tip"),
+        channels: Channels { color: true, depth: true, mask: true, ..Channels::NONE },
+        update_period: 0.01,
+        latency_steps,
+        dropout,
+        history_length,
+        noise,
+        ..Default::default()
+    };
+    let pair = StereoCameraCfg { camera: one_eye, left_to_right_pos: [0.05, 0.0, 0.0], ..Default::default() };
     let contact = ContactSensorCfg {
         filters: vec!["ground".into(), "box.*".into()],
         track_pose: true,
@@ -107,6 +124,7 @@ fn world(threads: usize, seed: u64, sampling: Sampling) -> (SimulationManager, I
         camera: sim.add_sensor("camera", camera).unwrap(),
         rays: sim.add_sensor("rays", rays).unwrap(),
         eye: sim.add_sensor("eye", eye).unwrap(),
+        pair: sim.add_sensor("pair", pair).unwrap(),
         contact: sim.add_sensor("contact", contact).unwrap(),
         imu: sim.add_sensor("imu", ImuCfg { sampling: sampling("lin_acc_b", 0.0), ..ImuCfg::on("box1") }).unwrap(),
         frames: sim.add_sensor("frames", frames).unwrap(),
@@ -151,6 +169,19 @@ fn pictures(camera: &Camera) -> Vec<u64> {
     all
 }
 
+/// What both eyes of a pair show and remember.
+fn both(pair: &StereoCamera) -> Vec<u64> {
+    let mut all = Vec::new();
+    for eye in [pair.left(), pair.right()] {
+        all.extend(bits(&eye.stamps()).chain(bits(&eye.stamp_history())));
+        all.extend(eye.color().unwrap().iter().map(|x| u64::from(*x)));
+        all.extend(eye.depth().unwrap().iter().map(|x| u64::from(x.to_bits())));
+        all.extend(eye.history::<Depth>().unwrap().iter().map(|x| u64::from(x.to_bits())));
+    }
+    all.extend(pair.disparity().unwrap().iter().map(|x| u64::from(x.to_bits())));
+    all
+}
+
 /// What is made of the numbers of a camera of rays: pictures in single precision.
 fn seen(eye: &RayCasterCamera) -> impl Iterator<Item = u64> {
     let depth = eye.depth().into_iter().chain(eye.distance()).map(|x| u64::from(x.to_bits())).collect::<Vec<_>>();
@@ -178,6 +209,8 @@ fn listen(sim: &SimulationManager, ids: &Ids, said: &mut Said) {
     add("ray_caster", sampled(rays).into_iter().chain(bits(&rays.hits())).collect());
     let eye = sim.sensor(ids.eye).unwrap();
     add("ray_caster_camera", sampled(eye).into_iter().chain(seen(eye)).collect());
+    let pair = sim.sensor(ids.pair).unwrap();
+    add("stereo_camera", both(pair));
     add("contact_sensor", sampled(sim.sensor(ids.contact).unwrap()));
     add("imu", sampled(sim.sensor(ids.imu).unwrap()));
     add("frame_transformer", sampled(sim.sensor(ids.frames).unwrap()));
