@@ -27,6 +27,7 @@ use crate::ros::{self, Cdr, Schema, Stamp};
 use crate::stream::{Element, Kind, Stream};
 use crate::writer::Sink;
 use mcap::records::MessageHeader;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use ndarray::Array2;
 use std::collections::BTreeMap;
@@ -297,6 +298,35 @@ impl Sink for McapFile {
     }
 }
 
+/// How many messages stand in whole and undamaged chunks at the beginning of a file, and what is wrong with the next chunk, if
+/// that is more than a torn end. Chunks are compared with their checksums before anything in them is believed: a length that is
+/// no length would be asked for as memory.
+fn sound_messages(bytes: &[u8]) -> (usize, Option<String>) {
+    let options = LinearReaderOptions::default()
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(bytes.len().max(LARGEST_CHUNK));
+    let (mut reader, mut rest, mut messages) = (LinearReader::new_with_options(options), bytes, 0);
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let (given, left) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(given.len())[..given.len()].copy_from_slice(given);
+                reader.notify_read(given.len());
+                rest = left;
+            }
+            Ok(LinearReadEvent::Record { opcode, .. }) => messages += usize::from(opcode == mcap::records::op::MESSAGE),
+            // Where the process was killed.
+            Err(McapError::UnexpectedEof) => break,
+            Err(error) => return (messages, Some(error.to_string())),
+        }
+    }
+    (messages, None)
+}
+
+/// Chunks are smaller by far, before they are compressed \[bytes\].
+const LARGEST_CHUNK: usize = 1 << 30;
+
 /// What was made of a recording that was killed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recovered {
@@ -331,20 +361,20 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     let (mut part, file) = PartFile::create_as(path, on_the_way, false)?;
     let failed = |error: McapError| RecordError::file(path, io_error(error));
     let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
+    let (sound, mut damage) = sound_messages(&bytes);
     let messages = mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into());
     let mut recovered = Recovered { messages: 0, damage: None };
-    for message in messages.map_err(|error| nothing(error.to_string()))? {
+    for message in messages.map_err(|error| nothing(error.to_string()))?.take(sound) {
         match message {
             Ok(message) => writer.write(&message).map_err(failed)?,
-            // Where the process was killed.
-            Err(McapError::UnexpectedEof) => break,
             Err(error) => {
-                recovered.damage = Some(error.to_string());
+                damage = Some(error.to_string());
                 break;
             }
         }
         recovered.messages += 1;
     }
+    recovered.damage = damage;
     if recovered.messages == 0 {
         return Err(nothing(recovered.damage.unwrap_or_else(|| "there is no whole message in it".into())));
     }
