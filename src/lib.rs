@@ -4,15 +4,18 @@
 pub mod assets;
 
 pub use ndarray;
+#[cfg(feature = "record")]
 pub use record;
 pub use scene;
 pub use sensors;
 pub use sim;
+#[cfg(feature = "view")]
 pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
     pub use crate::assets;
+    #[cfg(feature = "record")]
     pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use scene::Pose;
     pub use sensors::camera::{
@@ -37,5 +40,6 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
+    #[cfg(feature = "view")]
     pub use view::{OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError};
 }

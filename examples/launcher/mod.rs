@@ -8,28 +8,20 @@ pub(crate) mod motion;
 pub(crate) mod npy;
 pub(crate) mod panel;
 pub(crate) mod picture;
+mod recording;
 pub(crate) mod stage;
 pub(crate) mod trial;
+mod views;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::prelude::*;
-use kinetoscope::view::{Command, Speed, Viewer, Viewing, Wants};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
-
-/// Lets a simulation go on that somebody paused.
-static KEY: OnceLock<Viewer> = OnceLock::new();
-
-/// Ctrl+C ends an example also while somebody holds it, in a window or in a browser.
-fn keep_key(sim: &mut SimulationManager) {
-    // One is enough for both.
-    KEY.get_or_init(|| sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false }));
-}
 
 /// Errors end an example with a message and exit code 2.
 pub(crate) type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -186,34 +178,6 @@ impl Launcher {
         })
     }
 
-    /// Shows the simulation in browsers where `--serve` asks for it.
-    ///
-    /// # Errors
-    /// The address is none, or in use.
-    pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
-        let Some(address) = &self.serve else { return Ok(()) };
-        let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
-        let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
-        println!("Open {} in a browser", served.url());
-        keep_key(sim);
-        Ok(())
-    }
-
-    /// Opens a window onto the simulation, unless `--headless` says otherwise. Where there is no display, that is said, and
-    /// the example goes on without.
-    pub(crate) fn open_window(&self, sim: &mut SimulationManager) {
-        if self.headless {
-            return;
-        }
-        match sim.open_window() {
-            Ok(_) => {
-                println!("A window is open, in real time: H in it shows the keys.");
-                keep_key(sim);
-            }
-            Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
-        }
-    }
-
     /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.
     ///
     /// # Errors
@@ -225,16 +189,6 @@ impl Launcher {
         }
         println!("Pipeline stages written to {}", dir.display());
         Ok(())
-    }
-
-    /// Begins to record to the file of `--record`.
-    ///
-    /// # Errors
-    /// The file cannot be written, or has no place for anything of this example.
-    pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-        let record = |path: &PathBuf| sim.record(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) });
-        let recorder = self.record.as_ref().map(record).transpose().map_err(|error| format!("--record {error}"))?;
-        Ok(Recording { recorder })
     }
 
     /// The folder of `--out`, else the one that the example runs in; made where it is `wanted`.
@@ -258,26 +212,6 @@ impl Launcher {
         let text = serde_json::to_string_pretty(report)? + "\n";
         std::fs::write(path, text).map_err(|e| format!("--report {}: {e}", path.display()))?;
         println!("Report written to {}", path.display());
-        Ok(())
-    }
-}
-
-/// What `--record` has begun, if anything.
-#[derive(Debug)]
-pub(crate) struct Recording {
-    recorder: Option<RecorderId>,
-}
-
-impl Recording {
-    /// Ends the recording: the file is whole.
-    ///
-    /// # Errors
-    /// It could not be written.
-    pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
-        if let Some(recorder) = self.recorder {
-            let recorded = sim.finish_recording(recorder).map_err(|error| format!("--record {error}"))?;
-            println!("Recorded to {recorded}");
-        }
         Ok(())
     }
 }
@@ -346,11 +280,7 @@ impl Progress {
         let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
-            // A viewer that holds the simulation does not hold the program.
-            if let Some(key) = KEY.get() {
-                key.send(Command::Resume);
-                key.send(Command::SetSpeed(Speed::Free));
-            }
+            views::let_go();
             if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }

@@ -24,10 +24,18 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
         .current_dir(".")
         .args(["run", "--release", "--manifest-path"])
         .arg(repo.root.join("Cargo.toml"))
-        .args(["--package", "kinetoscope", "--example", "create_sensor", "--"])
+        .args(["--package", "kinetoscope", "--example", "create_sensor"])
+        .args(rooms(&args.args))
+        .arg("--")
         .args(merged(&defaults, &args.args))
         .inherit_stdin()
         .run()
+}
+
+/// What a newcomer waits for is the build: recordings and the browser view are compiled where a flag asks for them.
+fn rooms(user: &[String]) -> &'static [&'static str] {
+    let asked = |arg: &String| flag_name(arg).is_some_and(|name| ["record", "serve"].contains(&name.as_str()));
+    if user.iter().any(asked) { &[] } else { &["--no-default-features"] }
 }
 
 fn merged(defaults: &[(&str, Option<&str>)], user: &[String]) -> Vec<String> {
@@ -60,6 +68,14 @@ mod tests {
     #[test]
     fn defaults_stand_without_flags_of_the_user() {
         assert_eq!(merged(DEFAULTS, &[]), words("--headless --num-envs 4 --steps 2004"));
+    }
+
+    #[test]
+    fn what_flags_ask_for_is_built() {
+        assert_eq!(rooms(&words("--seed 3 --overwrite")), ["--no-default-features"]);
+        for flags in ["--serve", "--serve=127.0.0.1:0", "--seed 3 --record run.mcap"] {
+            assert!(rooms(&words(flags)).is_empty(), "{flags}");
+        }
     }
 
     #[test]

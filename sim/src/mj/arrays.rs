@@ -281,7 +281,8 @@ data_arrays! {
     geom_xmat: f64, "Geom rotation matrices, row-major, (ngeom, 9).";
     efc_type: i32, "Kind of each constraint row, (nefc,).";
     efc_id: i32, "Object of each constraint row, (nefc,).";
-    efc_force: f64, "Force of each constraint row, (nefc,).";
+    efc_pos: f64, "Residual of each constraint row (metres or radians by its kind), (nefc,).";
+    efc_force: f64, "Force of each constraint row, (nefc,), as [`Data::step2`] or [`Data::forward`] solved it; after [`Data::step1`] alone, MuJoCo 4 has not written it yet and it means nothing.";
     contact: mujoco_sys::mjContact, "Contacts, (ncon,).";
     act: f64, "Activations of actuators with a state, (na,).";
     site_xpos: f64, "Site positions \\[m\\], (nsite, 3).";

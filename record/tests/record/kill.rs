@@ -2,8 +2,7 @@
 //! written as fast as it is recorded.
 
 use super::support::{World, messages, of};
-use kinetoscope::prelude::*;
-use kinetoscope::record;
+use record::{Record, RecorderCfg};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

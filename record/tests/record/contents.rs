@@ -1,9 +1,11 @@
 //! What is in recordings, held against what was read from the simulation meanwhile.
 
 use super::support::{IMU_EVERY, Message, PICTURE_EVERY, World, bytes, contains, messages, of};
-use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
-use kinetoscope::sensors::Sampled;
+use ndarray::Axis;
+use record::{Record, RecorderCfg, Topic};
+use sensors::JointState;
+use sensors::Sampled;
+use sim::EnvId;
 
 const STEPS: u32 = 20;
 

@@ -1,8 +1,9 @@
 //! Folders of pictures, and animations.
 
 use super::support::{PICTURE_EVERY, World};
-use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
+use ndarray::Axis;
+use record::{Record, RecordError, Recorded, RecorderCfg, Topic};
+use sim::EnvId;
 use std::io::BufReader;
 use std::path::Path;
 

@@ -8,11 +8,11 @@ mod chromium;
 mod running;
 
 use chromium::{Chromium, Tab};
-use kinetoscope::prelude::*;
 use running::{Running, wait_until};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
+use view::ServeCfg;
 
 /// Where screenshots of the page are written, for the documentation; nowhere without it.
 const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
