@@ -36,6 +36,20 @@ impl<S> Clone for SensorId<S> {
 
 impl<S> Copy for SensorId<S> {}
 
+impl<S> PartialEq for SensorId<S> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.manager, self.index) == (other.manager, other.index)
+    }
+}
+
+impl<S> Eq for SensorId<S> {}
+
+impl<S> std::hash::Hash for SensorId<S> {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        (self.manager, self.index).hash(state);
+    }
+}
+
 impl<S> std::fmt::Debug for SensorId<S> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "SensorId({})", self.index)

@@ -1,6 +1,7 @@
 //! Work with single environments: states to go back to, rollouts, properties of their own, shares of several processes.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod listings;
 mod looks;
 mod observers;
 mod randomize;

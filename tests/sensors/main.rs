@@ -8,6 +8,7 @@ mod every_kind;
 mod frames;
 mod history;
 mod imu;
+mod past_values;
 mod refused;
 mod same_bits;
 mod ticks;

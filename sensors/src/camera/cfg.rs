@@ -118,13 +118,14 @@ pub struct CameraCfg {
 }
 
 impl Default for CameraCfg {
-    /// EmbodiChain's camera: 640 x 480 pixels, f = 600 pixels, from 5 mm to 100 m, colour only. Geom groups 0, 1 and 2 are
+    /// EmbodiChain's camera: 640 x 480 pixels, f = 600 pixels ([`Intrinsics::EMBODICHAIN`]: what other sizes see is the
+    /// same), from 5 mm to 100 m, colour only. Geom groups 0, 1 and 2 are
     /// drawn, as in MuJoCo's own viewers.
     fn default() -> Self {
         Self {
             width: 640,
             height: 480,
-            intrinsics: Intrinsics::Pixels { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 },
+            intrinsics: Intrinsics::EMBODICHAIN,
             lens: lens::Lens::default(),
             near: 0.005,
             far: 100.0,

@@ -62,6 +62,16 @@ pub struct PixelIntrinsics {
 }
 
 impl Intrinsics {
+    /// EmbodiChain's default lens, f = 600 pixels in a picture 640 wide, which sees the same in pictures of other sizes: f is
+    /// 15/16 of the width, pixels are square.
+    pub const EMBODICHAIN: Self = Self::Aperture {
+        focal_length: 15.0,
+        horizontal_aperture: 16.0,
+        vertical_aperture: None,
+        horizontal_offset: 0.0,
+        vertical_offset: 0.0,
+    };
+
     /// Isaac's default lens: 24 behind a film 20.955 wide, square pixels.
     pub const ISAAC: Self = Self::Aperture {
         focal_length: 24.0,
@@ -202,6 +212,9 @@ mod tests {
 
         let isaac = Intrinsics::ISAAC.to_pixels(640, 480).unwrap();
         assert!((isaac.fx - 640.0 * 24.0 / 20.955).abs() < 1e-9 && isaac.fx == isaac.fy);
+        let default = |w, h| Intrinsics::EMBODICHAIN.to_pixels(w, h).unwrap();
+        assert_eq!(default(640, 480), PixelIntrinsics { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 });
+        assert_eq!(default(64, 48), PixelIntrinsics { fx: 60.0, fy: 60.0, cx: 32.0, cy: 24.0 });
         let right_angle = Intrinsics::Fovy { radians: PI / 2.0 }.to_pixels(300, 200).unwrap();
         assert!((right_angle.fx - 100.0).abs() < 1e-12 && (right_angle.cx, right_angle.cy) == (150.0, 100.0));
 

@@ -1,0 +1,93 @@
+//! What a simulation holds, by name and by handle: for programs that did not build it themselves, such as views and recorders.
+
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use std::any::Any;
+
+struct World {
+    sim: SimulationManager,
+    robots: [RobotId; 2],
+    camera: SensorId<Camera>,
+}
+
+fn world() -> World {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let urdf = || UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    let robots = ["left", "right"].map(|uid| {
+        let init_pose = Pose::translation(if uid == "left" { 0.8 } else { -0.8 }, 0.0, 0.0);
+        sim.add_robot(RobotCfg { uid: uid.into(), urdf: urdf(), init_pose, ..Default::default() }).unwrap()
+    });
+    for (uid, mass) in [("ball", 0.5), ("cube", 2.0)] {
+        let init_pose = Pose::translation(0.0, 0.0, 5.0 + mass);
+        let shape = if uid == "ball" { ObjectShape::Sphere { radius: 0.1 } } else { ObjectShape::cube(0.2) };
+        let cfg = RigidObjectCfg { uid: uid.into(), shape, mass: Some(mass), init_pose, ..Default::default() };
+        sim.add_rigid_object(cfg).unwrap();
+    }
+    sim.add_sensor("imu", ImuCfg::on("ball")).unwrap();
+    let mut cfg = CameraCfg { width: 8, height: 6, ..CameraCfg::default() };
+    cfg.update_period = 0.05;
+    let camera = sim.add_sensor("eye", cfg).unwrap();
+    World { sim, robots, camera }
+}
+
+#[test]
+fn everything_is_listed_in_the_order_in_which_it_was_added() {
+    let World { sim, robots, camera } = world();
+    assert_eq!(sim.jointed_uids(), ["left", "right"]);
+    assert_eq!(sim.robot_ids(), [("left", robots[0]), ("right", robots[1])]);
+    assert_eq!(sim.jointed_id("right").unwrap(), robots[1]);
+    let error = sim.jointed_id("rigth").unwrap_err().to_string();
+    assert!(error.contains("right"), "{error}");
+    assert_eq!(sim.rigid_object_uids(), ["ball", "cube"]);
+    assert!(sim.mjcf_uids().is_empty());
+    assert_eq!(sim.sensor_uids(), ["imu", "eye"]);
+    assert_eq!(sim.sensor_ids::<Camera>(), [("eye".to_string(), camera)]);
+    assert!(sim.sensor_ids::<RayCaster>().is_empty());
+    let imu: &dyn Any = sim.sensor_called("imu").unwrap();
+    assert!(imu.is::<Imu>() && !imu.is::<Camera>());
+    let error = sim.sensor_called("ey").err().unwrap().to_string();
+    assert!(error.contains("eye"), "{error}");
+    assert!((0..6).all(|joint| sim.robot(robots[0]).is_driven(JointIndex(joint))));
+}
+
+/// A camera of every fifth step, and an IMU of every step, after each of a dozen steps.
+#[test]
+fn sensors_say_when_they_measure_next() {
+    let World { mut sim, .. } = world();
+    for step in 1..=12_u64 {
+        sim.update(1);
+        assert_eq!(sim.sensor_due_in("eye").unwrap(), 5 - step % 5, "step {step}");
+        assert_eq!(sim.sensor_due_in("imu").unwrap(), 1, "step {step}");
+    }
+}
+
+/// A body that falls and turns, against the object's own state; a robot's base carries the whole robot.
+#[test]
+fn bodies_say_how_they_move() {
+    let World { mut sim, robots, .. } = world();
+    let cube = sim.rigid_object_id("cube").unwrap();
+    let velocity = [0.3, -0.2, 0.1, 0.0, 0.0, 1.5];
+    sim.rigid_object_mut(cube).write_velocity(&Array2::from_shape_fn((2, 6), |(_, k)| velocity[k]), None).unwrap();
+    sim.update(10);
+    let names = sim.body_names();
+    let place = |name: &str| names.iter().position(|body| body == name).unwrap();
+    let (pose, velocity) = (sim.rigid_object(cube).get_pose(), sim.rigid_object(cube).get_velocity());
+    let motion = sim.body_motion(EnvId(1), place("cube")).unwrap();
+    for k in 0..3 {
+        assert!((motion.pose.translation.vector[k] - pose[(1, k)]).abs() < 1e-12);
+        assert!((motion.linear[k] - velocity[(1, k)]).abs() < 1e-12);
+        assert!((motion.angular[k] - velocity[(1, 3 + k)]).abs() < 1e-12);
+    }
+    // Ten steps of 10 ms in free fall: 0.1 - 9.81 * 0.1.
+    assert!((motion.linear[2] + 0.881).abs() < 1e-9, "{}", motion.linear[2]);
+    assert!((motion.carried_mass - 2.0).abs() < 1e-12 && !motion.is_fixed);
+    let base = sim.body_motion(EnvId(0), place("left/base_link")).unwrap();
+    assert!(base.is_fixed);
+    // All that has mass hangs on the first link: the file gives the base none. Six numbers are added, in another order.
+    let link = sim.body_motion(EnvId(0), place("left/link1")).unwrap();
+    let last = sim.body_motion(EnvId(0), place("left/link6")).unwrap();
+    let total = sim.robot(robots[0]).total_mass();
+    assert!(!link.is_fixed && (link.carried_mass - total).abs() < 1e-13, "{link:?} of {total}");
+    assert!((last.carried_mass - 0.634).abs() < 1e-13, "{last:?}: link6 in the file");
+    assert!(sim.body_motion(EnvId(2), 0).is_err() && sim.body_motion(EnvId(0), names.len()).is_err());
+}
