@@ -3,7 +3,6 @@
 use super::support::{IMU_EVERY, Message, PICTURE_EVERY, World, bytes, contains, messages, of};
 use ndarray::Axis;
 use record::{Record, RecorderCfg, Topic};
-use sensors::JointState;
 use sensors::Sampled;
 use sim::EnvId;
 

@@ -3,7 +3,6 @@
 use crate::running::{Running, wait_until};
 use crate::visitor::{Visitor, connect};
 use serde_json::json;
-use sim::Error;
 use std::io::Write;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
