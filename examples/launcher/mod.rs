@@ -10,6 +10,7 @@ pub(crate) mod panel;
 pub(crate) mod picture;
 pub(crate) mod stage;
 pub(crate) mod trial;
+pub(crate) mod waiting;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
