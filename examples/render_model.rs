@@ -13,7 +13,7 @@ use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
-use launcher::{PathFlags, Renderer, picture};
+use launcher::{PathFlags, Renderer, picture, waiting};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -58,6 +58,12 @@ struct Args {
     renderer: Renderer,
     #[command(flatten)]
     paths: PathFlags,
+    /// Rays for ambient occlusion, with --renderer hybrid
+    #[arg(long, default_value_t = 0)]
+    ao_rays: u16,
+    /// Give up after so many seconds, with an error
+    #[arg(long, value_name = "SECONDS")]
+    time_limit: Option<f64>,
     /// Geom groups that are drawn, as in MuJoCo's viewers
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
     groups: Vec<u8>,
@@ -67,6 +73,9 @@ struct Args {
     /// Draw again and again for so many seconds and report images per second
     #[arg(long)]
     bench: Option<f64>,
+    /// Also draw the color with the rasterizer, and write both side by side: raster-and-rt.png
+    #[arg(long)]
+    compare: bool,
     /// Folder for color.png, depth.png, mask.png, normal.png and meta.json
     #[arg(long, default_value = ".")]
     out: PathBuf,
@@ -106,6 +115,7 @@ fn run(args: &Args) -> launcher::Result {
     let cfg = RasterCfg {
         samples: args.msaa,
         shadows: args.shadows == Switch::On,
+        occlusion_rays: args.ao_rays,
         groups: args.groups.iter().fold(0, |bits, group| bits | 1u32.checked_shl(u32::from(*group)).unwrap_or(0)),
         ..RasterCfg::default()
     };
@@ -119,16 +129,33 @@ fn run(args: &Args) -> launcher::Result {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
     let seconds = Duration::try_from_secs_f64(args.bench.unwrap_or(0.0)).map_err(|e| format!("--bench: {e}"))?;
+    let limit =
+        args.time_limit.map(Duration::try_from_secs_f64).transpose().map_err(|e| format!("--time-limit: {e}"))?;
     let (start, mut images) = (Instant::now(), 0u32);
-    while images == 0 || start.elapsed() < seconds {
-        let mut job = [(still.shot(&view), frame.as_mut())];
-        rasterizer.render(&mut job).map_err(|(_, error)| error)?;
-        images += 1;
-    }
+    let progress = rasterizer.progress().clone();
+    waiting::draw(&progress, limit, || {
+        while images == 0 || start.elapsed() < seconds {
+            let mut job = [(still.shot(&view), frame.as_mut())];
+            rasterizer.render(&mut job).map_err(|(_, error)| error)?;
+            images += 1;
+        }
+        launcher::Result::Ok(())
+    })?;
     let rate = f64::from(images) / start.elapsed().as_secs_f64();
 
     launcher::make_folder(&args.out)?;
     write_pictures(args, &view, &frame)?;
+    if args.compare {
+        let mut raster = Frame::new(view.width, view.height, Channels { color: true, ..Channels::default() });
+        rasterizer.set_cfg(RasterCfg { occlusion_rays: 0, ..cfg });
+        rasterizer.set_renderer(kinetoscope::sensors::camera::Renderer::Raster);
+        rasterizer.render(&mut [(still.shot(&view), raster.as_mut())]).map_err(|(_, error)| error)?;
+        let both = [&raster, &frame].map(|frame| frame.color.as_deref().unwrap_or_default());
+        picture::write_png(
+            &args.out.join("raster-and-rt.png"),
+            &picture::side_by_side([view.width, view.height], both),
+        )?;
+    }
     let meta = json!({
         "width": view.width,
         "height": view.height,

@@ -12,6 +12,7 @@ mod recording;
 pub(crate) mod stage;
 pub(crate) mod trial;
 mod views;
+pub(crate) mod waiting;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};

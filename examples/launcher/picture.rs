@@ -8,6 +8,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+/// Space between two pictures \[pixels\].
+const GAP: u32 = 8;
+
 /// Writes an array for NumPy.
 pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
 where
@@ -31,6 +34,16 @@ pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result {
 /// Colours without their opacity.
 pub(crate) fn color_picture(size: [usize; 2], color: &[u8]) -> RgbImage {
     picture(size, |k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]])
+}
+
+/// Two pictures of the same size, beside each other.
+pub(crate) fn side_by_side(size: [usize; 2], colors: [&[u8]; 2]) -> RgbImage {
+    let [left, right] = colors.map(|color| color_picture(size, color));
+    let second = left.width() + GAP;
+    let mut both = RgbImage::from_pixel(second + right.width(), left.height(), Rgb([255; 3]));
+    image::imageops::replace(&mut both, &left, 0, 0);
+    image::imageops::replace(&mut both, &right, second.into(), 0);
+    both
 }
 
 /// Depths by colour between the ends of `range`.

@@ -111,10 +111,20 @@ impl Phases {
 
     /// Steps until the next environment is due, at least 1, when they are at `steps`.
     pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
+        self.first_of(steps, |wait| wait)
+    }
+
+    /// The least of what `of` makes of the steps until each environment is due.
+    pub(crate) fn first_of(&self, steps: impl IntoIterator<Item = u64>, of: impl Fn(u64) -> u64) -> u64 {
+        let running = steps.into_iter().take(self.envs.len()).enumerate().filter(|(_, step)| *step != Self::STANDS);
+        running.map(|(env, step)| of(self.wait(env, step))).min().unwrap_or(self.schedule.period_steps)
+    }
+
+    /// Steps until environment `env`, which is at physics step `step`, is due: 1 to a period.
+    #[track_caller]
+    pub(crate) fn wait(&self, env: usize, step: u64) -> u64 {
         let period = self.schedule.period_steps;
-        let wait = |(phase, step): (&Phase, u64)| period - step.saturating_sub(phase.start) % period;
-        let running = self.envs.iter().zip(steps).filter(|(_, step)| *step != Self::STANDS);
-        running.map(wait).min().unwrap_or(period)
+        period - step.saturating_sub(self.envs[env].start) % period
     }
 
     /// Starts environment `env` anew: the next measurement falls one period after `step`.

@@ -5,7 +5,8 @@ use scene::shape::{Capsule, Mesh, Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
 use sensors::camera::lens::Equidistant;
 use sensors::camera::{
-    Before, Channels, Frame, LensRays, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot,
+    Aperture, Before, Channels, Frame, LensRays, Opened, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
+    Shot, Shutter, Take,
 };
 use sensors::visibility::View;
 use sensors::{Crew, ScopedThreads, Threads};
@@ -73,6 +74,29 @@ fn pictures_by_rays_allocate_nothing() {
         let allocations = allocation_counter::measure(|| (0..2).for_each(|_| draw())).count_total;
         assert_eq!(allocations, 0, "{renderer:?}");
     }
+}
+
+/// What glows, a lens with an opening, a shutter that takes time: the second picture finds all its memory.
+#[test]
+fn pictures_of_rolling_shutters_allocate_nothing() {
+    let (scene, poses) = scene();
+    let mut instances = scene.instances().to_vec();
+    instances.iter_mut().for_each(|instance| instance.material.emission = 0.5);
+    let scene = RenderScene::new(instances).expect("a good scene");
+    let view = view([64, 48]);
+    let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
+    let opened = Opened { poses: &moved, world_from_camera: view.world_from_camera, before: 0.1 };
+    let take = Take { noise: 1, opened: Some(opened) };
+    let mut frame = Frame::new(view.width, view.height, FOUR);
+    let mut rasterizer = Rasterizer::default();
+    rasterizer.renderer = Renderer::RayTraced { samples: 2, max_bounces: 2, denoise: true, seed: 0 };
+    rasterizer.aperture = Some(Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 });
+    rasterizer.shutter = Shutter { row_time: 1e-3, exposure_time: 0.01 };
+    let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+    let mut draw = || rasterizer.render_take(&shot, &take, &mut frame.as_mut()).expect("a good frame");
+    draw();
+    let allocations = allocation_counter::measure(|| (0..3).for_each(|_| draw())).count_total;
+    assert_eq!(allocations, 0);
 }
 
 /// Every channel there is, of things that moved since the picture before.

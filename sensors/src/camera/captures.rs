@@ -1,8 +1,8 @@
 //! What there was to see when pictures were due.
 
+use super::opening::{Opening, parent_pose};
 use super::ticket::Ticket;
 use ndarray::{Array1, Array2, Axis};
-use scene::pose::from_row;
 use scene::{Light, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 
 /// What there was to see.
@@ -18,12 +18,27 @@ pub(super) struct Captures {
     pub(super) world_from_parent: Vec<Option<Pose>>,
     pub(super) stamps: Array1<f64>,
     pub(super) tickets: Vec<Ticket>,
+    /// Of cameras with a shutter that takes time.
+    opened: Option<Opened>,
+}
+
+/// Where things were when the shutter opened.
+#[derive(Clone, Debug)]
+struct Opened {
+    /// World from instance, shape \[rows, instances\].
+    poses: Array2<PoseF32>,
+    /// Where the parent was; `None` of pictures of one instant.
+    parents: Vec<Option<Pose>>,
 }
 
 impl Captures {
-    /// Room for `rows` captures of a scene.
-    pub(super) fn new(rows: usize, scene: &RenderScene, ticket: Ticket) -> Self {
+    /// Room for `rows` captures of a scene, by a shutter that takes time or not.
+    pub(super) fn new(rows: usize, scene: &RenderScene, ticket: Ticket, slow: bool) -> Self {
         Self {
+            opened: slow.then(|| Opened {
+                poses: Array2::from_elem((rows, scene.instances().len()), PoseF32::IDENTITY),
+                parents: vec![None; rows],
+            }),
             poses: Array2::from_elem((rows, scene.instances().len()), PoseF32::IDENTITY),
             lights: Array2::from_elem((rows, scene.lights.len()), Light::default()),
             scenes: vec![OwnScene::default(); rows],
@@ -40,16 +55,22 @@ impl Captures {
         (state, env): (&SceneState, usize),
         parent: Option<usize>,
         ticket: Ticket,
+        opening: Option<(&Opening, usize)>,
     ) {
         let Some(visible) = &state.visible else { return };
         self.poses.index_axis_mut(Axis(0), row).assign(&visible.instance_poses.index_axis(Axis(0), env));
         self.lights.index_axis_mut(Axis(0), row).assign(&visible.lights.index_axis(Axis(0), env));
         self.scenes[row].clone_from(state.own_scene(env));
-        let parent = parent.zip(state.body_poses.as_ref());
-        let world_from_parent = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
-        self.world_from_parent[row] = Some(world_from_parent.unwrap_or_else(Pose::identity));
+        self.world_from_parent[row] = Some(parent_pose(state, env, parent));
         self.stamps[row] = state.time[env];
         self.tickets[row] = ticket;
+        if let Some(opened) = &mut self.opened {
+            opened.parents[row] = None;
+            if let Some((poses, parent)) = opening.and_then(|(opening, of)| opening.of(of)) {
+                opened.poses.index_axis_mut(Axis(0), row).assign(&poses);
+                opened.parents[row] = Some(parent);
+            }
+        }
     }
 
     /// Keeps what another one of the same scene has kept in a row.
@@ -60,5 +81,16 @@ impl Captures {
         self.world_from_parent[row] = other.world_from_parent[from];
         self.stamps[row] = other.stamps[from];
         self.tickets[row] = other.tickets[from];
+        if let (Some(opened), Some(other)) = (&mut self.opened, &other.opened) {
+            opened.poses.index_axis_mut(Axis(0), row).assign(&other.poses.index_axis(Axis(0), from));
+            opened.parents[row] = other.parents[from];
+        }
+    }
+
+    /// Where things were when the shutter of a row opened, and its parent; `None` of pictures of one instant.
+    pub(super) fn opened(&self, row: usize) -> Option<(&[PoseF32], Pose)> {
+        let Opened { poses, parents } = self.opened.as_ref()?;
+        let width = poses.ncols();
+        Some((poses.as_slice()?.get(row * width..(row + 1) * width)?, parents[row]?))
     }
 }

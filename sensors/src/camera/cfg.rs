@@ -1,5 +1,6 @@
 //! What a camera is, before it exists.
 
+use super::aperture::Aperture;
 use super::channel::{Channels, Pictures};
 use super::error::CameraError;
 use super::extrinsics::Extrinsics;
@@ -8,11 +9,14 @@ use super::imperfection::Imperfections;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::lens::{self, RaysOfRows};
 use super::memory::Memory;
+use super::opening::Opening;
 use super::rasterizer::RasterCfg;
 use super::renderer::Renderer;
 use super::sensor::{Camera, Lens};
+use super::shutter::Shutter;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
+use crate::resolve::plan::{check_light, check_occlusion};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use crate::visibility::RenderError;
@@ -68,6 +72,11 @@ pub struct CameraCfg {
     pub intrinsics: Intrinsics,
     /// The lens: which way the rays of pixels go. Lenses other than a pinhole need a renderer that follows rays.
     pub lens: lens::Lens,
+    /// The size of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
+    pub aperture: Option<Aperture>,
+    /// When light falls on which row, for rolling shutters and motion blur; by default a picture is of one instant. Needs
+    /// [`Renderer::RayTraced`]. The first picture after a reset or after somebody wrote to the state is of one instant.
+    pub shutter: Shutter,
     /// Nothing nearer is seen: smallest depth along the optical axis \[m\], or along the ray where rays of the lens do not all
     /// go forward ([`Lens::is_forward`](lens::Lens::is_forward)).
     pub near: f64,
@@ -127,6 +136,8 @@ impl Default for CameraCfg {
             height: 480,
             intrinsics: Intrinsics::EMBODICHAIN,
             lens: lens::Lens::default(),
+            aperture: None,
+            shutter: Shutter::default(),
             near: 0.005,
             far: 100.0,
             extrinsics: Extrinsics::default(),
@@ -177,6 +188,10 @@ impl SensorCfg for CameraCfg {
             return Err(CameraError::View(RenderError::Samples { samples: self.raster.samples }).into());
         }
         self.renderer.validate().map_err(CameraError::View)?;
+        self.aperture.as_ref().map_or(Ok(()), Aperture::check).map_err(CameraError::View)?;
+        self.shutter.check().map_err(CameraError::View)?;
+        check_light(self.renderer, self.aperture.as_ref(), self.shutter).map_err(CameraError::View)?;
+        check_occlusion(self.raster, self.renderer).map_err(CameraError::View)?;
         self.check_flow()?;
         self.check_lens()?;
         let lens = Lens::new(self)?;
@@ -185,12 +200,13 @@ impl SensorCfg for CameraCfg {
         let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
         check_env_ids(&env_ids, context.num_envs)?;
         self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len(), schedule)?;
+        let opening = Opening::new(self, schedule, context.dt, env_ids.len(), &scene)?;
         let rays = self.lens_rays(&pixels, env_ids.len())?;
         let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
         let mount = self.extrinsics.parent_from_camera()?;
         let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
         let optics = (lens, pixels, mount);
-        Ok(Camera::new(self, context, scene, schedule, parent, optics, rays, env_ids, (pictures, faults)))
+        Ok(Camera::new(self, context, scene, (schedule, opening), parent, optics, rays, env_ids, (pictures, faults)))
     }
 }
 
@@ -198,7 +214,11 @@ impl CameraCfg {
     /// Flow is of two pictures that follow each other.
     fn check_flow(&self) -> Result<(), CameraError> {
         let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
-        if self.channels.flow && past { Err(CameraError::FlowOfThePast) } else { Ok(()) }
+        match self.channels.flow {
+            true if past => Err(CameraError::FlowOfThePast),
+            true if !self.shutter.is_instant() => Err(CameraError::FlowOfRows),
+            _ => Ok(()),
+        }
     }
 
     /// What is only right where rays are straight lines of the picture.
@@ -232,7 +252,9 @@ impl CameraCfg {
         schedule: Schedule,
     ) -> Result<(), CameraError> {
         let bytes_per_pixel = self.channels.bytes_per_pixel();
-        let capture = instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
+        // A shutter that takes time is twice a moment.
+        let moments = if self.shutter.is_instant() { 1 } else { 2 };
+        let capture = moments * instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
         let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
         let fits = |pictures: usize, captures: usize| {
             let captures = captures.checked_mul(capture.saturating_add(CAPTURE));

@@ -156,6 +156,20 @@ pub enum CameraError {
         "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"
     )]
     FlowOfThePast,
+    /// A shutter that is open longer than there is time between pictures.
+    #[error(
+        "the shutter takes {span} s, from the first light to the last row, and there is a picture every {period} s; make \
+         row_time, exposure_time or the picture's height smaller, or update_period larger"
+    )]
+    ShutterTooSlow {
+        /// How long the shutter takes \[s\].
+        span: f64,
+        /// Time between pictures \[s\].
+        period: f64,
+    },
+    /// Flow of a picture whose rows are of several instants.
+    #[error("flow is from one instant to another: a camera with flow has a shutter of one instant")]
+    FlowOfRows,
     /// A mask id that no thing can have.
     #[error("mask id {id} {problem}")]
     MaskId {

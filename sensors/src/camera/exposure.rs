@@ -4,13 +4,17 @@ use super::channel::FrameMut;
 use super::lens::LensRays;
 use super::rasterizer::{Rasterizer, Shot};
 use super::renderer::Renderer;
+use super::shutter::{Clock, Take};
 use crate::crew::Crew;
-use crate::resolve::path::Paths;
+use crate::resolve::path::eye::{Eye, Pupil};
 use crate::resolve::path::film::{Film, develop};
 use crate::resolve::path::smooth;
+use crate::resolve::path::{Moving, Paths, Ways};
 use crate::resolve::plan::Plan;
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
+use crate::visibility::trace::motion::Motion;
+use std::sync::{Mutex, PoisonError};
 
 /// Rows of pixels that a thread takes at once: a row of blocks.
 const ROWS: usize = BLOCK;
@@ -19,57 +23,65 @@ const ROWS: usize = BLOCK;
 pub(super) fn expose(
     crew: &Crew,
     rasterizers: &mut [Rasterizer],
-    shot: &Shot<'_>,
+    (shot, take): (&Shot<'_>, &Take<'_>),
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
     let Some(first) = rasterizers.first_mut() else { return Ok(()) };
     let (mut plan, mut film) = (std::mem::take(&mut first.plan), std::mem::take(&mut first.film));
-    let result = plan.prepare(first.style(), shot, frame);
-    if result.is_ok() {
-        draw(crew, rasterizers, &plan, &mut film, shot, frame);
-    }
+    let ready = plan.prepare(first.style(), shot, frame).and_then(|()| first.shutter.clock(shot, take));
+    let result = ready.and_then(|clock| {
+        let opened = take.opened.filter(|_| clock.is_some());
+        if let Some(opened) = opened.filter(|_| frame.color.is_some()) {
+            plan.tracer.place(shot.scene, shot.poses, Some(opened.poses));
+        }
+        draw_colors(crew, rasterizers, (&plan, clock.as_ref()), &mut film, (shot, take), frame)?;
+        draw_others(crew, rasterizers, (&plan, clock.as_ref()), (shot, take), frame)?;
+        show(crew, rasterizers, &plan, &film, frame);
+        Ok(())
+    });
     if let Some(first) = rasterizers.first_mut() {
         (first.plan, first.film) = (plan, film);
     }
     result
 }
 
-/// Draws a prepared shot.
-fn draw(
+/// Follows the paths of a prepared shot; writes nothing into the frame.
+fn draw_colors(
     crew: &Crew,
     rasterizers: &mut [Rasterizer],
-    plan: &Plan,
+    (plan, clock): (&Plan, Option<&Clock>),
     film: &mut Film,
-    shot: &Shot<'_>,
-    frame: &mut FrameMut<'_>,
-) {
-    let (Some(projection), Some(cfg)) = (&plan.projection, rasterizers.first().map(|r| r.cfg)) else { return };
-    let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return };
-    let (width, height) = (projection.width, projection.height);
-    // Colours come from paths; all other channels from what the pixels' centres see.
-    let color = frame.color.take();
-    if frame.channels() != Default::default() {
-        let mut rest = frame.reborrow();
-        let bands = (0..height).step_by(ROWS).map(move |row| {
-            let rows = ROWS.min(height - row);
-            (row / BLOCK, rest.split_off_first(width * rows))
-        });
-        crew.share(rasterizers, bands, |rasterizer, (block, mut frame)| {
-            rasterizer.brush.paint(rasterizer.level, plan, shot, &mut frame, block..block + 1);
-        });
+    (shot, take): (&Shot<'_>, &Take<'_>),
+    frame: &FrameMut<'_>,
+) -> Result<(), RenderError> {
+    let (Some(projection), Some(first)) = (&plan.projection, rasterizers.first()) else { return Ok(()) };
+    let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return Ok(()) };
+    if frame.color.is_none() {
+        return Ok(());
     }
-    let Some(color) = color else { return };
+    let (cfg, progress) = (first.cfg, first.progress.clone());
+    let (width, height) = (projection.width, projection.height);
     film.resize([width, height], denoise);
-    let forward = shot.lens.is_none_or(LensRays::is_forward);
+    let (tracer, lens) = (&plan.tracer, shot.lens);
+    let forward = lens.is_none_or(LensRays::is_forward);
     let lights = shot.lights.unwrap_or(&shot.scene.lights);
-    film.lamps.prepare(shot.scene, lights, cfg.shadows, (projection, forward));
-    let (lamps, rows) = film.rows(ROWS);
-    let (scene, poses, tracer) = (shot.scene, shot.poses, &plan.tracer);
-    let lens = shot.lens;
-    let paths = Paths { scene, poses, tracer, projection, lens, samples, max_bounces, seed, lamps };
-    crew.share(rasterizers, rows, |rasterizer, mut rows| {
-        rows.expose(&paths, denoise, rasterizer.brush.stack());
+    film.lamps.prepare((shot.scene, tracer), lights, cfg.shadows, (projection, forward));
+    let moving = clock.zip(take.opened).map(|(clock, opened)| Moving {
+        clock: *clock,
+        camera: Motion::between(&opened.world_from_camera, &shot.view.world_from_camera),
     });
+    let eye = Eye { projection, lens, pupil: first.aperture.as_ref().and_then(Pupil::of) };
+    let (lamps, rows) = film.rows(ROWS);
+    // Takes of number 0 are as they were without.
+    let seed = seed ^ take.noise;
+    let (scene, moving) = (shot.scene, moving.as_ref());
+    let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
+    crew.share(rasterizers, rows, |rasterizer, mut rows| {
+        rows.expose(&paths, denoise, rasterizer.brush.stack(), &progress);
+    });
+    if progress.is_cancelled() {
+        return Err(RenderError::Cancelled { samples: progress.samples(), total: progress.total() });
+    }
     let size = width * ROWS;
     if denoise && samples == 1 {
         let Film { pixels, next, guides, .. } = &mut *film;
@@ -87,9 +99,53 @@ fn draw(
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }
-    let parts = film.pixels.chunks(size).zip(film.guides.chunks(size)).zip(color.chunks_mut(4 * size));
-    crew.share(rasterizers, parts, |rasterizer, ((pixels, guides), out)| {
-        develop(rasterizer.level, pixels, guides, denoise, out);
+    Ok(())
+}
+
+/// Draws all channels but the colour: what the pixels' centres see.
+fn draw_others(
+    crew: &Crew,
+    rasterizers: &mut [Rasterizer],
+    (plan, clock): (&Plan, Option<&Clock>),
+    (shot, take): (&Shot<'_>, &Take<'_>),
+    frame: &mut FrameMut<'_>,
+) -> Result<(), RenderError> {
+    let Some(projection) = &plan.projection else { return Ok(()) };
+    let (width, height) = (projection.width, projection.height);
+    let color = frame.color.take();
+    let mut failure = Ok(());
+    if frame.channels() != Default::default() {
+        let mut rest = frame.reborrow();
+        if let Some((clock, opened)) = clock.zip(take.opened) {
+            let first = Mutex::new(&mut failure);
+            let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
+            crew.share(rasterizers, rows, |rasterizer, (y, mut row)| {
+                if let Err(error) = rasterizer.draw_row(shot, (&opened, clock), y, &mut row) {
+                    **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
+                }
+            });
+        } else {
+            let bands = (0..height).step_by(ROWS).map(move |row| {
+                let rows = ROWS.min(height - row);
+                (row / BLOCK, rest.split_off_first(width * rows))
+            });
+            crew.share(rasterizers, bands, |rasterizer, (block, mut frame)| {
+                rasterizer.brush.paint(rasterizer.level, plan, shot, &mut frame, block..block + 1);
+            });
+        }
+    }
+    frame.color = color;
+    failure
+}
+
+/// Makes bytes of what the paths found.
+fn show(crew: &Crew, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
+    let Renderer::RayTraced { denoise, .. } = plan.renderer else { return };
+    let Some(color) = frame.color.as_deref_mut() else { return };
+    let size = film.width * ROWS;
+    let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
+    crew.share(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
+        let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
+        develop(rasterizer.level, pixels, guides, out);
     });
-    frame.color = Some(color);
 }

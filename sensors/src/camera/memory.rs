@@ -75,18 +75,19 @@ impl Memory {
         scene: &RenderScene,
         (mount, ticket): (Mount, Ticket),
     ) -> Option<Box<Self>> {
+        let slow = !cfg.shutter.is_instant();
         Self::is_needed(cfg).then(|| {
             let queues = Queues::new(rows, cfg.latency_steps.into(), schedule.period_steps());
             let kept = rows * cfg.history_length;
             Box::new(Self {
                 late: cfg.latency_steps > 0,
                 dropout: cfg.dropout,
-                waiting: Captures::new(queues.slots(), scene, ticket),
+                waiting: Captures::new(queues.slots(), scene, ticket, slow),
                 queues,
                 refreshed: vec![0; rows],
                 past: Past {
                     length: cfg.history_length,
-                    captures: Captures::new(kept, scene, ticket),
+                    captures: Captures::new(kept, scene, ticket, slow),
                     mounts: vec![mount; kept],
                     lenses: vec![None; kept],
                     arrived: vec![0; rows],

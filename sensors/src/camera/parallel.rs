@@ -1,9 +1,12 @@
 //! Draws many frames on several threads.
 
+use super::aperture::Aperture;
 use super::channel::FrameMut;
 use super::exposure::expose;
+use super::progress::RenderProgress;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
 use super::renderer::Renderer;
+use super::shutter::{Shutter, Take};
 use crate::crew::Crew;
 use crate::ray::RayAssets;
 use crate::resolve::plan::{Plan, estimate};
@@ -29,13 +32,16 @@ pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
     plans: Vec<Plan>,
     crew: Crew,
+    progress: RenderProgress,
 }
 
 impl ParallelRasterizer {
     /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The others start with each
     /// batch and end with it: see [`with_crew`](Self::with_crew).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        Self { rasterizers: vec![Rasterizer::new(cfg); threads.max(1)], plans: Vec::new(), crew: Crew::default() }
+        let rasterizer = Rasterizer::new(cfg);
+        let progress = rasterizer.progress.clone();
+        Self { rasterizers: vec![rasterizer; threads.max(1)], plans: Vec::new(), crew: Crew::default(), progress }
     }
 
     /// Draws on the threads of `crew`. With those of a simulation nothing is allocated after the first batches.
@@ -63,6 +69,18 @@ impl ParallelRasterizer {
         }
     }
 
+    /// What the lens and the shutter do to light: `None` and [`Shutter::default`] are a point and an instant.
+    pub fn set_light(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
+        for rasterizer in &mut self.rasterizers {
+            (rasterizer.aperture, rasterizer.shutter) = (aperture, shutter);
+        }
+    }
+
+    /// How far the paths of the pictures are that are drawn.
+    pub fn progress(&self) -> &RenderProgress {
+        &self.progress
+    }
+
     /// The geom groups that are drawn: bit k is group k.
     pub(crate) fn groups(&self) -> u32 {
         self.rasterizers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
@@ -87,14 +105,26 @@ impl ParallelRasterizer {
     ///
     /// Of the first shot that cannot be drawn, with its index; the others are drawn nevertheless.
     pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
-        let Self { rasterizers, plans, crew } = self;
+        self.render_takes(jobs, &[])
+    }
+
+    /// As [`render`](Self::render), of pictures by path tracing each with its noise and with things that moved while the
+    /// shutter was open. Shots without a take are still, and have the same noise.
+    ///
+    /// # Errors
+    ///
+    /// As [`render`](Self::render).
+    pub fn render_takes(&mut self, jobs: &mut [Job<'_>], takes: &[Take<'_>]) -> Result<(), (usize, RenderError)> {
+        let Self { rasterizers, plans, crew, progress } = self;
         let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
         let threads = worth(cfg, renderer, jobs).min(rasterizers.len());
         let rasterizers = &mut rasterizers[..threads];
         let failure = Failure::default();
+        progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.paths(shot, frame))));
         if renderer.follows_paths() {
             for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
-                failure.note(index, expose(crew, rasterizers, shot, frame));
+                let take = takes.get(index).copied().unwrap_or_default();
+                failure.note(index, expose(crew, rasterizers, (shot, &take), frame));
             }
             return failure.first();
         }
@@ -124,7 +154,7 @@ impl ParallelRasterizer {
 /// How many threads some shots are worth; at least 1.
 fn worth(cfg: RasterCfg, renderer: Renderer, jobs: &[Job<'_>]) -> usize {
     let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
-    (cost.saturating_mul(renderer.slowness()) / (WORTH_A_THREAD / 2)).max(1)
+    (cost.saturating_mul(renderer.slowness(cfg)) / (WORTH_A_THREAD / 2)).max(1)
 }
 
 /// The first shot that could not be drawn.

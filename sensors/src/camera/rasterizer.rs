@@ -1,9 +1,13 @@
 //! Draws frames.
 
+use super::aperture::Aperture;
 use super::channel::{Frame, FrameMut};
 use super::exposure::expose;
 use super::lens::LensRays;
+use super::progress::RenderProgress;
 use super::renderer::Renderer;
+use super::rolling::Roll;
+use super::shutter::{Clock, Opened, Shutter, Take};
 use crate::crew::Crew;
 use crate::lanes::Level;
 use crate::ray::RayAssets;
@@ -25,6 +29,10 @@ pub struct RasterCfg {
     pub shadows: bool,
     /// Texels along the side of a shadow map; 0 chooses by the picture's size.
     pub shadow_size: usize,
+    /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`] only; 0 is none. Ambient light is then
+    /// what arrives of [`RenderScene::ambient`] past what is in the way, as [`Renderer::RayTraced`] has it without bounces:
+    /// exact where nothing is, with the noise of so many rays elsewhere, which depends on the point and nothing else.
+    pub occlusion_rays: u16,
     /// Geom groups that are drawn: bit k is group k.
     pub groups: u32,
     /// Draw dense meshes coarser where that is hardly seen (level of detail).
@@ -50,7 +58,7 @@ pub struct RasterCfg {
 
 impl Default for RasterCfg {
     fn default() -> Self {
-        Self { samples: 4, shadows: true, shadow_size: 0, groups: u32::MAX, lod: true }
+        Self { samples: 4, shadows: true, shadow_size: 0, occlusion_rays: 0, groups: u32::MAX, lod: true }
     }
 }
 
@@ -100,12 +108,20 @@ pub struct Rasterizer {
     pub cfg: RasterCfg,
     /// Which renderer draws them.
     pub renderer: Renderer,
+    /// The size of the lens; `None` is a point.
+    pub aperture: Option<Aperture>,
+    /// When light falls on which row.
+    pub shutter: Shutter,
+    /// How far the paths of a picture are.
+    pub progress: RenderProgress,
     pub(super) assets: RayAssets,
     pub(super) level: Level,
     pub(super) plan: Plan,
     pub(super) brush: Brush,
     /// Of pictures by path tracing.
     pub(super) film: Film,
+    /// Of pictures whose rows are of several instants.
+    pub(super) roll: Roll,
 }
 
 impl Default for Rasterizer {
@@ -124,17 +140,22 @@ impl Rasterizer {
         Self {
             cfg,
             renderer: Renderer::default(),
+            aperture: None,
+            shutter: Shutter::default(),
+            progress: RenderProgress::default(),
             assets: RayAssets::default(),
             level,
             plan: Plan::default(),
             brush: Brush::default(),
             film: Film::default(),
+            roll: Roll::default(),
         }
     }
 
     /// How shots are drawn.
     pub(super) fn style(&self) -> Style<'_> {
-        Style { cfg: self.cfg, renderer: self.renderer, assets: &self.assets }
+        let Self { cfg, renderer, aperture, shutter, assets, .. } = self;
+        Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, assets }
     }
 
     /// The instruction set in use.
@@ -144,7 +165,7 @@ impl Rasterizer {
 
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
-        self.plan.bytes() + self.brush.bytes() + self.film.bytes()
+        self.plan.bytes() + self.brush.bytes() + self.film.bytes() + self.roll.bytes()
     }
 
     /// Draws the channels that `frame` has.
@@ -168,15 +189,46 @@ impl Rasterizer {
     ///
     /// A view, a pose or a buffer that is no good; nothing is drawn then.
     pub fn render_shot(&mut self, shot: &Shot<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
+        self.render_take(shot, &Take::default(), frame)
+    }
+
+    /// As [`render_shot`](Self::render_shot), of pictures by path tracing with noise of their own and with things that moved
+    /// while the shutter was open.
+    ///
+    /// # Errors
+    ///
+    /// As [`render_shot`](Self::render_shot), and where things were that is no good or not long enough ago.
+    pub fn render_take(
+        &mut self,
+        shot: &Shot<'_>,
+        take: &Take<'_>,
+        frame: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
         if self.renderer.follows_paths() {
-            return expose(&Crew::default(), std::slice::from_mut(self), shot, frame);
+            self.progress.begin(self.renderer.paths(shot, frame));
+            return expose(&Crew::default(), std::slice::from_mut(self), (shot, take), frame);
         }
-        let Self { cfg, renderer, assets, level, plan, brush, .. } = self;
-        plan.prepare(Style { cfg: *cfg, renderer: *renderer, assets }, shot, frame)?;
+        let Self { cfg, renderer, aperture, shutter, assets, level, plan, brush, .. } = self;
+        let (aperture, shutter) = (aperture.as_ref(), *shutter);
+        plan.prepare(Style { cfg: *cfg, renderer: *renderer, aperture, shutter, assets }, shot, frame)?;
         for band in plan.shadow_bands() {
             brush.shadow(*level, shot.scene, band);
         }
         brush.paint(*level, plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
         Ok(())
+    }
+
+    /// Draws a row of a picture, at its own instant, into a frame of that row.
+    pub(super) fn draw_row(
+        &mut self,
+        shot: &Shot<'_>,
+        when: (&Opened<'_>, &Clock),
+        y: usize,
+        row: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let Self { cfg, renderer, aperture, shutter, assets, level, brush, roll, .. } = self;
+        let (aperture, shutter) = (aperture.as_ref(), *shutter);
+        let style = Style { cfg: *cfg, renderer: *renderer, aperture, shutter, assets };
+        roll.draw((brush, style, *level), shot, when, y, row)
     }
 }

@@ -1,5 +1,7 @@
 //! Which renderer draws pictures.
 
+use super::channel::FrameMut;
+use super::rasterizer::{RasterCfg, Shot};
 use crate::visibility::RenderError;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +19,9 @@ pub enum Renderer {
     /// and transparency are the rasterizer's. Meshes are never drawn coarser
     /// ([`RasterCfg::lod`](super::RasterCfg::lod) is for shadow maps only).
     FastRayTraced,
-    /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too. Meshes
-    /// are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
+    /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too; and
+    /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](super::RasterCfg::occlusion_rays) asks for some.
+    /// Meshes are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
     /// goes dark triangle by triangle.
     Hybrid,
     /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
@@ -33,7 +36,9 @@ pub enum Renderer {
     ///   ground's from below. Where nothing is in the way a matt surface (specular 0) gets what the rasterizer gives it; below a glossy
     ///   layer it gets what the layer leaves. Cameras and mirrors see
     ///   [`RenderScene::sky`](scene::RenderScene::sky) there instead.
-    /// - **Emission** of a material lights other things, with `max_bounces` 0 too.
+    /// - **Emission** of a material lights other things, with `max_bounces` 0 too. Points of what glows are looked for at every
+    ///   surface: of finite planes (area lamps), boxes, spheres, cylinders and meshes. Capsules, ellipsoids, height fields and
+    ///   infinite planes light as much, with more noise: paths meet them by chance.
     /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
     ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
     ///   1). The layer mirrors a lamp's `specular` colour and everything else's only colour. `reflectance` of the light is
@@ -42,7 +47,9 @@ pub enum Renderer {
     ///   itself.
     ///
     /// The tone curve and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
-    /// any number of threads.
+    /// any number of threads. Pictures of [`Camera`](super::Camera)s have noise of their own each, by the seed of the
+    /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
+    /// same in any batch.
     RayTraced {
         /// Paths per pixel; 1 to 65536. A power of two spreads them best.
         samples: u32,
@@ -101,11 +108,22 @@ impl Renderer {
         matches!(self, Self::RayTraced { .. })
     }
 
+    /// How many paths a picture takes.
+    pub(crate) fn paths(self, shot: &Shot<'_>, frame: &FrameMut<'_>) -> u64 {
+        match self {
+            Self::RayTraced { samples, .. } if frame.color.is_some() => {
+                (shot.view.width as u64).saturating_mul(shot.view.height as u64).saturating_mul(samples.into())
+            }
+            _ => 0,
+        }
+    }
+
     /// How much longer a pixel takes than the rasterizer's, about.
-    pub(crate) fn slowness(self) -> usize {
+    pub(crate) fn slowness(self, cfg: RasterCfg) -> usize {
         match self {
             Self::Raster => 1,
-            Self::Hybrid | Self::FastRayTraced => 20,
+            Self::Hybrid => 20 * (1 + usize::from(cfg.occlusion_rays)),
+            Self::FastRayTraced => 20,
             Self::RayTraced { samples, max_bounces, .. } => {
                 (samples as usize).saturating_mul(20 * (1 + max_bounces as usize))
             }

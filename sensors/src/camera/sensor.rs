@@ -12,9 +12,12 @@ use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::lens::{self, LensRays, Optics, RaysOfRows};
 use super::memory::{Memory, Past};
 use super::mounts::{Mount, Mounts, chosen_rows};
+use super::opening::Opening;
 use super::parallel::{Job, ParallelRasterizer};
+use super::progress::RenderProgress;
 use super::rasterizer::Shot;
-use super::ticket::Ticket;
+use super::shutter::{Opened, Take};
+use super::ticket::{Stream, Ticket};
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor, SensorContext};
@@ -66,6 +69,9 @@ pub struct Camera {
     memory: Option<Box<Memory>>,
     /// Where flow is measured.
     earlier: Option<Earlier>,
+    /// Where the shutter takes time.
+    opening: Option<Opening>,
+    progress: RenderProgress,
     frame_counts: Array1<u64>,
     /// Rows that are due, between updates without meaning: its memory is kept.
     due: Vec<usize>,
@@ -101,6 +107,7 @@ struct Desk {
     /// Lists that are empty between drawings: their memory is kept.
     views: Vec<View>,
     jobs: Vec<Job<'static>>,
+    takes: Vec<Take<'static>>,
     tickets: Vec<Ticket>,
     /// What happens to pictures after they were drawn.
     faults: Option<Faults>,
@@ -144,16 +151,19 @@ impl Sensor for Camera {
                     self.frame_counts[row] += 1;
                 }
                 self.keep_earlier(&due);
-                self.capture(&due, state);
+                self.capture(&due, state, true);
+                self.close_shutters(&due);
             }
             Some(mut memory) => {
                 self.send(&due, state, &mut memory);
+                self.close_shutters(&due);
                 due.clear();
                 self.receive(state, &mut memory, &mut due);
                 self.memory = Some(memory);
                 self.draw_if_eager();
             }
         }
+        self.open_shutters(0..self.env_ids.len(), state);
         self.due = due;
         Ok(())
     }
@@ -170,7 +180,9 @@ impl Sensor for Camera {
             }
             self.earlier.iter_mut().for_each(|earlier| earlier.forget(row));
         }
-        self.capture(&rows, state);
+        self.close_shutters(&rows);
+        self.capture(&rows, state, false);
+        self.open_shutters(rows.into_iter(), state);
         Ok(())
     }
 
@@ -180,13 +192,18 @@ impl Sensor for Camera {
         for &row in &rows {
             self.tickets[row].refresh();
         }
-        self.capture(&rows, state);
+        self.capture(&rows, state, false);
+        for &row in &rows {
+            let (now, parent) = ((state, self.env_ids[row]), self.parent);
+            self.opening.iter_mut().for_each(|opening| opening.refresh(row, now, parent));
+        }
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
         let steps = || self.env_ids.iter().map(|&env| step[env]);
-        let due = self.phases.due_in(steps());
+        let wait = |due: u64| self.opening.as_ref().map_or(due, |opening| opening.wait(due));
+        let due = self.phases.first_of(steps(), wait);
         self.memory.as_ref().and_then(|memory| memory.due_in(steps())).map_or(due, |arrival| arrival.min(due))
     }
 
@@ -209,7 +226,7 @@ impl Camera {
         cfg: &CameraCfg,
         context: &SensorContext,
         scene: Arc<RenderScene>,
-        schedule: Schedule,
+        (schedule, opening): (Schedule, Option<Opening>),
         parent: Option<usize>,
         (lens, pixels, parent_from_camera): (Lens, PixelIntrinsics, Pose),
         rays: RaysOfRows,
@@ -225,10 +242,12 @@ impl Camera {
         let tickets: Vec<Ticket> = env_ids.iter().map(key).collect();
         let mount = Mount { parent_from_camera, pixels };
         let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
-        let captures = Captures::new(rows, &scene, tickets[0]);
+        let captures = Captures::new(rows, &scene, tickets[0], opening.is_some());
         let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
+        rasterizer.set_light(cfg.aperture, cfg.shutter);
+        let progress = rasterizer.progress().clone();
         rasterizer.share_assets(&context.ray_assets);
         let canvas = Some(Canvas::new(pictures, rows));
         Self {
@@ -248,6 +267,8 @@ impl Camera {
             tickets,
             memory,
             earlier,
+            opening,
+            progress,
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
@@ -256,6 +277,7 @@ impl Camera {
                 canvas,
                 views: Vec::new(),
                 jobs: Vec::new(),
+                takes: Vec::new(),
                 tickets: Vec::new(),
                 faults,
             }),
@@ -303,6 +325,12 @@ impl Camera {
     /// How many pictures were drawn since the camera was built, each environment counted: a measure of work.
     pub fn draws(&self) -> u64 {
         self.draws.load(Ordering::Relaxed)
+    }
+
+    /// How far the drawing of pictures by path tracing is, and a way to break it off from another thread. A reading that was
+    /// broken off is [`CameraError::Draw`] with [`RenderError::Cancelled`], until something was captured anew or set.
+    pub fn progress(&self) -> &RenderProgress {
+        &self.progress
     }
 
     /// The pictures of one channel: `camera.channel::<Depth>()?`, shape (N, H, W) or (N, H, W, components). Draws what was
@@ -591,6 +619,21 @@ impl Camera {
         }
     }
 
+    /// Closes the shutters of some rows.
+    fn close_shutters(&mut self, rows: &[usize]) {
+        if let Some(opening) = &mut self.opening {
+            rows.iter().for_each(|&row| opening.close(row));
+        }
+    }
+
+    /// Opens the shutters of those of some rows whose time it is.
+    fn open_shutters(&mut self, rows: impl Iterator<Item = usize>, state: &SceneState) {
+        let Self { opening, phases, env_ids, parent, .. } = self;
+        if let Some(opening) = opening {
+            opening.open(rows, phases, (state, env_ids), *parent);
+        }
+    }
+
     /// What some rows show now is what the pictures before showed, from now on.
     fn keep_earlier(&mut self, rows: &[usize]) {
         let Self { earlier, captures, .. } = self;
@@ -599,11 +642,13 @@ impl Camera {
         }
     }
 
-    /// Shows what there is to see in some environments; the state was checked.
-    fn capture(&mut self, rows: &[usize], state: &SceneState) {
+    /// Shows what there is to see in some environments, and with `opened` what there was since the shutter opened; the state
+    /// was checked.
+    fn capture(&mut self, rows: &[usize], state: &SceneState, opened: bool) {
         for &row in rows {
             let env = self.env_ids[row];
-            self.captures.keep(row, (state, env), self.parent, self.tickets[row]);
+            let opening = self.opening.as_ref().filter(|_| opened).map(|opening| (opening, row));
+            self.captures.keep(row, (state, env), self.parent, self.tickets[row], opening);
             if let Some(memory) = &mut self.memory {
                 memory.refresh(row, state.step[env]);
             }
@@ -619,7 +664,8 @@ impl Camera {
         for &row in rows {
             let (env, ticket) = (self.env_ids[row], self.tickets[row]);
             if let Some(slot) = memory.send(row, state.step[env], &ticket) {
-                memory.waiting.keep(slot, (state, env), self.parent, ticket);
+                let opening = self.opening.as_ref().map(|opening| (opening, row));
+                memory.waiting.keep(slot, (state, env), self.parent, ticket, opening);
             }
         }
     }
@@ -703,7 +749,7 @@ impl Camera {
         frames: impl Iterator<Item = FrameMut<'a>>,
     ) -> Result<(), (usize, RenderError)> {
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let Desk { rasterizer, views, jobs: kept, tickets, faults, .. } = &mut *desk;
+        let Desk { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults, .. } = &mut *desk;
         views.clear();
         views.extend(places.clone().map(|(_, place)| {
             let (mount, _) = look(place);
@@ -712,6 +758,7 @@ impl Camera {
         }));
         tickets.clear();
         let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
+        let mut takes: Vec<Take<'_>> = emptied(std::mem::take(kept_takes));
         for (((row, place), frame), view) in places.zip(frames).zip(&*views) {
             let poses = row_of(&captures.poses, place);
             let lights = Some(row_of(&captures.lights, place));
@@ -719,8 +766,15 @@ impl Camera {
             let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
             jobs.push((Shot { scene, poses, view, lights, lens: look(place).1, before }, frame));
             tickets.push(captures.tickets[place]);
+            let opened = captures.opened(place).and_then(|(poses, parent)| {
+                let camera = self.world_from(look(place).0, Some(parent))?;
+                let before = self.opening.as_ref()?.seconds();
+                Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
+            });
+            takes.push(Take { noise: captures.tickets[place].bits(Stream::PATHS), opened });
         }
-        let result = rasterizer.render(&mut jobs);
+        let result = rasterizer.render_takes(&mut jobs, &takes);
+        *kept_takes = emptied(takes);
         if let Some(faults) = faults {
             faults.spoil(&mut jobs, tickets);
         }

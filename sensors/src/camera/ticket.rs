@@ -27,6 +27,8 @@ impl Stream {
     pub(crate) const SHOT_IN_THE_DARK: Self = Self(4);
     pub(crate) const READ: Self = Self(2);
     pub(crate) const DEPTH: Self = Self(3);
+    /// The noise of paths.
+    pub(crate) const PATHS: Self = Self(5);
 
     /// What each picture adds to a channel; channels are counted from 0.
     pub(crate) const fn white(channel: u8) -> Self {
@@ -77,6 +79,11 @@ impl Ticket {
     #[inline]
     pub(crate) fn uniforms(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.uniforms(place(stream, block, self.number, 0))
+    }
+
+    /// 32 random bits of this picture.
+    pub(crate) fn bits(&self, stream: Stream) -> u32 {
+        self.dice.bits(place(stream, 0, self.number, 0))[0]
     }
 
     /// Four normal numbers of this picture.

@@ -66,6 +66,7 @@ impl Brush {
         let (step, top) = (plan.rows(), rows.start * BLOCK);
         // Shadows may come later: memory is taken once.
         self.tile.reserve(plan.most_of_shadow_bands());
+        self.tile.only = plan.only;
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());

@@ -7,7 +7,7 @@ use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_rays::ShadowRays;
 use crate::camera::channel::{FrameMut, Stage};
 use crate::camera::rasterizer::Shot;
-use crate::camera::{LensRays, RasterCfg, Renderer};
+use crate::camera::{Aperture, LensRays, RasterCfg, Renderer, Shutter};
 use crate::ray::RayAssets;
 use crate::ray::bvh::Stack;
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
@@ -40,6 +40,10 @@ pub(crate) struct Plan {
     pub(crate) renderer: Renderer,
     /// Whether shadows are cast by rays.
     shadow_rays: bool,
+    /// Rays for ambient occlusion.
+    occlusion_rays: u16,
+    /// The only row of each block that is wanted, if not all.
+    pub(crate) only: Option<usize>,
 }
 
 /// How shots are drawn.
@@ -47,6 +51,8 @@ pub(crate) struct Plan {
 pub(crate) struct Style<'a> {
     pub(crate) cfg: RasterCfg,
     pub(crate) renderer: Renderer,
+    pub(crate) aperture: Option<&'a Aperture>,
+    pub(crate) shutter: Shutter,
     /// Where trees over meshes are kept.
     pub(crate) assets: &'a RayAssets,
 }
@@ -66,22 +72,46 @@ impl Plan {
         shot: &Shot<'_>,
         frame: &FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Style { cfg, renderer, assets } = style;
         self.projection = None;
-        self.maps = 0;
+        let View { width, height, .. } = *shot.view;
+        shot.view.validate()?;
+        frame.validate(width * height)?;
+        self.prepare_part(style, shot, frame)
+    }
+
+    /// As [`prepare`](Self::prepare), for one row of the picture; the frame is that of the row of blocks that it is in.
+    pub(crate) fn prepare_row(
+        &mut self,
+        style: Style<'_>,
+        shot: &Shot<'_>,
+        frame: &FrameMut<'_>,
+        row: usize,
+    ) -> Result<(), RenderError> {
+        self.projection = None;
+        self.prepare_part(style, shot, frame)?;
+        self.only = Some(row % BLOCK);
+        Ok(())
+    }
+
+    fn prepare_part(&mut self, style: Style<'_>, shot: &Shot<'_>, frame: &FrameMut<'_>) -> Result<(), RenderError> {
+        let Style { cfg, renderer, aperture, shutter, assets } = style;
+        (self.maps, self.only) = (0, None);
         let Shot { scene, poses, view, .. } = *shot;
         view.validate()?;
         if !matches!(cfg.samples, 1 | 4) {
             return Err(RenderError::Samples { samples: cfg.samples });
         }
         renderer.validate()?;
+        check_occlusion(cfg, renderer)?;
         if poses.len() != scene.instances().len() {
             return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
         }
         if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, p)| !p.is_rigid()) {
             return Err(RenderError::InstancePose { instance, pose: *pose });
         }
-        frame.validate(view.width * view.height)?;
+        aperture.map_or(Ok(()), Aperture::check)?;
+        shutter.check()?;
+        check_light(renderer, aperture, shutter)?;
         if frame.wants(Stage::Flow) {
             self.moves.prepare(shot)?;
         }
@@ -91,7 +121,10 @@ impl Plan {
         if let Some(lens) = shot.lens {
             check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
         }
-        self.shadow_rays = wants_color && cfg.shadows && renderer == Renderer::Hybrid;
+        let hybrid = wants_color && renderer == Renderer::Hybrid;
+        self.shadow_rays = hybrid && cfg.shadows;
+        self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
+        let casts_rays = self.shadow_rays || self.occlusion_rays > 0;
         if wants_color && !renderer.follows_paths() {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
         }
@@ -103,11 +136,11 @@ impl Plan {
         };
         let keep = |instance: &Instance| Layer::of(instance, cfg.groups);
         self.list.build(&projection, shot.lens, scene, poses, parts, keep);
-        if renderer.sees_by_rays() || self.shadow_rays {
+        if renderer.sees_by_rays() || casts_rays {
             self.tracer.find_bodies(scene, assets, keep);
         }
-        if self.shadow_rays || wants_color && renderer.follows_paths() {
-            self.tracer.place(scene, poses);
+        if casts_rays || wants_color && renderer.follows_paths() {
+            self.tracer.place(scene, poses, None);
         }
         self.renderer = renderer;
         self.projection = Some(projection);
@@ -170,8 +203,10 @@ impl Plan {
         stack: &'a RefCell<&'a mut Stack>,
         [detail, albedo, flow]: [bool; 3],
     ) -> Context<'a> {
+        let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
+        let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
         Context {
-            shadow_rays: self.shadow_rays.then_some(ShadowRays { tracer: &self.tracer, stack }),
+            shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
             projection,
             scene: shot.scene,
             poses: shot.poses,
@@ -185,6 +220,31 @@ impl Plan {
             moves: flow.then_some(&self.moves),
         }
     }
+}
+
+/// Whether a renderer casts rays for ambient occlusion, if it is to.
+pub(crate) fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderError> {
+    match renderer {
+        Renderer::Raster | Renderer::FastRayTraced if cfg.occlusion_rays > 0 => {
+            Err(RenderError::Occlusion { rays: cfg.occlusion_rays, renderer: renderer.name() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether a renderer can draw what a lens and a shutter do to light.
+pub(crate) fn check_light(
+    renderer: Renderer,
+    aperture: Option<&Aperture>,
+    shutter: Shutter,
+) -> Result<(), RenderError> {
+    let what = match (aperture, shutter.is_instant()) {
+        _ if renderer.follows_paths() => return Ok(()),
+        (None, true) => return Ok(()),
+        (Some(_), _) => "an aperture (depth of field)",
+        (None, false) => "a shutter that takes time",
+    };
+    Err(RenderError::NeedsPaths { what, renderer: renderer.name() })
 }
 
 /// Whether the rays of a lens are those of the picture, and can be followed.

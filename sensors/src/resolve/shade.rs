@@ -212,6 +212,12 @@ pub(crate) fn shade<S: Simd>(
     let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
     let ambient = |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission);
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
+    if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
+        let [above, below] = rays.blocked(s, (at.position, at.normal, n, at.along), lanes);
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
+        }
+    }
     let mut gloss = [zero, zero, zero];
     let shiny = Gloss::of(material);
     let headlight = &scene.headlight;
@@ -239,7 +245,7 @@ pub(crate) fn shade<S: Simd>(
                 lit = lit * map.light(s, at.position, at.normal, source.placed.error, matters);
             }
         }
-        if let Some(rays) = shadow_rays.filter(|_| light.cast_shadow) {
+        if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
                 let from = (at.position, at.normal, at.along);

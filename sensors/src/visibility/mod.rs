@@ -104,6 +104,60 @@ pub enum RenderError {
         /// The renderer.
         renderer: &'static str,
     },
+    /// What only paths can show, and a renderer that follows none.
+    #[error(
+        "{what}: colours come from paths all over the lens and the exposure, and {renderer} follows none; use renderer: RayTraced"
+    )]
+    NeedsPaths {
+        /// What is to be shown.
+        what: &'static str,
+        /// The renderer.
+        renderer: &'static str,
+    },
+    /// Ambient occlusion of a renderer that has none.
+    #[error("{rays} rays for ambient occlusion: {renderer} casts none; use renderer: Hybrid (RayTraced needs none)")]
+    Occlusion {
+        /// How many rays.
+        rays: u16,
+        /// The renderer.
+        renderer: &'static str,
+    },
+    /// A lens that no camera has.
+    #[error("{what} of the aperture is {value}; it must be {allowed}")]
+    Aperture {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What is possible.
+        allowed: &'static str,
+    },
+    /// A shutter that no camera has.
+    #[error("{what} of the shutter is {value} s; it must be 0 or positive, and finite")]
+    Shutter {
+        /// Which number.
+        what: &'static str,
+        /// The number \[s\].
+        value: f64,
+    },
+    /// The shutter was open before anybody knows where things were.
+    #[error(
+        "the shutter opens {span} s before the picture's instant, but where things were is known from {before} s before"
+    )]
+    Opened {
+        /// From when poses are \[s\].
+        before: f64,
+        /// How long the shutter takes \[s\].
+        span: f64,
+    },
+    /// Somebody broke the picture off ([`RenderProgress::cancel`](crate::camera::RenderProgress::cancel)).
+    #[error("the picture was broken off after {samples} of {total} paths")]
+    Cancelled {
+        /// Paths that were followed.
+        samples: u64,
+        /// Paths that there were to follow.
+        total: u64,
+    },
     /// Flow through a lens.
     #[error("flow is known of pinhole cameras only; this picture has a lens")]
     LensFlow,

@@ -324,6 +324,14 @@ macro_rules! channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
+            /// Takes over a row of a frame with the same channels and `width`, as the first row.
+            pub(crate) fn take_row(&mut self, from: &Frame, row: usize, width: usize) {
+                $(if let (Some(to), Some(from)) = (self.$field.as_deref_mut(), from.$field.as_deref()) {
+                    let each = width * $Name::COMPONENTS;
+                    to[..each].copy_from_slice(&from[row * each..(row + 1) * each]);
+                })*
+            }
+
             /// Checks the lengths against a number of pixels.
             pub(crate) fn validate(&self, pixels: usize) -> Result<(), RenderError> {
                 $(if let Some(buffer) = &self.$field {

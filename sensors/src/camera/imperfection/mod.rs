@@ -5,8 +5,8 @@
 //! on the screen the least light that is. Those of depth work on the depth along the optical axis, from which distance
 //! follows. All other channels stay the truth.
 //!
-//! Motion blur is none of them: light that falls in while the shutter is open is of several instants, and a camera here
-//! captures one.
+//! Motion blur is none of them: light that falls in while the shutter is open is of several instants, which a finished picture
+//! does not know any more. It is [`CameraCfg::shutter`](super::CameraCfg::shutter)'s.
 
 mod tone;
 

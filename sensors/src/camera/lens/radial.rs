@@ -26,3 +26,57 @@ pub(super) fn unproject([x, y]: [f64; 2], most: f64, angle: impl Fn(f64) -> Opti
     let by = sine / radius;
     Some([x * by, y * by, cosine])
 }
+
+/// A fisheye of one law, the same all around: a type whose only number is the angle at which it ends.
+macro_rules! fisheye {
+    (
+        $(#[$doc:meta])*
+        $Name:ident: $name:literal, $aliases:expr;
+        angles up to $most:expr, $allowed:literal;
+        radius: $radius:expr;
+        angle: $angle:expr;
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $Name {
+            #[doc = concat!("Nothing is seen farther from the optical axis than this angle \\[rad\\]: ", $allowed, ".")]
+            pub max_angle: f64,
+        }
+
+        impl Default for $Name {
+            /// As far as it goes.
+            fn default() -> Self {
+                Self { max_angle: $most }
+            }
+        }
+
+        impl super::LensModel for $Name {
+            const NAME: &'static str = $name;
+            const ALIASES: &'static [&'static str] = $aliases;
+
+            fn max_angle(&self) -> Option<f64> {
+                Some(self.max_angle)
+            }
+
+            fn validate(&self) -> Result<(), super::CameraError> {
+                super::angle_up_to(self.max_angle, $most, $allowed)
+            }
+
+            fn domain(&self) -> super::Domain {
+                let radius: fn(f64) -> f64 = $radius;
+                super::Domain { angle: self.max_angle, radius: radius(self.max_angle), folds: false }
+            }
+
+            fn project(&self, domain: &super::Domain, direction: [f64; 3]) -> Option<[f64; 2]> {
+                super::radial::project(direction, domain.angle, $radius)
+            }
+
+            fn unproject(&self, domain: &super::Domain, point: [f64; 2]) -> Option<[f64; 3]> {
+                super::radial::unproject(point, domain.angle, $angle)
+            }
+        }
+    };
+}
+
+pub(super) use fisheye;

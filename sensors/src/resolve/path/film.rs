@@ -2,6 +2,7 @@
 
 use super::smooth::Guide;
 use super::{Found, Lamps, Paths};
+use crate::camera::RenderProgress;
 use crate::lanes::{LANES, Level, Simd, at_level, load};
 use crate::ray::bvh::Stack;
 use crate::resolve::tone::encode;
@@ -15,6 +16,7 @@ pub(crate) struct Film {
     pub(crate) pixels: Vec<Pixel>,
     /// The pixels of the next pass of smoothing.
     pub(crate) next: Vec<Pixel>,
+    /// None without smoothing.
     pub(crate) guides: Vec<Guide>,
 }
 
@@ -47,26 +49,35 @@ impl Film {
         self.width = width;
         let count = width * height;
         self.pixels.resize(count, Pixel::default());
-        self.guides.resize(count, Guide::default());
+        self.guides.resize(if smooth { count } else { 0 }, Guide::default());
         self.next.resize(if smooth { count } else { 0 }, Pixel::default());
     }
 
     /// The film in parts of some rows, and its lamps.
     pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
         let size = (self.width * rows).max(1);
-        let parts = self.pixels.chunks_mut(size).zip(self.guides.chunks_mut(size)).enumerate();
-        (&self.lamps, parts.map(move |(k, (pixels, guides))| Rows { first: k * rows, pixels, guides }))
+        let (parts, mut guides) = (self.pixels.chunks_mut(size).enumerate(), self.guides.chunks_mut(size));
+        let part = move |(k, pixels)| Rows { first: k * rows, pixels, guides: guides.next().unwrap_or_default() };
+        (&self.lamps, parts.map(part))
     }
 }
 
 impl Rows<'_> {
-    /// Follows the paths of all pixels. With `smooth` the colour of surfaces is divided out.
-    pub(crate) fn expose(&mut self, paths: &Paths<'_>, smooth: bool, stack: &mut Stack) {
-        let width = paths.projection.width;
-        for (k, (pixel, guide)) in self.pixels.iter_mut().zip(&mut *self.guides).enumerate() {
-            let found @ Found { color, variance, albedo, .. } = paths.pixel([k % width, self.first + k / width], stack);
-            *guide = Guide::new(&found);
-            let by = if smooth { guide.albedo } else { [1.0; 3] };
+    /// Follows the paths of all pixels, until it is broken off. With `smooth` the colour of surfaces is divided out.
+    pub(crate) fn expose(&mut self, paths: &Paths<'_>, smooth: bool, stack: &mut Stack, progress: &RenderProgress) {
+        let width = paths.eye.projection.width;
+        for (k, pixel) in self.pixels.iter_mut().enumerate() {
+            if progress.is_cancelled() {
+                return;
+            }
+            let found @ Found { color, variance, albedo, rays, .. } =
+                paths.pixel([k % width, self.first + k / width], stack);
+            progress.add(paths.samples.into(), rays);
+            let mut by = [1.0; 3];
+            if let Some(guide) = self.guides.get_mut(k).filter(|_| smooth) {
+                *guide = Guide::new(&found);
+                by = guide.albedo;
+            }
             let mean = super::brightness(by.map(f64::from));
             *pixel = Pixel {
                 color: [0, 1, 2].map(|c| color[c] as f32 / by[c]),
@@ -77,18 +88,17 @@ impl Rows<'_> {
     }
 }
 
-/// Colours for the screen, of as many pixels as there are; with `smooth` the colour of surfaces is multiplied again.
-pub(crate) fn develop(level: Level, pixels: &[Pixel], guides: &[Guide], smooth: bool, out: &mut [u8]) {
-    at_level!(level, s => develop_lanes(s, pixels, guides, smooth, out));
+/// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
+pub(crate) fn develop(level: Level, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+    at_level!(level, s => develop_lanes(s, pixels, guides, out));
 }
 
-fn develop_lanes<S: Simd>(s: S, pixels: &[Pixel], guides: &[Guide], smooth: bool, out: &mut [u8]) {
-    let groups = pixels.chunks(LANES).zip(guides.chunks(LANES)).zip(out.chunks_mut(4 * LANES));
-    for ((pixels, guides), out) in groups {
+fn develop_lanes<S: Simd>(s: S, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+    for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
         for c in 0..3 {
             let mut linear = [0.0f32; LANES];
-            for (to, (pixel, guide)) in linear.iter_mut().zip(pixels.iter().zip(guides)) {
-                *to = pixel.color[c] * if smooth { guide.albedo[c] } else { 1.0 };
+            for ((to, pixel), k) in linear.iter_mut().zip(pixels).zip(group * LANES..) {
+                *to = pixel.color[c] * guides.get(k).map_or(1.0, |guide| guide.albedo[c]);
             }
             let mut bytes = [0i32; LANES];
             // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.

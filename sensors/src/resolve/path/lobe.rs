@@ -24,7 +24,7 @@ pub(super) struct Lobe {
 
 /// Axes at a point, the third is the normal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Basis([V3; 3]);
+pub(in crate::resolve) struct Basis([V3; 3]);
 
 /// Where light is followed to.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +33,8 @@ pub(super) struct Scattered {
     /// What of the light from there goes on.
     pub(super) weight: V3,
     pub(super) mirrored: bool,
+    /// How likely the direction was \[1/sr\]; 0 of mirrors, which have one only.
+    pub(super) likely: f64,
 }
 
 /// What of the light from a direction is scattered into another, times the cosine of the first: below the layer, and by it.
@@ -44,14 +46,14 @@ pub(super) struct Scatter {
 
 impl Basis {
     /// Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017.
-    pub(super) fn of(n: V3) -> Self {
+    pub(in crate::resolve) fn of(n: V3) -> Self {
         let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
         let a = -1.0 / (sign + n[2]);
         let b = n[0] * n[1] * a;
         Self([[1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]], [b, sign + n[1] * n[1] * a, -n[1]], n])
     }
 
-    pub(super) fn to_world(self, v: V3) -> V3 {
+    pub(in crate::resolve) fn to_world(self, v: V3) -> V3 {
         [0, 1, 2].map(|k| self.0[0][k] * v[0] + self.0[1][k] * v[1] + self.0[2][k] * v[2])
     }
 
@@ -148,7 +150,7 @@ impl Lobe {
             return None;
         }
         if lobe < self.mirror {
-            return Some(Scattered { direction: [-o[0], -o[1], o[2]], weight: [1.0; 3], mirrored: true });
+            return Some(Scattered { direction: [-o[0], -o[1], o[2]], weight: [1.0; 3], mirrored: true, likely: 0.0 });
         }
         let rest = 1.0 - self.mirror;
         let lobe = (lobe - self.mirror) / rest;
@@ -157,16 +159,23 @@ impl Lobe {
         if direction[2] <= 0.0 {
             return None;
         }
+        let likely = self.likely(o, direction);
+        let Scatter { below, layer } = self.scatter(o, direction);
+        let weight = below.map(|x| (x + layer) / likely);
+        Some(Scattered { direction, weight, mirrored: false, likely })
+    }
+
+    /// How likely [`choose`](Self::choose) chooses a direction above the surface for light that goes to `o` \[1/sr\].
+    pub(super) fn likely(&self, o: V3, i: V3) -> f64 {
+        let share = self.share(o);
         // As likely as one of the two ways makes it.
-        let mut likely = (1.0 - share) * direction[2] / PI;
+        let mut likely = (1.0 - share) * i[2] / PI;
         if share > 0.0 {
-            let half = [0, 1, 2].map(|k| o[k] + direction[k]);
+            let half = [0, 1, 2].map(|k| o[k] + i[k]);
             let tilt = half[2] / dot(half, half).sqrt();
             likely += share * self.seen(o[2]) * self.density(tilt) / (4.0 * o[2]);
         }
-        let Scatter { below, layer } = self.scatter(o, direction);
-        let weight = below.map(|x| (x + layer) / (likely * rest));
-        Some(Scattered { direction, weight, mirrored: false })
+        likely * (1.0 - self.mirror)
     }
 
     /// Mirrored by a microfacet that is seen from `o`.
@@ -185,7 +194,7 @@ impl Lobe {
 }
 
 /// A direction by the cosine law.
-fn cosine(at: [f64; 2]) -> V3 {
+pub(in crate::resolve) fn cosine(at: [f64; 2]) -> V3 {
     let [x, y] = on_disc(at);
     [x, y, (1.0 - at[0]).max(0.0).sqrt()]
 }

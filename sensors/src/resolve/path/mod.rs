@@ -2,33 +2,39 @@
 //!
 //! At every surface all lamps are asked for their light (one shadow ray each), and one direction is chosen by the surface's
 //! own law; what is met there sends its emission, what is not met the dome's light. So lamps are met by shadow rays only, the
-//! dome and emitting surfaces by paths only: nothing counts twice. Later bounces end by Russian roulette. Source: Kajiya, The
-//! rendering equation, 1986; the conventions of light are those of [`Renderer`](crate::camera::Renderer).
+//! dome by paths only: nothing counts twice. Surfaces that glow are met in both ways, each of which has its share of the light
+//! ([`emitter`]). Later bounces end by Russian roulette. Source: Kajiya, The rendering equation, 1986; the conventions of
+//! light are those of [`Renderer`](crate::camera::Renderer).
 
+mod direct;
+mod emitter;
+pub(crate) mod eye;
 pub(crate) mod film;
 mod lamp;
-mod lobe;
+pub(super) mod lobe;
 mod point;
 pub(crate) mod smooth;
-mod sobol;
+pub(super) mod sobol;
 mod texel;
 
 #[cfg(test)]
 mod tests;
 
-use crate::camera::LensRays;
+use crate::camera::shutter::Clock;
 use crate::ray::Ray;
 use crate::ray::bvh::Stack;
-use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
+use crate::ray::vector::{V3, along, dot, scale, to_f64};
 use crate::resolve::tone;
 use crate::visibility::Projection;
-use crate::visibility::trace::Tracer;
+use crate::visibility::trace::motion::{Motion, NOW, wide};
+use crate::visibility::trace::{Hit, Tracer};
+use emitter::{Emitters, power_heuristic};
+use eye::Eye;
 use lamp::Lamp;
 use lobe::Basis;
 use point::Point;
-use scene::{Light, PoseF32, RenderScene};
+use scene::{Light, PoseF64, RenderScene};
 use sobol::{Sample, Sequence};
-use std::f64::consts::PI;
 
 /// Lamps that are asked, at most; the camera's comes besides.
 const MAX_LAMPS: usize = crate::resolve::shade::MAX_LIGHTS;
@@ -40,6 +46,8 @@ const SURE: u32 = 2;
 const REACH: f64 = 1.0 - 1e-6;
 /// Surfaces that are not opaque that a path goes through, at most.
 const MAX_PASSES: u32 = 64;
+/// How much wider by the metre what is seen together gets where light is scattered, at least.
+const SCATTERED: f64 = 0.1;
 /// Pairs of numbers: in the pixel, and at each surface where to go on, which lobe and whether at all, whether through.
 const IN_PIXEL: u32 = 0;
 const ONWARD: u32 = 1;
@@ -47,26 +55,72 @@ const CHANCE: u32 = 2;
 const THROUGH: u32 = 3;
 /// Pairs of each surface: those, and one for each lamp.
 const PAIRS: u32 = 4 + MAX_LAMPS as u32;
+/// Far beyond those: the point of the lens's opening, and the instant.
+const ON_LENS: u32 = 1 << 30;
+const INSTANT: u32 = (1 << 30) + 1;
 
 /// What the paths of a picture have in common.
 #[derive(Clone, Debug)]
 pub(crate) struct Paths<'a> {
     pub(crate) scene: &'a RenderScene,
-    pub(crate) poses: &'a [PoseF32],
     pub(crate) tracer: &'a Tracer,
-    pub(crate) projection: &'a Projection,
-    /// Instead of the projection's rays.
-    pub(crate) lens: Option<&'a LensRays>,
+    pub(crate) eye: Eye<'a>,
+    pub(crate) moving: Option<&'a Moving>,
     pub(crate) samples: u32,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u32,
     pub(crate) lamps: &'a Lamps,
+    pub(crate) ways: Ways,
+}
+
+/// A shutter that takes time, and a camera that may move meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moving {
+    pub(crate) clock: Clock,
+    pub(crate) camera: Option<Motion>,
+}
+
+/// In which ways light of what glows is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ways {
+    Both,
+    /// Only by looking for it.
+    #[cfg(test)]
+    Looking,
+    /// Only by paths that meet it.
+    #[cfg(test)]
+    Meeting,
+}
+
+impl Ways {
+    /// The share of light that is found by looking for it with a density, which paths meet with another.
+    fn looking(self, own: f64, other: f64) -> f64 {
+        match self {
+            Self::Both => power_heuristic(own, other),
+            #[cfg(test)]
+            Self::Looking => 1.0,
+            #[cfg(test)]
+            Self::Meeting => 0.0,
+        }
+    }
+
+    /// The share of light that paths meet with a density, where it is looked for with another.
+    fn meeting(self, own: f64, other: f64) -> f64 {
+        match self {
+            Self::Both => power_heuristic(own, other),
+            #[cfg(test)]
+            Self::Looking => 0.0,
+            #[cfg(test)]
+            Self::Meeting => 1.0,
+        }
+    }
 }
 
 /// The light of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lamps {
     lamps: Vec<Lamp>,
+    emitters: Emitters,
     /// Radiance of the dome from above and below the horizon.
     dome: [V3; 2],
     /// What cameras and mirrors see there: straight up, at the horizon, straight down.
@@ -79,13 +133,14 @@ impl Lamps {
     /// along its axis.
     pub(crate) fn prepare(
         &mut self,
-        scene: &RenderScene,
+        (scene, tracer): (&RenderScene, &Tracer),
         lights: &[Light],
         shadows: bool,
         (view, forward): (&Projection, bool),
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
-        let Self { lamps, dome, sky, haze } = self;
+        let Self { lamps, emitters, dome, sky, haze } = self;
+        emitters.prepare(scene, tracer);
         *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
@@ -101,7 +156,7 @@ impl Lamps {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.lamps.capacity() * size_of::<Lamp>()
+        self.lamps.capacity() * size_of::<Lamp>() + self.emitters.bytes()
     }
 
     /// The sky as cameras see it.
@@ -125,6 +180,8 @@ pub(crate) struct Found {
     pub(crate) albedo: V3,
     pub(crate) normal: V3,
     pub(crate) distance: f64,
+    /// How many rays were cast.
+    pub(crate) rays: u64,
 }
 
 /// What a camera ray met first.
@@ -133,6 +190,15 @@ struct First {
     albedo: V3,
     normal: V3,
     distance: f64,
+}
+
+/// One path: its numbers, its instant, and how many rays were cast for it.
+#[derive(Debug)]
+struct Path<'a> {
+    sample: Sample,
+    time: f64,
+    rays: u64,
+    stack: &'a mut Stack,
 }
 
 impl Paths<'_> {
@@ -144,8 +210,11 @@ impl Paths<'_> {
         let mut squares = 0.0;
         for index in 0..self.samples {
             let sample = sequence.sample(index);
+            let time = self.moving.map_or(NOW, |moving| moving.clock.at(at[1], sample.pair(INSTANT)[0]));
             let [dx, dy] = sample.pair(IN_PIXEL);
-            let (color, first) = self.radiance(sample, [at[0] as f64 + dx, at[1] as f64 + dy], stack);
+            let mut path = Path { sample, time, rays: 0, stack: &mut *stack };
+            let (color, first) = self.radiance(&mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
+            out.rays += path.rays;
             // Lamps and skies may be anything; what is no number would spread over its neighbours.
             let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
             let bright = brightness(color);
@@ -160,41 +229,38 @@ impl Paths<'_> {
         out
     }
 
+    /// Where the camera is at a time.
+    fn camera(&self, time: f64) -> PoseF64 {
+        match self.moving.and_then(|moving| moving.camera.as_ref()) {
+            Some(motion) => motion.at(time),
+            None => wide(&self.eye.projection.world_from_camera),
+        }
+    }
+
     /// The light that comes to a point of the picture, and what is seen there.
-    fn radiance(&self, sample: Sample, [u, v]: [f64; 2], stack: &mut Stack) -> (V3, First) {
+    fn radiance(&self, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
+        let (sample, time) = (path.sample, path.time);
         let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
-        let view = self.projection;
-        let wide = f64::from;
-        let (c, f) = match self.lens {
-            None => {
-                let c = [(u - wide(view.cx)) / wide(view.fx), (v - wide(view.cy)) / wide(view.fy), 1.0];
-                (c, wide(view.fx))
-            }
-            Some(lens) => match lens.optics().ray([u, v]) {
-                Some(c) => (c, 1.0 / lens.pixel()),
-                // Outside of the image circle no light falls.
-                None => return ([0.0; 3], first),
-            },
+        let Some(eye::First { mut ray, travelled: near, mut limit, mut width, mut spread }) =
+            self.eye.look(at, &self.camera(time), || sample.pair(ON_LENS))
+        else {
+            // Outside of the image circle no light falls.
+            return ([0.0; 3], first);
         };
-        let d = view.world_from_camera.rotation.map(|r| dot(to_f64(r), c));
-        let length = dot(d, d).sqrt();
-        let direction = scale(d, 1.0 / length);
-        let (near, far) = (wide(view.near) * length, wide(view.far) * length);
-        let mut ray = Ray { origin: along(to_f64(view.world_from_camera.translation), near, direction), direction };
-        let mut limit = far - near;
-        // How wide a pixel is at the end of the path so far, and how much wider it gets by the metre.
-        let (mut width, mut spread) = (wide(view.near) / f, 1.0 / (f * length));
         let (mut light, mut kept) = ([0.0; 3], [1.0; 3]);
         let (mut bounce, mut passes, mut travelled) = (0, 0, near);
         // Whether it goes on as the camera's ray went.
         let mut clear = true;
+        // Where the direction was chosen, and how likely it was, if it was not the only one.
+        let mut chosen: Option<(V3, f64)> = None;
         loop {
-            let hit = self.tracer.nearest(&ray, limit, stack);
+            path.rays += 1;
+            let hit = self.tracer.nearest(&ray, limit, time, path.stack);
             let met = hit.and_then(|hit| {
                 let footprint = width + spread * hit.distance;
-                Some((hit.distance, Point::new(self.scene, self.poses, &ray, &hit, footprint)?))
+                Some((hit, Point::new(self.scene, &ray, &hit, footprint)?))
             });
-            let Some((distance, point)) = met else {
+            let Some((hit @ Hit { distance, .. }, point)) = met else {
                 let below = usize::from(ray.direction[2] <= 0.0);
                 let beyond = if clear { self.lamps.sky(ray.direction) } else { self.lamps.dome[below] };
                 light = add(light, times(kept, beyond));
@@ -231,11 +297,13 @@ impl Paths<'_> {
                     kept = scale(kept, 1.0 - k);
                 }
             }
-            light = add(light, times(kept, scale(point.emission, 1.0 - point.lobe.mirror)));
+            let share = chosen.map_or(1.0, |(from, likely)| self.met(from, likely, &hit, point.position));
+            light = add(light, times(kept, scale(point.emission, share * (1.0 - point.lobe.mirror))));
             if bounce > self.max_bounces {
                 break;
             }
-            light = add(light, times(kept, self.lit(&point, o, sample, dims, stack)));
+            light = add(light, times(kept, self.lit(&point, o, path, dims)));
+            light = add(light, times(kept, self.glow(&point, o, path, bounce, width)));
             let basis = Basis::of(point.normal);
             let [lobe, chance] = sample.pair(dims + CHANCE);
             let Some(next) = point.lobe.choose(basis.to_local(o), lobe, sample.pair(dims + ONWARD)) else { break };
@@ -253,52 +321,14 @@ impl Paths<'_> {
                 kept = scale(kept, 1.0 / most);
             }
             if !next.mirrored {
-                (clear, spread) = (false, spread.max(0.1));
+                (clear, spread) = (false, spread.max(SCATTERED));
             }
             bounce += 1;
             ray = Ray { origin: above(&point, 1.0), direction: onward };
+            chosen = (!next.mirrored).then_some((ray.origin, next.likely));
             limit = f64::INFINITY;
         }
         (light, first)
-    }
-
-    /// What a point sends to `o` of the lamps' light.
-    fn lit(&self, point: &Point, o: V3, sample: Sample, dims: u32, stack: &mut Stack) -> V3 {
-        let basis = Basis::of(point.normal);
-        let local = basis.to_local(o);
-        let matt = 1.0 - point.lobe.mirror;
-        let mut out = [0.0; 3];
-        let mut origin = None;
-        for (lamp, k) in self.lamps.lamps.iter().zip(4..) {
-            let choice = if lamp.has_size() { sample.pair(dims + k) } else { [0.0; 2] };
-            let Some(light) = lamp.at(point.position, choice) else { continue };
-            out = along(out, light.strength * matt, times(point.lobe.albedo, lamp.ambient));
-            let scatter = point.lobe.scatter(local, basis.to_local(light.direction));
-            let sent = [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer * lamp.specular[c]));
-            if sent.iter().all(|&x| x <= 0.0) {
-                continue;
-            }
-            let passes = if lamp.cast_shadow {
-                let origin = *origin.get_or_insert_with(|| self.lifted(point, stack));
-                let ray = Ray { origin, direction: light.direction };
-                self.tracer.passes(&ray, light.distance * REACH, stack)
-            } else {
-                1.0
-            };
-            out = along(out, light.strength * passes, sent);
-        }
-        out
-    }
-
-    /// Where shadow rays of a point begin: where its smooth normals mean it to be, unless something is between.
-    fn lifted(&self, point: &Point, stack: &mut Stack) -> V3 {
-        let (here, lifted) = (above(point, 1.0), above(&Point { position: point.lifted, ..*point }, 1.0));
-        let way = sub(lifted, here);
-        let (far, Some(direction)) = (dot(way, way).sqrt(), unit(way)) else { return lifted };
-        match self.tracer.nearest(&Ray { origin: here, direction }, far, stack) {
-            Some(_) => here,
-            None => lifted,
-        }
     }
 }
 

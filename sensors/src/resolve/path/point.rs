@@ -5,7 +5,7 @@ use super::texel;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use crate::visibility::trace::Hit;
-use scene::{Instance, PoseF32, RenderMesh, RenderScene, TextureKind};
+use scene::{Instance, RenderMesh, RenderScene, TextureKind};
 
 /// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
 const LIFT: f64 = 0.15;
@@ -40,15 +40,15 @@ struct Corner {
 
 impl Point {
     /// The point of a hit. `footprint` is how much of the surface is seen together, if it is seen straight on \[m\].
-    pub(super) fn new(scene: &RenderScene, poses: &[PoseF32], ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
+    pub(super) fn new(scene: &RenderScene, ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
         let index = hit.instance as usize;
-        let (instance, pose) = (scene.instances().get(index)?, poses.get(index)?);
+        let (instance, pose) = (scene.instances().get(index)?, &hit.world_from_instance);
         let position = ray.at(hit.distance);
         let front = dot(hit.normal, ray.direction) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let flat = scale(hit.normal, side);
-        let rotation = pose.rotation.map(to_f64);
-        let from = sub(position, to_f64(pose.translation));
+        let rotation = pose.rotation;
+        let from = sub(position, pose.translation);
         let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
         let corner = instance.mesh().map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
         let normal = corner.and_then(|c| {

@@ -6,13 +6,13 @@
 
 /// The sequence of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sequence {
+pub(in crate::resolve) struct Sequence {
     seed: u32,
 }
 
 /// One sample of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
+pub(in crate::resolve) struct Sample {
     seed: u32,
     index: u32,
 }
@@ -56,11 +56,11 @@ fn second(mut index: u32) -> u32 {
 
 impl Sequence {
     /// Of a pixel, in pictures of a seed.
-    pub(super) fn new([x, y]: [usize; 2], seed: u32) -> Self {
+    pub(in crate::resolve) fn new([x, y]: [usize; 2], seed: u32) -> Self {
         Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
     }
 
-    pub(super) fn sample(self, index: u32) -> Sample {
+    pub(in crate::resolve) fn sample(self, index: u32) -> Sample {
         Sample { seed: self.seed, index }
     }
 }
@@ -68,7 +68,7 @@ impl Sequence {
 impl Sample {
     /// Two numbers in 0..1. The first 2^k samples have one in each of 2^k boxes of the square, of any proportions; pairs do
     /// not depend on each other.
-    pub(super) fn pair(self, dimension: u32) -> [f64; 2] {
+    pub(in crate::resolve) fn pair(self, dimension: u32) -> [f64; 2] {
         let seed = combine(self.seed, dimension);
         let index = scramble(self.index, seed);
         let unit = |x: u32| f64::from(x) / 4_294_967_296.0;

@@ -1,12 +1,17 @@
 //! Light against closed forms.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+mod aperture;
+mod emitters;
+
 use super::*;
 use crate::ray::RayAssets;
+use crate::ray::vector::sub;
 use crate::visibility::View;
 use crate::visibility::raster::Layer;
 use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
-use scene::{Headlight, Hemisphere, Instance, LightKind, Material, Shape, Sky};
+use scene::{Headlight, Hemisphere, Instance, LightKind, Material, PoseF32, Shape, Sky};
+use std::f64::consts::PI;
 
 /// A scene without any light of its own.
 fn dark(instances: Vec<Instance>) -> RenderScene {
@@ -34,36 +39,46 @@ fn looking(eye: [f32; 3], target: [f32; 3]) -> View {
     View { fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, ..View::look_at([1, 1], 0.5, eye, target, [0., 0., 1.]).unwrap() }
 }
 
-/// What a pixel shows in several pictures of different seeds: the mean, and the standard deviation of it.
+/// What rays meet, and the light.
+struct Studio<'a> {
+    scene: &'a RenderScene,
+    tracer: Tracer,
+    lamps: Lamps,
+    projection: Projection,
+}
+
+impl<'a> Studio<'a> {
+    fn new(scene: &'a RenderScene, poses: &[PoseF32], view: &View) -> Self {
+        let mut tracer = Tracer::default();
+        tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
+        tracer.place(scene, poses, None);
+        let (mut lamps, projection) = (Lamps::default(), Projection::from(view));
+        lamps.prepare((scene, &tracer), &scene.lights, true, (&projection, true));
+        Self { scene, tracer, lamps, projection }
+    }
+
+    fn paths(&self, samples: u32, max_bounces: u32, seed: u32) -> Paths<'_> {
+        let Self { scene, tracer, lamps, projection } = self;
+        let eye = Eye { projection, lens: None, pupil: None };
+        Paths { scene, tracer, eye, moving: None, samples, max_bounces, seed, lamps, ways: Ways::Both }
+    }
+
+    /// What a pixel shows in several pictures of different seeds: the mean, and the standard deviation of it.
+    fn seen(&self, paths: &Paths<'_>, count: u32) -> (f64, f64) {
+        let mut stack = Stack::default();
+        let all: Vec<f64> =
+            (0..count).map(|seed| Paths { seed, ..paths.clone() }.pixel([0, 0], &mut stack).color[1]).collect();
+        let n = f64::from(count);
+        let mean = all.iter().sum::<f64>() / n;
+        let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, (variance / n).sqrt())
+    }
+}
+
+/// What a pixel shows in sixteen pictures.
 fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_bounces: u32) -> (f64, f64) {
-    let mut tracer = Tracer::default();
-    tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
-    tracer.place(scene, poses);
-    let mut lamps = Lamps::default();
-    let projection = &Projection::from(view);
-    lamps.prepare(scene, &scene.lights, true, (projection, true));
-    let count = 16u32;
-    let mut stack = Stack::default();
-    let all: Vec<f64> = (0..count)
-        .map(|seed| {
-            let paths = Paths {
-                scene,
-                poses,
-                tracer: &tracer,
-                projection,
-                lens: None,
-                samples,
-                max_bounces,
-                seed,
-                lamps: &lamps,
-            };
-            paths.pixel([0, 0], &mut stack).color[1]
-        })
-        .collect();
-    let n = f64::from(count);
-    let mean = all.iter().sum::<f64>() / n;
-    let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+    let studio = Studio::new(scene, poses, view);
+    studio.seen(&studio.paths(samples, max_bounces, 0), 16)
 }
 
 /// Five standard deviations, and rounding: colours and lamps are single precision.

@@ -34,6 +34,8 @@ pub(crate) struct Tile {
     fresh: Vec<bool>,
     /// The nearness where nothing is.
     empty: f32,
+    /// The only row of each block that rays are cast for, if not all.
+    pub(crate) only: Option<usize>,
 }
 
 impl Tile {
@@ -108,7 +110,12 @@ impl Tile {
         self.farthest.clone_from(&other.farthest);
         self.stale.clone_from(&other.stale);
         self.fresh.clone_from(&other.fresh);
-        self.empty = other.empty;
+        (self.empty, self.only) = (other.empty, other.only);
+    }
+
+    /// The rows of each block that rays are cast for.
+    pub(crate) fn rows(&self) -> std::ops::Range<usize> {
+        self.only.map_or(0..BLOCK, |row| row..row + 1)
     }
 
     /// Bytes held.

@@ -9,6 +9,7 @@
 //! where its rays are cast in packets of eight, the nearest instances first. What is written is the rasterizer's own
 //! visibility buffer, so every channel comes from the same code.
 
+pub(crate) mod motion;
 mod tree;
 
 use super::Projection;
@@ -24,6 +25,7 @@ use crate::ray::shape::mesh::MeshTree;
 use crate::ray::triangle::ShearPacket;
 use crate::ray::vector::{V3, along, dot, scale};
 use crate::ray::{Ray, RayAssets};
+use motion::{Motion, wide};
 use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
 use tree::Tree;
@@ -47,6 +49,8 @@ enum Body {
 struct Thing {
     instance: u32,
     world_from_instance: PoseF64,
+    /// Of what moves while the shutter is open.
+    motion: Option<Motion>,
     /// Opacity.
     alpha: f64,
 }
@@ -61,6 +65,8 @@ pub(crate) struct Hit {
     pub(crate) triangle: u32,
     /// Unit normal out of the body, world frame.
     pub(crate) normal: V3,
+    /// Where the instance is.
+    pub(crate) world_from_instance: PoseF64,
 }
 
 /// What rays meet in a frame; keeps its memory.
@@ -96,9 +102,12 @@ impl Body {
     }
 }
 
-/// The pose in double precision.
-fn wide(pose: &PoseF32) -> PoseF64 {
-    PoseF64 { rotation: pose.rotation.map(|r| r.map(f64::from)), translation: pose.translation.map(f64::from) }
+impl Thing {
+    /// Where it is at a time.
+    #[inline(always)]
+    fn at(&self, time: f64) -> PoseF64 {
+        self.motion.as_ref().map_or(self.world_from_instance, |motion| motion.at(time))
+    }
 }
 
 impl Tracer {
@@ -121,8 +130,9 @@ impl Tracer {
         }
     }
 
-    /// Puts everything where it is, for rays that go anywhere. Its bodies were found before.
-    pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32]) {
+    /// Puts everything where it is, for rays that go anywhere at any time; `before` is where it was at time 0, if it was not
+    /// where it is all the time. Its bodies were found before.
+    pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
         let Self { bodies, things, endless, tree } = self;
         things.clear();
         endless.clear();
@@ -132,20 +142,28 @@ impl Tracer {
             let world_from_instance = wide(&poses[k]);
             let thing = things.len() as u32;
             let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
-            things.push(Thing { instance: k as u32, world_from_instance, alpha });
-            match body.bounds() {
-                Some(bounds) => tree.add(thing, &world_from_instance, bounds),
-                None => endless.push(thing),
+            let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));
+            things.push(Thing { instance: k as u32, world_from_instance, motion, alpha });
+            match (body.bounds(), motion) {
+                (Some(bounds), None) => tree.add(thing, &world_from_instance, bounds),
+                (Some(bounds), Some(motion)) => tree.add_moving(thing, &motion, bounds),
+                (None, _) => endless.push(thing),
             }
         }
         tree.build();
     }
 
-    /// The nearest surface at a distance from 0 to `limit` \[m\].
-    pub(crate) fn nearest(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Hit> {
+    /// Where an instance that is seen is at a time.
+    pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
+        let thing = self.things.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
+        Some(self.things[thing].at(time))
+    }
+
+    /// The nearest surface at a distance from 0 to `limit` \[m\], at a time.
+    pub(crate) fn nearest(&self, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
         let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
         let mut meet = |thing: u32, limit: f64| {
-            let Some(found) = self.meet(thing, ray, limit, stack) else { return limit };
+            let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
             // Of two that are as near, the first in the scene counts.
             if best.is_none_or(|b| found.distance < b.distance || found.distance == b.distance && thing < b.thing) {
                 best = Some(found);
@@ -156,20 +174,20 @@ impl Tracer {
             limit = meet(thing, limit);
         }
         self.tree.visit(ray, limit, meet);
-        self.hit(best?)
+        self.hit(best?, time)
     }
 
-    /// The part of the light that gets along a ray from distance 0 to `limit` \[m\]: nothing past something opaque, and past
-    /// the front of other things what they let through.
-    pub(crate) fn passes(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> f64 {
+    /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
+    /// and past the front of other things what they let through.
+    pub(crate) fn passes(&self, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
         let mut left = 1.0;
         let mut meet = |thing: u32, limit: f64| {
-            let Thing { instance, world_from_instance, alpha } = &self.things[thing as usize];
+            let placed @ Thing { instance, alpha, .. } = &self.things[thing as usize];
             if *alpha < 1.0 {
-                left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, stack));
+                left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
                 return limit;
             }
-            let local = seen_from(ray, world_from_instance);
+            let local = seen_from(ray, &placed.at(time));
             let blocked = match &self.bodies[*instance as usize] {
                 Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
                 Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
@@ -191,13 +209,14 @@ impl Tracer {
     }
 
     /// How many fronts of a thing a ray goes through, at most [`MAX_FRONTS`].
-    fn fronts(&self, thing: u32, ray: &Ray, limit: f64, stack: &mut Stack) -> i32 {
+    fn fronts(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> i32 {
         // Closed forms are convex: after the first surface there is only a back.
         let body = &self.bodies[self.things[thing as usize].instance as usize];
         let most = if matches!(body, Some(Body::Closed(_))) { 1 } else { MAX_FRONTS };
         let (mut from, mut left, mut count) = (*ray, limit, 0);
         for _ in 0..most {
-            let Some(hit) = self.meet(thing, &from, left, stack).and_then(|found| self.hit(found)) else { break };
+            let met = self.meet(thing, &from, left, time, stack);
+            let Some(hit) = met.and_then(|found| self.hit(found, time)) else { break };
             count += i32::from(dot(hit.normal, ray.direction) < 0.0);
             let onward = hit.distance + PAST * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));
             from.origin = along(from.origin, onward, from.direction);
@@ -208,9 +227,9 @@ impl Tracer {
 
     /// Where a ray meets a thing.
     #[inline(always)]
-    fn meet(&self, thing: u32, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Found> {
-        let Thing { instance, world_from_instance, .. } = &self.things[thing as usize];
-        let local = seen_from(ray, world_from_instance);
+    fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
+        let placed @ Thing { instance, .. } = &self.things[thing as usize];
+        let local = seen_from(ray, &placed.at(time));
         match self.bodies[*instance as usize].as_ref()? {
             Body::Mesh(_, tree) => {
                 let (distance, index) = tree.nearest(&local, limit, None, stack)?;
@@ -227,14 +246,15 @@ impl Tracer {
         }
     }
 
-    fn hit(&self, found: Found) -> Option<Hit> {
-        let Thing { instance, world_from_instance, .. } = &self.things[found.thing as usize];
+    fn hit(&self, found: Found, time: f64) -> Option<Hit> {
+        let placed @ Thing { instance, .. } = &self.things[found.thing as usize];
+        let world_from_instance = placed.at(time);
         let (triangle, normal) = match self.bodies[*instance as usize].as_ref()? {
             Body::Mesh(_, tree) => (tree.number(found.index), tree.normal(found.index)?),
             Body::Closed(_) => (0, found.normal),
         };
         let normal = world_from_instance.rotate(normal);
-        Some(Hit { distance: found.distance, instance: *instance, triangle, normal })
+        Some(Hit { distance: found.distance, instance: *instance, triangle, normal, world_from_instance })
     }
 
     /// Casts the rays of all samples where an instance may be seen, into a visibility buffer. One copy per instruction set.
@@ -270,7 +290,7 @@ impl Tracer {
                         for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                             let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
                             let samples = tile.samples(block, plane);
-                            for row in 0..BLOCK {
+                            for row in tile.rows() {
                                 let corner = [(bx * BLOCK) as f64 + dx, (by * BLOCK + row) as f64 + dy];
                                 let at = samples + row * BLOCK..samples + (row + 1) * BLOCK;
                                 let (near, ids) = (&mut tile.nearness[at.clone()], &mut tile.id[at]);

@@ -1,5 +1,6 @@
 //! The tree over the things of a frame: halves of equal number, along the longest side.
 
+use super::motion::Motion;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, scale};
 use scene::PoseF64;
@@ -44,6 +45,12 @@ impl Tree {
         let pad = [0, 1, 2].map(|k| reach[k] + 1e-9 * (at[k].abs() + reach[k]));
         let bounds = [[0, 1, 2].map(|k| at[k] - pad[k]), [0, 1, 2].map(|k| at[k] + pad[k])];
         self.boxes.push((bounds, scale(at, 2.0), thing));
+    }
+
+    /// Adds a thing that moves.
+    pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
+        let [lo, hi] = motion.bounds(bounds, LARGER);
+        self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
     }
 
     /// Builds the tree over what was added.

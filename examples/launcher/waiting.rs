@@ -1,0 +1,46 @@
+//! How far a long picture is, for who waits for it at a terminal.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use kinetoscope::sensors::camera::RenderProgress;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Does some work, and shows meanwhile how far its paths are, where there is a terminal. After `limit` it is broken off.
+pub(crate) fn draw<T>(progress: &RenderProgress, limit: Option<Duration>, work: impl FnOnce() -> T) -> T {
+    let (done, until_done) = channel::<()>();
+    let start = Instant::now();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let bar = ProgressBar::new(0);
+            let style = ProgressStyle::with_template("{percent:>3} % {wide_bar} {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            // Ended, or nobody waits any more.
+            while until_done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                if limit.is_some_and(|limit| start.elapsed() > limit) {
+                    progress.cancel();
+                }
+                if progress.total() == 0 {
+                    continue;
+                }
+                bar.set_length(progress.total());
+                bar.set_position(progress.samples());
+                bar.set_message(message(progress));
+            }
+            bar.finish_and_clear();
+        });
+        let result = work();
+        drop(done);
+        result
+    })
+}
+
+/// Speed, and how long it takes yet.
+fn message(progress: &RenderProgress) -> String {
+    let seconds = progress.elapsed().map_or(0.0, |time| time.as_secs_f64());
+    let rate = |count: u64| if seconds > 0.0 { count as f64 / seconds / 1e6 } else { 0.0 };
+    let left = progress.remaining().map_or_else(String::new, |left| format!(", {} s left", left.as_secs()));
+    format!("{:.2} M paths/s, {:.2} M rays/s{left}", rate(progress.samples()), rate(progress.rays()))
+}

@@ -1,0 +1,161 @@
+//! Light of what glows, looked for and met.
+
+use super::*;
+
+/// A shiny floor below what glows.
+fn lit_by(glow: Shape, at: PoseF32, floor: Material) -> (RenderScene, [PoseF32; 2]) {
+    let emitter = Material { emission: 2.0, ..matt(0.5) };
+    let scene = dark(vec![Instance::new(Plane::INFINITE, floor, 1), Instance::new(glow, emitter, 2)]);
+    (scene, [PoseF32::IDENTITY, at])
+}
+
+/// Face down.
+fn down(translation: [f32; 3]) -> PoseF32 {
+    PoseF32 { rotation: [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]], translation }
+}
+
+fn shiny() -> Material {
+    Material { specular: 1.0, shininess: 0.3, ..matt(0.3) }
+}
+
+/// A box as a mesh.
+fn brick(half: [f32; 3]) -> Shape {
+    let mesh = Shape::from(Box { half }).tessellate(8);
+    scene::shape::Mesh { mesh: std::sync::Arc::new(scene::RenderMesh::new(&mesh, 0.1)) }.into()
+}
+
+/// What each way finds of light, alone and together: mean and standard deviation.
+fn by_ways(scene: &RenderScene, poses: &[PoseF32], view: &View, bounces: u32, count: u32) -> [(f64, f64); 3] {
+    let studio = Studio::new(scene, poses, view);
+    [Ways::Both, Ways::Looking, Ways::Meeting].map(|ways| {
+        let paths = Paths { ways, ..studio.paths(16, bounces, 0) };
+        studio.seen(&paths, count)
+    })
+}
+
+/// The same mean by each way alone and by both, of every shape whose points are chosen, on matt and on shiny floors.
+#[test]
+fn both_ways_find_the_same_light() {
+    let upright = PoseF32::from_translation([0.2, 0.1, 0.9]);
+    let shapes: [(Shape, PoseF32); 6] = [
+        (Plane { half: [0.6, 0.4] }.into(), down([0.2, 0.1, 0.8])),
+        (Sphere { radius: 0.3 }.into(), upright),
+        (Box { half: [0.3, 0.2, 0.1] }.into(), upright),
+        (Cylinder { radius: 0.2, half_length: 0.3 }.into(), upright),
+        (brick([0.3, 0.2, 0.1]), upright),
+        // Seen from inside.
+        (Sphere { radius: 3.0 }.into(), upright),
+    ];
+    for floor in [matt(0.7), shiny()] {
+        for (shape, at) in &shapes {
+            let (scene, poses) = lit_by(shape.clone(), *at, floor.clone());
+            let view = looking([1.2, 0.5, 0.9], [0.0; 3]);
+            let [both, looking, meeting] = by_ways(&scene, &poses, &view, 0, 400);
+            let what = format!("{} over {}: {both:?} {looking:?} {meeting:?}", shape.name(), floor.specular);
+            assert!(both.0 > 0.02, "{what}");
+            for one in [looking, meeting] {
+                // Five standard deviations of the difference, and a fifth at most: something is asserted.
+                let off = 5.0 * both.1.hypot(one.1);
+                assert!((both.0 - one.0).abs() < off + 1e-6, "{what}");
+                assert!(off < 0.2 * both.0, "{what}");
+            }
+            // A control: a tenth less light would be found out of what is looked for and met.
+            assert!(0.1 * both.0 > 5.0 * both.1, "{what}");
+        }
+    }
+}
+
+/// A large lamp over a sharp highlight is met by paths and hard to look for; a small one over a matt floor is looked for, and
+/// hard to meet. Both ways together have less variance than either over both, as in Veach and Guibas 1995, figure 8.
+#[test]
+fn both_ways_together_have_less_noise_than_either() {
+    let sharp = Material { specular: 1.0, shininess: 1.0, ..matt(0.05) };
+    let scenes = [
+        (lit_by(Plane { half: [0.8, 0.8] }.into(), down([-0.8, 0.0, 0.6]), sharp.clone()), [1.0, 0.0, 0.6]),
+        (lit_by(Plane { half: [0.1, 0.1] }.into(), down([0.2, 0.1, 0.8]), matt(0.7)), [1.2, 0.5, 0.9]),
+        (lit_by(Plane { half: [0.3, 0.3] }.into(), down([-0.8, 0.0, 0.6]), sharp), [1.0, 0.0, 0.6]),
+    ];
+    let mut variances = [0.0; 3];
+    for ((scene, poses), eye) in &scenes {
+        let light = by_ways(scene, poses, &looking(*eye, [0.0; 3]), 0, 400);
+        println!("both {:?}, looking {:?}, meeting {:?}", light[0], light[1], light[2]);
+        for (variance, (mean, deviation)) in variances.iter_mut().zip(light) {
+            // Relative: the scenes are not as bright as each other.
+            *variance += (deviation / mean).powi(2);
+            assert!((mean - light[0].0).abs() < 5.0 * deviation.hypot(light[0].1));
+        }
+    }
+    let [both, looking, meeting] = variances;
+    // Of 400 pictures a variance is known to 7 %.
+    assert!(both < 0.5 * looking && both < 0.5 * meeting, "{both} {looking} {meeting}");
+}
+
+/// A rectangle that is looked for, against its form factor, at a few paths: what paths met by chance needed 64 times as many.
+#[test]
+fn area_lamps_light_by_their_form_factor() {
+    let half = [0.3f32, 0.2];
+    let (scene, poses) = lit_by(Plane { half }.into(), down([0., 0., 1.2]), matt(0.7));
+    let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
+    let factor = form_factor(f64::from(half[0]) / 1.2, f64::from(half[1]) / 1.2);
+    let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
+    let light = seen(&scene, &poses, &view, 64, 0);
+    assert!(agrees(light, expected), "{light:?}, not {expected}");
+    assert!(light.1 < 0.005 * expected && !agrees(light, 1.05 * expected), "it can tell a twentieth: {light:?}");
+}
+
+/// Below a ball of radius r at the distance d: the form factor is (r / d)². Source: Howell, B-43.
+#[test]
+fn balls_light_by_the_square_of_radius_over_distance() {
+    for (radius, distance) in [(0.3f32, 1.0f32), (0.05, 2.0), (0.9, 1.0)] {
+        let at = PoseF32::from_translation([0.0, 0.0, distance]);
+        let (scene, poses) = lit_by(Sphere { radius }.into(), at, matt(0.7));
+        let view = looking([0.4, 0.02, 0.05], [0.0; 3]);
+        let expected = albedo(0.7) * 2.0 * albedo(0.5) * f64::from(radius / distance).powi(2);
+        let light = seen(&scene, &poses, &view, 256, 0);
+        // Paths fall into the ball's cone evenly: of 256, always as many up to one, which is a part of what both ways find.
+        let off = (light.0 - expected).abs();
+        assert!(off < 5.0 * light.1 + 1e-3 * expected, "{radius} {distance}: {light:?}, not {expected}");
+        assert!(light.1 < 0.01 * expected, "{light:?}");
+    }
+}
+
+/// A lamp of alpha 0.5 sends half as much, and what is between takes its part.
+#[test]
+fn what_is_not_opaque_glows_by_its_alpha() {
+    let view = looking([1.2, 0.5, 0.4], [0.0; 3]);
+    let (scene, poses) = lit_by(Plane { half: [0.3; 2] }.into(), down([0., 0., 0.8]), matt(0.7));
+    let whole = seen(&scene, &poses, &view, 256, 0);
+    let mut instances = scene.instances().to_vec();
+    instances[1].material.rgba[3] = 0.5;
+    let half = seen(&dark(instances.clone()), &poses, &view, 256, 0);
+    assert!((half.0 - 0.5 * whole.0).abs() < 5.0 * half.1.hypot(whole.1), "{half:?} of {whole:?}");
+    instances[1].material.rgba[3] = 1.0;
+    let mut glass = matt(0.0);
+    glass.rgba[3] = 0.3;
+    instances.push(Instance::new(Plane { half: [2.0; 2] }, glass, 3));
+    let poses = [poses[0], poses[1], PoseF32::from_translation([0., 0., 0.5])];
+    // It is seen from above only, and lamps shine from above.
+    let veiled = seen(&dark(instances), &poses, &view, 256, 0);
+    assert!((veiled.0 - whole.0).abs() < 5.0 * veiled.1.hypot(whole.1), "backs are not seen: {veiled:?}, {whole:?}");
+}
+
+/// Of several lamps, each is chosen as often as it is bright: the sum is that of each alone.
+#[test]
+fn lamps_add_up() {
+    let view = looking([1.2, 0.5, 0.4], [0.0; 3]);
+    let lamp = |x: f32, emission: f32, half: f32| {
+        (Instance::new(Plane { half: [half; 2] }, Material { emission, ..matt(0.5) }, 2), down([x, 0.2, 0.8]))
+    };
+    let all = [lamp(-0.5, 1.0, 0.1), lamp(0.4, 4.0, 0.15), lamp(1.0, 0.5, 0.3)];
+    let light = |lamps: &[(Instance, PoseF32)]| {
+        let floor = (Instance::new(Plane::INFINITE, matt(0.7), 1), PoseF32::IDENTITY);
+        let (instances, poses): (Vec<_>, Vec<_>) = std::iter::once(floor).chain(lamps.iter().cloned()).unzip();
+        seen(&dark(instances), &poses, &view, 512, 0)
+    };
+    let together = light(&all);
+    let alone = all.each_ref().map(|lamp| light(std::slice::from_ref(lamp)));
+    let (sum, square) = alone.iter().fold((0.0, 0.0), |(sum, square), (mean, d)| (sum + mean, square + d * d));
+    assert!((together.0 - sum).abs() < 5.0 * (together.1.powi(2) + square).sqrt(), "{together:?}, not {sum}");
+    // A control: without the faintest it is less.
+    assert!((together.0 - (sum - alone[0].0)).abs() > 5.0 * (together.1.powi(2) + square).sqrt());
+}
