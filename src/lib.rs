@@ -2,9 +2,11 @@
 #![forbid(unsafe_code)]
 
 pub mod assets;
+mod record_button;
 
 pub use ndarray;
 pub use record;
+pub use record_button::FileRecording;
 pub use scene;
 pub use sensors;
 pub use sim;
@@ -12,7 +14,7 @@ pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
-    pub use crate::assets;
+    pub use crate::{FileRecording, assets};
     pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use scene::Pose;
     pub use sensors::camera::{
@@ -37,5 +39,7 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
-    pub use view::{OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError};
+    pub use view::{
+        OpenWindow, RecordButton, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
+    };
 }

@@ -4,7 +4,8 @@ use crate::model::ModelArgs;
 use crate::{Ending, Result, excerpt};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
-use std::sync::Arc;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -29,6 +30,13 @@ pub(crate) struct Args {
     /// End after so many steps
     #[arg(long)]
     steps: Option<u64>,
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .apng for the first camera, a folder
+    /// for PNG files of all cameras. Without it the record button begins a recording.mcap
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Replace the file of --record, and what a recording that was killed has left
+    #[arg(long, requires = "record")]
+    overwrite: bool,
     /// Simulated seconds per second, until a viewer sets another speed
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
@@ -42,13 +50,21 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let cfg = SimulationManagerCfg { num_envs: args.num_envs, threads: args.threads, ..Default::default() };
     let mut sim = args.model.scene(cfg)?;
     let warned = excerpt::print_warnings(sim.diagnostics());
-    let window = args.show(&mut sim)?;
+    let files = Arc::new(Mutex::new(args.recording()));
+    if args.record.is_some() {
+        files.lock().unwrap_or_else(PoisonError::into_inner).begin(&mut sim).map_err(|error| format!("--record {error}"))?;
+    }
+    let window = args.show(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let interrupted = on_ctrl_c(&mut sim);
     let closed = || window.as_ref().and_then(Window::closed);
     let mut step = 0;
     while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
         sim.update(1);
         step += 1;
+    }
+    let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).end(&mut sim);
+    for recorded in recorded.map_err(|error| format!("--record {error}"))? {
+        println!("Recorded to {recorded}");
     }
     if let Some(Closed::DisplayLost(reason)) = closed() {
         return Err(format!("the window is gone after {step} steps: {reason}").into());
@@ -61,21 +77,27 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
 }
 
 impl Args {
+    /// What the record button does.
+    fn recording(&self) -> FileRecording {
+        let path = self.record.clone().unwrap_or_else(|| "recording.mcap".into());
+        FileRecording::new(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) })
+    }
+
     /// Shows the simulation; gives the window, where it is one.
     ///
     /// # Errors
     /// There is no display, or nothing can listen at the address.
-    fn show(&self, sim: &mut SimulationManager) -> Result<Option<Window>> {
-        let speed = Speed::Times(self.speed);
+    fn show(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
+        let (speed, recording) = (Speed::Times(self.speed), Some(button));
         let names = self.model.names();
         if let Some(address) = &self.serve {
-            let served = sim.serve_with(address, ServeCfg { speed, ..ServeCfg::default() });
+            let served = sim.serve_with(address, ServeCfg { speed, recording, ..ServeCfg::default() });
             let served = served.map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser to see {names}; Ctrl+C here ends it.", served.url());
             return Ok(None);
         }
-        let cfg =
-            WindowCfg { title: format!("{names} - Kinetoscope"), speed: Some(speed), ..WindowCfg::default() };
+        let title = format!("{names} - Kinetoscope");
+        let cfg = WindowCfg { title, speed: Some(speed), recording, ..WindowCfg::default() };
         let window = sim.open_window_with(cfg).map_err(|error| no_window(&error, &names))?;
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))

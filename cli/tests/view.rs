@@ -151,6 +151,31 @@ fn a_browser_gets_a_page_and_ctrl_c_is_a_good_end() {
 }
 
 #[test]
+fn what_is_recorded_is_whole_at_every_good_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = write(folder.path(), "arm.urdf", ARM);
+    // All steps are done: one row for each, and one for the beginning.
+    let file = folder.path().join("steps.npz");
+    let name = file.to_str().unwrap();
+    let args = ["view", &arm, "--serve", "127.0.0.1:0", "--speed", "100", "--steps", "30", "--record", name];
+    let (out, err, code) = said(&command(&args).output().unwrap());
+    assert_eq!(code, 0, "{out}{err}");
+    assert!(out.contains("Recorded to") && out.contains("steps.npz: 31 rows") && file.is_file(), "{out}");
+    // What is there is not written over.
+    let (_, err, code) = said(&command(&args).output().unwrap());
+    assert!(code == 2 && err.contains("--record") && err.contains("steps.npz"), "{err}");
+    // Ctrl+C.
+    let file = folder.path().join("interrupted.mcap");
+    let args = ["view", &arm, "--serve", "127.0.0.1:0", "--record", file.to_str().unwrap()];
+    let mut running = Running::start(&mut command(&args));
+    running.line();
+    assert!(!file.exists(), "it has its name when it is whole");
+    running.interrupt();
+    assert_eq!(running.ended().code(), Some(0));
+    assert!(std::fs::read(file).unwrap().ends_with(b"\x89MCAP0\r\n"), "the end of a whole MCAP file");
+}
+
+#[test]
 fn an_mjcf_file_that_is_no_robot_is_shown_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let scene = write(folder.path(), "scene.xml", SCENE);

@@ -19,11 +19,14 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Lets a simulation go on that somebody paused.
 static KEY: OnceLock<Viewer> = OnceLock::new();
+
+/// What the record button of window and browser does, and `--record`.
+static FILES: OnceLock<Arc<Mutex<FileRecording>>> = OnceLock::new();
 
 /// Ctrl+C ends an example also while somebody holds it, in a window or in a browser.
 fn keep_key(sim: &mut SimulationManager) {
@@ -75,7 +78,8 @@ pub(crate) struct Launcher {
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
     /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .apng for the first camera, a folder for
-    /// PNG files of all cameras
+    /// PNG files of all cameras; from the start, where without it the record button of window and browser begins a
+    /// recording.mcap
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Replace the file of --record, and what a recording that was killed has left
@@ -192,7 +196,7 @@ impl Launcher {
     /// The address is none, or in use.
     pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
         let Some(address) = &self.serve else { return Ok(()) };
-        let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
+        let cfg = ServeCfg { speed: Speed::REAL, recording: Some(self.record_button()), ..ServeCfg::default() };
         let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
         println!("Open {} in a browser", served.url());
         keep_key(sim);
@@ -205,7 +209,7 @@ impl Launcher {
         if self.headless {
             return;
         }
-        match sim.open_window() {
+        match sim.open_window_with(WindowCfg { recording: Some(self.record_button()), ..WindowCfg::default() }) {
             Ok(_) => {
                 println!("A window is open, in real time: H in it shows the keys.");
                 keep_key(sim);
@@ -227,14 +231,31 @@ impl Launcher {
         Ok(())
     }
 
+    /// What records to the file of `--record`, or, where the record button is pressed without it, to `recording.mcap` in the
+    /// folder of `--out`.
+    fn files(&self) -> &'static Arc<Mutex<FileRecording>> {
+        FILES.get_or_init(|| {
+            let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
+            let path = self.record.clone().unwrap_or_else(folder);
+            Arc::new(Mutex::new(FileRecording::new(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) })))
+        })
+    }
+
+    fn record_button(&self) -> RecordButton {
+        RecordButton::shared(Arc::clone(self.files()))
+    }
+
     /// Begins to record to the file of `--record`.
     ///
     /// # Errors
     /// The file cannot be written, or has no place for anything of this example.
     pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-        let record = |path: &PathBuf| sim.record(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) });
-        let recorder = self.record.as_ref().map(record).transpose().map_err(|error| format!("--record {error}"))?;
-        Ok(Recording { recorder })
+        let files = self.files();
+        if self.record.is_some() {
+            let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
+            begun.map_err(|error| format!("--record {error}"))?;
+        }
+        Ok(Recording { files })
     }
 
     /// The folder of `--out`, else the one that the example runs in; made where it is `wanted`.
@@ -262,10 +283,10 @@ impl Launcher {
     }
 }
 
-/// What `--record` has begun, if anything.
+/// What `--record` or the record button has begun, if anything.
 #[derive(Debug)]
 pub(crate) struct Recording {
-    recorder: Option<RecorderId>,
+    files: &'static Mutex<FileRecording>,
 }
 
 impl Recording {
@@ -274,8 +295,8 @@ impl Recording {
     /// # Errors
     /// It could not be written.
     pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
-        if let Some(recorder) = self.recorder {
-            let recorded = sim.finish_recording(recorder).map_err(|error| format!("--record {error}"))?;
+        let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).end(sim);
+        for recorded in ended.map_err(|error| format!("--record {error}"))? {
             println!("Recorded to {recorded}");
         }
         Ok(())

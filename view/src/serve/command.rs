@@ -34,6 +34,8 @@ pub(super) enum Command {
     Reset,
     /// Simulated seconds per second; without bound where there is none.
     Speed { factor: Option<f64> },
+    /// Begins to record, or ends it.
+    Record { on: bool },
     /// Moves a joint's target \[rad or m\] in the environment that is looked at, or in all.
     Target { robot: String, joint: String, value: f64 },
 }
@@ -83,6 +85,7 @@ mod tests {
             (r#"{"do":"environment","env":null}"#, Command::Environment { env: None }),
             (r#"{"do":"environment","env":3}"#, Command::Environment { env: Some(3) }),
             (r#"{"do":"zoom","by":-1.5}"#, Command::Zoom { by: -1.5 }),
+            (r#"{"do":"record","on":true}"#, Command::Record { on: true }),
             (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
             (
                 r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,

@@ -322,6 +322,7 @@ impl Eyes for OwnEyes {
                 }
                 self.send(control::Command::SetSpeed(Speed::Times(factor)))
             }
+            Command::Record { on } => self.send(control::Command::Record(on)),
             Command::Target { robot, joint, value } => self.set_target(&robot, &joint, value),
         }
     }

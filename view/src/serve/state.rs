@@ -86,6 +86,7 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, viewers: usize) -> Value 
         "robots": robots,
         "diverged": diverged.map(|(k, why)| format!("environment {k}: {why}")).collect::<Vec<_>>(),
         "refused": snapshot.run.refused,
+        "recording": snapshot.run.recording.as_ref().map(|now| json!({"on": now.on, "text": now.text})),
     })
 }
 

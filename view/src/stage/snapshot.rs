@@ -1,6 +1,6 @@
 //! The whole stage at one moment.
 
-use crate::control::{Speed, Wants};
+use crate::control::{RecordingState, Speed, Wants};
 use scene::state::Contact;
 use scene::{Marker, RenderScene};
 use sensors::camera::Camera;
@@ -56,6 +56,8 @@ pub struct Run {
     pub measured_speed: Option<f64>,
     /// Why the last command that was refused was refused.
     pub refused: Option<String>,
+    /// How the recording stands; `None` where there is no record button.
+    pub recording: Option<RecordingState>,
 }
 
 /// What things are called; the same until something is added to the simulation.

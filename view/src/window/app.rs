@@ -246,6 +246,7 @@ impl App {
             Action::RealTime => self.commands.push(Command::SetSpeed(Speed::REAL)),
             Action::FreeSpeed => self.commands.push(Command::SetSpeed(Speed::Free)),
             Action::Reset => self.commands.push(Command::Reset(self.env_id())),
+            Action::Record => self.commands.push(Command::Record(!records(&snapshot))),
             Action::NextEnv => self.show_env((self.env + 1) % envs),
             Action::PreviousEnv => self.show_env((self.env + envs - 1) % envs),
             Action::AllEnvs => self.shown = Shown::All,
@@ -311,6 +312,10 @@ impl App {
 
     fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
         let Some(snapshot) = self.snapshot.clone() else { return };
+        if button == 1 && snapshot.run.recording.is_some() && hud::on_record_button(self.size[0], self.aside(), at) {
+            self.commands.push(Command::Record(!records(&snapshot)));
+            return;
+        }
         let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
         let grip = match button {
             1 if on_slider.is_some() => {
@@ -477,9 +482,17 @@ impl App {
         if let Some(first) = self.sliders {
             hud::sliders(canvas, &snapshot, self.env, first);
         }
+        if let Some(recording) = &snapshot.run.recording {
+            hud::record_button(canvas, self.aside(), recording);
+        }
         if self.help {
             hud::help(canvas);
         }
+    }
+
+    /// How much of the right side the sliders take \[pixels\].
+    fn aside(&self) -> usize {
+        if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 }
     }
 
     /// The camera panel in the lower right corner, beside the sliders.
@@ -487,9 +500,13 @@ impl App {
         let Some(camera) = self.panel_of else { return };
         if self.panel.draw(snapshot, camera, self.env, PANEL, &mut self.small) {
             let [width, height] = self.small.dimensions();
-            let aside = if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 };
-            let left = self.size[0].saturating_sub(width + aside + 6);
+            let left = self.size[0].saturating_sub(width + self.aside() + 6);
             canvas.paste(&self.small, [left, self.size[1].saturating_sub(height + 6)]);
         }
     }
+}
+
+/// Whether what is shown is being recorded.
+fn records(snapshot: &Snapshot) -> bool {
+    snapshot.run.recording.as_ref().is_some_and(|recording| recording.on)
 }

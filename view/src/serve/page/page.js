@@ -168,6 +168,13 @@ function refresh() {
   const everywhere = contents?.environments > 1 ? "all" : "0";
   const environment = state.environment === null ? everywhere : String(state.environment);
   if (document.activeElement !== $("environment")) $("environment").value = environment;
+  const recording = state.recording;
+  $("record").hidden = recording === null;
+  if (recording !== null) {
+    $("record").textContent = recording.on ? "Stop recording" : "Record";
+    $("record").setAttribute("aria-pressed", String(recording.on));
+  }
+  $("record-text").textContent = recording?.text ?? "";
   if (state.refused !== refused && state.refused !== null) note(state.refused);
   refused = state.refused;
   $("diverged").hidden = state.diverged.length === 0;
@@ -188,6 +195,7 @@ $("pause").addEventListener("click", () => send({ do: state?.paused ? "play" : "
 $("step").addEventListener("click", () => send({ do: "step" }));
 $("reset").addEventListener("click", () => send({ do: "reset" }));
 $("home").addEventListener("click", () => send({ do: "home" }));
+$("record").addEventListener("click", () => send({ do: "record", on: !state?.recording?.on }));
 $("speed").addEventListener("change", (event) => {
   const value = event.target.value;
   send({ do: "speed", factor: value === "max" ? null : Number(value) });
