@@ -41,6 +41,8 @@ pub struct Snapshot {
     pub names: Arc<Names>,
     /// The environments.
     pub envs: Vec<EnvStage>,
+    /// Which of them have their contacts in it.
+    pub contacts_of: Option<Shown>,
 }
 
 /// How a simulation runs.
@@ -159,6 +161,7 @@ impl Snapshot {
                 self.envs[env].markers.push(marker);
             }
         }
+        self.contacts_of = wants.contacts;
         if let Some(shown) = wants.contacts {
             let chosen: Vec<EnvId> = (0..self.envs.len()).filter(|env| shown.has(*env)).map(EnvId).collect();
             let contacts = sim.contacts(Some(&chosen)).unwrap_or_default();

@@ -3,7 +3,9 @@
 use super::hud;
 use super::keys::{Action, Key, action};
 use crate::control::{Command, Speed, Wants};
-use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Shown, Snapshot, Trails, describe};
+use crate::stage::{
+    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
+};
 use nalgebra::Vector3;
 use sensors::visibility::View;
 use sim::EnvId;
@@ -50,12 +52,8 @@ enum Grip {
     Turn,
     /// A slider of a joint.
     Slider(usize),
-    /// A body, held in a plane at this depth of the picture \[m\].
-    Spring {
-        picked: Picked,
-        depth: f64,
-        target: [f64; 3],
-    },
+    /// A body.
+    Spring(Pull),
 }
 
 /// A mouse that moved less than this between press and release clicked \[pixels\].
@@ -142,11 +140,9 @@ impl App {
         if self.eye.is_none() {
             self.eye = Some(Eye::overview(&snapshot));
         }
-        // Numbers of bodies are other ones when something was added.
-        if let Some(picked) = &mut self.picked
-            && picked.body.is_some()
-        {
-            picked.body = snapshot.names.bodies.iter().position(|name| *name == picked.name);
+        self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
+        if let Some((Grip::Spring(pull), ..)) = &mut self.grip {
+            pull.renumber(&snapshot.names);
         }
         if let (Some(last), Some(picked), Some(eye)) = (self.follow, &self.picked, &mut self.eye) {
             let now = picked.point_now(&snapshot);
@@ -175,12 +171,7 @@ impl App {
 
     /// What it wants to find in snapshots.
     pub fn wants(&self) -> Wants {
-        let one = Shown::One(self.picked.as_ref().map_or(self.env, |picked| picked.env));
-        let contacts = match (self.overlays.contacts, self.picked.is_some()) {
-            (true, _) => Some(self.shown),
-            (false, true) => Some(one),
-            (false, false) => None,
-        };
+        let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
         Wants { contacts, markers: self.overlays.sensors, ..Wants::default() }
     }
 
@@ -338,22 +329,9 @@ impl App {
     fn spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<Grip> {
         let view = self.view();
         let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
-        let picked = self.painter.pick(snapshot, &view, &look, at)?;
-        picked.body?;
-        let origin = snapshot.envs.get(picked.env)?.origin;
-        let in_overview = [0, 1, 2].map(|k| (picked.point[k] + origin[k]) as f32);
-        let depth = f64::from(view.world_from_camera.apply_inverse(in_overview)[2]);
-        let target = picked.point;
-        self.picked = Some(picked.clone());
-        Some(Grip::Spring { picked, depth, target })
-    }
-
-    /// Where a pixel is in an environment, at a depth \[m\].
-    fn at_depth(&self, [x, y]: [f64; 2], depth: f64, origin: [f64; 3]) -> [f64; 3] {
-        let view = self.view();
-        let in_camera = [(x as f32 - view.cx) / view.fx, (y as f32 - view.cy) / view.fy, 1.0].map(|n| n * depth as f32);
-        let p = view.world_from_camera.apply(in_camera);
-        [0, 1, 2].map(|k| f64::from(p[k]) - origin[k])
+        let pull = Pull::at(&mut self.painter, snapshot, &view, &look, at)?;
+        self.picked = Some(pull.picked().clone());
+        Some(Grip::Spring(pull))
     }
 
     fn drag(&mut self, at: [f64; 2]) {
@@ -373,10 +351,7 @@ impl App {
                     let value = hud::slider_value(&snapshot, self.env, *joint, self.size[0], at[0]);
                     value.into_iter().for_each(|value| self.set_target(&snapshot, *joint, value));
                 }
-                Grip::Spring { picked, depth, target } => {
-                    let origin = snapshot.envs.get(picked.env).map_or([0.0; 3], |env| env.origin);
-                    *target = self.at_depth(at, *depth, origin);
-                }
+                Grip::Spring(pull) => pull.to(&snapshot, &self.view(), at),
                 Grip::Orbit | Grip::Pan | Grip::Turn => {}
             }
         }
@@ -386,11 +361,9 @@ impl App {
 
     /// Sends the spring as it is.
     fn pull(&mut self) {
-        if let Some((Grip::Spring { picked, target, .. }, ..)) = &self.grip
-            && let Some(body) = picked.body
+        if let Some((Grip::Spring(pull), ..)) = &self.grip
+            && let Some(drag) = pull.command()
         {
-            let (env, hold, target) = (EnvId(picked.env), picked.hold, *target);
-            let drag = Command::Drag { env, body, hold, target };
             self.commands.retain(|command| !matches!(command, Command::Drag { .. }));
             self.commands.push(drag);
         }
@@ -399,7 +372,7 @@ impl App {
     fn release(&mut self, at: [f64; 2]) {
         let Some((grip, start, _)) = self.grip.take() else { return };
         match grip {
-            Grip::Spring { .. } => self.commands.push(Command::Release),
+            Grip::Spring(_) => self.commands.push(Command::Release),
             Grip::Orbit if (at[0] - start[0]).hypot(at[1] - start[1]) < CLICK => self.select(at),
             _ => {}
         }
@@ -459,9 +432,7 @@ impl App {
         self.drawn.push(now);
         let view = self.view();
         let spring = match &self.grip {
-            Some((Grip::Spring { picked, target, .. }, ..)) => {
-                Some((picked.env, [picked.point_now(&snapshot), *target]))
-            }
+            Some((Grip::Spring(pull), ..)) => Some(pull.spring(&snapshot)),
             _ => None,
         };
         let shown = if self.through.is_some() { Shown::One(self.env) } else { self.shown };
