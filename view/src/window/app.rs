@@ -56,6 +56,8 @@ enum Grip {
     Spring(Pull),
 }
 
+/// Pictures per second, at most: what most screens show.
+const RATE: f64 = 60.0;
 /// A mouse that moved less than this between press and release clicked \[pixels\].
 const CLICK: f64 = 3.0;
 /// Width of each of the panel's four pictures \[pixels\].
@@ -172,7 +174,7 @@ impl App {
     /// What it wants to find in snapshots.
     pub fn wants(&self) -> Wants {
         let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
-        Wants { contacts, markers: self.overlays.sensors, ..Wants::default() }
+        Wants { rate: RATE, contacts, markers: self.overlays.sensors, ..Wants::default() }
     }
 
     /// What it asks the simulation for, since this was called last.

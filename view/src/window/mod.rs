@@ -1,6 +1,7 @@
 //! A native window onto a simulation that runs.
 
 mod app;
+mod enlarge;
 mod hud;
 mod keys;
 #[cfg(test)]
