@@ -2,10 +2,14 @@
 #![forbid(unsafe_code)]
 
 pub mod assets;
+#[cfg(all(feature = "record", feature = "view"))]
+mod record_button;
 
 pub use ndarray;
 #[cfg(feature = "record")]
 pub use record;
+#[cfg(all(feature = "record", feature = "view"))]
+pub use record_button::FileRecording;
 pub use scene;
 pub use sensors;
 pub use sim;
@@ -14,6 +18,8 @@ pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
+    #[cfg(all(feature = "record", feature = "view"))]
+    pub use crate::FileRecording;
     pub use crate::assets;
     #[cfg(feature = "record")]
     pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
@@ -41,5 +47,7 @@ pub mod prelude {
         WeldCfg, WeldId, WrenchFrame,
     };
     #[cfg(feature = "view")]
-    pub use view::{OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError};
+    pub use view::{
+        OpenWindow, RecordButton, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
+    };
 }

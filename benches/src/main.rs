@@ -19,6 +19,7 @@ mod row;
 mod startup;
 mod step;
 mod trace;
+mod view;
 
 use clap::Parser;
 use row::Row;
@@ -33,6 +34,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("camera", camera::run),
     ("rays", rays::run),
     ("record", record::run),
+    ("view", view::run),
     ("trace", trace::run),
     ("contacts", contacts::run),
     ("ik", ik::run),
@@ -55,7 +57,7 @@ struct Settings {
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, trace, contacts, ik, randomize, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

@@ -7,6 +7,7 @@ mod excerpt;
 mod model;
 mod picture;
 mod render;
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -24,9 +25,11 @@ Examples:
   kinetoscope check arm.urdf hand.urdf          tree, joints, masses, dynamics, and everything odd in the files
   kinetoscope convert arm.urdf -o arm_mjcf      MJCF for both lines of MuJoCo, with its meshes
   kinetoscope render humanoid.xml -o out.png    a picture
+  kinetoscope view arm.urdf                     a window in which it moves; --serve for a browser
+  kinetoscope view humanoid.xml --floating-base a robot that is not bolted to the world
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
 
-Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused.
+Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or broken off.
 A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
 
 /// One line per command; what it does is in the file of its name.
@@ -35,6 +38,7 @@ enum Command {
     Check(check::Args),
     Convert(convert::Args),
     Render(render::Args),
+    View(view::Args),
     Bench(bench::Args),
 }
 
@@ -62,6 +66,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Render(args) => render::run(args),
+        Command::View(args) => view::run(args),
         Command::Bench(args) => bench::run(args),
     };
     match ended {

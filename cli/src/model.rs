@@ -3,6 +3,7 @@
 use crate::Result;
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::mjcf::robot_file::RobotFileError;
 use std::path::{Path, PathBuf};
 
 /// The files of a model.
@@ -66,6 +67,49 @@ impl ModelArgs {
         let id = sim.add_robot(robot)?;
         Ok((sim, id))
     }
+
+    /// A simulation of the model to be looked at: as [`simulation`](Self::simulation), but an MJCF file that is no robot
+    /// (several bodies, balls, nothing that turns or slides) is there as it is, with what stands in its world, and no ground
+    /// beside its own.
+    ///
+    /// # Errors
+    /// Whatever is wrong in the files.
+    pub(crate) fn scene(&self, cfg: SimulationManagerCfg) -> Result<SimulationManager> {
+        let refused = match self.simulation(cfg.clone()) {
+            Ok((sim, _)) => return Ok(sim),
+            Err(refused) => refused,
+        };
+        let is_scene = matches!(refused.downcast_ref(), Some(Error::RobotFile { error, .. }) if is_scene(error));
+        match self.files()? {
+            Files::Mjcf(path) if is_scene => {
+                let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg })?;
+                sim.add_mjcf(MjcfCfg::file("scene", path))?;
+                Ok(sim)
+            }
+            _ => Err(refused),
+        }
+    }
+
+    /// The files as they were given.
+    pub(crate) fn names(&self) -> String {
+        let names: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
+        names.join(" ")
+    }
+}
+
+/// Whether what is no robot may be a scene.
+fn is_scene(error: &RobotFileError) -> bool {
+    use RobotFileError::{Actuator, BallJoint, MocapBody, NeedsWorld, NoBody, NoJoint, SeveralRoots};
+    matches!(
+        error,
+        NoBody
+            | SeveralRoots { .. }
+            | NoJoint
+            | BallJoint { .. }
+            | MocapBody { .. }
+            | Actuator { .. }
+            | NeedsWorld { .. }
+    )
 }
 
 /// A file of the user, else an asset, else the path as it is: the loader says that there is none.

@@ -3,28 +3,44 @@
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
 
-#[cfg(feature = "record")]
+#[cfg(all(feature = "record", feature = "view"))]
 mod recorded {
     use super::*;
-    use std::path::PathBuf;
+    use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+    /// What the record button of window and browser does, and `--record`.
+    static FILES: OnceLock<Arc<Mutex<FileRecording>>> = OnceLock::new();
 
     impl Launcher {
+        /// What records to the file of `--record`, or, where the record button is pressed without it, to `recording.mcap` in
+        /// the folder of `--out`.
+        pub(in super::super) fn files(&self) -> &'static Arc<Mutex<FileRecording>> {
+            FILES.get_or_init(|| {
+                let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
+                let path = self.record.clone().unwrap_or_else(folder);
+                let cfg = RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) };
+                Arc::new(Mutex::new(FileRecording::new(cfg)))
+            })
+        }
+
         /// Begins to record to the file of `--record`.
         ///
         /// # Errors
         /// The file cannot be written, or has no place for anything of this example.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-            let record =
-                |path: &PathBuf| sim.record(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) });
-            let recorder = self.record.as_ref().map(record).transpose().map_err(|error| format!("--record {error}"))?;
-            Ok(Recording { recorder })
+            let files = self.files();
+            if self.record.is_some() {
+                let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
+                begun.map_err(|error| format!("--record {error}"))?;
+            }
+            Ok(Recording { files })
         }
     }
 
-    /// What `--record` has begun, if anything.
+    /// What `--record` or the record button has begun, if anything.
     #[derive(Debug)]
     pub(crate) struct Recording {
-        recorder: Option<RecorderId>,
+        files: &'static Mutex<FileRecording>,
     }
 
     impl Recording {
@@ -33,8 +49,8 @@ mod recorded {
         /// # Errors
         /// It could not be written.
         pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
-            if let Some(recorder) = self.recorder {
-                let recorded = sim.finish_recording(recorder).map_err(|error| format!("--record {error}"))?;
+            let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).end(sim);
+            for recorded in ended.map_err(|error| format!("--record {error}"))? {
                 println!("Recorded to {recorded}");
             }
             Ok(())
@@ -42,15 +58,15 @@ mod recorded {
     }
 }
 
-#[cfg(feature = "record")]
+#[cfg(all(feature = "record", feature = "view"))]
 pub(crate) use recorded::Recording;
 
 /// Nothing: this build does not record.
-#[cfg(not(feature = "record"))]
+#[cfg(not(all(feature = "record", feature = "view")))]
 #[derive(Debug)]
 pub(crate) struct Recording;
 
-#[cfg(not(feature = "record"))]
+#[cfg(not(all(feature = "record", feature = "view")))]
 impl Launcher {
     /// This build records nothing.
     ///
@@ -59,7 +75,7 @@ impl Launcher {
     pub(crate) fn start_recording(&self, _: &mut SimulationManager) -> Result<Recording> {
         match self.record {
             Some(_) => {
-                Err("--record: this build does not record; build with the feature `record`, which is on by default"
+                Err("--record: this build does not record; build with the features `record` and `view`, which are on by default"
                     .into())
             }
             None => Ok(Recording),
@@ -67,7 +83,7 @@ impl Launcher {
     }
 }
 
-#[cfg(not(feature = "record"))]
+#[cfg(not(all(feature = "record", feature = "view")))]
 impl Recording {
     /// There is nothing to end.
     ///

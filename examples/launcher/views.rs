@@ -38,7 +38,7 @@ mod shown {
         /// The address is none, or in use.
         pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
             let Some(address) = &self.serve else { return Ok(()) };
-            let cfg = ServeCfg { speed: Speed::REAL, ..ServeCfg::default() };
+            let cfg = ServeCfg { speed: Speed::REAL, recording: self.record_button(), ..ServeCfg::default() };
             let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser", served.url());
             keep_key(sim);
@@ -51,13 +51,21 @@ mod shown {
             if self.headless {
                 return;
             }
-            match sim.open_window() {
+            match sim.open_window_with(WindowCfg { recording: self.record_button(), ..WindowCfg::default() }) {
                 Ok(_) => {
                     println!("A window is open, in real time: H in it shows the keys.");
                     keep_key(sim);
                 }
                 Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
             }
+        }
+
+        /// The record button of window and browser, where the build records.
+        fn record_button(&self) -> Option<RecordButton> {
+            #[cfg(feature = "record")]
+            return Some(RecordButton::shared(std::sync::Arc::clone(self.files())));
+            #[cfg(not(feature = "record"))]
+            None
         }
     }
 }

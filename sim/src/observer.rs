@@ -149,6 +149,11 @@ impl SimulationManager {
         self.observers.seats.iter().filter(is).map(id).collect()
     }
 
+    /// Whether an observer is there: added to this simulation, not taken away, and not the one that is being told right now.
+    pub fn has_observer<O: Observer>(&self, id: ObserverId<O>) -> bool {
+        id.manager == self.serial && self.seat_of(id).is_ok()
+    }
+
     /// Physics steps that [`update`](Self::update) has done since the simulation was made, whatever was reset meanwhile: what
     /// an observer counts by.
     pub fn steps(&self) -> u64 {

@@ -18,7 +18,7 @@ pub mod serve;
 pub mod stage;
 pub mod window;
 
-pub use control::{Command, Conductor, Speed, Viewer, Viewing, Wants};
+pub use control::{Command, Conductor, RecordButton, Recording, RecordingState, Speed, Viewer, Viewing, Wants};
 pub use serve::{Serve, ServeCfg, ServeError, Served};
 pub use stage::{Canvas, Eye, Overlays, Painter, Shown, Snapshot};
 pub use window::{Closed, OpenWindow, Window, WindowCfg, WindowError};

@@ -2,79 +2,22 @@
 //! closed again and again, and the loss of the display ends the window, not the program.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-use scene::Pose;
-use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+#[allow(dead_code, reason = "each test uses its part")]
+mod display;
+
+use display::{Display, LONG, SIZE, pixels, press, screenshot, simulation, until};
+use sim::SimulationManager;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use view::window::App;
-use view::{Canvas, Closed, OpenWindow, Speed, Viewing, Wants, Window, WindowCfg, WindowError};
+use view::{Canvas, Closed, OpenWindow, Speed, Viewing, Wants, Window, WindowError};
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{
-    ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT, KeyButMask,
-    KeyPressEvent,
-};
-use x11rb::rust_connection::RustConnection;
+use x11rb::protocol::xproto::{ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask};
 
-/// What is not there by then does not come.
-const LONG: Duration = Duration::from_secs(30);
-const SIZE: [usize; 2] = [480, 270];
 /// Below the status, which counts pictures per second \[pixels\].
 const BELOW_STATUS: usize = 70;
-
-/// An X server of its own.
-struct Display {
-    server: Child,
-    name: String,
-}
-
-impl Display {
-    /// `None` where there is no Xvfb; in CI that is a failure. `cargo xtask test` installs it.
-    fn start() -> Option<Self> {
-        let command = ["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"];
-        let started = Command::new("Xvfb").args(command).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
-        let Ok(mut server) = started else {
-            assert!(std::env::var_os("CI").is_none(), "Xvfb is not there; cargo xtask test installs it");
-            eprintln!("note: without Xvfb no window is opened (cargo xtask test installs it)");
-            return None;
-        };
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        Some(Self { server, name: format!(":{}", number.trim()) })
-    }
-
-    fn cfg(&self) -> WindowCfg {
-        WindowCfg { size: SIZE, display: Some(self.name.clone()), threads: Some(1), ..WindowCfg::default() }
-    }
-
-    fn connect(&self) -> RustConnection {
-        x11rb::connect(Some(&self.name)).unwrap().0
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-fn simulation() -> SimulationManager {
-    let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.01, threads: Some(1), ..Default::default() };
-    let mut sim = SimulationManager::new(cfg).unwrap();
-    sim.add_rigid_object(RigidObjectCfg {
-        uid: "cube".into(),
-        shape: ObjectShape::cube(0.4),
-        init_pose: Pose::translation(0.0, 0.0, 0.2),
-        rgba: [0.8, 0.1, 0.1, 1.0],
-        ..Default::default()
-    })
-    .unwrap();
-    sim
-}
 
 /// A simulation that a thread steps until it is told to stop.
 struct Running {
@@ -108,55 +51,6 @@ impl Running {
     }
 }
 
-/// The upper left of the whole display, as red, green and blue.
-fn screenshot(connection: &RustConnection, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
-    let root = connection.setup().roots[0].root;
-    let image = connection.get_image(ImageFormat::Z_PIXMAP, root, 0, 0, width as u16, height as u16, !0).unwrap();
-    // Xvfb's pixels of 24 bits: blue, green, red, nothing.
-    image.reply().unwrap().data.chunks_exact(4).map(|p| [p[2], p[1], p[0]]).collect()
-}
-
-fn pixels(canvas: &Canvas) -> Vec<[u8; 3]> {
-    canvas.bytes().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
-}
-
-fn until(what: &str, mut is: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !is() {
-        assert!(start.elapsed() < LONG, "never: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
-/// The code of a key by its sign.
-fn code(connection: &RustConnection, sign: u32) -> u8 {
-    let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
-    let mapping = connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
-    let each = usize::from(mapping.keysyms_per_keycode);
-    let place = mapping.keysyms.chunks(each).position(|signs| signs[0] == sign).unwrap();
-    first + place as u8
-}
-
-fn press(connection: &RustConnection, window: u32, sign: u32) {
-    let event = KeyPressEvent {
-        response_type: KEY_PRESS_EVENT,
-        detail: code(connection, sign),
-        sequence: 0,
-        time: 0,
-        root: connection.setup().roots[0].root,
-        event: window,
-        child: 0,
-        root_x: 0,
-        root_y: 0,
-        event_x: 0,
-        event_y: 0,
-        state: KeyButMask::default(),
-        same_screen: true,
-    };
-    connection.send_event(false, window, EventMask::KEY_PRESS, event).unwrap();
-    connection.flush().unwrap();
-}
-
 fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
 }
@@ -168,7 +62,7 @@ fn ended(window: &Window) -> Closed {
 /// Windows of one process, one after the other: all of it is one test, because threads are counted.
 #[test]
 fn a_window_shows_obeys_and_goes() {
-    let Some(mut display) = Display::start() else { return };
+    let Some(mut display) = Display::start("1280x800") else { return };
     let mut sim = simulation();
 
     // What is on the display is what was drawn.

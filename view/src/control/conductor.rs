@@ -2,6 +2,7 @@
 
 use super::hub::{Hub, Mail, Viewer};
 use super::pace::Pace;
+use super::recording::{RecordButton, RecordingState};
 use super::spring::Spring;
 use super::{Command, Speed, Wants};
 use crate::stage::{Pool, Run};
@@ -39,6 +40,11 @@ pub struct Conductor {
     /// Something changed that no snapshot shows.
     dirty: bool,
     springs: BTreeMap<u64, Spring>,
+    button: Option<RecordButton>,
+    /// How the recording stood when that was asked last.
+    recording: Option<RecordingState>,
+    /// Who began what is recorded; `None` where the program did.
+    recorded_by: Option<u64>,
     refused: Option<String>,
 }
 
@@ -56,6 +62,9 @@ impl Conductor {
             shown: None,
             dirty: true,
             springs: BTreeMap::new(),
+            button: None,
+            recording: None,
+            recorded_by: None,
             refused: None,
         }
     }
@@ -68,14 +77,53 @@ impl Conductor {
         viewer
     }
 
+    /// Another record button.
+    pub(super) fn set_button(&mut self, sim: &mut SimulationManager, button: RecordButton) {
+        if self.button.as_ref() == Some(&button) {
+            return;
+        }
+        if let Some(old) = self.button.replace(button) {
+            self.refused = old.set(sim, false).err().or(self.refused.take());
+        }
+        (self.recording, self.recorded_by) = (None, None);
+        if self.hub.viewers() > 0 {
+            self.publish(sim);
+        }
+    }
+
+    /// Begins to record for a viewer, or ends it.
+    fn record(&mut self, sim: &mut SimulationManager, viewer: u64, on: bool) -> Result<(), String> {
+        let button = self.button.as_ref().ok_or("there is no record button here: the program has given none")?;
+        let was = button.state(sim).is_some_and(|state| state.on);
+        button.set(sim, on)?;
+        if !on {
+            self.recorded_by = None;
+        } else if !was {
+            self.recorded_by = Some(viewer);
+        }
+        Ok(())
+    }
+
+    /// What a viewer has begun to record ends with the viewer.
+    fn end_recording_of_gone(&mut self, sim: &mut SimulationManager, viewers: &[u64]) {
+        if let Some(viewer) = self.recorded_by.filter(|viewer| !viewers.contains(viewer)) {
+            self.dirty = true;
+            self.refused = self.record(sim, viewer, false).err().or(self.refused.take());
+        }
+    }
+
     /// Shows the simulation as it is.
     pub(super) fn publish(&mut self, sim: &mut SimulationManager) {
+        if let Some(button) = &self.button {
+            self.recording = button.state(sim).or(self.recording.take());
+        }
         let run = Run {
             steps: sim.steps(),
             paused: self.hold_at.is_some_and(|step| step <= sim.steps()),
             speed: self.pace.as_ref().map_or(Speed::Free, Pace::speed),
             measured_speed: self.pace.as_ref().and_then(Pace::measured),
             refused: self.refused.clone(),
+            recording: self.recording.clone(),
         };
         self.shown = Some(Instant::now());
         // Where every snapshot is in somebody's hands, or the newest is just being taken, the next one will do.
@@ -105,6 +153,7 @@ impl Conductor {
             self.release(sim, viewer);
         }
         self.forget_gone(sim.steps(), &viewers);
+        self.end_recording_of_gone(sim, &viewers);
         !viewers.is_empty()
     }
 
@@ -183,6 +232,7 @@ impl Conductor {
                 self.springs.insert(viewer, spring);
             }
             Command::Release => self.release(sim, viewer),
+            Command::Record(on) => self.record(sim, viewer, on)?,
         }
         Ok(())
     }

@@ -3,12 +3,14 @@
 mod conductor;
 mod hub;
 mod pace;
+mod recording;
 mod spring;
 #[cfg(test)]
 mod tests;
 
 pub use conductor::Conductor;
 pub use hub::Viewer;
+pub use recording::{RecordButton, Recording, RecordingState};
 
 use crate::stage::Shown;
 use sim::{EnvId, JointIndex, RobotId, SimulationManager};
@@ -57,6 +59,8 @@ pub enum Command {
     },
     /// End this viewer's drag.
     Release,
+    /// Begin to record, or end it, as the simulation's [`RecordButton`] says.
+    Record(bool),
 }
 
 impl Command {
@@ -145,17 +149,36 @@ pub trait Viewing {
     /// What a viewer told the simulation ends with the viewer: its pause, its speed, its spring. So a simulation goes on, as
     /// fast as it can, when all are gone.
     fn viewer(&mut self, wants: Wants) -> Viewer;
+
+    /// Gives all viewers a record button, in place of the one they had; what that one was recording ends.
+    fn record_button(&mut self, button: RecordButton);
 }
 
 impl Viewing for SimulationManager {
     fn viewer(&mut self, wants: Wants) -> Viewer {
-        let known = self.observer_ids::<Conductor>().first().copied();
-        let id = known.unwrap_or_else(|| self.add_observer(Conductor::new()));
-        // Taken out and put back: it reads the whole simulation for the first snapshot. Nobody else takes it.
-        let Ok(mut conductor) = self.remove_observer(id) else { return Viewer::of_nothing() };
-        let viewer = conductor.admit(wants);
-        conductor.publish(self);
-        self.add_observer(conductor);
-        viewer
+        let viewer = with_conductor(self, |conductor, sim| {
+            let viewer = conductor.admit(wants);
+            conductor.publish(sim);
+            viewer
+        });
+        viewer.unwrap_or_else(Viewer::of_nothing)
     }
+
+    fn record_button(&mut self, button: RecordButton) {
+        with_conductor(self, |conductor, sim| conductor.set_button(sim, button));
+    }
+}
+
+/// Does something with the conductor of a simulation, which is made where there is none.
+fn with_conductor<T>(
+    sim: &mut SimulationManager,
+    act: impl FnOnce(&mut Conductor, &mut SimulationManager) -> T,
+) -> Option<T> {
+    let known = sim.observer_ids::<Conductor>().first().copied();
+    let id = known.unwrap_or_else(|| sim.add_observer(Conductor::new()));
+    // Taken out and put back: it reads the whole simulation. Nobody else takes it.
+    let mut conductor = sim.remove_observer(id).ok()?;
+    let done = act(&mut conductor, sim);
+    sim.add_observer(conductor);
+    Some(done)
 }

@@ -6,8 +6,8 @@ use crate::sample::{MASS, sample};
 use crate::stage::Snapshot;
 use scene::Pose;
 use sim::{BodyMotion, RigidObjectCfg, SimulationManagerCfg};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -351,4 +351,106 @@ fn a_viewer_sees_what_was_added_later() {
     assert!(after.names.bodies.iter().any(|name| name == "late"));
     assert_eq!(before.names.bodies.len() + 1, after.names.bodies.len(), "a snapshot never changes");
     assert_eq!(after.envs[0].look.bodies.len(), after.names.bodies.len());
+}
+
+/// Counts how often a recording was begun and ended.
+#[derive(Debug, Default)]
+struct Counter {
+    on: bool,
+    begun: u32,
+    ended: u32,
+}
+
+impl Recording for Counter {
+    fn set(&mut self, _: &mut SimulationManager, on: bool) -> Result<(), String> {
+        self.begun += u32::from(on && !self.on);
+        self.ended += u32::from(self.on && !on);
+        self.on = on;
+        Ok(())
+    }
+
+    fn state(&self, sim: &SimulationManager) -> RecordingState {
+        RecordingState { on: self.on, text: format!("step {}", sim.steps()) }
+    }
+}
+
+#[test]
+fn the_record_button_is_pressed_between_steps_and_its_state_is_seen() {
+    let mut sim = sample(1).sim;
+    let viewer = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
+    let newest = |viewer: &Viewer| viewer.newest().unwrap().run.clone();
+    assert_eq!(newest(&viewer).recording, None);
+    viewer.send(Command::Record(true));
+    step_until(&mut sim, |_| newest(&viewer).refused.is_some_and(|reason| reason.contains("record button")));
+    let counter = Arc::new(Mutex::new(Counter::default()));
+    let counted = || {
+        let counter = counter.lock().unwrap();
+        (counter.on, counter.begun, counter.ended)
+    };
+    let button = RecordButton::shared(Arc::clone(&counter));
+    sim.record_button(button.clone());
+    assert!(newest(&viewer).recording.is_some_and(|recording| !recording.on));
+    viewer.send(Command::Record(true));
+    step_until(&mut sim, |_| counted() == (true, 1, 0));
+    // What it says is of the very step that is shown.
+    step_until(&mut sim, |_| {
+        let run = newest(&viewer);
+        run.recording.is_some_and(|recording| recording.on && recording.text == format!("step {}", run.steps))
+    });
+    // Who comes later may end it.
+    let other = viewer.another(Wants::default());
+    other.send(Command::Record(false));
+    step_until(&mut sim, |_| counted() == (false, 1, 1));
+    // While its lock is held it is refused, and nothing waits.
+    let held = counter.lock().unwrap();
+    viewer.send(Command::Record(true));
+    step_until(&mut sim, |_| newest(&viewer).refused.is_some_and(|reason| reason.contains("busy")));
+    assert!(newest(&viewer).recording.is_some(), "what was known of it stays");
+    drop(held);
+    assert_eq!(counted(), (false, 1, 1));
+    // Paused, it is pressed too.
+    viewer.send(Command::Pause);
+    viewer.send(Command::Record(true));
+    let running = Running::start(sim);
+    let paused = wait_for(&viewer, |s| s.run.paused && s.run.recording.as_ref().is_some_and(|r| r.on)).run.steps;
+    assert_eq!(counted(), (true, 2, 1));
+    viewer.send(Command::Resume);
+    assert!(running.goes_on_beyond(paused + 2));
+    drop((viewer, other));
+    running.end();
+}
+
+#[test]
+fn a_recording_ends_with_the_viewer_that_began_it_and_with_nobody_else() {
+    let mut sim = sample(1).sim;
+    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    let counter = Arc::new(Mutex::new(Counter::default()));
+    let counted = || {
+        let counter = counter.lock().unwrap();
+        (counter.on, counter.begun, counter.ended)
+    };
+    sim.record_button(RecordButton::shared(Arc::clone(&counter)));
+    first.send(Command::Record(true));
+    step_until(&mut sim, |_| counted() == (true, 1, 0));
+    // Pressed again it is not somebody else's.
+    second.send(Command::Record(true));
+    sim.update(200);
+    drop(second);
+    sim.update(200);
+    assert_eq!(counted(), (true, 1, 0));
+    drop(first);
+    step_until(&mut sim, |_| counted() == (false, 1, 1));
+    // What the program began is the program's.
+    counter.lock().unwrap().set(&mut sim, true).unwrap();
+    let viewer = sim.viewer(Wants::default());
+    viewer.send(Command::Record(true));
+    sim.update(200);
+    drop(viewer);
+    sim.update(200);
+    assert_eq!(counted(), (true, 2, 1));
+    // The same button once more changes nothing; another one ends what the first was doing.
+    sim.record_button(RecordButton::shared(Arc::clone(&counter)));
+    assert_eq!(counted(), (true, 2, 1));
+    sim.record_button(RecordButton::new(Counter::default()));
+    assert_eq!(counted(), (false, 2, 2));
 }

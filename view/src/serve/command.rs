@@ -34,6 +34,19 @@ pub(super) enum Command {
     Reset,
     /// Simulated seconds per second; without bound where there is none.
     Speed { factor: Option<f64> },
+    /// Selects what is seen at a point of the picture; nothing where that is the sky. Points are in parts of the picture's
+    /// width and height, from its upper left.
+    Select { x: f64, y: f64 },
+    /// Selects nothing.
+    Unselect,
+    /// Takes hold of the body at a point of the picture, and selects it.
+    Grab { x: f64, y: f64 },
+    /// Pulls what is held to a point of the picture, or beside it, with a spring.
+    Pull { x: f64, y: f64 },
+    /// Lets go of it.
+    Release,
+    /// Begins to record, or ends it.
+    Record { on: bool },
     /// Moves a joint's target \[rad or m\] in the environment that is looked at, or in all.
     Target { robot: String, joint: String, value: f64 },
 }
@@ -63,7 +76,13 @@ impl Command {
         let within = |value: f64, what: &str| {
             if value.abs() <= FAR { Ok(()) } else { Err(format!("{what} is {value}: -{FAR} to {FAR} would do")) }
         };
+        let inside = |value: f64, what: &str| {
+            let found = (0.0..=1.0).contains(&value);
+            if found { Ok(()) } else { Err(format!("{what} is {value}: the picture goes from 0 to 1")) }
+        };
         match self {
+            Self::Select { x, y } | Self::Grab { x, y } => inside(*x, "x").and_then(|()| inside(*y, "y")),
+            Self::Pull { x, y } => within(*x, "x").and_then(|()| within(*y, "y")),
             Self::Orbit { dx, dy } | Self::Pan { dx, dy } => within(*dx, "dx").and_then(|()| within(*dy, "dy")),
             Self::Zoom { by } => within(*by, "by"),
             _ => Ok(()),
@@ -83,6 +102,9 @@ mod tests {
             (r#"{"do":"environment","env":null}"#, Command::Environment { env: None }),
             (r#"{"do":"environment","env":3}"#, Command::Environment { env: Some(3) }),
             (r#"{"do":"zoom","by":-1.5}"#, Command::Zoom { by: -1.5 }),
+            (r#"{"do":"select","x":0.25,"y":1}"#, Command::Select { x: 0.25, y: 1.0 }),
+            (r#"{"do":"pull","x":-0.5,"y":2}"#, Command::Pull { x: -0.5, y: 2.0 }),
+            (r#"{"do":"record","on":true}"#, Command::Record { on: true }),
             (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
             (
                 r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,
@@ -105,6 +127,10 @@ mod tests {
             (r#"{"do":"target","robot":"a","joint":"b"}"#, "missing field `value`"),
             (r#"{"do":"orbit","dx":1e300,"dy":0}"#, "dx is"),
             (r#"{"do":"zoom","by":-101}"#, "by is -101"),
+            (r#"{"do":"select","x":1.5,"y":0}"#, "x is 1.5"),
+            (r#"{"do":"grab","x":0.5,"y":-0.1}"#, "y is -0.1"),
+            (r#"{"do":"pull","x":0.5,"y":1e5}"#, "y is 100000"),
+            (r#"{"do":"record"}"#, "missing field `on`"),
         ] {
             let reason = Command::parse(text).expect_err(text);
             assert!(reason.contains(says), "{text}: {reason}");

@@ -5,9 +5,12 @@ use super::command::Command;
 use super::show::{Eyes, Picture, Show};
 use super::state;
 use crate::control::{self, Speed, Viewer, Wants};
-use crate::stage::{Canvas, Eye, Look, Names, Overlays, Painter, Panel, Shown, Snapshot, Trails};
+use crate::stage::{
+    Canvas, Eye, Look, Names, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted,
+};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
+use sensors::visibility::View;
 use serde_json::{Value, json};
 use sim::EnvId;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,6 +25,9 @@ const MOST_PIXELS: usize = 1920 * 1080;
 const PANEL_EVERY: Duration = Duration::from_millis(100);
 /// Width of each of the four pictures of a camera, at most \[pixels\].
 const PANEL_WIDTH: usize = 320;
+
+/// Why a command is not done.
+const TAKES_NONE: &str = "the simulation takes no commands: the program does not step it";
 
 /// Gives viewers their eyes.
 pub(super) struct Theatre {
@@ -77,6 +83,8 @@ struct OwnEyes {
     trails: Trails,
     size: [usize; 2],
     camera: Option<String>,
+    picked: Option<Picked>,
+    pull: Option<Pull>,
     painter: Painter,
     panel: Panel,
     canvas: Canvas,
@@ -109,6 +117,8 @@ impl OwnEyes {
             trails: Trails::default(),
             size: [960, 540],
             camera: None,
+            picked: None,
+            pull: None,
             painter: Painter::new(1),
             panel: Panel::new(1),
             canvas: Canvas::default(),
@@ -136,7 +146,7 @@ impl OwnEyes {
 
     fn send(&self, command: control::Command) -> Result<(), String> {
         let sent = self.shared.hands().send(command);
-        sent.then_some(()).ok_or_else(|| "the simulation takes no commands: the program does not step it".into())
+        sent.then_some(()).ok_or_else(|| TAKES_NONE.into())
     }
 
     fn home(&self, snapshot: &Snapshot) -> Eye {
@@ -195,7 +205,8 @@ impl OwnEyes {
 
     /// Asks for what is drawn, and no more: contacts are solved for the purpose.
     fn want(&mut self) {
-        let wants = Wants { contacts: self.overlays.contacts.then_some(self.shown), ..self.wants };
+        let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
+        let wants = Wants { contacts, ..self.wants };
         if wants != self.wants {
             self.wants = wants;
             self.viewer.set_wants(wants);
@@ -222,17 +233,78 @@ impl OwnEyes {
         self.send(control::Command::SetTarget { robot, joint, env: self.env(), value })
     }
 
+    /// The view of the stage, and what is drawn in it, to find out what is seen at a point: in parts of width and height.
+    fn with_seen<T>(
+        &mut self,
+        [x, y]: [f64; 2],
+        find: impl FnOnce(&mut Painter, &Snapshot, &View, &Look<'_>, [f64; 2]) -> Option<T>,
+    ) -> Option<T> {
+        let snapshot = self.viewer.newest()?;
+        let eye = self.eye.unwrap_or_else(|| self.home(&snapshot));
+        let [width, height] = self.size;
+        let view = eye.view(width, height);
+        // The last pixel is at 1.
+        let pixel = [(x, width), (y, height)].map(|(part, side)| (part * side as f64).min(side as f64 - 0.5));
+        let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
+        let shared = Arc::clone(&self.shared);
+        let _brush = shared.brush.lock().unwrap_or_else(PoisonError::into_inner);
+        find(&mut self.painter, &snapshot, &view, &look, pixel)
+    }
+
+    fn select(&mut self, picked: Option<Picked>) -> Result<(), String> {
+        self.picked = picked;
+        self.looks += 1;
+        self.want();
+        Ok(())
+    }
+
+    fn grab(&mut self, at: [f64; 2]) -> Result<(), String> {
+        self.pull = self.with_seen(at, Pull::at);
+        let Some(pull) = &self.pull else { return Err("there is nothing here that can be pulled at".into()) };
+        let picked = pull.picked().clone();
+        self.select(Some(picked))?;
+        self.send_pull()
+    }
+
+    fn pull_to(&mut self, at: [f64; 2]) -> Result<(), String> {
+        // Who grabbed nothing was told so.
+        let Some(mut pull) = self.pull.take() else { return Ok(()) };
+        self.pull = self.with_seen([0.0; 2], move |_, snapshot, view, _, _| {
+            pull.to(snapshot, view, [at[0] * view.width as f64, at[1] * view.height as f64]);
+            Some(pull)
+        });
+        self.looks += 1;
+        self.send_pull()
+    }
+
+    /// The spring is this viewer's own: it ends with it.
+    fn send_pull(&self) -> Result<(), String> {
+        self.pull.as_ref().and_then(Pull::command).map_or(Ok(()), |pull| self.send_own(pull))
+    }
+
+    fn send_own(&self, command: control::Command) -> Result<(), String> {
+        self.viewer.send(command).then_some(()).ok_or_else(|| TAKES_NONE.into())
+    }
+
     fn draw_stage(&mut self, snapshot: &Snapshot) -> Option<Picture> {
         self.trails.add(snapshot);
         let key = (snapshot.number, self.looks);
         if self.drawn == key {
             return None;
         }
+        if snapshot.number != self.drawn.0 {
+            self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
+            self.pull.iter_mut().for_each(|pull| pull.renumber(&snapshot.names));
+            // Where that fails it is over.
+            let _ = self.send_pull();
+        }
         self.drawn = key;
         let eye = self.eye.unwrap_or_else(|| self.home(snapshot));
         self.eye = Some(eye);
         let view = eye.view(self.size[0], self.size[1]);
-        let look = Look { shown: self.shown, overlays: self.overlays, trails: Some(&self.trails), ..Look::default() };
+        let spring = self.pull.as_ref().map(|pull| pull.spring(snapshot));
+        let (overlays, picked, trails) = (self.overlays, self.picked.as_ref(), Some(&self.trails));
+        let look = Look { shown: self.shown, overlays, picked, trails, spring };
         let shared = Arc::clone(&self.shared);
         let _brush = shared.brush.lock().unwrap_or_else(PoisonError::into_inner);
         self.painter.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
@@ -286,7 +358,7 @@ impl Eyes for OwnEyes {
     fn state(&mut self) -> Option<Value> {
         let viewers = self.shared.seated.load(Ordering::Acquire);
         self.with_newest(|own, snapshot| {
-            let state = state::state(snapshot, own.shown, viewers);
+            let state = state::state(snapshot, own.shown, own.picked.as_ref(), viewers);
             let told = own.told.as_ref() == Some(&state);
             own.told = Some(state.clone());
             (!told).then_some(state)
@@ -322,6 +394,20 @@ impl Eyes for OwnEyes {
                 }
                 self.send(control::Command::SetSpeed(Speed::Times(factor)))
             }
+            Command::Select { x, y } => {
+                let picked = self.with_seen([x, y], |painter, snapshot, view, look, pixel| {
+                    painter.pick(snapshot, view, look, pixel)
+                });
+                self.select(picked)
+            }
+            Command::Unselect => self.select(None),
+            Command::Grab { x, y } => self.grab([x, y]),
+            Command::Pull { x, y } => self.pull_to([x, y]),
+            Command::Release => {
+                (self.pull, self.looks) = (None, self.looks + 1);
+                self.send_own(control::Command::Release)
+            }
+            Command::Record { on } => self.send(control::Command::Record(on)),
             Command::Target { robot, joint, value } => self.set_target(&robot, &joint, value),
         }
     }

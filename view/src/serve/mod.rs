@@ -37,7 +37,7 @@ mod viewer;
 
 pub use error::ServeError;
 
-use crate::control::{Speed, Viewing, Wants};
+use crate::control::{RecordButton, Speed, Viewing, Wants};
 use door::Door;
 use eyes::Theatre;
 use server::{House, Server};
@@ -47,7 +47,7 @@ use std::sync::{Arc, Weak};
 use token::Token;
 
 /// How a simulation is served.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ServeCfg {
     /// Viewers at a time, at most. A further one is told to come later.
     pub max_viewers: usize,
@@ -57,11 +57,13 @@ pub struct ServeCfg {
     pub quality: u8,
     /// How fast simulated time passes until some viewer says otherwise, and again when the last one has gone.
     pub speed: Speed,
+    /// The simulation's record button; where `None`, the one that another view has brought, if any.
+    pub recording: Option<RecordButton>,
 }
 
 impl Default for ServeCfg {
     fn default() -> Self {
-        Self { max_viewers: 16, rate: 30.0, quality: 85, speed: Speed::Free }
+        Self { max_viewers: 16, rate: 30.0, quality: 85, speed: Speed::Free, recording: None }
     }
 }
 
@@ -121,7 +123,8 @@ pub trait Serve {
 }
 
 impl Serve for SimulationManager {
-    fn serve_with(&mut self, address: &str, cfg: ServeCfg) -> Result<Served, ServeError> {
+    fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<Served, ServeError> {
+        let (button, max_viewers) = (cfg.recording.take(), cfg.max_viewers);
         let asked = address::parse(address)?;
         let listener = address::listen(asked)?;
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
@@ -131,7 +134,8 @@ impl Serve for SimulationManager {
         // Who comes in later finds how things were half a second ago, also where the program does not step just then.
         let usher = self.viewer(Wants { rate: 2.0, ..Wants::default() });
         let theatre = Arc::new(Theatre::new(usher, cfg));
-        let server = Server::start(listener, Door::new(address, token), theatre, cfg.max_viewers)?;
+        let server = Server::start(listener, Door::new(address, token), theatre, max_viewers)?;
+        button.into_iter().for_each(|button| self.record_button(button));
         let house = server.house();
         let host = self.add_observer(Host(server));
         Ok(Served { url, address, house, host })

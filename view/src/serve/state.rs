@@ -1,7 +1,7 @@
 //! What the page is told, as JSON.
 
 use crate::control::Speed;
-use crate::stage::{JointName, Names, Overlays, Shown, Snapshot};
+use crate::stage::{JointName, Names, Overlays, Picked, Shown, Snapshot, describe};
 use serde_json::{Value, json};
 
 /// Name, words for people, and the switch of what can be drawn over the scene.
@@ -54,7 +54,7 @@ pub(super) fn contents(snapshot: &Snapshot, overlays: &Overlays) -> Value {
 }
 
 /// How everything stands, with the joints of the environment that is shown, or of the first.
-pub(super) fn state(snapshot: &Snapshot, shown: Shown, viewers: usize) -> Value {
+pub(super) fn state(snapshot: &Snapshot, shown: Shown, picked: Option<&Picked>, viewers: usize) -> Value {
     let (index, environment) = match shown {
         Shown::All => (0, None),
         Shown::One(env) => (env, Some(env)),
@@ -86,6 +86,26 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, viewers: usize) -> Value 
         "robots": robots,
         "diverged": diverged.map(|(k, why)| format!("environment {k}: {why}")).collect::<Vec<_>>(),
         "refused": snapshot.run.refused,
+        "selected": picked.map(|picked| selected(picked, snapshot)),
+        "recording": snapshot.run.recording.as_ref().map(|now| json!({"on": now.on, "text": now.text})),
+    })
+}
+
+/// What was clicked on: where it is, and the contact forces on it, in the axes of its environment; null what is not known.
+fn selected(picked: &Picked, snapshot: &Snapshot) -> Value {
+    let pose = picked.pose(snapshot);
+    let position = pose.map_or(picked.point, |pose| pose.translation.vector.into());
+    let quaternion = pose.map(|pose| [pose.rotation.w, pose.rotation.i, pose.rotation.j, pose.rotation.k].map(finite));
+    let (contacts, force) = picked.contact_force(snapshot).unzip();
+    json!({
+        "name": picked.name,
+        "environment": picked.env,
+        "mask_id": picked.mask_id,
+        "position": position.map(finite),
+        "quaternion": quaternion,
+        "contacts": contacts,
+        "force": force.map(|force| force.map(finite)),
+        "says": describe(picked, snapshot),
     })
 }
 

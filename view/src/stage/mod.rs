@@ -9,6 +9,7 @@ mod painter;
 mod panel;
 mod pick;
 mod pool;
+mod pull;
 mod snapshot;
 mod trail;
 
@@ -20,7 +21,9 @@ pub use eye::Eye;
 pub use overlay::Overlays;
 pub use painter::{Look, Painter};
 pub use panel::Panel;
+pub(crate) use pick::contacts_wanted;
 pub use pick::{Picked, describe};
 pub(crate) use pool::Pool;
+pub(crate) use pull::Pull;
 pub use snapshot::{EnvStage, JointName, Names, Run, Shown, Snapshot};
 pub use trail::Trails;

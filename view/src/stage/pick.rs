@@ -1,6 +1,7 @@
 //! What was clicked on.
 
-use super::snapshot::Snapshot;
+use super::overlay::Overlays;
+use super::snapshot::{Names, Shown, Snapshot};
 use nalgebra::{Point3, Vector3};
 use scene::Pose;
 
@@ -40,6 +41,31 @@ impl Picked {
         snapshot.envs.get(self.env)?.look.bodies.get(self.body?).copied()
     }
 
+    /// Numbers of bodies are other ones when something was added to the simulation.
+    pub(crate) fn renumber(&mut self, names: &Names) {
+        let is = |body: usize| names.bodies.get(body) == Some(&self.name);
+        if self.body.is_some_and(|body| !is(body)) {
+            self.body = names.bodies.iter().position(|name| *name == self.name);
+        }
+    }
+
+    /// How many contacts the body has, and the sum of their forces on it \[N\], in the axes of its environment. `None` for the
+    /// world, and where the snapshot has no contacts of its environment.
+    pub fn contact_force(&self, snapshot: &Snapshot) -> Option<(usize, [f64; 3])> {
+        let body = self.body?;
+        let env = snapshot.envs.get(self.env).filter(|_| snapshot.contacts_of.is_some_and(|of| of.has(self.env)))?;
+        let of = |contact: &Option<u32>| contact.is_some_and(|contact| contact as usize == body);
+        let (mut count, mut sum) = (0, Vector3::zeros());
+        for contact in &env.contacts {
+            // The force is on the second body; the first has its negative.
+            for (_, sign) in contact.bodies.iter().zip([-1.0, 1.0]).filter(|(body, _)| of(body)) {
+                count += 1;
+                sum += Vector3::from(contact.force) * sign;
+            }
+        }
+        Some((count, sum.into()))
+    }
+
     /// Where the point is now, in its environment \[m\].
     pub fn point_now(&self, snapshot: &Snapshot) -> [f64; 3] {
         self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.hold)).into())
@@ -57,19 +83,19 @@ pub fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
     let (t, q) = (pose.translation.vector, pose.rotation);
     lines.push(format!("position  {:+.3} {:+.3} {:+.3} m", t.x, t.y, t.z));
     lines.push(format!("quaternion w x y z  {:+.3} {:+.3} {:+.3} {:+.3}", q.w, q.i, q.j, q.k));
-    let (mut count, mut sum) = (0, Vector3::zeros());
-    let of = |body: Option<u32>| body.is_some_and(|body| Some(body as usize) == picked.body);
-    for contact in snapshot.envs.get(picked.env).into_iter().flat_map(|env| &env.contacts) {
-        // The force is on the second body; the first has its negative.
-        for sign in contact.bodies.iter().zip([-1.0, 1.0]).filter(|(body, _)| of(**body)).map(|(_, sign)| sign) {
-            count += 1;
-            sum += Vector3::from(contact.force) * sign;
-        }
-    }
-    lines.push(match count {
+    lines.extend(picked.contact_force(snapshot).map(|(count, [x, y, z])| match count {
         0 => "no contact".into(),
-        1 => format!("1 contact: force on it  {:+.2} {:+.2} {:+.2} N", sum.x, sum.y, sum.z),
-        n => format!("{n} contacts: force on it  {:+.2} {:+.2} {:+.2} N", sum.x, sum.y, sum.z),
-    });
+        1 => format!("1 contact: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
+        n => format!("{n} contacts: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
+    }));
     lines
+}
+
+/// Whose contacts are needed to draw them where that is wanted, and to say which forces are on what was clicked on.
+pub(crate) fn contacts_wanted(shown: Shown, overlays: &Overlays, picked: Option<&Picked>) -> Option<Shown> {
+    let of_picked = picked.filter(|picked| picked.body.is_some()).map(|picked| Shown::One(picked.env));
+    match (overlays.contacts.then_some(shown), of_picked) {
+        (Some(drawn), Some(said)) if drawn != said => Some(Shown::All),
+        (drawn, said) => drawn.or(said),
+    }
 }

@@ -1,6 +1,6 @@
 //! The whole stage at one moment.
 
-use crate::control::{Speed, Wants};
+use crate::control::{RecordingState, Speed, Wants};
 use scene::state::Contact;
 use scene::{Marker, RenderScene};
 use sensors::camera::Camera;
@@ -41,6 +41,8 @@ pub struct Snapshot {
     pub names: Arc<Names>,
     /// The environments.
     pub envs: Vec<EnvStage>,
+    /// Which of them have their contacts in it.
+    pub contacts_of: Option<Shown>,
 }
 
 /// How a simulation runs.
@@ -56,6 +58,8 @@ pub struct Run {
     pub measured_speed: Option<f64>,
     /// Why the last command that was refused was refused.
     pub refused: Option<String>,
+    /// How the recording stands; `None` where there is no record button.
+    pub recording: Option<RecordingState>,
 }
 
 /// What things are called; the same until something is added to the simulation.
@@ -157,6 +161,7 @@ impl Snapshot {
                 self.envs[env].markers.push(marker);
             }
         }
+        self.contacts_of = wants.contacts;
         if let Some(shown) = wants.contacts {
             let chosen: Vec<EnvId> = (0..self.envs.len()).filter(|env| shown.has(*env)).map(EnvId).collect();
             let contacts = sim.contacts(Some(&chosen)).unwrap_or_default();

@@ -3,7 +3,9 @@
 use super::hud;
 use super::keys::{Action, Key, action};
 use crate::control::{Command, Speed, Wants};
-use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Shown, Snapshot, Trails, describe};
+use crate::stage::{
+    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
+};
 use nalgebra::Vector3;
 use sensors::visibility::View;
 use sim::EnvId;
@@ -50,14 +52,12 @@ enum Grip {
     Turn,
     /// A slider of a joint.
     Slider(usize),
-    /// A body, held in a plane at this depth of the picture \[m\].
-    Spring {
-        picked: Picked,
-        depth: f64,
-        target: [f64; 3],
-    },
+    /// A body.
+    Spring(Pull),
 }
 
+/// Pictures per second, at most: what most screens show.
+const RATE: f64 = 60.0;
 /// A mouse that moved less than this between press and release clicked \[pixels\].
 const CLICK: f64 = 3.0;
 /// Width of each of the panel's four pictures \[pixels\].
@@ -142,11 +142,9 @@ impl App {
         if self.eye.is_none() {
             self.eye = Some(Eye::overview(&snapshot));
         }
-        // Numbers of bodies are other ones when something was added.
-        if let Some(picked) = &mut self.picked
-            && picked.body.is_some()
-        {
-            picked.body = snapshot.names.bodies.iter().position(|name| *name == picked.name);
+        self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
+        if let Some((Grip::Spring(pull), ..)) = &mut self.grip {
+            pull.renumber(&snapshot.names);
         }
         if let (Some(last), Some(picked), Some(eye)) = (self.follow, &self.picked, &mut self.eye) {
             let now = picked.point_now(&snapshot);
@@ -175,13 +173,8 @@ impl App {
 
     /// What it wants to find in snapshots.
     pub fn wants(&self) -> Wants {
-        let one = Shown::One(self.picked.as_ref().map_or(self.env, |picked| picked.env));
-        let contacts = match (self.overlays.contacts, self.picked.is_some()) {
-            (true, _) => Some(self.shown),
-            (false, true) => Some(one),
-            (false, false) => None,
-        };
-        Wants { contacts, markers: self.overlays.sensors, ..Wants::default() }
+        let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
+        Wants { rate: RATE, contacts, markers: self.overlays.sensors, ..Wants::default() }
     }
 
     /// What it asks the simulation for, since this was called last.
@@ -246,6 +239,7 @@ impl App {
             Action::RealTime => self.commands.push(Command::SetSpeed(Speed::REAL)),
             Action::FreeSpeed => self.commands.push(Command::SetSpeed(Speed::Free)),
             Action::Reset => self.commands.push(Command::Reset(self.env_id())),
+            Action::Record => self.commands.push(Command::Record(!records(&snapshot))),
             Action::NextEnv => self.show_env((self.env + 1) % envs),
             Action::PreviousEnv => self.show_env((self.env + envs - 1) % envs),
             Action::AllEnvs => self.shown = Shown::All,
@@ -311,6 +305,10 @@ impl App {
 
     fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
         let Some(snapshot) = self.snapshot.clone() else { return };
+        if button == 1 && snapshot.run.recording.is_some() && hud::on_record_button(self.size[0], self.aside(), at) {
+            self.commands.push(Command::Record(!records(&snapshot)));
+            return;
+        }
         let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
         let grip = match button {
             1 if on_slider.is_some() => {
@@ -333,22 +331,9 @@ impl App {
     fn spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<Grip> {
         let view = self.view();
         let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
-        let picked = self.painter.pick(snapshot, &view, &look, at)?;
-        picked.body?;
-        let origin = snapshot.envs.get(picked.env)?.origin;
-        let in_overview = [0, 1, 2].map(|k| (picked.point[k] + origin[k]) as f32);
-        let depth = f64::from(view.world_from_camera.apply_inverse(in_overview)[2]);
-        let target = picked.point;
-        self.picked = Some(picked.clone());
-        Some(Grip::Spring { picked, depth, target })
-    }
-
-    /// Where a pixel is in an environment, at a depth \[m\].
-    fn at_depth(&self, [x, y]: [f64; 2], depth: f64, origin: [f64; 3]) -> [f64; 3] {
-        let view = self.view();
-        let in_camera = [(x as f32 - view.cx) / view.fx, (y as f32 - view.cy) / view.fy, 1.0].map(|n| n * depth as f32);
-        let p = view.world_from_camera.apply(in_camera);
-        [0, 1, 2].map(|k| f64::from(p[k]) - origin[k])
+        let pull = Pull::at(&mut self.painter, snapshot, &view, &look, at)?;
+        self.picked = Some(pull.picked().clone());
+        Some(Grip::Spring(pull))
     }
 
     fn drag(&mut self, at: [f64; 2]) {
@@ -368,10 +353,7 @@ impl App {
                     let value = hud::slider_value(&snapshot, self.env, *joint, self.size[0], at[0]);
                     value.into_iter().for_each(|value| self.set_target(&snapshot, *joint, value));
                 }
-                Grip::Spring { picked, depth, target } => {
-                    let origin = snapshot.envs.get(picked.env).map_or([0.0; 3], |env| env.origin);
-                    *target = self.at_depth(at, *depth, origin);
-                }
+                Grip::Spring(pull) => pull.to(&snapshot, &self.view(), at),
                 Grip::Orbit | Grip::Pan | Grip::Turn => {}
             }
         }
@@ -381,11 +363,9 @@ impl App {
 
     /// Sends the spring as it is.
     fn pull(&mut self) {
-        if let Some((Grip::Spring { picked, target, .. }, ..)) = &self.grip
-            && let Some(body) = picked.body
+        if let Some((Grip::Spring(pull), ..)) = &self.grip
+            && let Some(drag) = pull.command()
         {
-            let (env, hold, target) = (EnvId(picked.env), picked.hold, *target);
-            let drag = Command::Drag { env, body, hold, target };
             self.commands.retain(|command| !matches!(command, Command::Drag { .. }));
             self.commands.push(drag);
         }
@@ -394,7 +374,7 @@ impl App {
     fn release(&mut self, at: [f64; 2]) {
         let Some((grip, start, _)) = self.grip.take() else { return };
         match grip {
-            Grip::Spring { .. } => self.commands.push(Command::Release),
+            Grip::Spring(_) => self.commands.push(Command::Release),
             Grip::Orbit if (at[0] - start[0]).hypot(at[1] - start[1]) < CLICK => self.select(at),
             _ => {}
         }
@@ -454,9 +434,7 @@ impl App {
         self.drawn.push(now);
         let view = self.view();
         let spring = match &self.grip {
-            Some((Grip::Spring { picked, target, .. }, ..)) => {
-                Some((picked.env, [picked.point_now(&snapshot), *target]))
-            }
+            Some((Grip::Spring(pull), ..)) => Some(pull.spring(&snapshot)),
             _ => None,
         };
         let shown = if self.through.is_some() { Shown::One(self.env) } else { self.shown };
@@ -477,9 +455,17 @@ impl App {
         if let Some(first) = self.sliders {
             hud::sliders(canvas, &snapshot, self.env, first);
         }
+        if let Some(recording) = &snapshot.run.recording {
+            hud::record_button(canvas, self.aside(), recording);
+        }
         if self.help {
             hud::help(canvas);
         }
+    }
+
+    /// How much of the right side the sliders take \[pixels\].
+    fn aside(&self) -> usize {
+        if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 }
     }
 
     /// The camera panel in the lower right corner, beside the sliders.
@@ -487,9 +473,13 @@ impl App {
         let Some(camera) = self.panel_of else { return };
         if self.panel.draw(snapshot, camera, self.env, PANEL, &mut self.small) {
             let [width, height] = self.small.dimensions();
-            let aside = if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 };
-            let left = self.size[0].saturating_sub(width + aside + 6);
+            let left = self.size[0].saturating_sub(width + self.aside() + 6);
             canvas.paste(&self.small, [left, self.size[1].saturating_sub(height + 6)]);
         }
     }
+}
+
+/// Whether what is shown is being recorded.
+fn records(snapshot: &Snapshot) -> bool {
+    snapshot.run.recording.as_ref().is_some_and(|recording| recording.on)
 }

@@ -1,7 +1,7 @@
 //! What is written over the picture of a window: status, help, joint sliders. Functions of what they show, on a canvas.
 
 use super::keys;
-use crate::control::Speed;
+use crate::control::{RecordingState, Speed};
 use crate::stage::{Canvas, Shown, Snapshot};
 use embedded_graphics::mono_font::MonoFont;
 use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13};
@@ -13,9 +13,12 @@ const GREY: [u8; 3] = [170; 3];
 const YELLOW: [u8; 3] = [255, 210, 60];
 const BLUE: [u8; 3] = [80, 150, 240];
 const DARK: [u8; 3] = [20, 22, 26];
+const RED: [u8; 3] = [235, 60, 50];
 
 /// Width of the panel of sliders \[pixels\].
 pub(super) const SLIDERS: i32 = 210;
+/// Size of the record button \[pixels\].
+const RECORD: [i32; 2] = [96, 19];
 /// Height of a slider with its name \[pixels\].
 const ROW: i32 = 26;
 /// Where the first slider is, from the top of the panel \[pixels\].
@@ -55,6 +58,32 @@ pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, vie
     }
     if let Some(refused) = &run.refused {
         canvas.text(&format!("not done: {refused}"), [8, below], SMALL, YELLOW);
+    }
+}
+
+/// Where the record button is, on a canvas of this width whose right side is taken by something `aside` pixels wide.
+fn record_corner(width: usize, aside: usize) -> [i32; 2] {
+    [int(width.saturating_sub(aside)) - RECORD[0] - 6, 6]
+}
+
+/// Whether a pixel is on the record button.
+pub(super) fn on_record_button(width: usize, aside: usize, at: [f64; 2]) -> bool {
+    let corner = record_corner(width, aside);
+    (0..2).all(|k| (f64::from(corner[k])..f64::from(corner[k] + RECORD[k])).contains(&at[k]))
+}
+
+/// The record button, and how the recording stands.
+pub(super) fn record_button(canvas: &mut Canvas, aside: usize, recording: &RecordingState) {
+    let width = canvas.dimensions()[0];
+    let [x, y] = record_corner(width, aside);
+    let (text, color) = if recording.on { ("R: stop", WHITE) } else { ("R: record", GREY) };
+    canvas.fill([x, y], RECORD, DARK, 200);
+    canvas.fill([x + 6, y + 5], [9, 9], if recording.on { RED } else { GREY }, 255);
+    canvas.text(text, [x + 24, y + 3], FONT, color);
+    if !recording.text.is_empty() {
+        let long = int(recording.text.chars().count()) * 6;
+        let right = int(width.saturating_sub(aside)) - 8;
+        canvas.text(&recording.text, [(right - long).max(8), y + RECORD[1] + 5], SMALL, WHITE);
     }
 }
 

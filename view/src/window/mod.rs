@@ -1,6 +1,7 @@
 //! A native window onto a simulation that runs.
 
 mod app;
+mod enlarge;
 mod hud;
 mod keys;
 #[cfg(test)]
@@ -10,7 +11,7 @@ mod x11;
 pub use app::{App, Input, Modifiers};
 pub use keys::Key;
 
-use crate::control::{Command, Speed, Viewer, Viewing, Wants};
+use crate::control::{Command, RecordButton, Speed, Viewer, Viewing, Wants};
 use crate::stage::Canvas;
 use sim::SimulationManager;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -31,11 +32,14 @@ pub struct WindowCfg {
     pub speed: Option<Speed>,
     /// Threads that draw; half of the machine's, at least one, where `None`. The others step.
     pub threads: Option<usize>,
+    /// The simulation's record button; where `None`, the one that another view has brought, if any.
+    pub recording: Option<RecordButton>,
 }
 
 impl Default for WindowCfg {
     fn default() -> Self {
-        Self { title: "Kinetoscope".into(), size: [960, 540], display: None, speed: Some(Speed::REAL), threads: None }
+        let (title, speed) = ("Kinetoscope".into(), Some(Speed::REAL));
+        Self { title, size: [960, 540], display: None, speed, threads: None, recording: None }
     }
 }
 
@@ -143,7 +147,8 @@ pub trait OpenWindow {
 }
 
 impl OpenWindow for SimulationManager {
-    fn open_window_with(&mut self, cfg: WindowCfg) -> Result<Window, WindowError> {
+    fn open_window_with(&mut self, mut cfg: WindowCfg) -> Result<Window, WindowError> {
+        let button = cfg.recording.take();
         let (opened, result) = mpsc::channel();
         let shared = Arc::new(Shared::default());
         let window = Window { shared: Arc::clone(&shared) };
@@ -171,7 +176,10 @@ impl OpenWindow for SimulationManager {
         let thread = std::thread::Builder::new().name("kinetoscope-window".into());
         thread.spawn(run).map_err(|error| WindowError::Thread(error.to_string()))?;
         match result.recv() {
-            Ok(Ok(())) => Ok(window),
+            Ok(Ok(())) => {
+                button.into_iter().for_each(|button| self.record_button(button));
+                Ok(window)
+            }
             Ok(Err(error)) => Err(error),
             Err(_) => Err(WindowError::Thread("it ended before the window was there".into())),
         }

@@ -3,6 +3,7 @@
 
 use super::keys::{Action, TABLE};
 use super::*;
+use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample};
 use crate::stage::{Eye, Shown};
 use sim::EnvId;
@@ -203,4 +204,55 @@ fn held_keys_fly_and_are_let_go() {
     assert!(way >= 0.029 * before.distance && way <= 0.101 * before.distance, "{way}");
     app.handle(Input::FocusLost);
     assert!(!app.moves());
+}
+
+/// A recording that is what it is set to.
+#[derive(Debug, Default)]
+struct Switch(bool);
+
+impl Recording for Switch {
+    fn set(&mut self, _: &mut SimulationManager, on: bool) -> Result<(), String> {
+        self.0 = on;
+        Ok(())
+    }
+
+    fn state(&self, _: &SimulationManager) -> RecordingState {
+        RecordingState { on: self.0, text: "run.mcap: 12 rows".into() }
+    }
+}
+
+#[test]
+fn the_record_button_is_a_key_and_a_place_in_the_picture() {
+    let (mut sample, viewer, mut app) = app(1);
+    let on_button = [SIZE[0] as f64 - 96.0, 11.0];
+    let click = |app: &mut App, at| {
+        app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+        app.handle(Input::ButtonRelease(1, at));
+        app.take_commands()
+    };
+    let red = |app: &mut App| {
+        let canvas = drawn(app);
+        // The whole mark, of 9 by 9 pixels.
+        (0..9).all(|k| canvas.pixel(SIZE[0] - 96 + k, 11 + k) == Some([235, 60, 50]))
+    };
+    // Without a button there is none, and the key says so by what the simulation answers.
+    assert!(click(&mut app, on_button).is_empty() && !red(&mut app));
+    assert_eq!(press(&mut app, Key::Char('r')), [Command::Record(true)]);
+    let bare = drawn(&mut app);
+    for on in [false, true] {
+        sample.sim.record_button(RecordButton::new(Switch(on)));
+        app.show(viewer.newest().unwrap());
+        assert_eq!(press(&mut app, Key::Char('r')), [Command::Record(!on)]);
+        assert_eq!(click(&mut app, on_button), [Command::Record(!on)]);
+        assert!(click(&mut app, [on_button[0], 40.0]).is_empty(), "below it");
+        assert_eq!(red(&mut app), on);
+    }
+    // What it says is beside it: the first 60 rows on the right have other pixels below the button.
+    let with = drawn(&mut app);
+    let unlike = (30..42).flat_map(|y| (SIZE[0] - 110..SIZE[0] - 8).map(move |x| (x, y)));
+    assert!(unlike.filter(|&(x, y)| bare.pixel(x, y) != with.pixel(x, y)).count() > 200);
+    // Beside the sliders, where they are open.
+    press(&mut app, Key::Tab);
+    assert!(!matches!(click(&mut app, on_button)[..], [Command::Record(_)]));
+    assert_eq!(click(&mut app, [on_button[0] - 210.0, 11.0]), [Command::Record(false)]);
 }

@@ -1,14 +1,16 @@
 //! A window of an X server, by the protocol itself: no C library, so nothing but an error comes of a lost connection.
 
 use super::app::{Input, Modifiers};
+use super::enlarge::{self, Enlarged};
 use super::keys::Key;
 use crate::stage::Canvas;
 use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::errors::{ConnectionError, ReplyError, ReplyOrIdError};
 use x11rb::protocol::Event;
+use x11rb::protocol::render::Pictformat;
 use x11rb::protocol::xproto::{
-    AtomEnum, ConnectionExt as _, CreateGCAux, CreateWindowAux, EventMask, ImageFormat, ImageOrder, KeyButMask,
-    PropMode, Screen, Window, WindowClass,
+    AtomEnum, ConnectionExt as _, CreateGCAux, CreateWindowAux, Drawable, EventMask, ImageFormat, ImageOrder,
+    KeyButMask, PropMode, Screen, Window, WindowClass,
 };
 use x11rb::rust_connection::RustConnection;
 use x11rb::wrapper::ConnectionExt as _;
@@ -37,6 +39,10 @@ pub(super) struct Screened {
     keys: Keys,
     /// Pixels as the server has them.
     pixels: Vec<u8>,
+    /// How the server calls them, where it can enlarge pictures.
+    format: Option<Pictformat>,
+    /// The picture that it enlarges, while the window is huge.
+    enlarged: Option<Enlarged>,
 }
 
 /// What happened.
@@ -64,7 +70,8 @@ pub(super) enum Failure {
     Colors,
 }
 
-/// Larger pictures are drawn coarser: more than this takes longer than a thirtieth of a second \[pixels\].
+/// Larger pictures are drawn coarser, and enlarged by the server where it can: more than this takes longer than a thirtieth
+/// of a second \[pixels\].
 const MOST_PIXELS: usize = 1920 * 1200;
 
 impl Screened {
@@ -113,8 +120,22 @@ impl Screened {
         connection.flush()?;
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
-        let pixels = Vec::new();
-        Ok(Self { connection, window, gc, atoms, depth, shifts, most_significant_first, size, keys, pixels })
+        let format = enlarge::format(&connection, visual)?;
+        let (pixels, enlarged) = (Vec::new(), None);
+        Ok(Self {
+            connection,
+            window,
+            gc,
+            atoms,
+            depth,
+            shifts,
+            most_significant_first,
+            size,
+            keys,
+            pixels,
+            format,
+            enlarged,
+        })
     }
 
     /// How many pixels of the window a pixel of the picture covers, along each side.
@@ -194,7 +215,30 @@ impl Screened {
 
     /// Shows a picture.
     pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), Failure> {
-        let (k, [width, height], [columns, rows]) = (self.coarseness(), self.size, canvas.dimensions());
+        let (k, picture) = (self.coarseness(), canvas.dimensions());
+        let fits = |old: &Enlarged| k > 1 && (old.size, old.factor) == (picture, k);
+        if let Some(old) = self.enlarged.take_if(|old| !fits(old)) {
+            old.free(&self.connection)?;
+        }
+        if let (true, None, Some(format)) = (k > 1, &self.enlarged, self.format) {
+            let of = (self.depth, format);
+            self.enlarged = Some(Enlarged::new(&self.connection, self.window, of, picture, k)?);
+        }
+        match self.enlarged.take() {
+            Some(enlarged) => {
+                self.put(canvas, 1, enlarged.pixmap(), picture)?;
+                enlarged.show(&self.connection, self.size)?;
+                self.enlarged = Some(enlarged);
+            }
+            None => self.put(canvas, k, self.window, self.size)?,
+        }
+        self.connection.flush()?;
+        Ok(())
+    }
+
+    /// Sends a picture, each pixel `k` times along each side, to something of `size` pixels.
+    fn put(&mut self, canvas: &Canvas, k: usize, to: Drawable, [width, height]: [usize; 2]) -> Result<(), Failure> {
+        let [columns, rows] = canvas.dimensions();
         let line = 4 * width;
         // What one request may hold, without its head.
         let most = self.connection.maximum_request_bytes().saturating_sub(64);
@@ -214,10 +258,9 @@ impl Screened {
             }
             let [width, band] = [width, band].map(|n| u16::try_from(n).unwrap_or(u16::MAX));
             let top = i16::try_from(top).unwrap_or(i16::MAX);
-            let (format, window, gc) = (ImageFormat::Z_PIXMAP, self.window, self.gc);
-            self.connection.put_image(format, window, gc, width, band, 0, top, 0, self.depth, &self.pixels)?;
+            let (format, gc) = (ImageFormat::Z_PIXMAP, self.gc);
+            self.connection.put_image(format, to, gc, width, band, 0, top, 0, self.depth, &self.pixels)?;
         }
-        self.connection.flush()?;
         Ok(())
     }
 }

@@ -11,7 +11,9 @@ let refused = null;
 let unseen = 0; // pictures that came while the page was hidden
 let noteTimer = 0;
 let arrivals = [];
-const history = { positions: new History(), efforts: new History() };
+const history = { positions: new History(), efforts: new History(), forces: new History() };
+const AXES = ["x", "y", "z"].map((name, column) => ({ name, column, color: ["#e4572e", "#2e9e5b", "#2f7ed8"][column] }));
+let plotted = null; // whose contact force is in the plot
 
 function send(command) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
@@ -134,9 +136,11 @@ function build() {
   if (contents.cameras.length) send({ do: "camera", name: $("camera").value });
   const driven = contents.robots.some((robot) => robot.joints.length);
   $("joint-card").hidden = !driven;
-  $("plots").hidden = !driven;
+  $("plots").hidden = false;
+  for (const figure of document.querySelectorAll("#plots .of-joints")) figure.hidden = !driven;
   history.positions.clear();
   history.efforts.clear();
+  history.forces.clear();
   joints.build(contents.robots);
   $("overlays").hidden = contents.overlays.length === 0;
   $("overlays").replaceChildren($("overlays").querySelector("legend"), ...contents.overlays.map((overlay) => {
@@ -168,13 +172,42 @@ function refresh() {
   const everywhere = contents?.environments > 1 ? "all" : "0";
   const environment = state.environment === null ? everywhere : String(state.environment);
   if (document.activeElement !== $("environment")) $("environment").value = environment;
+  const recording = state.recording;
+  $("record").hidden = recording === null;
+  if (recording !== null) {
+    $("record").textContent = recording.on ? "Stop recording" : "Record";
+    $("record").setAttribute("aria-pressed", String(recording.on));
+  }
+  $("record-text").textContent = recording?.text ?? "";
   if (state.refused !== refused && state.refused !== null) note(state.refused);
   refused = state.refused;
   $("diverged").hidden = state.diverged.length === 0;
   $("diverged").textContent = state.diverged.join("; ");
+  select(state.selected);
   joints.show(state.robots);
   history.positions.add(state.time, state.robots.flatMap((robot) => robot.positions));
   history.efforts.add(state.time, state.robots.flatMap((robot) => robot.efforts));
+}
+
+/** What was clicked on, and the contact force on it. */
+function select(selected) {
+  $("selected-card").hidden = selected === null;
+  $("selected").textContent = selected === null ? "" : selected.says.join("\n");
+  const whose = selected === null || selected.quaternion === null ? "" : `${selected.name}, environment ${selected.environment}`;
+  if (whose !== plotted) {
+    plotted = whose;
+    history.forces.clear();
+    const keys = AXES.map((axis) => {
+      const key = document.createElement("span");
+      key.className = "key";
+      key.style.color = axis.color;
+      key.textContent = axis.name;
+      return key;
+    });
+    if (whose) $("forces-title").replaceChildren(`Contact force on ${whose}`, ...keys);
+    else $("forces-title").textContent = "Contact force on what is selected: click on a body";
+  }
+  if (whose && selected.force !== null) history.forces.add(state.time, selected.force);
 }
 
 function replot() {
@@ -182,12 +215,15 @@ function replot() {
   const unit = (turns, slides) => [units.has("rad") && turns, units.has("m") && slides].filter(Boolean).join(", ");
   plot($("positions"), history.positions, joints.lines(), unit("rad", "m"));
   plot($("efforts"), history.efforts, joints.lines(), unit("N m", "N"));
+  plot($("forces"), history.forces, AXES, "N");
 }
 
 $("pause").addEventListener("click", () => send({ do: state?.paused ? "play" : "pause" }));
 $("step").addEventListener("click", () => send({ do: "step" }));
 $("reset").addEventListener("click", () => send({ do: "reset" }));
 $("home").addEventListener("click", () => send({ do: "home" }));
+$("unselect").addEventListener("click", () => send({ do: "unselect" }));
+$("record").addEventListener("click", () => send({ do: "record", on: !state?.recording?.on }));
 $("speed").addEventListener("change", (event) => {
   const value = event.target.value;
   send({ do: "speed", factor: value === "max" ? null : Number(value) });
@@ -197,6 +233,7 @@ $("environment").addEventListener("change", (event) => {
   const value = event.target.value;
   history.positions.clear();
   history.efforts.clear();
+  history.forces.clear();
   send({ do: "environment", env: value === "all" ? null : Number(value) });
   event.target.blur();
 });

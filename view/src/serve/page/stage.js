@@ -1,4 +1,6 @@
-// The picture of the stage, and the hand that turns it.
+// The picture of the stage, and the hand that turns it, selects and pulls.
+
+const CLICK = 4; // a hand that moved less than this clicked, in CSS pixels
 
 class Stage {
   constructor(canvas, send) {
@@ -6,14 +8,35 @@ class Stage {
     this.send = send;
     this.moved = null;
     this.hands = new Map();
+    this.pressed = null; // where the one hand came down that may be clicking
+    this.pulling = null; // the hand that pulls at a body
+    this.pulled = null; // where to, until that is sent
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       canvas.focus({ preventScroll: true });
+      if (event.button === 0 && (event.ctrlKey || event.metaKey) && this.hands.size === 0) {
+        this.pulling = event.pointerId;
+        canvas.dataset.pulls = "";
+        this.send({ do: "grab", ...this.place(event) });
+        return;
+      }
+      this.pressed = event.button === 0 && !event.shiftKey && this.hands.size === 0 ? [event.clientX, event.clientY] : null;
       this.hands.set(event.pointerId, [event.clientX, event.clientY]);
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, (event) => this.hands.delete(event.pointerId));
+      canvas.addEventListener(end, (event) => {
+        this.hands.delete(event.pointerId);
+        if (this.pulling === event.pointerId) {
+          this.pulling = null;
+          this.pulled = null;
+          delete canvas.dataset.pulls;
+          this.send({ do: "release" });
+        } else if (this.pressed !== null) {
+          if (end === "pointerup") this.send({ do: "select", ...this.place(event) });
+          this.pressed = null;
+        }
+      });
     }
     canvas.addEventListener("pointermove", (event) => this.drag(event));
     canvas.addEventListener("wheel", (event) => {
@@ -25,7 +48,32 @@ class Stage {
     new ResizeObserver(() => this.size()).observe(canvas);
   }
 
+  /** Where in the picture: parts of its width and height; a hand that pulls may leave it. */
+  place(event, inside = true) {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const part = (at, from, side) => (at - from) / Math.max(side, 1);
+    const [x, y] = [part(event.clientX, left, width), part(event.clientY, top, height)];
+    return inside ? { x: Math.min(1, Math.max(0, x)), y: Math.min(1, Math.max(0, y)) } : { x, y };
+  }
+
+  pull(event) {
+    const first = this.pulled === null;
+    this.pulled = this.place(event, false);
+    if (!first) return;
+    setTimeout(() => {
+      if (this.pulled !== null) this.send({ do: "pull", ...this.pulled });
+      this.pulled = null;
+    }, 16);
+  }
+
   drag(event) {
+    if (this.pulling === event.pointerId) {
+      this.pull(event);
+      return;
+    }
+    if (this.pressed !== null && Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) >= CLICK) {
+      this.pressed = null;
+    }
     const before = this.hands.get(event.pointerId);
     if (!before) return;
     const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
@@ -50,6 +98,7 @@ class Stage {
     else if (event.key === "+" || event.key === "=") this.move("zoom", 0, 1);
     else if (event.key === "-") this.move("zoom", 0, -1);
     else if (event.key === "h" || event.key === "H") this.send({ do: "home" });
+    else if (event.key === "Escape") this.send({ do: "unselect" });
     else return;
     event.preventDefault();
   }

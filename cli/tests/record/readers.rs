@@ -1,9 +1,8 @@
 //! Readers that nobody here wrote: NumPy, the `mcap` package with its decoder of ROS 2 messages, Pillow.
 
 use super::support::{PICTURE_EVERY, World};
-use ndarray::Axis;
-use record::{Record, RecorderCfg};
-use sensors::camera::CameraConvention;
+use kinetoscope::ndarray::Axis;
+use kinetoscope::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

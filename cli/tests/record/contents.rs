@@ -1,10 +1,9 @@
 //! What is in recordings, held against what was read from the simulation meanwhile.
 
 use super::support::{IMU_EVERY, Message, PICTURE_EVERY, World, bytes, contains, messages, of};
-use ndarray::Axis;
-use record::{Record, RecorderCfg, Topic};
-use sensors::Sampled;
-use sim::EnvId;
+use kinetoscope::ndarray::Axis;
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::Sampled;
 
 const STEPS: u32 = 20;
 

@@ -1,12 +1,10 @@
 //! Viewers that vanish leave nothing behind. Alone in its process, because it counts threads and files.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use scene::Pose;
-use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use kinetoscope::prelude::*;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
-use view::Serve;
 
 /// Names of the threads of this process, without those of the test harness that come and go.
 fn threads() -> Vec<String> {

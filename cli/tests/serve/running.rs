@@ -1,19 +1,13 @@
 //! A simulation that steps on a thread of its own while it is served.
 
-use ndarray::Array2;
-use scene::Pose;
-use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
-use sim::{
-    ComponentCfg, DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg,
-};
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Viewer, Viewing, Wants};
 use std::net::SocketAddr;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use view::{Command, Viewer, Viewing, Wants};
-use view::{Serve, ServeCfg, Served};
 
 /// Bundled arm of six driven joints.
 pub(crate) const ARM: &str = "sr5/SR5.urdf";
@@ -51,13 +45,7 @@ pub(crate) fn scene(num_envs: usize) -> SimulationManager {
     .unwrap();
     sim.add_robot(RobotCfg {
         uid: "arm".into(),
-        urdf: UrdfCfg {
-            components: vec![ComponentCfg::new(
-                "arm",
-                Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(ARM),
-            )],
-            ..Default::default()
-        },
+        urdf: UrdfCfg { components: vec![ComponentCfg::new("arm", assets::path(ARM).unwrap())], ..Default::default() },
         drive: DriveCfg { stiffness: 1e4.into(), damping: 1e3.into(), ..Default::default() },
         ..Default::default()
     })

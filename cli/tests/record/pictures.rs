@@ -1,9 +1,8 @@
 //! Folders of pictures, and animations.
 
 use super::support::{PICTURE_EVERY, World};
-use ndarray::Axis;
-use record::{Record, RecordError, Recorded, RecorderCfg, Topic};
-use sim::EnvId;
+use kinetoscope::ndarray::Axis;
+use kinetoscope::prelude::*;
 use std::io::BufReader;
 use std::path::Path;
 

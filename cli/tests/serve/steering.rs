@@ -2,7 +2,9 @@
 
 use crate::running::Running;
 use crate::visitor::{Came, Visitor};
+use kinetoscope::prelude::*;
 use serde_json::{Value, json};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 #[test]
@@ -146,4 +148,34 @@ fn what_cannot_be_done_is_said() {
     }
     let before = running.now().steps;
     running.wait_until("it steps all the same", |now| now.steps > before + 10);
+}
+
+#[test]
+fn the_record_button_is_there_where_the_program_gives_one_and_writes_a_file() {
+    // Without one there is none, and pressing it is refused.
+    let running = Running::start(1);
+    let mut visitor = Visitor::enter(&running);
+    let state = visitor.wait_state("a state", |_| true);
+    assert_eq!(state["recording"], Value::Null);
+    visitor.ask(json!({"do": "record", "on": true}));
+    visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
+    drop((visitor, running));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
+    let recording = Some(RecordButton::shared(files));
+    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
+    let mut visitor = Visitor::enter(&running);
+    visitor.wait_state("a button", |state| state["recording"] == json!({"on": false, "text": ""}));
+    visitor.ask(json!({"do": "record", "on": true}));
+    let text = |state: &Value| state["recording"]["text"].as_str().unwrap_or_default().to_owned();
+    let state = visitor.wait_state("it records", |state| state["recording"]["on"] == true);
+    assert!(text(&state).starts_with("run.npz: "), "{state}");
+    // Another viewer sees it, and ends it.
+    let mut other = Visitor::enter(&running);
+    other.wait_state("rows", |state| state["recording"]["on"] == true && text(state).len() > "run.npz: 9 rows".len());
+    assert!(!path.exists());
+    other.ask(json!({"do": "record", "on": false}));
+    let state = visitor.wait_state("it has ended", |state| state["recording"]["on"] == false);
+    assert!(text(&state).ends_with(" MB") && path.is_file(), "{state}");
 }

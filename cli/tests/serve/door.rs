@@ -2,8 +2,8 @@
 
 use crate::running::{Running, scene};
 use crate::visitor::{say, status, status_of};
+use kinetoscope::prelude::*;
 use std::net::TcpListener;
-use view::{Serve, ServeCfg, ServeError};
 
 /// What a browser sends to open a WebSocket.
 const UPGRADE: [&str; 4] = [

@@ -1,6 +1,7 @@
 //! Recordings: what is in the files, held against the simulation and read by readers that nobody here wrote.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod button;
 mod contents;
 mod kill;
 mod pictures;

@@ -8,11 +8,12 @@ mod chromium;
 mod running;
 
 use chromium::{Chromium, Tab};
+use kinetoscope::prelude::*;
 use running::{Running, wait_until};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use view::ServeCfg;
 
 /// Where screenshots of the page are written, for the documentation; nowhere without it.
 const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
@@ -60,7 +61,7 @@ fn the_page_shows_the_simulation_and_acts_on_it() {
     let Some(browser) = browser() else { return };
     let running = Running::start(2);
     let mut tab = page(&browser, &running);
-    assert_eq!(tab.evaluate("document.title"), "arm – Kinetoscope");
+    tab.wait_until("its title", "document.title === 'arm – Kinetoscope'");
 
     // A picture arrives, as large as it is shown, with the cube in it.
     tab.wait_until("a picture", "document.getElementById('cover').hidden");
@@ -118,6 +119,104 @@ fn the_page_shows_the_simulation_and_acts_on_it() {
     assert_eq!(tab.evaluate("document.getElementById('note').hidden"), true, "nothing was refused");
     assert_eq!(tab.evaluate("document.getElementById('environment').value"), "1");
     screenshot(&mut tab, "serve.png");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+/// Where the cube is on the stage's canvas, in parts of it; null where it is not seen.
+const CUBE: &str = "(() => {
+    const canvas = document.getElementById('stage');
+    const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    let [x, y, n] = [0, 0, 0];
+    for (let k = 0; k < bytes.length; k += 4) {
+        if (!(bytes[k] > 60 && bytes[k] > 2.5 * Math.max(bytes[k + 1], bytes[k + 2]))) continue;
+        x += (k / 4) % canvas.width;
+        y += Math.floor(k / 4 / canvas.width);
+        n += 1;
+    }
+    return n < 50 ? null : [x / n / canvas.width, y / n / canvas.height];
+})()";
+
+/// Numbers behind a word in what is said of the selection.
+fn said(tab: &mut Tab<'_>, word: &str) -> Vec<f64> {
+    let text = tab.evaluate("document.getElementById('selected').textContent");
+    let line = text.as_str().unwrap().lines().find_map(|line| line.split_once(word)).map_or("", |(_, rest)| rest);
+    line.split_whitespace().filter_map(|number| number.parse().ok()).collect()
+}
+
+#[test]
+fn a_click_selects_its_force_is_plotted_and_a_drag_with_ctrl_pulls() {
+    let Some(browser) = browser() else { return };
+    let running = Running::start(1);
+    let mut tab = page(&browser, &running);
+    assert_eq!(tab.evaluate("document.getElementById('selected-card').hidden"), true);
+    let title = "document.getElementById('forces-title').textContent";
+    tab.wait_until("a hint", &format!("{title}.includes('click on a body')"));
+    // The cube has come to rest by then: 1.5 s of simulation.
+    tab.wait_until("1.5 s", "parseFloat(document.getElementById('time').textContent) > 1.5");
+    tab.wait_until("the cube is seen", &format!("{CUBE} !== null"));
+    let at = tab.evaluate(CUBE);
+    let [left, middle, width, height] = tab.rectangle("document.getElementById('stage')");
+    let [u, v] = [0, 1].map(|k| at[k].as_f64().unwrap());
+    let place = [left + u * width, middle + (v - 0.5) * height];
+    tab.drag(place, place);
+    tab.wait_until("it is selected", "document.getElementById('selected').textContent.startsWith('cube ')");
+    tab.wait_until("forces", "/contacts: force on it/.test(document.getElementById('selected').textContent)");
+    // The contacts carry the weight of 1 kg; what is said is rounded to hundredths of a newton.
+    let force = said(&mut tab, "force on it");
+    assert!(force.len() == 3 && (force[2] - 9.81).abs() < 0.011 && force[0].abs() < 0.011, "{force:?}");
+    // And are plotted: the line of z has its colour, over most of a second's width of the plot at least.
+    assert_eq!(tab.evaluate(title), "Contact force on cube, environment 0xyz");
+    tab.wait_until(
+        "a line",
+        "(() => {
+            const canvas = document.getElementById('forces');
+            const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+            const columns = new Set();
+            for (let k = 0; k < bytes.length; k += 4) {
+                if (Math.abs(bytes[k] - 0x2f) + Math.abs(bytes[k + 1] - 0x7e) + Math.abs(bytes[k + 2] - 0xd8) < 60 && bytes[k + 3] > 200) {
+                    columns.add((k / 4) % canvas.width);
+                }
+            }
+            return columns.size > canvas.width / 12;
+        })()",
+    );
+    let rest = said(&mut tab, "position")[2];
+    assert!((rest - 0.2).abs() < 2e-3, "{rest}");
+    screenshot(&mut tab, "serve_selected.png");
+    // Pulled up by a part of the picture's height it leaves the ground; let go, it comes back.
+    let up = [place[0], place[1] - 0.3 * height];
+    tab.hold(place, up, true);
+    tab.wait_until("nothing touches it", "/no contact/.test(document.getElementById('selected').textContent)");
+    assert!(said(&mut tab, "position")[2] > rest);
+    screenshot(&mut tab, "serve_pulled.png");
+    tab.let_go(up);
+    tab.wait_until("it is back", "/contacts?: force on it/.test(document.getElementById('selected').textContent)");
+    tab.click("document.getElementById('unselect')");
+    tab.wait_until("nothing is selected", "document.getElementById('selected-card').hidden");
+    assert_eq!(tab.evaluate("document.getElementById('note').hidden"), true, "nothing was refused");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn the_record_button_writes_a_file() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
+    let recording = Some(RecordButton::shared(files));
+    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
+    let mut tab = page(&browser, &running);
+    let button = "document.getElementById('record')";
+    tab.wait_until("a button", &format!("!{button}.hidden && {button}.textContent === 'Record'"));
+    tab.click(button);
+    tab.wait_until("it records", &format!("{button}.textContent === 'Stop recording'"));
+    tab.wait_until(
+        "rows are told",
+        "/^run.npz: \\d\\d+ rows$/.test(document.getElementById('record-text').textContent)",
+    );
+    tab.click(button);
+    tab.wait_until("it has ended", &format!("{button}.textContent === 'Record'"));
+    assert!(path.is_file());
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 

@@ -1,11 +1,8 @@
 //! Recordings that cannot be begun, and what is said.
 
 use super::support::World;
-use record::{Record, RecordError, RecorderCfg, Topic};
-use sensors::JointStateCfg;
-use sim::{EnvId, ObjectShape, RigidObjectCfg, RobotCfg, UrdfCfg};
+use kinetoscope::prelude::*;
 use std::fs;
-use std::path::Path;
 
 fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
     let error = World::new(1, 1).sim.record(cfg).unwrap_err();
@@ -129,7 +126,7 @@ fn what_is_recorded_must_stay_what_it_is() {
     world.step(1);
     assert!(!world.sim.observer(recorder).unwrap().has_failed());
     // A second robot has joints, which the sensor of all joints now measures.
-    let urdf = UrdfCfg::single(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join("sr5/SR5.urdf"));
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
     world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
     world.step(2);
     let error = world.sim.finish_recording(recorder).unwrap_err();

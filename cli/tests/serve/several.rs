@@ -2,12 +2,12 @@
 
 use crate::running::{Running, wait_until};
 use crate::visitor::{Visitor, connect};
+use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Speed};
 use serde_json::json;
 use std::io::Write;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
-use view::ServeCfg;
-use view::{Command, Speed};
 
 /// A step of this scene takes less than a millisecond; a viewer that does not read is given up after five seconds. A
 /// simulation that waited for it, even once, would take longer for a step than this.

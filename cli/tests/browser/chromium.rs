@@ -173,9 +173,10 @@ impl Tab<'_> {
         [0, 1, 2, 3].map(|k| rectangle[k].as_f64().unwrap())
     }
 
-    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], pressed: bool) {
-        let buttons = u8::from(pressed);
-        let params = json!({"type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1});
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], pressed: bool, ctrl: bool) {
+        let (buttons, modifiers) = (u8::from(pressed), 2 * u8::from(ctrl));
+        let params = json!({"type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1,
+                            "modifiers": modifiers});
         self.ask("Input.dispatchMouseEvent", params);
     }
 
@@ -187,13 +188,23 @@ impl Tab<'_> {
 
     /// Drags with the mouse.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
-        self.mouse("mouseMoved", from, false);
-        self.mouse("mousePressed", from, true);
+        self.hold(from, to, false);
+        self.mouse("mouseReleased", to, false, false);
+    }
+
+    /// Drags, with Ctrl pressed or not, and does not let go.
+    pub(crate) fn hold(&mut self, from: [f64; 2], to: [f64; 2], ctrl: bool) {
+        self.mouse("mouseMoved", from, false, ctrl);
+        self.mouse("mousePressed", from, true, ctrl);
         for k in 1..=5 {
             let part = f64::from(k) / 5.0;
-            self.mouse("mouseMoved", [0, 1].map(|i| from[i] + part * (to[i] - from[i])), true);
+            self.mouse("mouseMoved", [0, 1].map(|i| from[i] + part * (to[i] - from[i])), true, ctrl);
         }
-        self.mouse("mouseReleased", to, false);
+    }
+
+    /// Lets go.
+    pub(crate) fn let_go(&mut self, at: [f64; 2]) {
+        self.mouse("mouseReleased", at, false, false);
     }
 
     /// Chooses in a list.

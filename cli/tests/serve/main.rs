@@ -5,6 +5,7 @@ mod door;
 mod hostile;
 mod pictures;
 mod running;
+mod selecting;
 mod several;
 mod steering;
 mod visitor;

@@ -2,7 +2,8 @@
 //! written as fast as it is recorded.
 
 use super::support::{World, messages, of};
-use record::{Record, RecorderCfg};
+use kinetoscope::prelude::*;
+use kinetoscope::record;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

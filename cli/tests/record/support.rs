@@ -1,12 +1,7 @@
 //! A scene with something of everything, and MCAP files as lists of messages.
 
-use ndarray::Array2;
-use sensors::camera::{Camera, CameraCfg, Channels, Intrinsics};
-use sensors::{Imu, ImuCfg, JointState, JointStateCfg, SamplingCfg};
-use sim::{
-    ObjectId, ObjectShape, RigidObjectCfg, RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg,
-    UrdfCfg,
-};
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
 use std::borrow::Borrow;
 use std::path::Path;
 
@@ -29,7 +24,7 @@ impl World {
         let cfg = SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() };
         let dt = cfg.physics_dt;
         let mut sim = SimulationManager::new(cfg).unwrap();
-        let urdf = UrdfCfg::single(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join("sr5/SR5.urdf"));
+        let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
         let arm = sim.add_robot(RobotCfg { uid: "arm".into(), urdf, ..Default::default() }).unwrap();
         let cube = RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() };
         let cube = sim.add_rigid_object(cube).unwrap();

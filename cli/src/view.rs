@@ -1,0 +1,148 @@
+//! `kinetoscope view`: a model as it moves, in a window or in a browser.
+
+use crate::model::ModelArgs;
+use crate::{Ending, Result, excerpt};
+use kinetoscope::prelude::*;
+use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A model as it moves: in a window, or in a browser with --serve
+///
+/// Its drives hold it where it starts; sliders and the mouse move it. It goes on until the window is closed, all --steps are
+/// done, or Ctrl+C; each of them is a good end (exit code 0). H in the window shows its keys.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    model: ModelArgs,
+    /// Show it in browsers and open no window; at 127.0.0.1:8080 where no address is given. An address that other machines
+    /// reach (0.0.0.0:8080) needs the token that is printed
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
+    serve: Option<String>,
+    /// Environments, side by side
+    #[arg(long, alias = "num_envs", default_value_t = 1)]
+    num_envs: usize,
+    /// Threads that step [default: every core]
+    #[arg(long)]
+    threads: Option<usize>,
+    /// End after so many steps
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .apng for the first camera, a folder
+    /// for PNG files of all cameras. Without it the record button begins a recording.mcap
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Replace the file of --record, and what a recording that was killed has left
+    #[arg(long, requires = "record")]
+    overwrite: bool,
+    /// Simulated seconds per second, until a viewer sets another speed
+    #[arg(long, default_value_t = 1.0)]
+    speed: f64,
+}
+
+pub(crate) fn run(args: &Args) -> Result<Ending> {
+    let [slow, fast] = Speed::RANGE;
+    if !(slow..=fast).contains(&args.speed) {
+        return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
+    }
+    let cfg = SimulationManagerCfg { num_envs: args.num_envs, threads: args.threads, ..Default::default() };
+    let mut sim = args.model.scene(cfg)?;
+    let warned = excerpt::print_warnings(sim.diagnostics());
+    let files = Arc::new(Mutex::new(args.recording()));
+    if args.record.is_some() {
+        files
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(&mut sim)
+            .map_err(|error| format!("--record {error}"))?;
+    }
+    let window = args.show(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
+    let interrupted = on_ctrl_c(&mut sim);
+    let closed = || window.as_ref().and_then(Window::closed);
+    let mut step = 0;
+    while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
+        sim.update(1);
+        step += 1;
+    }
+    let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).end(&mut sim);
+    for recorded in recorded.map_err(|error| format!("--record {error}"))? {
+        println!("Recorded to {recorded}");
+    }
+    if let Some(Closed::DisplayLost(reason)) = closed() {
+        return Err(format!("the window is gone after {step} steps: {reason}").into());
+    }
+    let diverged = sim.diverged();
+    for (env, reason) in &diverged {
+        eprintln!("warning: environment {}: {reason}", env.0);
+    }
+    Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
+}
+
+impl Args {
+    /// What the record button does.
+    fn recording(&self) -> FileRecording {
+        let path = self.record.clone().unwrap_or_else(|| "recording.mcap".into());
+        FileRecording::new(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) })
+    }
+
+    /// Shows the simulation; gives the window, where it is one.
+    ///
+    /// # Errors
+    /// There is no display, or nothing can listen at the address.
+    fn show(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
+        let (speed, recording) = (Speed::Times(self.speed), Some(button));
+        let names = self.model.names();
+        if let Some(address) = &self.serve {
+            let served = sim.serve_with(address, ServeCfg { speed, recording, ..ServeCfg::default() });
+            let served = served.map_err(|error| format!("--serve: {error}"))?;
+            println!("Open {} in a browser to see {names}; Ctrl+C here ends it.", served.url());
+            return Ok(None);
+        }
+        let title = format!("{names} - Kinetoscope");
+        let cfg = WindowCfg { title, speed: Some(speed), recording, ..WindowCfg::default() };
+        let window = sim.open_window_with(cfg).map_err(|error| no_window(&error, &names))?;
+        println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
+        Ok(Some(window))
+    }
+}
+
+/// What to do where there is no window.
+fn no_window(error: &WindowError, names: &str) -> String {
+    match error {
+        WindowError::NoDisplay { reason, display, wayland } => {
+            let of = |variable: &Option<String>| variable.clone().unwrap_or_else(|| "not set".into());
+            format!(
+                "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which \
+                 Wayland desktops have too (XWayland); or look at it in a browser, also from another machine: kinetoscope \
+                 view {names} --serve; or have a picture of it: kinetoscope render {names} -o out.png",
+                of(display),
+                of(wayland),
+            )
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Raised by Ctrl+C, which also lets the simulation go on where a viewer holds it; a second Ctrl+C ends the program at once.
+fn on_ctrl_c(sim: &mut SimulationManager) -> Arc<AtomicBool> {
+    let wants = Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
+    let key: Viewer = sim.viewer(wants);
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    // Some programs send the signal to a process and to its group: that is one Ctrl+C.
+    let mut first: Option<Instant> = None;
+    let handler = ctrlc::set_handler(move || {
+        flag.store(true, Ordering::SeqCst);
+        key.send(Command::Resume);
+        key.send(Command::SetSpeed(Speed::Free));
+        if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = handler {
+        eprintln!("warning: Ctrl+C will end the program at once: {error}");
+    }
+    interrupted
+}

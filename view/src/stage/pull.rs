@@ -1,0 +1,67 @@
+//! A body that the mouse pulls at.
+
+use super::painter::{Look, Painter};
+use super::pick::Picked;
+use super::snapshot::{Names, Snapshot};
+use crate::control::Command;
+use sensors::visibility::View;
+use sim::EnvId;
+
+/// A body that is held in a point of it, and where it is pulled to: in the plane through that point that is parallel to the
+/// picture.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pull {
+    picked: Picked,
+    /// Distance of that plane along the optical axis \[m\].
+    depth: f64,
+    /// In the environment \[m\].
+    target: [f64; 3],
+}
+
+impl Pull {
+    /// Takes hold of what is seen at a pixel; `None` where that is no body.
+    pub(crate) fn at(
+        painter: &mut Painter,
+        snapshot: &Snapshot,
+        view: &View,
+        look: &Look<'_>,
+        pixel: [f64; 2],
+    ) -> Option<Self> {
+        let picked = painter.pick(snapshot, view, look, pixel)?;
+        picked.body?;
+        let origin = snapshot.envs.get(picked.env)?.origin;
+        let in_overview = [0, 1, 2].map(|k| (picked.point[k] + origin[k]) as f32);
+        let depth = f64::from(view.world_from_camera.apply_inverse(in_overview)[2]);
+        let target = picked.point;
+        Some(Self { picked, depth, target })
+    }
+
+    /// What is held.
+    pub(crate) fn picked(&self) -> &Picked {
+        &self.picked
+    }
+
+    /// Pulls to a pixel.
+    pub(crate) fn to(&mut self, snapshot: &Snapshot, view: &View, [x, y]: [f64; 2]) {
+        let origin = snapshot.envs.get(self.picked.env).map_or([0.0; 3], |env| env.origin);
+        let ray = [(x as f32 - view.cx) / view.fx, (y as f32 - view.cy) / view.fy, 1.0];
+        let place = view.world_from_camera.apply(ray.map(|n| n * self.depth as f32));
+        self.target = [0, 1, 2].map(|k| f64::from(place[k]) - origin[k]);
+    }
+
+    /// Something was added to the simulation.
+    pub(crate) fn renumber(&mut self, names: &Names) {
+        self.picked.renumber(names);
+    }
+
+    /// What asks the simulation for it; `None` where the body is gone.
+    pub(crate) fn command(&self) -> Option<Command> {
+        let Picked { env, body, hold, .. } = self.picked;
+        Some(Command::Drag { env: EnvId(env), body: body?, hold, target: self.target })
+    }
+
+    /// The spring as it is drawn: its environment and its ends there \[m\].
+    pub(crate) fn spring(&self, snapshot: &Snapshot) -> (usize, [[f64; 3]; 2]) {
+        (self.picked.env, [self.picked.point_now(snapshot), self.target])
+    }
+}

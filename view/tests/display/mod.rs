@@ -1,0 +1,122 @@
+//! A real X server without a screen (Xvfb), and what is to be seen on it.
+
+use scene::Pose;
+use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use view::{Canvas, WindowCfg};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT, KeyButMask, KeyPressEvent};
+use x11rb::rust_connection::RustConnection;
+
+/// What is not there by then does not come.
+pub(crate) const LONG: Duration = Duration::from_secs(30);
+pub(crate) const SIZE: [usize; 2] = [480, 270];
+
+/// An X server of its own.
+pub(crate) struct Display {
+    pub(crate) server: Child,
+    pub(crate) name: String,
+}
+
+impl Display {
+    /// `None` where there is no Xvfb; in CI that is a failure. `cargo xtask test` installs it.
+    pub(crate) fn start(screen: &str) -> Option<Self> {
+        let screen = format!("{screen}x24");
+        let command = ["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-noreset"];
+        let started = Command::new("Xvfb").args(command).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let Ok(mut server) = started else {
+            assert!(std::env::var_os("CI").is_none(), "Xvfb is not there; cargo xtask test installs it");
+            eprintln!("note: without Xvfb no window is opened (cargo xtask test installs it)");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some(Self { server, name: format!(":{}", number.trim()) })
+    }
+
+    pub(crate) fn cfg(&self) -> WindowCfg {
+        WindowCfg { size: SIZE, display: Some(self.name.clone()), threads: Some(1), ..WindowCfg::default() }
+    }
+
+    pub(crate) fn connect(&self) -> RustConnection {
+        x11rb::connect(Some(&self.name)).unwrap().0
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+pub(crate) fn simulation() -> SimulationManager {
+    let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.01, threads: Some(1), ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(0.4),
+        init_pose: Pose::translation(0.0, 0.0, 0.2),
+        rgba: [0.8, 0.1, 0.1, 1.0],
+        ..Default::default()
+    })
+    .unwrap();
+    sim
+}
+
+/// The upper left of the whole display, as red, green and blue.
+pub(crate) fn screenshot(connection: &RustConnection, size: [usize; 2]) -> Vec<[u8; 3]> {
+    screenshot_of(connection, [0, 0], size)
+}
+
+/// A part of the whole display.
+pub(crate) fn screenshot_of(connection: &RustConnection, corner: [usize; 2], size: [usize; 2]) -> Vec<[u8; 3]> {
+    let root = connection.setup().roots[0].root;
+    let ([x, y], [width, height]) = (corner.map(|n| n as i16), size.map(|n| n as u16));
+    let image = connection.get_image(ImageFormat::Z_PIXMAP, root, x, y, width, height, !0).unwrap();
+    // Xvfb's pixels of 24 bits: blue, green, red, nothing.
+    image.reply().unwrap().data.chunks_exact(4).map(|p| [p[2], p[1], p[0]]).collect()
+}
+
+pub(crate) fn pixels(canvas: &Canvas) -> Vec<[u8; 3]> {
+    canvas.bytes().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+pub(crate) fn until(what: &str, mut is: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !is() {
+        assert!(start.elapsed() < LONG, "never: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// The code of a key by its sign.
+pub(crate) fn code(connection: &RustConnection, sign: u32) -> u8 {
+    let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
+    let mapping = connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
+    let each = usize::from(mapping.keysyms_per_keycode);
+    let place = mapping.keysyms.chunks(each).position(|signs| signs[0] == sign).unwrap();
+    first + place as u8
+}
+
+pub(crate) fn press(connection: &RustConnection, window: u32, sign: u32) {
+    let event = KeyPressEvent {
+        response_type: KEY_PRESS_EVENT,
+        detail: code(connection, sign),
+        sequence: 0,
+        time: 0,
+        root: connection.setup().roots[0].root,
+        event: window,
+        child: 0,
+        root_x: 0,
+        root_y: 0,
+        event_x: 0,
+        event_y: 0,
+        state: KeyButMask::default(),
+        same_screen: true,
+    };
+    connection.send_event(false, window, EventMask::KEY_PRESS, event).unwrap();
+    connection.flush().unwrap();
+}
