@@ -8,6 +8,7 @@ mod overlay;
 mod painter;
 mod panel;
 mod pick;
+mod png;
 mod pool;
 mod snapshot;
 mod trail;
