@@ -1,5 +1,6 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+mod arrived;
 pub mod boxes;
 pub mod calibration;
 mod captures;
