@@ -6,6 +6,7 @@ mod convert;
 mod excerpt;
 mod model;
 mod picture;
+mod plot;
 mod render;
 
 use clap::{Parser, Subcommand};
@@ -25,6 +26,7 @@ Examples:
   kinetoscope convert arm.urdf -o arm_mjcf      MJCF for both lines of MuJoCo, with its meshes
   kinetoscope render humanoid.xml -o out.png    a picture
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
+  kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused.
 A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
@@ -36,6 +38,7 @@ enum Command {
     Convert(convert::Args),
     Render(render::Args),
     Bench(bench::Args),
+    Plot(plot::Args),
 }
 
 /// How a command ended that did its work.
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         Command::Convert(args) => convert::run(args),
         Command::Render(args) => render::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Plot(args) => plot::run(args),
     };
     match ended {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -20,7 +20,7 @@
 use crate::file::{PartFile, Storage, folder_of};
 use crate::npy;
 use crate::packet::{Block, Event, EventKind, Packet};
-use crate::stream::{Element, Kind, Stream};
+use crate::stream::{Element, Kind, Part, Stream};
 use crate::writer::Sink;
 use crate::zip::Archive;
 use serde_json::{Value, json};
@@ -88,7 +88,10 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             Kind::Poses { frames } => Some(frames),
             _ => None,
         };
-        let parts = stream.parts.iter().map(|part| json!({ "name": member(stream, &part.name), "shape": part.shape }));
+        let part = |part: &Part| {
+            json!({ "name": member(stream, &part.name), "shape": part.shape, "of_forces": part.of_forces })
+        };
+        let parts = stream.parts.iter().map(part);
         json!({
             "name": stream.name,
             "env_ids": stream.env_ids,

@@ -1,4 +1,6 @@
 use super::*;
+use crate::npy;
+use crate::zip;
 use crate::cfg::RecorderCfg;
 use crate::recorder::Record;
 use crate::topic::Topic;
