@@ -8,6 +8,7 @@ mod model;
 mod picture;
 mod plot;
 mod render;
+mod replay;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -27,6 +28,7 @@ Examples:
   kinetoscope render humanoid.xml -o out.png    a picture
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
   kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
+  kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused.
 A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
@@ -39,6 +41,7 @@ enum Command {
     Render(render::Args),
     Bench(bench::Args),
     Plot(plot::Args),
+    Replay(replay::Args),
 }
 
 /// How a command ended that did its work.
@@ -67,6 +70,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Plot(args) => plot::run(args),
+        Command::Replay(args) => replay::run(args),
     };
     match ended {
         Ok(Ending::Done) => ExitCode::SUCCESS,

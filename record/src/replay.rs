@@ -154,6 +154,14 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
     Repetition { archive, states, targets, steps }.run(sim)
 }
 
+/// How many environments a NumPy archive was recorded of.
+///
+/// # Errors
+/// The file is no such archive, or not whole.
+pub fn num_envs(path: impl AsRef<Path>) -> Result<usize> {
+    Ok(Archive::read(path.as_ref())?.start()?.len())
+}
+
 /// Everything that a repetition needs.
 struct Repetition {
     archive: Archive,

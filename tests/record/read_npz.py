@@ -25,7 +25,7 @@ def weighed(numbers):
 
 with np.load(sys.argv[1], allow_pickle=False) as file:
     about = json.loads(file["recording.json"])
-    arrays = {name: file[name] for name in file.files if name not in ("recording.json", "start.snapshot")}
+    arrays = {name: file[name] for name in file.files if name not in ("recording.json", "start.snapshot", "scene.zip")}
 
 streams = {stream["name"]: stream for stream in about["streams"]}
 for name, stream in streams.items():

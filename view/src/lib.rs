@@ -21,7 +21,7 @@ pub mod stage;
 mod whole_file;
 pub mod window;
 
-pub use control::{Command, Conductor, Speed, Viewer, Viewing, Wants};
+pub use control::{Command, Conductor, Film, Play, PlayError, Speed, Viewer, Viewing, Wants};
 pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
 pub use serve::{Serve, ServeCfg, ServeError, Served};
 pub use stage::{Canvas, Eye, Overlays, Painter, Shown, Snapshot};

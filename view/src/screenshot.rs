@@ -108,6 +108,9 @@ pub trait Screenshot {
     /// that do not exist. What was there before is there then.
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
+    /// From where all environments are in the picture, as they are now.
+    fn overview_eye(&mut self) -> Eye;
+
     /// The picture itself, four bytes per pixel.
     ///
     /// # Errors
@@ -129,6 +132,11 @@ impl Screenshot for SimulationManager {
         let canvas = self.picture_of_stage(cfg)?;
         let written = canvas.to_png().and_then(|bytes| whole_file::write(path, &bytes));
         written.map_err(|error| ScreenshotError::File { path: path.into(), error: Arc::new(error) })
+    }
+
+    fn overview_eye(&mut self) -> Eye {
+        let snapshot = Pool::default().take(self, 1, &Wants::NOTHING, Run::default());
+        snapshot.map_or_else(Eye::default, |snapshot| Eye::overview(&snapshot))
     }
 
     fn picture_of_stage(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError> {

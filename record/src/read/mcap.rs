@@ -34,7 +34,8 @@ fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()>
     let file = File::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
-    let torn = || malformed("it ends in the middle; record::recover makes a whole file of what a killed recorder left".into());
+    let torn =
+        || malformed("it ends in the middle; record::recover makes a whole file of what a killed recorder left".into());
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(LARGEST));
@@ -61,7 +62,10 @@ fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()>
                     }
                     Record::Message { header, data } => {
                         let Some(channel) = channels.get(&header.channel_id) else {
-                            return Err(malformed(format!("a message is of channel {}, which is not there", header.channel_id)));
+                            return Err(malformed(format!(
+                                "a message is of channel {}, which is not there",
+                                header.channel_id
+                            )));
                         };
                         tell(Told::Message { channel, time: header.log_time, data: &data })?;
                     }
@@ -129,7 +133,9 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
     let mut samples = vec![Samples::default(); wanted.len()];
     walk(path, |told| {
         let Told::Message { channel, time, data } = told else { return Ok(()) };
-        let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else { return Ok(()) };
+        let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else {
+            return Ok(());
+        };
         let value: Value = reads.read(data).ok_or_else(|| unreadable(path, channel))?;
         for (place, steps) in of_topic {
             if let Some(number) = value.number(steps) {
@@ -140,4 +146,18 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
         Ok(())
     })?;
     Ok(samples)
+}
+
+/// A file that is in the recording.
+pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
+    let mut found = None;
+    walk(path, |told| {
+        if let Told::Attachment(attachment) = told
+            && attachment.name == name
+        {
+            found = Some(attachment.data.into_owned());
+        }
+        Ok(())
+    })?;
+    Ok(found)
 }

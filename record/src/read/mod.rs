@@ -88,7 +88,9 @@ impl Recording {
                 (Content::Npz(Box::new(archive)), topics)
             }
             _ if path.extension().is_some_and(|end| end == "part") => {
-                return Err(malformed("this recording was not finished; record::recover makes a whole file of a .mcap.part"));
+                return Err(malformed(
+                    "this recording was not finished; record::recover makes a whole file of a .mcap.part",
+                ));
             }
             _ => return Err(malformed("recordings that can be read are called .mcap or .npz")),
         };
@@ -170,6 +172,19 @@ impl Recording {
             Content::Mcap => mcap::samples(&self.path, wanted),
             Content::Npz(archive) => npz::samples(archive, wanted),
         }
+    }
+
+    /// A file that the recording holds beside the numbers, by its name, such as the scene.
+    pub(crate) fn attachment(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        match &self.content {
+            Content::Mcap => mcap::attachment(&self.path, name),
+            Content::Npz(_) => npz::member(&self.path, name),
+        }
+    }
+
+    /// Whether it is an archive.
+    pub(crate) fn is_archive(&self) -> bool {
+        matches!(self.content, Content::Npz(_))
     }
 }
 

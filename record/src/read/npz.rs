@@ -2,8 +2,10 @@
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::archive::Archive;
-use crate::error::Result;
+use crate::error::{RecordError, Result};
+use crate::zip;
 use serde_json::Value;
+use std::path::Path;
 
 /// The numbers of a pose.
 const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
@@ -86,9 +88,8 @@ pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Sample
     let mut samples = Vec::with_capacity(wanted.len());
     for Wanted { topic, field } in wanted {
         let missing = || archive.malformed(format!("there is no {field} in {topic}"));
-        let of_env = |stream: &Stream<'_>| {
-            stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name))
-        };
+        let of_env =
+            |stream: &Stream<'_>| stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name));
         let (stream, row) = streams.iter().find_map(|stream| Some((stream, of_env(stream)?))).ok_or_else(missing)?;
         let place = |part: &Part<'_>| part.fields.iter().position(|known| known == field);
         let (part, column) = stream.parts.iter().find_map(|part| Some((part, place(part)?))).ok_or_else(missing)?;
@@ -108,7 +109,8 @@ pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Sample
 /// Times of the rows of a stream in an environment, on a clock that goes on over resets \[s\]; `None` where a row holds nothing new.
 fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) -> Result<Vec<Option<f64>>> {
     let forces = format!("{}/force_time", stream.name);
-    let array = if of_forces && archive.arrays.contains_key(&forces) { forces } else { format!("{}/time", stream.name) };
+    let array =
+        if of_forces && archive.arrays.contains_key(&forces) { forces } else { format!("{}/time", stream.name) };
     let steps = archive.steps(stream.name)?;
     let dt = archive.about["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
     let dt = dt.ok_or_else(|| archive.malformed("it does not say its time step".into()))?;
@@ -143,4 +145,11 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
         last = Some(time);
     }
     Ok(times)
+}
+
+/// A file of the archive.
+pub(super) fn member(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
+    let bytes = std::fs::read(path).map_err(|error| RecordError::file(path, error))?;
+    let members = zip::parse(&bytes).unwrap_or_default();
+    Ok(members.into_iter().find(|(known, _)| *known == name).map(|(_, data)| data.to_vec()))
 }

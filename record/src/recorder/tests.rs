@@ -85,7 +85,9 @@ fn a_simulation_waits_for_a_slow_disk_says_so_and_loses_nothing() {
 }
 
 fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
-    let recorder = Recorder::start(sim, RecorderCfg::new(path), &mut |file| Box::new(FullDisk { file, left }))?;
+    // Without the scene, which would fill the disk alone.
+    let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
+    let recorder = Recorder::start(sim, cfg, &mut |file| Box::new(FullDisk { file, left }))?;
     let recorder = sim.add_observer(recorder);
     sim.update(3000);
     sim.finish_recording(recorder)
@@ -298,8 +300,12 @@ fn late_pictures_and_points_are_recorded_as_they_were_taken_whatever_is_shown_me
         pattern: Grid { resolution: 0.1, size: [0.4, 0.4], ..Grid::default() }.into(),
         ..RayCasterCfg::default()
     };
-    let eyes =
-        RayCasterCameraCfg { width: 8, height: 6, extrinsics: camera.extrinsics.clone(), ..RayCasterCameraCfg::default() };
+    let eyes = RayCasterCameraCfg {
+        width: 8,
+        height: 6,
+        extrinsics: camera.extrinsics.clone(),
+        ..RayCasterCameraCfg::default()
+    };
     for (name, latency) in [("prompt", 0), ("late", LATENCY)] {
         let sampling = SamplingCfg { latency_steps: latency, ..SamplingCfg::default() };
         sim.add_sensor(format!("{name}_camera"), CameraCfg { latency_steps: latency, ..camera.clone() }).unwrap();
@@ -332,7 +338,14 @@ fn late_pictures_and_points_are_recorded_as_they_were_taken_whatever_is_shown_me
         let (_, shape, data) = npy::parse(data).unwrap();
         (shape[0], data.to_vec())
     };
-    let camera = ["camera/color", "camera/depth", "camera/mask", "camera/lens/pose", "camera/lens/intrinsics", "camera/depth/time"];
+    let camera = [
+        "camera/color",
+        "camera/depth",
+        "camera/mask",
+        "camera/lens/pose",
+        "camera/lens/intrinsics",
+        "camera/depth/time",
+    ];
     let rays = ["rays/hits", "rays/distances", "rays/time"];
     let eyes = ["eyes/depth", "eyes/distance", "eyes/normal", "eyes/mask", "eyes/lens/pose", "eyes/lens/intrinsics"];
     for array in camera.iter().chain(&rays).chain(&eyes) {

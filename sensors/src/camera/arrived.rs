@@ -99,7 +99,9 @@ impl Camera {
     /// As [`channel`](Self::channel).
     pub fn arrived<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
         let unseen = (0..self.env_ids().len()).any(|row| self.unseen(row).is_some());
-        let Some(landed) = self.past().and_then(|past| past.landed.as_ref()).filter(|_| unseen) else { return self.channel::<C>() };
+        let Some(landed) = self.past().and_then(|past| past.landed.as_ref()).filter(|_| unseen) else {
+            return self.channel::<C>();
+        };
         let off = || CameraError::ChannelOff { channel: C::NAME, enabled: self.channels().names() };
         if !self.channels().has::<C>() {
             return Err(off().into());

@@ -1,5 +1,9 @@
 //! The observer that shows a simulation to its viewers and does what they ask for.
 
+mod playback;
+
+pub use playback::{Film, Play, PlayError};
+
 use super::hub::{Hub, Mail, Viewer};
 use super::pace::Pace;
 use super::spring::Spring;
@@ -76,6 +80,7 @@ impl Conductor {
             speed: self.pace.as_ref().map_or(Speed::Free, Pace::speed),
             measured_speed: self.pace.as_ref().and_then(Pace::measured),
             refused: self.refused.clone(),
+            timeline: None,
         };
         self.shown = Some(Instant::now());
         // Where every snapshot is in somebody's hands, or the newest is just being taken, the next one will do.
@@ -183,6 +188,7 @@ impl Conductor {
                 self.springs.insert(viewer, spring);
             }
             Command::Release => self.release(sim, viewer),
+            Command::Seek(_) => return Err("this is no recording: only what was recorded has a time line".into()),
         }
         Ok(())
     }

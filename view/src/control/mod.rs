@@ -7,7 +7,7 @@ mod spring;
 #[cfg(test)]
 mod tests;
 
-pub use conductor::Conductor;
+pub use conductor::{Conductor, Film, Play, PlayError};
 pub use hub::Viewer;
 
 use crate::stage::Shown;
@@ -57,6 +57,8 @@ pub enum Command {
     },
     /// End this viewer's drag.
     Release,
+    /// Go to a time of what was recorded \[s\], the nearest that there is: only where a film is [played](Play).
+    Seek(f64),
 }
 
 impl Command {
@@ -66,7 +68,9 @@ impl Command {
             (Self::SetTarget { robot, joint, env, .. }, Self::SetTarget { robot: r, joint: j, env: e, .. }) => {
                 (robot, joint, env) == (r, j, e)
             }
-            (Self::Drag { .. } | Self::Release, Self::Drag { .. }) | (Self::SetSpeed(_), Self::SetSpeed(_)) => true,
+            (Self::Drag { .. } | Self::Release, Self::Drag { .. })
+            | (Self::SetSpeed(_), Self::SetSpeed(_))
+            | (Self::Seek(_), Self::Seek(_)) => true,
             _ => false,
         }
     }

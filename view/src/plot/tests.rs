@@ -110,7 +110,8 @@ fn curves_stay_in_the_frame_and_break_where_there_is_no_number() {
 
 #[test]
 fn many_curves_and_long_names_leave_room_for_the_plot() {
-    let series = (0..90).map(|k| Series::new(format!("{}end{k}", "long/".repeat(40)), [[0.0, 1.0], [1.0, f64::from(k)]]));
+    let series =
+        (0..90).map(|k| Series::new(format!("{}end{k}", "long/".repeat(40)), [[0.0, 1.0], [1.0, f64::from(k)]]));
     let plot = Plot { series: series.collect(), ..Plot::default() };
     let svg = plot.to_svg().unwrap();
     assert!(svg.contains("...") && svg.contains("end3</text>") && svg.contains("more</text>"), "{svg}");

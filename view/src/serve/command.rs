@@ -32,6 +32,8 @@ pub(super) enum Command {
     Step,
     /// Resets the environment that is looked at, or all.
     Reset,
+    /// Goes to a time of what was recorded \[s\].
+    Seek { time: f64 },
     /// Simulated seconds per second; without bound where there is none.
     Speed { factor: Option<f64> },
     /// Moves a joint's target \[rad or m\] in the environment that is looked at, or in all.
@@ -83,6 +85,7 @@ mod tests {
             (r#"{"do":"environment","env":null}"#, Command::Environment { env: None }),
             (r#"{"do":"environment","env":3}"#, Command::Environment { env: Some(3) }),
             (r#"{"do":"zoom","by":-1.5}"#, Command::Zoom { by: -1.5 }),
+            (r#"{"do":"seek","time":1.5}"#, Command::Seek { time: 1.5 }),
             (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
             (
                 r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,

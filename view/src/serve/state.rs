@@ -86,6 +86,7 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, viewers: usize) -> Value 
         "robots": robots,
         "diverged": diverged.map(|(k, why)| format!("environment {k}: {why}")).collect::<Vec<_>>(),
         "refused": snapshot.run.refused,
+        "timeline": snapshot.run.timeline.map(|line| json!({"now": line.now, "start": line.start, "end": line.end})),
     })
 }
 

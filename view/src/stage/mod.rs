@@ -23,5 +23,5 @@ pub use painter::{Look, Painter};
 pub use panel::Panel;
 pub use pick::{Picked, describe};
 pub(crate) use pool::Pool;
-pub use snapshot::{EnvStage, JointName, Names, Run, Shown, Snapshot};
+pub use snapshot::{EnvStage, JointName, Names, Run, Shown, Snapshot, Timeline};
 pub use trail::Trails;

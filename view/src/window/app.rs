@@ -1,7 +1,7 @@
 //! What a window does with mouse and keys, and what it draws: everything but the window.
 
-use super::hud;
 use super::keys::{Action, Key, action};
+use super::{hud, timeline};
 use crate::control::{Command, Speed, Wants};
 use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Shown, Snapshot, Trails, describe};
 use nalgebra::Vector3;
@@ -48,6 +48,8 @@ enum Grip {
     Orbit,
     Pan,
     Turn,
+    /// The time line of a recording.
+    Timeline,
     /// A slider of a joint.
     Slider(usize),
     /// A body, held in a plane at this depth of the picture \[m\].
@@ -312,7 +314,12 @@ impl App {
     fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
         let Some(snapshot) = self.snapshot.clone() else { return };
         let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
+        let on_timeline = timeline::time_at(&snapshot, self.size, at).filter(|_| button == 1);
         let grip = match button {
+            1 if on_timeline.is_some() => {
+                self.commands.extend(on_timeline.map(Command::Seek));
+                Some(Grip::Timeline)
+            }
             1 if on_slider.is_some() => {
                 let Some((joint, value)) = on_slider else { return };
                 self.set_target(&snapshot, joint, value);
@@ -371,6 +378,10 @@ impl App {
                 Grip::Spring { picked, depth, target } => {
                     let origin = snapshot.envs.get(picked.env).map_or([0.0; 3], |env| env.origin);
                     *target = self.at_depth(at, *depth, origin);
+                }
+                Grip::Timeline => {
+                    let time = timeline::time_beside(&snapshot, self.size[0], at[0]);
+                    self.commands.extend(time.map(Command::Seek));
                 }
                 Grip::Orbit | Grip::Pan | Grip::Turn => {}
             }
@@ -471,12 +482,15 @@ impl App {
         if let Some(picked) = &self.picked {
             let mut lines = describe(picked, &snapshot);
             lines.extend(self.follow.map(|_| "followed".into()));
+            // The time line is below.
+            lines.extend(snapshot.run.timeline.map(|_| String::new()));
             hud::note(canvas, &lines);
         }
         self.draw_panel(&snapshot, canvas);
         if let Some(first) = self.sliders {
             hud::sliders(canvas, &snapshot, self.env, first);
         }
+        timeline::draw(canvas, &snapshot);
         if self.help {
             hud::help(canvas);
         }

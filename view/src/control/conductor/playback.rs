@@ -190,7 +190,8 @@ impl Conductor {
                 }
             }
             // Where the newest picture is just being taken, the next attempt comes soon.
-            let wait = if self.dirty { self.rest().max(Duration::from_millis(2)) } else { head.rest().max(self.rest()) };
+            let wait =
+                if self.dirty { self.rest().max(Duration::from_millis(2)) } else { head.rest().max(self.rest()) };
             self.hub.wait_for_news(wait.clamp(Duration::from_millis(1), PATIENCE));
         }
         Ok(())
@@ -221,7 +222,16 @@ mod tests {
     use crate::sample::sample;
     use crate::stage::Snapshot;
     use ndarray::array;
-    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// Ends the showing, however it ends.
+    struct Ends<'a>(&'a AtomicBool);
+
+    impl Drop for Ends<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Release);
+        }
+    }
 
     /// A cube that rises by a metre each second, seen ten times a second.
     struct Rising(Vec<f64>);
@@ -243,15 +253,15 @@ mod tests {
         snapshot.envs[0].look.bodies[cube].translation.z
     }
 
-    /// What a viewer sees after commands, when the film rests.
-    fn watched(viewer: &Viewer, commands: &[Command]) -> Arc<Snapshot> {
+    /// What a viewer sees after commands, when the film rests: a copy, because who keeps snapshots gets no more.
+    fn watched(viewer: &Viewer, commands: &[Command]) -> Snapshot {
         let before = viewer.newest().unwrap().number;
         commands.iter().for_each(|command| assert!(viewer.send(*command)));
         let mut newest = viewer.wait(before, Duration::from_secs(20)).unwrap();
         while let Some(newer) = viewer.wait(newest.number, Duration::from_millis(400)) {
             newest = newer;
         }
-        newest
+        Snapshot::clone(&newest)
     }
 
     fn playing(act: impl FnOnce(&Viewer) + Send) {
@@ -260,13 +270,13 @@ mod tests {
         let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
         // Times that do not begin at 0, as those of a recording that was begun late.
         let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
-        let over = std::sync::atomic::AtomicBool::new(false);
+        let over = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
+                let _ends = Ends(&over);
                 act(&viewer);
-                over.store(true, std::sync::atomic::Ordering::Release);
             });
-            sim.play(&mut film, &mut || !over.load(std::sync::atomic::Ordering::Acquire)).unwrap();
+            sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
         });
         assert_eq!(sim.steps(), steps, "nothing was stepped");
         // The conductor is there again: the simulation goes on as it would have.

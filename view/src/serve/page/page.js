@@ -19,6 +19,7 @@ function send(command) {
 
 const stage = new Stage($("stage"), send);
 const joints = new Joints($("joints"), send, () => replot());
+const timeline = new Timeline(document.querySelector(".bar"), send);
 
 function link(name, text) {
   $("link").dataset.state = name;
@@ -172,6 +173,7 @@ function refresh() {
   refused = state.refused;
   $("diverged").hidden = state.diverged.length === 0;
   $("diverged").textContent = state.diverged.join("; ");
+  timeline.show(state.timeline);
   joints.show(state.robots);
   history.positions.add(state.time, state.robots.flatMap((robot) => robot.positions));
   history.efforts.add(state.time, state.robots.flatMap((robot) => robot.efforts));
