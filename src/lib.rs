@@ -37,5 +37,8 @@ pub mod prelude {
         SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
         WeldCfg, WeldId, WrenchFrame,
     };
-    pub use view::{OpenWindow, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError};
+    pub use view::{
+        OpenWindow, Screenshot, ScreenshotCfg, ScreenshotError, Serve, ServeCfg, ServeError, Served, Viewing, Window,
+        WindowCfg, WindowError,
+    };
 }

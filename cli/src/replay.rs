@@ -4,7 +4,6 @@ use crate::{Ending, Result, excerpt};
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
 use kinetoscope::view::control::{Film as Shows, Play, Speed};
-use kinetoscope::view::{Screenshot, ScreenshotCfg};
 use std::path::{Path, PathBuf};
 
 /// Shows a recording in a window or a browser with a time line, draws pictures of it, or runs its actions again

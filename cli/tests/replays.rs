@@ -3,7 +3,6 @@
 
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::view::{Screenshot, ScreenshotCfg};
 use std::path::Path;
 use std::process::{Command, Output};
 

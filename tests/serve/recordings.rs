@@ -58,7 +58,7 @@ fn a_browser_seeks_in_a_recording_and_sees_where_things_were() {
             let mut visitor = Visitor { socket };
             visitor.ask(json!({"do": "size", "width": 320, "height": 240}));
             visitor.ask(json!({"do": "pause"}));
-            let mut height = |visitor: &mut Visitor, time: f64| {
+            let height = |visitor: &mut Visitor, time: f64| {
                 visitor.ask(json!({"do": "seek", "time": time}));
                 let near = |now: f64| (now - time).abs() < 1e-6;
                 let at = |state: &serde_json::Value| state["timeline"]["now"].as_f64().is_some_and(near);

@@ -31,9 +31,9 @@ mod tests {
         assert!(few.len() <= 40, "{}", few.len());
         for column in 0..10 {
             let of = |points: &[[f64; 2]]| {
-                let ys = points.iter().filter(|p| p[0].floor() as i32 == column).map(|p| p[1]);
+                let mut ys = points.iter().filter(|p| p[0].floor() as i32 == column).map(|p| p[1]);
                 let ends = ys.clone().fold([f64::MAX, f64::MIN], |[low, high], y| [low.min(y), high.max(y)]);
-                (ends, ys.clone().next(), ys.last())
+                (ends, ys.clone().next(), ys.next_back())
             };
             assert_eq!(of(&few), of(&points), "column {column}");
         }

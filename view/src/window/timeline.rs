@@ -52,7 +52,10 @@ pub(super) fn time_beside(snapshot: &Snapshot, width: usize, x: f64) -> Option<f
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+    use crate::control::Command;
     use crate::stage::Run;
+    use crate::window::{App, Input, Modifiers};
+    use std::sync::Arc;
 
     fn at(now: f64) -> Snapshot {
         let timeline = Some(Timeline { now, start: 2.0, end: 6.0 });
@@ -73,6 +76,23 @@ mod tests {
         }
         assert_eq!(time_at(&at(3.0), size, [200.0, 250.0]), None, "above the line");
         assert_eq!([-50.0, 900.0].map(|x| time_beside(&at(3.0), 400, x).unwrap()), [2.0, 6.0]);
+    }
+
+    #[test]
+    fn a_window_seeks_where_its_line_is_pressed_and_dragged() {
+        let mut app = App::new([400, 300], 1);
+        let mut press = |snapshot: Snapshot, at: [f64; 2]| {
+            app.show(Arc::new(snapshot));
+            app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+            app.handle(Input::Move([200.0, 100.0]));
+            app.handle(Input::ButtonRelease(1, [200.0, 100.0]));
+            app.take_commands()
+        };
+        // The middle of 2 s to 6 s, wherever the mouse went above it.
+        assert_eq!(press(at(3.0), [70.0, 290.0]), [Command::Seek(2.0), Command::Seek(4.0)]);
+        // The controls: above the line, and where there is none.
+        assert_eq!(press(at(3.0), [70.0, 200.0]), []);
+        assert_eq!(press(Snapshot::default(), [70.0, 290.0]), []);
     }
 
     #[test]
