@@ -48,6 +48,7 @@ pub mod prelude {
     };
     #[cfg(feature = "view")]
     pub use view::{
-        OpenWindow, RecordButton, Serve, ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
+        OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve, ServeCfg, ServeError, Served,
+        Viewing, Window, WindowCfg, WindowError,
     };
 }

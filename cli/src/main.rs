@@ -6,7 +6,9 @@ mod convert;
 mod excerpt;
 mod model;
 mod picture;
+mod plot;
 mod render;
+mod replay;
 mod view;
 
 use clap::{Parser, Subcommand};
@@ -28,6 +30,8 @@ Examples:
   kinetoscope view arm.urdf                     a window in which it moves; --serve for a browser
   kinetoscope view humanoid.xml --floating-base a robot that is not bolted to the world
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
+  kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
+  kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or broken off.
 A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
@@ -40,6 +44,8 @@ enum Command {
     Render(render::Args),
     View(view::Args),
     Bench(bench::Args),
+    Plot(plot::Args),
+    Replay(replay::Args),
 }
 
 /// How a command ended that did its work.
@@ -68,6 +74,8 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::View(args) => view::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Plot(args) => plot::run(args),
+        Command::Replay(args) => replay::run(args),
     };
     match ended {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -58,9 +58,6 @@ mod recorded {
     }
 }
 
-#[cfg(all(feature = "record", feature = "view"))]
-pub(crate) use recorded::Recording;
-
 /// Nothing: this build does not record.
 #[cfg(not(all(feature = "record", feature = "view")))]
 #[derive(Debug)]

@@ -21,6 +21,9 @@ pub struct RecorderCfg {
     /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
     /// written, the simulation waits too. All together may take 16 GiB.
     pub packets: usize,
+    /// Whether the scene is put into the file, as MJCF with its meshes, so that the file is enough to show the recording
+    /// (`kinetoscope replay`). Of MCAP files and NumPy archives; it is taken once, when the recording begins.
+    pub scene: bool,
     /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
     /// has left. Of folders, only those of a recorder are replaced.
     pub overwrite: bool,
@@ -47,6 +50,7 @@ impl Default for RecorderCfg {
             envs: None,
             every: 1,
             packets: 8,
+            scene: true,
             overwrite: false,
         }
     }

@@ -79,6 +79,16 @@ pub enum RecordError {
         /// The names there are.
         candidates: Vec<String>,
     },
+    /// More than one is called so.
+    #[error("there is more than one {what} {name:?}: {}; say which", .found.join(", "))]
+    Ambiguous {
+        /// What was looked for.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// Those that are called so.
+        found: Vec<String>,
+    },
     /// A sensor that tells nobody its numbers.
     #[error("sensor {sensor:?} cannot be recorded: its type says nothing of its channels (Sensor::sampled)")]
     Unreadable {

@@ -7,7 +7,7 @@
 //!
 //! A [`Recorder`] is told of steps, copies what is due into a packet of a bounded pool, and a thread of its own writes the
 //! packets in their order. When all packets are on their way, the simulation waits for one, and [`Recorded`] says how often
-//! and how long.
+//! and how long. [`Recording`] reads the numbers again, [`replay`] does the actions again.
 //!
 //! ```no_run
 //! use record::{Record, RecorderCfg, Topic};
@@ -21,10 +21,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod archive;
 mod cfg;
 mod clock;
 mod error;
 mod file;
+mod film;
 mod format;
 mod mcap_file;
 mod npy;
@@ -32,9 +34,11 @@ mod npz;
 mod packet;
 mod picture;
 mod picture_folder;
+mod read;
 mod recorder;
 pub mod replay;
 mod ros;
+mod scene_file;
 mod source;
 mod stream;
 mod topic;
@@ -43,9 +47,11 @@ mod zip;
 
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
+pub use film::Film;
 pub use format::Format;
 pub use mcap_file::{Recovered, recover};
 pub use packet::{Event, EventKind};
+pub use read::{RecordedTopic, Recording, Samples, Wanted};
 pub use recorder::{Record, Recorded, Recorder, RecorderId};
 pub use stream::{Element, Kind, Part, Stream};
 pub use topic::Topic;

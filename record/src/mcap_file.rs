@@ -12,6 +12,7 @@
 //! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
 //! | resets, writes | `/events` | `rcl_interfaces/msg/Log` |
 //! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
+//! | the scene | attachment `scene.zip` | MJCF with meshes: see `scene_file.rs` |
 //!
 //! Messages have the time of capture, on the clock of the recording (`clock.rs`): forces, efforts and accelerations of sensors
 //! that of the beginning of the step. The message of joint states of a robot has one time, that of its positions; its efforts
@@ -24,11 +25,12 @@ use crate::file::{PartFile, Storage, lock_left, part_of, remove};
 use crate::packet::{Block, Event, Packet};
 use crate::picture::Png;
 use crate::ros::{self, Cdr, Schema, Stamp};
+use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Stream};
 use crate::writer::Sink;
-use mcap::records::MessageHeader;
+use mcap::records::{AttachmentHeader, MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{Compression, McapError, WriteOptions, Writer};
+use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Read, Seek, Write};
@@ -130,9 +132,15 @@ impl McapFile {
         streams: &[Stream],
         origins: &Array2<f64>,
         start: f64,
+        scene: Option<&[u8]>,
     ) -> io::Result<Self> {
         let to = BufWriter::with_capacity(1 << 16, storage);
         let mut writer = options().create(to).map_err(io_error)?;
+        if let Some(scene) = scene {
+            let (name, media_type, data) = (SCENE.into(), "application/zip".into(), scene.into());
+            let at = nanos(start);
+            writer.attach(&Attachment { log_time: at, create_time: at, name, media_type, data }).map_err(io_error)?;
+        }
         let mut channels = Channels::default();
         let mut rows = Vec::new();
         for stream in streams {
@@ -298,15 +306,16 @@ impl Sink for McapFile {
     }
 }
 
-/// How many messages stand in whole and undamaged chunks at the beginning of a file, and what is wrong with the next chunk, if
+/// How many messages stand in whole and undamaged chunks at the beginning of a file, what is attached there, and what is wrong with the next chunk, if
 /// that is more than a torn end. Chunks are compared with their checksums before anything in them is believed: a length that is
 /// no length would be asked for as memory.
-fn sound_messages(bytes: &[u8]) -> (usize, Option<String>) {
+fn sound_messages(bytes: &[u8]) -> (usize, Vec<Attachment<'static>>, Option<String>) {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(bytes.len().max(LARGEST_CHUNK));
     let (mut reader, mut rest, mut messages) = (LinearReader::new_with_options(options), bytes, 0);
+    let mut attachments = Vec::new();
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -315,13 +324,23 @@ fn sound_messages(bytes: &[u8]) -> (usize, Option<String>) {
                 reader.notify_read(given.len());
                 rest = left;
             }
-            Ok(LinearReadEvent::Record { opcode, .. }) => messages += usize::from(opcode == mcap::records::op::MESSAGE),
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                messages += usize::from(opcode == mcap::records::op::MESSAGE);
+                if opcode != mcap::records::op::ATTACHMENT {
+                    continue;
+                }
+                if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(opcode, data) {
+                    let AttachmentHeader { log_time, create_time, name, media_type } = header;
+                    let data = data.into_owned().into();
+                    attachments.push(Attachment { log_time, create_time, name, media_type, data });
+                }
+            }
             // Where the process was killed.
             Err(McapError::UnexpectedEof) => break,
-            Err(error) => return (messages, Some(error.to_string())),
+            Err(error) => return (messages, attachments, Some(error.to_string())),
         }
     }
-    (messages, None)
+    (messages, attachments, None)
 }
 
 /// Chunks are smaller by far, before they are compressed \[bytes\].
@@ -337,8 +356,8 @@ pub struct Recovered {
     pub damage: Option<String>,
 }
 
-/// Makes a whole file of what a recording has left that was killed: `path` is the name that it was to have. The messages of
-/// all chunks from the beginning that are whole are in it, and what was left is taken away, unless something in it is damaged.
+/// Makes a whole file of what a recording has left that was killed: `path` is the name that it was to have. The scene, and
+/// the messages of all chunks from the beginning that are whole, are in it, and what was left is taken away, unless something in it is damaged.
 ///
 /// # Errors
 /// There is no such recording, somebody is writing it, there is a file called `path` already, or no message can be read.
@@ -361,7 +380,10 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     let (mut part, file) = PartFile::create_as(path, on_the_way, false)?;
     let failed = |error: McapError| RecordError::file(path, io_error(error));
     let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
-    let (sound, mut damage) = sound_messages(&bytes);
+    let (sound, attachments, mut damage) = sound_messages(&bytes);
+    for attachment in &attachments {
+        writer.attach(attachment).map_err(failed)?;
+    }
     let messages = mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into());
     let mut recovered = Recovered { messages: 0, damage: None };
     for message in messages.map_err(|error| nothing(error.to_string()))?.take(sound) {

@@ -9,6 +9,7 @@
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
 //! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written |
 //! | `recording.json` | | time step, environments, names of joints and frames |
+//! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
 //! An environment that has nothing new in a row, because its sensor measures at other times, has its last value and time again.
@@ -20,7 +21,8 @@
 use crate::file::{PartFile, Storage, folder_of};
 use crate::npy;
 use crate::packet::{Block, Event, EventKind, Packet};
-use crate::stream::{Element, Kind, Stream};
+use crate::scene_file::SCENE;
+use crate::stream::{Element, Kind, Part, Stream};
 use crate::writer::Sink;
 use crate::zip::Archive;
 use serde_json::{Value, json};
@@ -41,6 +43,7 @@ pub(crate) struct NpzFile {
     storage: Option<Box<dyn Storage>>,
     about: Value,
     start: Vec<u8>,
+    scene: Option<Vec<u8>>,
     spools: Vec<Spool>,
     /// The events, one record each: step, environment, kind, time.
     events: Spool,
@@ -69,6 +72,7 @@ impl NpzFile {
         streams: &[Stream],
         dt: f64,
         start: &Snapshot,
+        scene: Option<&[u8]>,
     ) -> io::Result<Self> {
         let folder = folder_of(part.path());
         let spools = streams.iter().map(|_| Spool::create(folder)).collect::<io::Result<_>>()?;
@@ -77,7 +81,8 @@ impl NpzFile {
         let path = scratch.path().join(START);
         start.save(&path).map_err(io::Error::other)?;
         let (start, events) = (std::fs::read(path)?, Spool::create(folder)?);
-        Ok(Self { part, storage: Some(storage), about: about(streams, dt), start, spools, events })
+        let scene = scene.map(<[u8]>::to_vec);
+        Ok(Self { part, storage: Some(storage), about: about(streams, dt), start, scene, spools, events })
     }
 }
 
@@ -88,7 +93,8 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             Kind::Poses { frames } => Some(frames),
             _ => None,
         };
-        let parts = stream.parts.iter().map(|part| json!({ "name": member(stream, &part.name), "shape": part.shape }));
+        let part = |part: &Part| json!({ "name": member(stream, &part.name), "shape": part.shape, "of_forces": part.of_forces });
+        let parts = stream.parts.iter().map(part);
         json!({
             "name": stream.name,
             "env_ids": stream.env_ids,
@@ -228,6 +234,9 @@ impl Sink for NpzFile {
         let about = format!("{:#}\n", self.about);
         archive.add(ABOUT, b"", &mut about.as_bytes())?;
         archive.add(START, b"", &mut &self.start[..])?;
+        if let Some(scene) = &self.scene {
+            archive.add(SCENE, b"", &mut &scene[..])?;
+        }
         let record = EVENT[3].2.end;
         for (name, element, range) in EVENT {
             let head = header(element, &[self.events.rows])?;

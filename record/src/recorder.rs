@@ -10,6 +10,7 @@ use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
 use crate::picture::Animation;
 use crate::picture_folder::PictureFolder;
+use crate::scene_file;
 use crate::source::Source;
 use crate::stream::{Kind, Stream};
 use crate::topic::Topic;
@@ -71,8 +72,8 @@ pub struct Recorded {
     pub waits: u64,
     /// How long it waited in all.
     pub waited: Duration,
-    /// What [`Topic::Everything`] and [`Topic::Sensor`] have left out, with the reason: sensors whose types say nothing of their
-    /// channels or that are in none of the environments, channels that the format has no place for.
+    /// What [`Topic::Everything`], [`Topic::Sensor`] and the scene have left out, with the reason: sensors whose types say nothing of
+    /// their channels or that are in none of the environments, channels that the format has no place for, meshes that cannot be read.
     pub left_out: Vec<String>,
 }
 
@@ -140,7 +141,12 @@ impl Recorder {
         if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL {
             return Err(RecordError::TooLarge { packets: cfg.packets, bytes, most: MAX_POOL });
         }
-        let sink = open(sim, &cfg, format, &streams, wrap)?;
+        let (scene, not_in_it) = match format {
+            Format::Mcap | Format::Npz if cfg.scene => packed_scene(sim),
+            _ => (None, Vec::new()),
+        };
+        let left_out = [left_out, not_in_it].concat();
+        let sink = open(sim, &cfg, format, &streams, scene.as_deref(), wrap)?;
         Self::begin(sim, cfg, sources, left_out, sink)
     }
 
@@ -491,12 +497,21 @@ fn everything(
     Ok(sources)
 }
 
+/// The scene, and what of it is left out: a scene that cannot be written is no reason not to record.
+fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<String>) {
+    match scene_file::pack(sim) {
+        Ok((scene, left_out)) => (Some(scene), left_out.iter().map(|what| format!("of the scene: {what}")).collect()),
+        Err(error) => (None, vec![format!("the scene ({error})")]),
+    }
+}
+
 /// The file of a format.
 fn open(
     sim: &SimulationManager,
     cfg: &RecorderCfg,
     format: Format,
     streams: &[Stream],
+    scene: Option<&[u8]>,
     wrap: Wrap<'_>,
 ) -> Result<Box<dyn Sink>> {
     if format == Format::Pictures {
@@ -507,11 +522,11 @@ fn open(
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Mcap => {
             let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
-            let file = McapFile::create(part, storage, streams, &sim.env_origins(), start);
+            let file = McapFile::create(part, storage, streams, &sim.env_origins(), start, scene);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Npz => {
-            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, &sim.snapshot(None)?);
+            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, &sim.snapshot(None)?, scene);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Apng | Format::Pictures => {

@@ -4,11 +4,11 @@ use crate::error::{RecordError, Result};
 use crate::packet::{Block, Values};
 use crate::stream::{Element, Kind, Part, Stream};
 use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
-use sensors::camera::channel::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
+use sensors::camera::channel::{Color, Depth, Distance, Mask, Normal, Position, ShadingNormal};
 use sensors::camera::{CameraConvention, Channel};
 use sensors::{
     ActuatorState, Camera, ContactSensor, Imu, JointState, JointWrench, MujocoSensor, RayCaster, RayCasterCamera,
-    Sensor,
+    Sampled, Sensor,
 };
 use sim::{MjcfId, ObjectId, RobotId, SimulationManager};
 use std::any::Any;
@@ -231,13 +231,7 @@ impl Source {
         if let Some(uid) = &self.sensor {
             let sensor = sim.sensor_called(uid)?;
             block.fresh = self.count(sensor);
-            let stamps = Stamps::of(sensor, matches!(self.what, What::Numbers(_)));
-            if !matches!(self.what, What::Numbers(_)) {
-                // What arrives late and is not shown cannot be read as points or a picture: it is no row.
-                for (fresh, row) in block.fresh.iter_mut().zip(&self.rows) {
-                    *fresh &= stamps.is_shown(*row);
-                }
-            }
+            let stamps = Stamps::of(sensor);
             if !block.fresh.contains(&true) {
                 return Ok(());
             }
@@ -299,10 +293,10 @@ impl Source {
             What::Lens(uid) => {
                 let any: &dyn Any = sim.sensor_called(uid)?;
                 let lenses = if let Some(camera) = any.downcast_ref::<Camera>() {
-                    Some((camera.intrinsic_matrices(), camera.pose_w(CameraConvention::Ros)))
+                    Some((camera.arrived_intrinsic_matrices(), camera.arrived_pose_w(CameraConvention::Ros)))
                 } else {
-                    let camera = any.downcast_ref::<RayCasterCamera>();
-                    camera.map(|camera| (camera.intrinsic_matrices(), camera.pose_w(CameraConvention::Ros)))
+                    let pictures = any.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::arrived);
+                    pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
                 };
                 let (intrinsics, poses) = lenses.ok_or_else(|| self.changed())?;
                 let rows = intrinsics.len_of(Axis(0));
@@ -322,7 +316,7 @@ impl Source {
             What::Points(uid) => {
                 let any: &dyn Any = sim.sensor_called(uid)?;
                 let caster = any.downcast_ref::<RayCaster>().ok_or_else(|| self.changed())?;
-                let (hits, distances) = (caster.hits(), caster.distances());
+                let (hits, distances) = (caster.arrived_hits(), caster.sampler().arrived("distances"));
                 for &row in self.rows.iter().filter(|row| **row < distances.nrows()) {
                     if let Values::F64(values) = values {
                         values.extend(hits.index_axis(Axis(0), row));
@@ -337,12 +331,11 @@ impl Source {
     fn copy_picture(&self, sensor: &dyn Sensor, channel: &str, values: &mut Values) -> Result<()> {
         let any: &dyn Any = sensor;
         if let Some(camera) = any.downcast_ref::<Camera>() {
-            let pictures = camera.pictures().map_err(sim_error(self))?;
             macro_rules! put {
                 ($($Channel:ident),*) => {
                     match channel {
                         $(_ if channel == $Channel::NAME => {
-                            let picture = <$Channel as Listed>::of(pictures).ok_or_else(|| self.changed())?;
+                            let picture = camera.arrived::<$Channel>().map_err(sim_error(self))?;
                             self.put(values, &picture);
                         })*
                         _ => return Err(self.changed()),
@@ -352,11 +345,12 @@ impl Source {
             put!(Color, Depth, Distance, Mask, Normal, ShadingNormal, Position);
         } else {
             let camera = any.downcast_ref::<RayCasterCamera>().ok_or_else(|| self.changed())?;
+            let taken = camera.arrived();
             match channel {
-                _ if channel == Depth::NAME => self.put(values, &camera.depth()),
-                _ if channel == Distance::NAME => self.put(values, &camera.distance()),
-                _ if channel == Normal::NAME => self.put(values, &camera.normal()),
-                _ if channel == Mask::NAME => self.put(values, &camera.mask()),
+                _ if channel == Depth::NAME => self.put(values, &taken.depth()),
+                _ if channel == Distance::NAME => self.put(values, &taken.distance()),
+                _ if channel == Normal::NAME => self.put(values, &taken.normal()),
+                _ if channel == Mask::NAME => self.put(values, &taken.mask()),
                 _ => return Err(self.changed()),
             }
         }
@@ -414,29 +408,18 @@ struct Stamps {
     states: Vec<f64>,
     /// Forces, efforts and accelerations.
     forces: Vec<f64>,
-    /// What it shows, where that may be something else.
-    shown: Option<Vec<f64>>,
 }
 
 impl Stamps {
-    /// Those of what arrived last, or of what is shown.
-    fn of(sensor: &dyn Sensor, arrived: bool) -> Self {
+    /// Those of what arrived last, whether the sensor shows it or not.
+    fn of(sensor: &dyn Sensor) -> Self {
         let any: &dyn Any = sensor;
         if let Some(camera) = any.downcast_ref::<Camera>() {
-            let states = camera.stamps().to_vec();
-            return Self { forces: states.clone(), states, shown: None };
+            let states = camera.arrived_stamps().to_vec();
+            return Self { forces: states.clone(), states };
         }
-        let Some(sampled) = sensor.sampled() else {
-            return Self { states: Vec::new(), forces: Vec::new(), shown: None };
-        };
-        let (states, forces) = (sampled.arrived_stamps().to_vec(), sampled.arrived_force_stamps().to_vec());
-        let shown = (!arrived).then(|| sampled.stamps().to_vec());
-        Self { states, forces, shown }
-    }
-
-    /// Whether what arrived last is what the sensor shows.
-    fn is_shown(&self, row: usize) -> bool {
-        self.shown.as_ref().is_none_or(|shown| shown.get(row) == self.states.get(row))
+        let Some(sampled) = sensor.sampled() else { return Self { states: Vec::new(), forces: Vec::new() } };
+        Self { states: sampled.arrived_stamps().to_vec(), forces: sampled.arrived_force_stamps().to_vec() }
     }
 }
 

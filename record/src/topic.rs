@@ -17,8 +17,8 @@ pub enum Topic {
     /// Positions, velocities and controls of the MJCF part of this name.
     MjcfState(String),
     /// All channels of the sensor of this name, whenever a measurement arrives: with a latency as it was captured, with that
-    /// stamp. Of ray casters, which show their points only, what was on its way when somebody wrote to the state is left out; of cameras and ray casters that draw pictures also the
-    /// lens and the pose.
+    /// stamp, also what was on its way when somebody wrote to the state, which the sensor itself does not show any more. Of cameras
+    /// and ray casters that draw pictures also the lens and the pose.
     Sensor(String),
     /// One channel of a camera, such as `depth`, without lens and pose.
     Channel {

@@ -411,6 +411,11 @@ impl Sampler {
         }
     }
 
+    /// Whether measurements arrive later than they are captured.
+    pub(crate) fn is_late(&self) -> bool {
+        self.arrived.length() > 0
+    }
+
     fn stamps_arrived(&self, which: usize) -> ArrayView1<'_, f64> {
         if self.arrived.length() == 0 {
             return [&self.stamps, &self.force_stamps][which].view();

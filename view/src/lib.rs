@@ -8,17 +8,23 @@
 //!
 //! The [`Conductor`] is an observer of the simulation. At most as often as somebody wants to see something it copies where
 //! everything is to a [`Snapshot`]; it waits for no viewer, and draws nothing. Viewers draw what they like of the newest
-//! snapshot, on their own threads, and send commands.
+//! snapshot, on their own threads, and send commands. [`Screenshot`] is a picture in one call; [`plot`] draws numbers over time.
 #![forbid(unsafe_code)]
 
 pub mod control;
+pub mod plot;
 #[cfg(test)]
 mod sample;
+mod screenshot;
 pub mod serve;
 pub mod stage;
+mod whole_file;
 pub mod window;
 
-pub use control::{Command, Conductor, RecordButton, Recording, RecordingState, Speed, Viewer, Viewing, Wants};
+pub use control::{
+    Command, Conductor, Film, Play, PlayError, RecordButton, Recording, RecordingState, Speed, Viewer, Viewing, Wants,
+};
+pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
 pub use serve::{Serve, ServeCfg, ServeError, Served};
 pub use stage::{Canvas, Eye, Overlays, Painter, Shown, Snapshot};
 pub use window::{Closed, OpenWindow, Window, WindowCfg, WindowError};

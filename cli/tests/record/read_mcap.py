@@ -1,13 +1,13 @@
 """Says as JSON what the last messages of a recording hold, read by the packages mcap, mcap-ros2-support and Pillow."""
 
 import io
-import json
 import struct
 import sys
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from PIL import Image
+from told import tell, weighed
 
 last, counts = {}, {}
 transforms = {}
@@ -23,22 +23,6 @@ with open(sys.argv[1], "rb") as file:
                 transforms[transform.child_frame_id] = transform
     indexed = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
     assert all(indexed.get(topic, 0) == count for topic, count in counts.items()), "the index counts otherwise"
-
-
-def bits(value):
-    """Numbers with a fraction as texts of their bits: nothing is lost on the way."""
-    if isinstance(value, float):
-        return str(struct.unpack("<Q", struct.pack("<d", value))[0])
-    if isinstance(value, list):
-        return [bits(one) for one in value]
-    if isinstance(value, dict):
-        return {name: bits(one) for name, one in value.items()}
-    return value
-
-
-def weighed(numbers):
-    """The sum of numbers, each by its place."""
-    return sum(k * int(x) for k, x in enumerate(numbers, 1))
 
 
 def pose(frame, parent):
@@ -65,29 +49,25 @@ info = last["/env_1/camera/camera_info"][1]
 assert (info.width, info.height, list(info.d)) == (depth.width, depth.height, [0.0] * 5)
 assert pose("env_0", "world")[3:] == [1, 0, 0, 0]
 links = [frame for frame in transforms if frame.startswith("env_1/arm/")]
-print(
-    json.dumps(
-        bits({
-            "names": list(joints.name),
-            "position": list(joints.position),
-            "velocity": list(joints.velocity),
-            "effort": list(joints.effort),
-            "target": list(target.position),
-            "tip": pose(links[-1], "env_1"),
-            "tip_name": links[-1],
-            "cube": pose("env_1/cube", "env_1"),
-            "acceleration": [imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z],
-            "orientation": [imu.orientation.w, imu.orientation.x, imu.orientation.y, imu.orientation.z],
-            "intrinsics": list(info.k),
-            "camera": pose("env_1/sensors/camera", "env_1"),
-            "nanoseconds": last["/env_1/arm/joint_states"][0].log_time,
-            "depth_shape": [depth.height, depth.width],
-            "depth_finite": len(finite),
-            "depth_range": [min(finite), max(finite)],
-            "mask_sum": weighed(struct.unpack(f"<{mask.width * mask.height}i", bytes(mask.data))),
-            "color_sum": weighed(picture.tobytes()),
-            "rows": counts["/env_1/arm/joint_states"],
-            "pictures": counts["/env_1/camera/color"],
-        })
-    )
-)
+tell({
+    "names": list(joints.name),
+    "position": list(joints.position),
+    "velocity": list(joints.velocity),
+    "effort": list(joints.effort),
+    "target": list(target.position),
+    "tip": pose(links[-1], "env_1"),
+    "tip_name": links[-1],
+    "cube": pose("env_1/cube", "env_1"),
+    "acceleration": [imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z],
+    "orientation": [imu.orientation.w, imu.orientation.x, imu.orientation.y, imu.orientation.z],
+    "intrinsics": list(info.k),
+    "camera": pose("env_1/sensors/camera", "env_1"),
+    "nanoseconds": last["/env_1/arm/joint_states"][0].log_time,
+    "depth_shape": [depth.height, depth.width],
+    "depth_finite": len(finite),
+    "depth_range": [min(finite), max(finite)],
+    "mask_sum": weighed(struct.unpack(f"<{mask.width * mask.height}i", bytes(mask.data))),
+    "color_sum": weighed(picture.tobytes()),
+    "rows": counts["/env_1/arm/joint_states"],
+    "pictures": counts["/env_1/camera/color"],
+})

@@ -1,31 +1,14 @@
 """Says as JSON what the last rows of a recording hold, read by NumPy."""
 
 import json
-import struct
 import sys
 
 import numpy as np
-
-
-def bits(value):
-    """Numbers with a fraction as texts of their bits: nothing is lost on the way."""
-    if isinstance(value, float):
-        return str(struct.unpack("<Q", struct.pack("<d", value))[0])
-    if isinstance(value, list):
-        return [bits(one) for one in value]
-    if isinstance(value, dict):
-        return {name: bits(one) for name, one in value.items()}
-    return value
-
-
-def weighed(numbers):
-    """The sum of numbers, each by its place."""
-    return sum(k * int(x) for k, x in enumerate(numbers.ravel(), 1))
-
+from told import tell, weighed
 
 with np.load(sys.argv[1], allow_pickle=False) as file:
     about = json.loads(file["recording.json"])
-    arrays = {name: file[name] for name in file.files if name not in ("recording.json", "start.snapshot")}
+    arrays = {name: file[name] for name in file.files if name not in ("recording.json", "start.snapshot", "scene.zip")}
 
 streams = {stream["name"]: stream for stream in about["streams"]}
 for name, stream in streams.items():
@@ -38,29 +21,25 @@ depth = arrays["camera/depth"][-1, 1]
 assert depth.dtype == np.float32 and arrays["camera/color"].dtype == np.uint8
 finite = depth[np.isfinite(depth)].astype(np.float64)
 last = {name: array[-1, 1] for name, array in arrays.items() if array.ndim > 2}
-print(
-    json.dumps(
-        bits({
-            "names": names,
-            "position": last["arm/joint_states/positions"].tolist(),
-            "velocity": last["arm/joint_states/velocities"].tolist(),
-            "effort": last["arm/joint_states/efforts"].tolist(),
-            "target": last["arm/targets/positions"].tolist(),
-            "tip": last["arm/link_poses"][-1].tolist(),
-            "tip_name": "env_1/" + streams["arm/link_poses"]["columns"][-1],
-            "cube": last["cube/pose"][0].tolist(),
-            "acceleration": last["imu/lin_acc_b"].tolist(),
-            "orientation": last["imu/quat_w"].tolist(),
-            "intrinsics": last["camera/lens/intrinsics"].ravel().tolist(),
-            "camera": last["camera/lens/pose"].tolist(),
-            "nanoseconds": round(arrays["arm/joint_states/time"][-1, 1].item() * 1e9),
-            "depth_shape": list(depth.shape),
-            "depth_finite": int(np.isfinite(depth).sum()),
-            "depth_range": [finite.min().item(), finite.max().item()],
-            "mask_sum": weighed(last["camera/mask"]),
-            "color_sum": weighed(last["camera/color"][..., :3]),
-            "rows": arrays["arm/joint_states/positions"].shape[0],
-            "pictures": arrays["camera/color"].shape[0],
-        })
-    )
-)
+tell({
+    "names": names,
+    "position": last["arm/joint_states/positions"].tolist(),
+    "velocity": last["arm/joint_states/velocities"].tolist(),
+    "effort": last["arm/joint_states/efforts"].tolist(),
+    "target": last["arm/targets/positions"].tolist(),
+    "tip": last["arm/link_poses"][-1].tolist(),
+    "tip_name": "env_1/" + streams["arm/link_poses"]["columns"][-1],
+    "cube": last["cube/pose"][0].tolist(),
+    "acceleration": last["imu/lin_acc_b"].tolist(),
+    "orientation": last["imu/quat_w"].tolist(),
+    "intrinsics": last["camera/lens/intrinsics"].ravel().tolist(),
+    "camera": last["camera/lens/pose"].tolist(),
+    "nanoseconds": round(arrays["arm/joint_states/time"][-1, 1].item() * 1e9),
+    "depth_shape": list(depth.shape),
+    "depth_finite": int(np.isfinite(depth).sum()),
+    "depth_range": [finite.min().item(), finite.max().item()],
+    "mask_sum": weighed(last["camera/mask"].ravel()),
+    "color_sum": weighed(last["camera/color"][..., :3].ravel()),
+    "rows": arrays["arm/joint_states/positions"].shape[0],
+    "pictures": arrays["camera/color"].shape[0],
+})

@@ -3,6 +3,7 @@
 use super::support::{PICTURE_EVERY, World};
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::ray::pattern::Grid;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -93,4 +94,67 @@ fn numpy_reads_every_array() {
     let path = folder.path().join("run.npz");
     let expected = recorded(&path);
     assert_eq!(said(&python, "read_npz.py", &path), expected);
+}
+
+/// A cube that stands, rays from above, a camera: what messages of points, forces and normals should hold.
+fn sensed(path: &Path) -> serde_json::Value {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let cube = RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(0.4),
+        mass: Some(2.0),
+        init_pose: Pose::translation(0.1, 0.05, 0.2),
+        ..Default::default()
+    };
+    sim.add_rigid_object(cube).unwrap();
+    let touch = sim.add_sensor("touch", ContactSensorCfg::of("cube")).unwrap();
+    let pattern = Grid { resolution: 0.2, size: [0.6, 0.4], ..Grid::default() };
+    let offset = Pose::translation(0.03, 0.0, 2.0);
+    // Some rays end before the ground: misses, which are no points.
+    let scanner = RayCasterCfg { offset, max_distance: 1.8, pattern: pattern.into(), ..RayCasterCfg::default() };
+    let scanner = sim.add_sensor("scanner", scanner).unwrap();
+    let placement = Placement::LookAt { eye: [1.5, 0.9, 1.4], target: [0.1, 0.0, 0.2], up: [0.0, 0.0, 1.0] };
+    let eye = CameraCfg {
+        width: 24,
+        height: 16,
+        intrinsics: Intrinsics::Fovy { radians: 0.8 },
+        extrinsics: Extrinsics { placement, ..Extrinsics::default() },
+        channels: Channels { normal: true, ..Channels::NONE },
+        ..CameraCfg::default()
+    };
+    let eye = sim.add_sensor("eye", eye).unwrap();
+    let recorder = sim.record(RecorderCfg::new(path)).unwrap();
+    sim.update(100);
+    let scanner = sim.sensor(scanner).unwrap();
+    let hits = scanner.hits().index_axis(Axis(0), 1).to_owned();
+    let points = hits.rows().into_iter().filter(|p| p.iter().all(|x| x.is_finite()));
+    let points: Vec<f64> = points.flat_map(|p| p.to_vec()).map(|x| f64::from(x as f32)).collect();
+    assert!(points.len() > 3 && points.len() < 3 * scanner.num_rays(), "hits and misses: {points:?}");
+    let forces: Vec<f64> = sim.sensor(touch).unwrap().net_forces_w().index_axis(Axis(0), 1).iter().copied().collect();
+    // It stands: what holds it is its weight, to what is left of its settling.
+    assert!((forces[2] - 2.0 * 9.81).abs() < 0.01, "{forces:?}");
+    let normal = sim.sensor(eye).unwrap().normal().unwrap().index_axis(Axis(0), 1).to_owned();
+    let up = normal.rows().into_iter().flat_map(|row| row.to_vec()).collect::<Vec<f32>>();
+    let upward = up.chunks(3).filter(|n| **n == [0.0, 0.0, 1.0]).count();
+    let expected = serde_json::json!({
+        "points": points,
+        "point_time": (sim.time()[1] * 1e9).round() as u64,
+        "forces": forces,
+        "normal_shape": normal.shape(),
+        "normal_sum": normal.iter().zip(1..).map(|(x, k)| u64::from(x.to_bits()) * k).sum::<u64>(),
+        "upward": upward,
+        "attached": ["scene.zip"],
+    });
+    assert!(upward > 0 && upward < 24 * 16, "{upward}");
+    sim.finish_recording(recorder).unwrap();
+    bits(expected)
+}
+
+#[test]
+fn a_foreign_reader_finds_points_forces_and_normals() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let expected = sensed(&path);
+    assert_eq!(said(&python, "read_sensors.py", &path), expected);
 }

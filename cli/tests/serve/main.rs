@@ -4,6 +4,7 @@
 mod door;
 mod hostile;
 mod pictures;
+mod recordings;
 mod running;
 mod selecting;
 mod several;

@@ -4,11 +4,14 @@ use crate::mcap_file::recover;
 use crate::npy;
 use crate::packet::Values;
 use crate::zip;
-use scene::SceneState;
+use scene::{Pose, SceneState};
+use sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use sensors::ray::pattern::Grid;
+use sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use sensors::{
     Channel, ImuCfg, Requires, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
 };
-use sim::{MjcfCfg, SimulationManagerCfg};
+use sim::{MjcfCfg, SensorId, SimulationManagerCfg};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -82,7 +85,9 @@ fn a_simulation_waits_for_a_slow_disk_says_so_and_loses_nothing() {
 }
 
 fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
-    let recorder = Recorder::start(sim, RecorderCfg::new(path), &mut |file| Box::new(FullDisk { file, left }))?;
+    // Without the scene, which would fill the disk alone.
+    let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
+    let recorder = Recorder::start(sim, cfg, &mut |file| Box::new(FullDisk { file, left }))?;
     let recorder = sim.add_observer(recorder);
     sim.update(3000);
     sim.finish_recording(recorder)
@@ -269,6 +274,91 @@ fn a_late_sensor_is_recorded_as_it_measured_whatever_is_shown_meanwhile() {
     assert!(heights[5] < 1.5 && heights[6] > 8.0, "what was on its way, then what was written: {heights:?}");
     let steps = array(&path, "late/step");
     assert!(steps.iter().copied().eq((LATENCY..STEPS).map(|step| (step + 1) as f64)), "{steps:?}");
+}
+
+/// Root cause: what arrives was counted, and what is shown was copied. They differ where somebody writes to the state while
+/// pictures are on their way: then a camera was recorded again and again as the state was after the write, and rows of ray
+/// casters were lost.
+#[test]
+fn late_pictures_and_points_are_recorded_as_they_were_taken_whatever_is_shown_meanwhile() {
+    const LATENCY: u32 = 4;
+    const STEPS: usize = 20;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = falling(2);
+    let placement = Placement::LookAt { eye: [1.0, 0.5, 1.2], target: [0.0, 0.0, 0.8], up: [0.0, 0.0, 1.0] };
+    let camera = CameraCfg {
+        width: 16,
+        height: 12,
+        intrinsics: Intrinsics::Fovy { radians: 1.2 },
+        extrinsics: Extrinsics { placement, ..Extrinsics::default() },
+        channels: Channels { color: true, depth: true, mask: true, ..Channels::default() },
+        ..CameraCfg::default()
+    };
+    let rays = RayCasterCfg {
+        offset: Pose::translation(0.0, 0.0, 2.0),
+        pattern: Grid { resolution: 0.1, size: [0.4, 0.4], ..Grid::default() }.into(),
+        ..RayCasterCfg::default()
+    };
+    let eyes = RayCasterCameraCfg {
+        width: 8,
+        height: 6,
+        extrinsics: camera.extrinsics.clone(),
+        ..RayCasterCameraCfg::default()
+    };
+    for (name, latency) in [("prompt", 0), ("late", LATENCY)] {
+        let sampling = SamplingCfg { latency_steps: latency, ..SamplingCfg::default() };
+        sim.add_sensor(format!("{name}_camera"), CameraCfg { latency_steps: latency, ..camera.clone() }).unwrap();
+        sim.add_sensor(format!("{name}_rays"), RayCasterCfg { sampling: sampling.clone(), ..rays.clone() }).unwrap();
+        sim.add_sensor(format!("{name}_eyes"), RayCasterCameraCfg { sampling, ..eyes.clone() }).unwrap();
+    }
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    let ball = sim.mjcf_id("ball").unwrap();
+    let put = |sim: &mut SimulationManager, x: f64, env: usize| {
+        let row = ndarray::array![[x, 0.1, 1.1, 1.0, 0.0, 0.0, 0.0]];
+        sim.mjcf_part_mut(ball).write_qpos(&row, Some(&[EnvId(env)])).unwrap();
+    };
+    sim.update(6);
+    put(&mut sim, 0.3, 0);
+    sim.update(2);
+    // Again, while what was seen in between is on its way, and in the other environment too.
+    put(&mut sim, -0.2, 0);
+    put(&mut sim, 0.2, 1);
+    sim.update(1);
+    // Somebody looks at what is shown in between.
+    let late: SensorId<Camera> = sim.sensor_ids().into_iter().find(|(name, _)| name == "late_camera").unwrap().1;
+    assert_eq!(sim.sensor(late).unwrap().frame_counts().to_vec(), [5, 5]);
+    assert!(sim.sensor(late).unwrap().depth().unwrap().iter().any(|depth| depth.is_finite()));
+    sim.update((STEPS - 9) as u32);
+    sim.finish_recording(recorder).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let members = zip::parse(&bytes).unwrap();
+    let rows = |name: &str| -> (usize, Vec<u8>) {
+        let data = members.iter().find(|(known, _)| known == &format!("{name}.npy")).unwrap().1;
+        let (_, shape, data) = npy::parse(data).unwrap();
+        (shape[0], data.to_vec())
+    };
+    let camera = [
+        "camera/color",
+        "camera/depth",
+        "camera/mask",
+        "camera/lens/pose",
+        "camera/lens/intrinsics",
+        "camera/depth/time",
+    ];
+    let rays = ["rays/hits", "rays/distances", "rays/time"];
+    let eyes = ["eyes/depth", "eyes/distance", "eyes/normal", "eyes/mask", "eyes/lens/pose", "eyes/lens/intrinsics"];
+    for array in camera.iter().chain(&rays).chain(&eyes) {
+        // The judge is a sensor that is not late: every row of the late one is one of its rows, once and in order.
+        let [(late, of_late), (prompt, of_prompt)] = ["late", "prompt"].map(|of| rows(&format!("{of}_{array}")));
+        assert_eq!((prompt, late), (STEPS, STEPS - LATENCY as usize), "{array}");
+        assert!(of_late == of_prompt[..of_prompt.len() / prompt * late], "{array}");
+    }
+    // The control: what was written is seen, in the environments where it was.
+    let depths = rows("late_camera/depth").1;
+    let picture = |row: usize, env: usize| &depths[(2 * row + env) * 4 * 16 * 12..][..4 * 16 * 12];
+    assert_ne!(picture(5, 0), picture(6, 0));
+    assert_ne!(picture(7, 1), picture(8, 1));
 }
 
 #[test]

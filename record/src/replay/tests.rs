@@ -1,7 +1,9 @@
 use super::*;
 use crate::cfg::RecorderCfg;
+use crate::npy;
 use crate::recorder::Record;
 use crate::topic::Topic;
+use crate::zip;
 use sim::{LinkId, MjcfCfg, RobotCfg, SimulationManagerCfg, UrdfCfg, WrenchFrame};
 use std::fs::File;
 

@@ -1,5 +1,6 @@
 //! What a camera captured and does not show yet, or no more: pictures on their way, and those of its history.
 
+use super::arrived::Landed;
 use super::captures::Captures;
 use super::cfg::CameraCfg;
 use super::channel::{Channels, Pictures};
@@ -40,6 +41,8 @@ pub(super) struct Past {
     pub(super) stamps: Array2<f64>,
     /// Whether the newest is what the camera shows, from where it shows it.
     pub(super) shown: Vec<bool>,
+    /// What arrived last, of a camera with latency.
+    pub(super) landed: Option<Landed>,
     pub(super) drawn: OnceLock<Album>,
     /// The album while it is not in `drawn`.
     pub(super) shelf: Mutex<Option<Album>>,
@@ -93,6 +96,7 @@ impl Memory {
                     arrived: vec![0; rows],
                     stamps: Array2::zeros((rows, cfg.history_length)),
                     shown: vec![false; rows],
+                    landed: (cfg.latency_steps > 0).then(|| Landed::new(rows, scene, ticket, slow)),
                     drawn: OnceLock::new(),
                     shelf: Mutex::new(Some(Album::new(cfg.channels, rows, cfg.history_length, cfg.width, cfg.height))),
                 },
@@ -153,6 +157,7 @@ impl Past {
     }
 
     fn remember(&mut self, row: usize, from: &Captures, slot: usize, (mount, lens): (&Mount, Option<&Arc<LensRays>>)) {
+        self.landed.iter_mut().for_each(|landed| landed.remember(row, from, slot, (mount, lens)));
         if self.length == 0 {
             return;
         }
@@ -169,6 +174,7 @@ impl Past {
     }
 
     fn reset(&mut self, row: usize) {
+        self.landed.iter_mut().for_each(|landed| landed.forget(row));
         self.arrived[row] = 0;
         self.stamps.row_mut(row).fill(0.0);
         self.outdate();

@@ -1,6 +1,7 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
 pub mod aperture;
+mod arrived;
 pub mod boxes;
 pub mod calibration;
 mod captures;

@@ -576,7 +576,7 @@ impl Camera {
     }
 
     /// Where the optical frame of a mount is.
-    fn world_from(&self, mount: &Mount, world_from_parent: Option<Pose>) -> Option<Pose> {
+    pub(super) fn world_from(&self, mount: &Mount, world_from_parent: Option<Pose>) -> Option<Pose> {
         let local = mount.parent_from_camera;
         match self.parent {
             None => Some(local),

@@ -26,7 +26,7 @@ mod tests;
 
 pub(crate) use assets::Assets;
 pub use assets::RayAssets;
-pub use camera::{RayCasterCamera, RayCasterCameraCfg};
+pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
 pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use pattern::RayPattern;

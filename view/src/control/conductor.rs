@@ -1,5 +1,9 @@
 //! The observer that shows a simulation to its viewers and does what they ask for.
 
+mod playback;
+
+pub use playback::{Film, Play, PlayError};
+
 use super::hub::{Hub, Mail, Viewer};
 use super::pace::Pace;
 use super::recording::{RecordButton, RecordingState};
@@ -124,6 +128,7 @@ impl Conductor {
             measured_speed: self.pace.as_ref().and_then(Pace::measured),
             refused: self.refused.clone(),
             recording: self.recording.clone(),
+            timeline: None,
         };
         self.shown = Some(Instant::now());
         // Where every snapshot is in somebody's hands, or the newest is just being taken, the next one will do.
@@ -233,6 +238,7 @@ impl Conductor {
             }
             Command::Release => self.release(sim, viewer),
             Command::Record(on) => self.record(sim, viewer, on)?,
+            Command::Seek(_) => return Err("this is no recording: only what was recorded has a time line".into()),
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ mod spring;
 #[cfg(test)]
 mod tests;
 
-pub use conductor::Conductor;
+pub use conductor::{Conductor, Film, Play, PlayError};
 pub use hub::Viewer;
 pub use recording::{RecordButton, Recording, RecordingState};
 
@@ -61,6 +61,8 @@ pub enum Command {
     Release,
     /// Begin to record, or end it, as the simulation's [`RecordButton`] says.
     Record(bool),
+    /// Go to a time of what was recorded \[s\], the nearest that there is: only where a film is [played](Play).
+    Seek(f64),
 }
 
 impl Command {
@@ -70,7 +72,9 @@ impl Command {
             (Self::SetTarget { robot, joint, env, .. }, Self::SetTarget { robot: r, joint: j, env: e, .. }) => {
                 (robot, joint, env) == (r, j, e)
             }
-            (Self::Drag { .. } | Self::Release, Self::Drag { .. }) | (Self::SetSpeed(_), Self::SetSpeed(_)) => true,
+            (Self::Drag { .. } | Self::Release, Self::Drag { .. })
+            | (Self::SetSpeed(_), Self::SetSpeed(_))
+            | (Self::Seek(_), Self::Seek(_)) => true,
             _ => false,
         }
     }

@@ -32,6 +32,8 @@ pub(super) enum Command {
     Step,
     /// Resets the environment that is looked at, or all.
     Reset,
+    /// Goes to a time of what was recorded \[s\].
+    Seek { time: f64 },
     /// Simulated seconds per second; without bound where there is none.
     Speed { factor: Option<f64> },
     /// Selects what is seen at a point of the picture; nothing where that is the sky. Points are in parts of the picture's
@@ -105,6 +107,7 @@ mod tests {
             (r#"{"do":"select","x":0.25,"y":1}"#, Command::Select { x: 0.25, y: 1.0 }),
             (r#"{"do":"pull","x":-0.5,"y":2}"#, Command::Pull { x: -0.5, y: 2.0 }),
             (r#"{"do":"record","on":true}"#, Command::Record { on: true }),
+            (r#"{"do":"seek","time":1.5}"#, Command::Seek { time: 1.5 }),
             (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
             (
                 r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,

@@ -386,6 +386,7 @@ impl Eyes for OwnEyes {
             Command::Play => self.send(control::Command::Resume),
             Command::Step => self.send(control::Command::Step(1)),
             Command::Reset => self.send(control::Command::Reset(self.env())),
+            Command::Seek { time } => self.send(control::Command::Seek(time)),
             Command::Speed { factor: None } => self.send(control::Command::SetSpeed(Speed::Free)),
             Command::Speed { factor: Some(factor) } => {
                 let [slow, fast] = Speed::RANGE;

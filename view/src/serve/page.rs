@@ -4,10 +4,11 @@
 pub(super) fn html(nonce: &str) -> String {
     const PAGE: &str = include_str!("page/index.html");
     const STYLE: &str = include_str!("page/page.css");
-    const PARTS: [&str; 4] = [
+    const PARTS: [&str; 5] = [
         include_str!("page/plot.js"),
         include_str!("page/joints.js"),
         include_str!("page/stage.js"),
+        include_str!("page/timeline.js"),
         include_str!("page/page.js"),
     ];
     PAGE.replace("NONCE", nonce).replace("/*STYLE*/", STYLE).replace("/*PROGRAM*/", &PARTS.join("\n"))

@@ -88,6 +88,7 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, picked: Option<&Picked>, 
         "refused": snapshot.run.refused,
         "selected": picked.map(|picked| selected(picked, snapshot)),
         "recording": snapshot.run.recording.as_ref().map(|now| json!({"on": now.on, "text": now.text})),
+        "timeline": snapshot.run.timeline.map(|line| json!({"now": line.now, "start": line.start, "end": line.end})),
     })
 }
 

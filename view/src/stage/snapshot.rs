@@ -60,6 +60,19 @@ pub struct Run {
     pub refused: Option<String>,
     /// How the recording stands; `None` where there is no record button.
     pub recording: Option<RecordingState>,
+    /// Where in a recording this is; `None` for a simulation that runs.
+    pub timeline: Option<Timeline>,
+}
+
+/// A moment of a recording, and the ends of it \[s\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timeline {
+    /// The moment.
+    pub now: f64,
+    /// The first one.
+    pub start: f64,
+    /// The last one.
+    pub end: f64,
 }
 
 /// What things are called; the same until something is added to the simulation.
@@ -150,6 +163,9 @@ impl Snapshot {
             env.origin = [0, 1, 2].map(|axis| origins[(k, axis)]);
             // There is such an environment.
             let _ = sim.look(EnvId(k), &mut env.look);
+            if let Some(timeline) = self.run.timeline {
+                env.look.time = timeline.now;
+            }
             env.contacts.clear();
             env.markers.clear();
             env.joints.clear();

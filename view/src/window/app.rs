@@ -1,7 +1,7 @@
 //! What a window does with mouse and keys, and what it draws: everything but the window.
 
-use super::hud;
 use super::keys::{Action, Key, action};
+use super::{hud, timeline};
 use crate::control::{Command, Speed, Wants};
 use crate::stage::{
     Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
@@ -50,6 +50,8 @@ enum Grip {
     Orbit,
     Pan,
     Turn,
+    /// The time line of a recording.
+    Timeline,
     /// A slider of a joint.
     Slider(usize),
     /// A body.
@@ -310,7 +312,12 @@ impl App {
             return;
         }
         let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
+        let on_timeline = timeline::time_at(&snapshot, self.size, at).filter(|_| button == 1);
         let grip = match button {
+            1 if on_timeline.is_some() => {
+                self.commands.extend(on_timeline.map(Command::Seek));
+                Some(Grip::Timeline)
+            }
             1 if on_slider.is_some() => {
                 let Some((joint, value)) = on_slider else { return };
                 self.set_target(&snapshot, joint, value);
@@ -354,6 +361,10 @@ impl App {
                     value.into_iter().for_each(|value| self.set_target(&snapshot, *joint, value));
                 }
                 Grip::Spring(pull) => pull.to(&snapshot, &self.view(), at),
+                Grip::Timeline => {
+                    let time = timeline::time_beside(&snapshot, self.size[0], at[0]);
+                    self.commands.extend(time.map(Command::Seek));
+                }
                 Grip::Orbit | Grip::Pan | Grip::Turn => {}
             }
         }
@@ -449,6 +460,8 @@ impl App {
         if let Some(picked) = &self.picked {
             let mut lines = describe(picked, &snapshot);
             lines.extend(self.follow.map(|_| "followed".into()));
+            // The time line is below.
+            lines.extend(snapshot.run.timeline.map(|_| String::new()));
             hud::note(canvas, &lines);
         }
         self.draw_panel(&snapshot, canvas);
@@ -458,6 +471,7 @@ impl App {
         if let Some(recording) = &snapshot.run.recording {
             hud::record_button(canvas, self.aside(), recording);
         }
+        timeline::draw(canvas, &snapshot);
         if self.help {
             hud::help(canvas);
         }

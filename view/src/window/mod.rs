@@ -6,6 +6,7 @@ mod hud;
 mod keys;
 #[cfg(test)]
 mod tests;
+mod timeline;
 mod x11;
 
 pub use app::{App, Input, Modifiers};

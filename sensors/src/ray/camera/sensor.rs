@@ -1,6 +1,7 @@
 //! The camera made of rays as a sensor.
 
 use super::cfg::RayCasterCameraCfg;
+use super::pictures::RayPictures;
 use super::pixels::Pixels;
 use crate::camera::frustum::frustum;
 use crate::camera::mounts::Mounts;
@@ -15,6 +16,7 @@ use crate::summary;
 use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
 use scene::pose::{from_row, to_row};
 use scene::{Marker, Pose, PoseF64, SceneState};
+use std::borrow::Cow;
 use std::fmt;
 
 /// A camera in every environment that casts one ray per pixel; [`Sampled`] has the stamps and counts of its pictures.
@@ -56,16 +58,15 @@ pub(super) struct Taken {
     pub(super) lens: PixelIntrinsics,
 }
 
+/// Channels of the sampler that pictures are made of.
+const CHANNELS: [&str; 5] = ["distances", "normals", "ids", "poses", "lenses"];
+
 /// The pictures of the current values.
 #[derive(Clone, Debug)]
 struct Shown {
     /// Measurements that they were made of.
     counts: Vec<u64>,
-    taken: Vec<Taken>,
-    depth: Array3<f32>,
-    distance: Array3<f32>,
-    normal: Array4<f32>,
-    mask: Array3<i32>,
+    pictures: RayPictures,
 }
 
 /// A summary of several lines.
@@ -117,11 +118,13 @@ impl RayCasterCamera {
             world_from_parent: vec![None; n],
             shown: Shown {
                 counts: vec![0; n],
-                taken: taken.clone(),
-                depth: Array3::from_elem(shape, miss),
-                distance: Array3::from_elem(shape, miss),
-                normal: Array4::zeros((n, cfg.height, cfg.width, 3)),
-                mask: Array3::zeros(shape),
+                pictures: RayPictures {
+                    taken: taken.clone(),
+                    depth: Array3::from_elem(shape, miss),
+                    distance: Array3::from_elem(shape, miss),
+                    normal: Array4::zeros((n, cfg.height, cfg.width, 3)),
+                    mask: Array3::zeros(shape),
+                },
             },
             taken,
         }
@@ -160,27 +163,26 @@ impl RayCasterCamera {
         let count = self.sample_counts()[env];
         let Self { sampler, scan, shown, miss, .. } = self;
         shown.counts[env] = count;
-        let [distances, normals, ids, poses, lenses] =
-            ["distances", "normals", "ids", "poses", "lenses"].map(|channel| sampler.values(channel));
-        let lens =
-            PixelIntrinsics { fx: lenses[(env, 0)], fy: lenses[(env, 1)], cx: lenses[(env, 2)], cy: lenses[(env, 3)] };
-        let world_from_camera = from_row(&std::array::from_fn(|k| poses[(env, k)]));
-        shown.taken[env] = Taken { world_from_camera, lens };
-        let pixels = scan.rays();
-        for k in 0..pixels.width * pixels.height {
-            let at = (env, k / pixels.width, k % pixels.width);
-            let id = ids[(env, k)] as i32;
-            let (depth, distance) = if id == 0 {
-                (*miss, *miss)
-            } else {
-                let distance = distances[(env, k)];
-                ((distance * pixels.direction(&lens, k)[2]) as f32, distance as f32)
-            };
-            (shown.depth[at], shown.distance[at], shown.mask[at]) = (depth, distance, id);
-            for axis in 0..3 {
-                shown.normal[(at.0, at.1, at.2, axis)] = normals[(env, 3 * k + axis)] as f32;
-            }
+        shown.pictures.develop(env, CHANNELS.map(|channel| sampler.values(channel)), scan.rays(), *miss);
+    }
+
+    /// The pictures of the measurement that arrived last, in all environments; made when asked. They are what the camera shows,
+    /// except with a latency after somebody wrote to the state: what was on its way then arrives, and is not shown.
+    pub fn arrived(&self) -> Cow<'_, RayPictures> {
+        if !self.sampler.is_late() {
+            return Cow::Borrowed(&self.shown.pictures);
         }
+        let mut pictures = self.shown.pictures.clone();
+        for env in 0..pictures.taken.len() {
+            let values = CHANNELS.map(|channel| self.sampler.arrived(channel));
+            pictures.develop(env, values, self.scan.rays(), self.miss);
+        }
+        Cow::Owned(pictures)
+    }
+
+    /// The pictures that it shows.
+    pub fn pictures(&self) -> &RayPictures {
+        &self.shown.pictures
     }
 
     /// Whether it hangs on a body.
@@ -195,12 +197,12 @@ impl RayCasterCamera {
 
     /// Distance along the optical axis, shape (N, H, W) \[m\]; for a miss what the configuration says.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
-        self.shown.depth.view()
+        self.shown.pictures.depth.view()
     }
 
     /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; for a miss what the configuration says.
     pub fn distance(&self) -> ArrayView3<'_, f32> {
-        self.shown.distance.view()
+        self.shown.pictures.distance.view()
     }
 
     /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where not
@@ -211,12 +213,12 @@ impl RayCasterCamera {
 
     /// Unit normals of faces, turned to the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
     pub fn normal(&self) -> ArrayView4<'_, f32> {
-        self.shown.normal.view()
+        self.shown.pictures.normal.view()
     }
 
     /// Mask ids, shape (N, H, W); 0 for a miss.
     pub fn mask(&self) -> ArrayView3<'_, i32> {
-        self.shown.mask.view()
+        self.shown.pictures.mask.view()
     }
 
     /// Pictures that arrived since the last reset, shape (N); the refresh of a reset is none.
@@ -226,24 +228,23 @@ impl RayCasterCamera {
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the pictures \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        let taken = &self.shown.taken;
-        Array3::from_shape_fn((taken.len(), 3, 3), |(env, i, j)| taken[env].lens.matrix()[(i, j)])
+        self.shown.pictures.intrinsic_matrices()
     }
 
     /// Poses in the environment at the instant of the pictures, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        let row = |taken: &Taken| to_row(&convention.of_optical(&taken.world_from_camera));
-        Array2::from(self.shown.taken.iter().map(row).collect::<Vec<[f64; 7]>>())
+        self.shown.pictures.pose_w(convention)
     }
 
     /// From where the picture of an environment was taken, through which lens.
     pub(super) fn taken(&self, env: usize) -> &Taken {
-        &self.shown.taken[env]
+        &self.shown.pictures.taken[env]
     }
 
     /// The depths of the pixels of an environment, row by row; `None` for a miss.
     pub(super) fn depths(&self, env: usize) -> impl Iterator<Item = Option<f32>> {
-        let (depth, mask) = (self.shown.depth.index_axis(Axis(0), env), self.shown.mask.index_axis(Axis(0), env));
+        let RayPictures { depth, mask, .. } = &self.shown.pictures;
+        let (depth, mask) = (depth.index_axis(Axis(0), env), mask.index_axis(Axis(0), env));
         depth.into_iter().zip(mask).map(|(depth, id)| (*id != 0).then_some(*depth))
     }
 }
@@ -324,7 +325,7 @@ impl Sensor for RayCasterCamera {
 
     /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
-        let taken = self.shown.taken.get(env);
+        let taken = self.shown.pictures.taken.get(env);
         let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.lens).ok()?)));
         placed.map_or_else(Vec::new, |(taken, optics)| frustum(&taken.world_from_camera, &optics, self.image_shape()))
     }

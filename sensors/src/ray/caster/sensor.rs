@@ -126,8 +126,7 @@ impl RayCaster {
         let (distances, ids) = (sampler.row("distances", env), sampler.row("ids", env));
         let points = part_of(shown.points.as_slice_mut(), env, 3 * rays.len());
         for (((ray, &distance), &id), point) in rays.iter().zip(distances).zip(ids).zip(points.chunks_exact_mut(3)) {
-            let hit = ray.mapped_by(&frame).at(distance);
-            point.copy_from_slice(&if id != 0.0 { hit } else { [f64::INFINITY; 3] });
+            point.copy_from_slice(&hit(ray, &frame, distance, id));
         }
         let (shown_ids, mask) = (shown.ids.as_slice_mut(), shown.mask.as_slice_mut());
         let (shown_ids, mask) = (part_of(shown_ids, env, rays.len()), part_of(mask, env, rays.len()));
@@ -138,10 +137,18 @@ impl RayCaster {
 
     /// World from the frame of the rays, of the current values.
     fn frame(&self, env: usize) -> PoseF64 {
-        let (pos, quat) = (self.sampler.values("pos_w"), self.sampler.values("quat_w"));
+        self.frame_of(env, &self.sampler.values("pos_w"), &self.sampler.values("quat_w"))
+    }
+
+    fn frame_of(&self, env: usize, pos: &ArrayView2<'_, f64>, quat: &ArrayView2<'_, f64>) -> PoseF64 {
         let row = std::array::from_fn(|k| if k < 3 { pos[(env, k)] } else { quat[(env, k - 3)] });
         self.alignment.align(&from_row(&row))
     }
+}
+
+/// Where a ray ends in the frame that `frame` maps to.
+fn hit(ray: &Ray, frame: &PoseF64, distance: f64, id: f64) -> [f64; 3] {
+    if id != 0.0 { ray.mapped_by(frame).at(distance) } else { [f64::INFINITY; 3] }
 }
 
 /// The numbers of an environment in an array in C order.
@@ -256,6 +263,22 @@ impl RayCaster {
     /// Where rays hit, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
     pub fn hits(&self) -> ArrayView3<'_, f64> {
         self.shown.points.view()
+    }
+
+    /// [`hits`](Self::hits) of the measurement that arrived last, as [`Sampler::arrived`] has its distances; made when asked.
+    pub fn arrived_hits(&self) -> Array3<f64> {
+        let [distances, ids, pos, quat] =
+            ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler.arrived(channel));
+        let (n, b) = distances.dim();
+        let mut points = Array3::zeros((n, b, 3));
+        for env in 0..n {
+            let frame = self.frame_of(env, &pos, &quat);
+            for (k, ray) in self.scan.rays().iter().enumerate() {
+                let point = hit(ray, &frame, distances[(env, k)], ids[(env, k)]);
+                (0..3).for_each(|axis| points[(env, k, axis)] = point[axis]);
+            }
+        }
+        points
     }
 
     /// Distances along the rays, shape (N, B) \[m\]; +inf for a miss.

@@ -21,6 +21,7 @@ function send(command) {
 
 const stage = new Stage($("stage"), send);
 const joints = new Joints($("joints"), send, () => replot());
+const timeline = new Timeline(document.querySelector(".bar"), send);
 
 function link(name, text) {
   $("link").dataset.state = name;
@@ -184,6 +185,7 @@ function refresh() {
   $("diverged").hidden = state.diverged.length === 0;
   $("diverged").textContent = state.diverged.join("; ");
   select(state.selected);
+  timeline.show(state.timeline);
   joints.show(state.robots);
   history.positions.add(state.time, state.robots.flatMap((robot) => robot.positions));
   history.efforts.add(state.time, state.robots.flatMap((robot) => robot.efforts));

@@ -1,0 +1,140 @@
+//! `kinetoscope replay`: a recording shown again, drawn, or run again.
+
+use crate::{Ending, Result, excerpt};
+use kinetoscope::prelude::*;
+use kinetoscope::record::{Film, Recording, replay};
+use kinetoscope::view::control::{Film as Shows, Play, Speed};
+use std::path::{Path, PathBuf};
+
+/// Shows a recording in a window or a browser with a time line, draws pictures of it, or runs its actions again
+///
+/// A recording holds its scene, so that the file is enough to show it. To run its actions again, the scene has to be built as it
+/// was, drives and all: give the scene file with --scene.
+#[derive(Debug, clap::Args)]
+#[command(after_help = ENDINGS)]
+pub(crate) struct Args {
+    /// A recording, .mcap or .npz; to be verified it is .npz
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// The scene file that was recorded, where the recording does not hold its scene, or for --verify
+    #[arg(long, value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+    /// Show it in browsers at this address instead of a window
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
+    serve: Option<String>,
+    /// Write pictures to this folder instead of opening a window
+    #[arg(long, value_name = "DIR", conflicts_with = "serve", requires = "at")]
+    out: Option<PathBuf>,
+    /// Times of these pictures, in seconds on the clock of the recording
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "out", allow_hyphen_values = true)]
+    at: Vec<f64>,
+    /// Pixels per row of pictures
+    #[arg(long, default_value_t = 960)]
+    width: usize,
+    /// Rows of pictures
+    #[arg(long, default_value_t = 540)]
+    height: usize,
+    /// Run the recorded actions again and compare every number, bit for bit
+    #[arg(long, requires = "scene", conflicts_with_all = ["serve", "out"])]
+    verify: bool,
+    /// End after so many seconds instead of when the window is closed
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["out", "verify"])]
+    seconds: Option<f64>,
+}
+
+const ENDINGS: &str = "\
+Exit codes: 0 shown, drawn, or the same to the last bit; 1 --verify found a difference, or something was left out; 2 refused.";
+
+pub(crate) fn run(args: &Args) -> Result<Ending> {
+    if args.verify {
+        return verify(args);
+    }
+    if let Some(seconds) = args.seconds.filter(|seconds| !(*seconds > 0.0 && *seconds < 1e9)) {
+        return Err(format!("--seconds {seconds}: give more than 0").into());
+    }
+    let recording = Recording::open(&args.file)?;
+    let envs = recording.env_ids().last().map_or(1, |last| last + 1);
+    let scene = args.scene.as_deref().map(|file| built(file, envs)).transpose()?;
+    let (film, sim) = Film::of(&recording, scene.as_ref().map(InteractiveScene::sim))?;
+    let warned = !film.unmoved().is_empty();
+    if warned {
+        eprintln!("warning: nothing was recorded of {}: they stay where they begin", film.unmoved().join(", "));
+    }
+    match &args.out {
+        Some(folder) => draw(args, film, sim, folder)?,
+        None => show(args, film, sim)?,
+    }
+    Ok(if warned { Ending::Warned } else { Ending::Done })
+}
+
+/// The scene of a file, in as many environments as were recorded.
+fn built(file: &Path, num_envs: usize) -> Result<InteractiveScene> {
+    let mut cfg = SceneCfg::from_file(file)?;
+    cfg.simulation.num_envs = num_envs;
+    let scene = InteractiveScene::new(cfg)?;
+    excerpt::print_warnings(scene.sim().diagnostics());
+    Ok(scene)
+}
+
+fn verify(args: &Args) -> Result<Ending> {
+    let Some(file) = &args.scene else { return Err("--verify: give the scene with --scene".into()) };
+    let mut scene = built(file, replay::num_envs(&args.file)?)?;
+    let verdict = replay::verify(scene.sim_mut(), &args.file)?;
+    println!("{}: {verdict}", args.file.display());
+    Ok(if verdict.is_same() { Ending::Done } else { Ending::Warned })
+}
+
+fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) -> Result<()> {
+    let (first, last) = (film.times()[0], film.times()[film.times().len() - 1]);
+    if let Some(time) = args.at.iter().find(|time| !(first..=last).contains(*time)) {
+        return Err(format!("--at {time}: the recording is from {first} s to {last} s").into());
+    }
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    // From the same place in all of them.
+    let cfg = ScreenshotCfg { size: [args.width, args.height], ..ScreenshotCfg::default() };
+    film.show(&mut sim, 0)?;
+    let cfg = ScreenshotCfg { eye: Some(sim.overview_eye()), ..cfg };
+    for time in &args.at {
+        film.show(&mut sim, film.frame_at(*time))?;
+        let path = folder.join(format!("replay_{time:.3}s.png"));
+        sim.screenshot_with(&path, &cfg)?;
+        println!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// A film for viewers.
+struct Shown(Film);
+
+impl Shows for Shown {
+    fn times(&self) -> &[f64] {
+        self.0.times()
+    }
+
+    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> std::result::Result<(), String> {
+        self.0.show(sim, frame).map_err(|error| error.to_string())
+    }
+}
+
+fn show(args: &Args, film: Film, mut sim: SimulationManager) -> Result<()> {
+    let begun = std::time::Instant::now();
+    let mut film = Shown(film);
+    // Whoever opens it sees the beginning at once, not the scene as it was built.
+    film.0.show(&mut sim, 0)?;
+    let in_time = || args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds);
+    match &args.serve {
+        Some(address) => {
+            let served = sim.serve_with(address, ServeCfg { speed: Speed::REAL, ..ServeCfg::default() })?;
+            println!("Look at {}; Ctrl+C ends it.", served.url());
+            sim.play(&mut film, &mut || in_time())?;
+            served.close(&mut sim)?;
+        }
+        None => {
+            let title = format!("{} - Kinetoscope", args.file.display());
+            let window = sim.open_window_with(WindowCfg { title, ..WindowCfg::default() })?;
+            sim.play(&mut film, &mut || window.is_open() && in_time())?;
+            window.close();
+        }
+    }
+    Ok(())
+}

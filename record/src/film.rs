@@ -1,0 +1,242 @@
+//! A recording that can be shown: a simulation of its scene, put where it was at each recorded time.
+
+use crate::error::{RecordError, Result};
+use crate::read::{Recording, Samples, Wanted};
+use crate::scene_file::{self, SCENE};
+use ndarray::Array2;
+use sim::{MjcfId, MjcfPart, SimulationManager};
+
+/// Recorded motion in its scene: [`show`](Self::show) puts the simulation where it was.
+///
+/// What moves by itself is shown: joints of robots, articulations and MJCF files, free bases and objects, objects that are moved by
+/// hand. What was changed per environment (sizes, colours) looks as in the scene.
+#[derive(Debug)]
+pub struct Film {
+    part: MjcfId,
+    times: Vec<f64>,
+    tracks: Vec<Track>,
+    /// Positions of all joints, as MuJoCo has them, shape (N, nq).
+    qpos: Array2<f64>,
+    hands: Vec<Hand>,
+    unmoved: Vec<String>,
+}
+
+/// One number over time, and where it belongs.
+#[derive(Debug)]
+struct Track {
+    env: usize,
+    column: Column,
+    samples: Samples,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Column {
+    /// Of `qpos`.
+    Joint(usize),
+    /// Of the pose of a body that is moved by hand: which, and which number.
+    Hand(usize, usize),
+}
+
+/// A body that is moved by hand.
+#[derive(Debug)]
+struct Hand {
+    body: String,
+    /// Rows x, y, z, qw, qx, qy, qz, shape (N, 7).
+    poses: Array2<f64>,
+    /// Whether anything was recorded of it.
+    known: bool,
+}
+
+/// What joints have in `qpos`, by MuJoCo's numbers of their types: free, ball, slide, hinge.
+const WIDTHS: [usize; 4] = [7, 4, 1, 1];
+const FREE: i32 = 0;
+
+impl Film {
+    /// What a recording shows, in the scene that it holds, or in one that is given: a simulation that is built as the recorded one
+    /// was. Gives what shows it, and the simulation that it is shown in.
+    ///
+    /// # Errors
+    /// The recording holds no scene and none is given; the scene cannot be compiled; nothing that moves was recorded.
+    pub fn of(recording: &Recording, scene: Option<&SimulationManager>) -> Result<(Self, SimulationManager)> {
+        let malformed = |what: &str| RecordError::Malformed { path: recording.path().into(), what: what.into() };
+        let packed = match scene {
+            Some(sim) => scene_file::pack(sim)?.0,
+            None => recording.attachment(SCENE)?.ok_or_else(|| {
+                malformed("it does not hold its scene; give a scene that is built as the recorded one was")
+            })?,
+        };
+        let (sim, part) = scene_file::unpack(&packed, recording.path())?;
+        let film = Self::in_scene(recording, &sim, part)?;
+        if film.times.is_empty() {
+            return Err(malformed(
+                "nothing that moves in its scene was recorded; record joint states, poses or states",
+            ));
+        }
+        Ok((film, sim))
+    }
+
+    fn in_scene(recording: &Recording, sim: &SimulationManager, part: MjcfId) -> Result<Self> {
+        let view = sim.mjcf_part(part);
+        let qpos = view.get_qpos();
+        let envs: Vec<usize> = recording.env_ids().into_iter().filter(|env| *env < sim.num_envs()).collect();
+        let by_hand = bodies_by_hand(&view);
+        let start = |body: &String| view.body_pose(body).map(|poses| Hand { body: body.clone(), poses, known: false });
+        let mut hands: Vec<Hand> = by_hand.iter().map(start).collect::<sim::Result<_>>()?;
+        let (mut wanted, mut places, mut unmoved) = (Vec::new(), Vec::new(), Vec::new());
+        let mut want = |topic: String, field: String, env: usize, column: Column| {
+            let known = recording.topics().iter().find(|known| known.name == topic);
+            let there = known.is_some_and(|topic| topic.fields.contains(&field));
+            if there {
+                wanted.push(Wanted { topic, field });
+                places.push((env, column));
+            }
+            there
+        };
+        for &env in &envs {
+            for (k, hand) in hands.iter_mut().enumerate() {
+                for (number, (topic, field)) in pose(recording, env, &hand.body).into_iter().enumerate() {
+                    hand.known |= want(topic, field, env, Column::Hand(k, number));
+                }
+            }
+            for joint in joints(&view) {
+                let mut there = false;
+                for (topic, field, column) in joint.numbers(recording, env, &view) {
+                    there |= want(topic, field, env, Column::Joint(column));
+                }
+                if !there && !unmoved.contains(&joint.name) {
+                    unmoved.push(joint.name);
+                }
+            }
+        }
+        let samples = recording.samples(&wanted)?;
+        let mut times: Vec<f64> = samples.iter().flat_map(|samples| samples.times.iter().copied()).collect();
+        times.sort_by(f64::total_cmp);
+        // Of two formats, one has whole nanoseconds.
+        times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+        let track = |(samples, (env, column))| Track { env, column, samples };
+        let tracks = samples.into_iter().zip(places).map(track).collect();
+        Ok(Self { part, times, tracks, qpos, hands, unmoved })
+    }
+
+    /// The times at which something was recorded \[s\], in ascending order, on the clock of the recording.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Joints of the scene that nothing was recorded of: they stay where they begin.
+    pub fn unmoved(&self) -> &[String] {
+        &self.unmoved
+    }
+
+    /// The number of the last recorded time that is not later than `time` \[s\]; 0 before the first.
+    pub fn frame_at(&self, time: f64) -> usize {
+        self.times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
+    }
+
+    /// Puts the simulation where it was at one of the [`times`](Self::times): each number is the last that was recorded until then.
+    ///
+    /// # Errors
+    /// What was recorded is no position: not finite, a quaternion of length zero.
+    pub fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
+        let Some(&time) = self.times.get(frame.min(self.times.len().saturating_sub(1))) else { return Ok(()) };
+        for Track { env, column, samples } in &self.tracks {
+            // Before its first time, it is where it will be then.
+            let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
+            let Some(&value) = samples.values.get(last) else { continue };
+            match *column {
+                Column::Joint(column) => self.qpos[(*env, column)] = value,
+                Column::Hand(hand, number) => self.hands[hand].poses[(*env, number)] = value,
+            }
+        }
+        let mut part = sim.mjcf_part_mut(self.part);
+        for hand in self.hands.iter().filter(|hand| hand.known) {
+            part.write_mocap_pose(&hand.body, &hand.poses, None)?;
+        }
+        if self.qpos.ncols() > 0 {
+            part.write_qpos(&self.qpos, None)?;
+        }
+        Ok(())
+    }
+}
+
+fn bodies_by_hand(view: &MjcfPart<'_>) -> Vec<String> {
+    // The first body is the world.
+    let by_hand = view.model().body_mocapid().iter().skip(1);
+    view.body_names().iter().zip(by_hand).filter(|(_, mocap)| **mocap >= 0).map(|(name, _)| name.clone()).collect()
+}
+
+/// A joint of the scene.
+struct Joint {
+    /// `uid/joint`.
+    name: String,
+    /// The body that it moves, `uid/link` or the uid of an object.
+    body: String,
+    kind: i32,
+    /// Its first number in `qpos`.
+    first: usize,
+}
+
+fn joints(view: &MjcfPart<'_>) -> Vec<Joint> {
+    let model = view.model();
+    let all = view.joint_names().iter().zip(model.jnt_type()).zip(model.jnt_qposadr()).zip(model.jnt_bodyid());
+    let body = |index: i32| {
+        let place = usize::try_from(index).ok().and_then(|index| index.checked_sub(1));
+        place.and_then(|place| view.body_names().get(place)).cloned().unwrap_or_default()
+    };
+    all.map(|(((name, kind), first), of)| Joint {
+        name: name.clone(),
+        body: body(*of),
+        kind: *kind,
+        first: usize::try_from(*first).unwrap_or(0),
+    })
+    .collect()
+}
+
+/// Where the numbers of a pose stand in a recording, in the order x, y, z, qw, qx, qy, qz.
+fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7] {
+    if recording.is_archive() {
+        // The stream of an object, whose name may have a stroke, or that of a robot's links.
+        let object = format!("{frame}/pose");
+        let is_object = recording.topics().iter().any(|topic| topic.name == format!("/env_{env}/{object}"));
+        let links = frame.split_once('/').map(|(uid, _)| format!("{uid}/link_poses"));
+        let stream = links.filter(|_| !is_object).unwrap_or(object);
+        return ["x", "y", "z", "qw", "qx", "qy", "qz"]
+            .map(|number| (format!("/env_{env}/{stream}"), format!("pose[{frame}].{number}")));
+    }
+    let parts =
+        ["translation.x", "translation.y", "translation.z", "rotation.w", "rotation.x", "rotation.y", "rotation.z"];
+    parts.map(|part| (format!("/env_{env}/tf"), format!("transforms[env_{env}/{frame}].transform.{part}")))
+}
+
+impl Joint {
+    /// Where its numbers stand in a recording, and in which columns of `qpos` they belong: more places than one where they may
+    /// stand in either.
+    fn numbers(&self, recording: &Recording, env: usize, view: &MjcfPart<'_>) -> Vec<(String, String, usize)> {
+        let mut places = Vec::new();
+        let width = usize::try_from(self.kind).ok().and_then(|kind| WIDTHS.get(kind)).copied().unwrap_or(0);
+        let Some((uid, own)) = self.name.split_once('/') else { return places };
+        if self.kind == FREE {
+            let columns = (0..width).map(|k| self.first + k);
+            let numbers = pose(recording, env, &self.body).into_iter().zip(columns);
+            places.extend(numbers.map(|((topic, field), column)| (topic, field, column)));
+        } else if width == 1 {
+            places.push((format!("/env_{env}/{uid}/joint_states"), format!("position[{own}]"), self.first));
+        }
+        // The state of an MJCF file: its own positions, in its own order, which begin with its first joint's.
+        let start = joints(view)
+            .iter()
+            .filter(|joint| joint.name.starts_with(&format!("{uid}/")))
+            .map(|joint| joint.first)
+            .min();
+        let (topic, array) = if recording.is_archive() { ("state", "position") } else { ("state/positions", "data") };
+        for k in 0..width {
+            let place = self.first + k - start.unwrap_or(self.first);
+            places.push((format!("/env_{env}/{uid}/{topic}"), format!("{array}[{place}]"), self.first + k));
+        }
+        places
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

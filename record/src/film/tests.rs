@@ -1,0 +1,197 @@
+use super::*;
+use crate::cfg::RecorderCfg;
+use crate::mcap_file::recover;
+use crate::recorder::Record;
+use crate::topic::Topic;
+use scene::Pose;
+use sim::{BodyType, EnvId, MjcfCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManagerCfg, UrdfCfg};
+use std::path::Path;
+
+const STEPS: usize = 30;
+
+/// An arm that moves, one with a free base, a cube that falls, a box that is moved by hand, a part with a ball and a slide.
+fn busy() -> SimulationManager {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let urdf = UrdfCfg::single(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/sr5/SR5.urdf"));
+    sim.add_robot(RobotCfg { uid: "arm".into(), urdf: urdf.clone(), ..Default::default() }).unwrap();
+    let init_pose = Pose::translation(2.0, 0.0, 1.0);
+    sim.add_robot(RobotCfg { uid: "loose".into(), urdf, fix_base: false, init_pose, ..Default::default() }).unwrap();
+    let object = |uid: &str, body_type, x| RigidObjectCfg {
+        uid: uid.into(),
+        shape: ObjectShape::cube(0.1),
+        body_type,
+        init_pose: Pose::translation(x, 1.0, 0.8),
+        ..Default::default()
+    };
+    sim.add_rigid_object(object("cube", BodyType::Dynamic, 0.0)).unwrap();
+    sim.add_rigid_object(object("hand", BodyType::Kinematic, 1.0)).unwrap();
+    let part = r#"<mujoco><worldbody><body name="ball" pos="-1 0 2"><joint name="swing" type="ball"/>
+        <geom size="0.1" pos="0.3 0 0"/><body name="tip" pos="0.5 0 0"><joint name="x" type="slide" axis="0 0 1"/>
+        <geom size="0.05"/></body></body></worldbody></mujoco>"#;
+    sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
+    sim
+}
+
+/// Poses of all bodies that are called so in both, in both environments.
+fn poses(sim: &SimulationManager) -> Vec<(String, Array2<f64>)> {
+    let mut poses = Vec::new();
+    for (uid, robot) in sim.robot_ids() {
+        let robot = sim.robot(robot);
+        poses.extend(robot.link_names().iter().map(|link| (format!("{uid}/{link}"), robot.link_pose(link).unwrap())));
+    }
+    for uid in ["cube", "hand"] {
+        poses.push((uid.into(), sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose()));
+    }
+    let part = sim.mjcf_part(sim.mjcf_id("part").unwrap());
+    poses.extend(["ball", "tip"].map(|body| (format!("part/{body}"), part.body_pose(body).unwrap())));
+    poses
+}
+
+fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
+    let mut sim = busy();
+    sim.update(3);
+    let recorder = sim.record(RecorderCfg { scene, ..RecorderCfg::new(path) }).unwrap();
+    let (arm, hand) = (sim.robot_id("arm").unwrap(), sim.rigid_object_id("hand").unwrap());
+    let mut all = Vec::new();
+    for step in 0..STEPS {
+        let target = |(env, joint)| 0.4 * (0.2 * step as f64 + joint as f64 + env as f64).sin();
+        let targets = Array2::from_shape_fn((2, sim.robot(arm).dof()), target);
+        sim.robot_mut(arm).set_qpos(&targets, None, None).unwrap();
+        let row = ndarray::array![[1.0, 1.0 + 0.01 * step as f64, 0.8, 0.6, 0.0, 0.8, 0.0]];
+        sim.rigid_object_mut(hand).write_pose(&row, Some(&[EnvId(step % 2)])).unwrap();
+        // What was written is recorded at the time of the step before: it is what is shown there.
+        all.push(poses(&sim));
+        sim.update(1);
+    }
+    all.push(poses(&sim));
+    sim.finish_recording(recorder).unwrap();
+    all
+}
+
+/// Largest distance of what a film shows from what was, of positions and quaternions, and of which body at which step.
+fn largest_difference(
+    film: &mut Film,
+    sim: &mut SimulationManager,
+    all: &[Vec<(String, Array2<f64>)>],
+) -> (f64, String) {
+    let mut largest = (0.0, String::new());
+    for (step, expected) in all.iter().enumerate() {
+        // The state after a step is the last that was recorded at its time; a recording that began at step 3 begins at 0.03 s.
+        let frame = film.frame_at(0.01 * (step + 3) as f64);
+        film.show(sim, frame).unwrap();
+        let part = sim.mjcf_part(film.part);
+        let mut compared = 0;
+        for (name, expected) in expected.iter().filter(|(name, _)| part.body_names().contains(name)) {
+            let found = part.body_pose(name).unwrap();
+            for (a, b) in found.rows().into_iter().zip(expected.rows()) {
+                let place = (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+                // A quaternion and its negative are the same rotation.
+                let [plus, minus] = [1.0, -1.0].map(|s| (3..7).map(|k| (a[k] - s * b[k]).abs()).fold(0.0, f64::max));
+                let off: f64 = place.max(plus.min(minus));
+                if off > largest.0 {
+                    largest = (off, format!("{name} at step {step}"));
+                }
+            }
+            compared += 1;
+        }
+        // Seven moving links and the base of the loose arm, six or more of the fixed one, two objects, two bodies.
+        assert!(compared >= 17, "{compared}");
+    }
+    largest
+}
+
+#[test]
+fn a_recording_alone_is_enough_to_show_where_everything_was() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.npz"] {
+        let path = folder.path().join(name);
+        let all = recorded(&path, true);
+        let (mut film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+        assert_eq!(sim.num_envs(), 2);
+        assert!(film.unmoved().is_empty(), "{:?}", film.unmoved());
+        assert_eq!(film.times().len(), STEPS + 1, "{name}: {:?}", film.times());
+        // The same joints in the same chain, computed by the same engine of a model that was written with all digits.
+        let largest = largest_difference(&mut film, &mut sim, &all);
+        assert!(largest.0 < 1e-9, "{name}: {largest:?}");
+        // To and fro.
+        film.show(&mut sim, STEPS).unwrap();
+        let end = sim.mjcf_part(film.part).get_qpos();
+        film.show(&mut sim, 0).unwrap();
+        assert_ne!(sim.mjcf_part(film.part).get_qpos(), end);
+        film.show(&mut sim, usize::MAX).unwrap();
+        assert_eq!(sim.mjcf_part(film.part).get_qpos(), end);
+        // The control: what was recorded a step later is elsewhere.
+        assert!(largest_difference(&mut film, &mut sim, &all[1..]).0 > 1e-4);
+    }
+}
+
+#[test]
+fn without_a_scene_one_is_asked_for_and_a_given_one_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let all = recorded(&path, false);
+    let recording = Recording::open(&path).unwrap();
+    let error = Film::of(&recording, None).unwrap_err().to_string();
+    assert!(error.contains("does not hold its scene"), "{error}");
+    let (mut film, mut sim) = Film::of(&recording, Some(&busy())).unwrap();
+    let largest = largest_difference(&mut film, &mut sim, &all);
+    assert!(largest.0 < 1e-9, "{largest:?}");
+    // A scene in which nothing is called so.
+    let mut other = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    other
+        .add_mjcf(MjcfCfg::text(
+            "other",
+            r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#,
+        ))
+        .unwrap();
+    let error = Film::of(&recording, Some(&other)).unwrap_err().to_string();
+    assert!(error.contains("nothing that moves"), "{error}");
+}
+
+#[test]
+fn what_was_not_recorded_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = busy();
+    let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())])).unwrap();
+    sim.update(3);
+    sim.finish_recording(recorder).unwrap();
+    let (film, _) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+    let unmoved = film.unmoved();
+    assert!(
+        unmoved.contains(&"cube/free".to_string()) && !unmoved.iter().any(|joint| joint.starts_with("arm/")),
+        "{unmoved:?}"
+    );
+}
+
+#[test]
+fn a_recovered_recording_has_its_scene_still() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = busy();
+    sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(40);
+    drop(sim);
+    assert!(recover(&path).unwrap().messages > 0);
+    let (film, sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+    assert!(film.unmoved().is_empty() && sim.num_envs() == 2);
+}
+
+#[test]
+fn a_scene_that_is_no_scene_is_refused() {
+    let packed = scene_file::pack(&busy()).unwrap().0;
+    let path = Path::new("run.mcap");
+    assert!(scene_file::unpack(&packed, path).is_ok());
+    for end in [0, 10, packed.len() / 2, packed.len() - 1] {
+        let error = scene_file::unpack(&packed[..end], path).unwrap_err().to_string();
+        assert!(error.contains("damaged"), "{error}");
+    }
+    // A file that would be written elsewhere.
+    for name in ["../away.xml", "/away.xml", "a/../../away.xml"] {
+        let mut archive = crate::zip::Archive::new(std::io::Cursor::new(Vec::new()));
+        archive.add(name, b"", &mut &b"x"[..]).unwrap();
+        let bytes = archive.finish().unwrap().into_inner();
+        let error = scene_file::unpack(&bytes, path).unwrap_err().to_string();
+        assert!(error.contains("no name of a file"), "{error}");
+    }
+}

@@ -1,0 +1,163 @@
+//! MCAP files of ROS 2 messages, read from the beginning to the end, a chunk at a time.
+
+use super::{RecordedTopic, Samples, Wanted};
+use crate::error::{RecordError, Result};
+use crate::ros::{MessageType, Step, Value};
+use mcap::records::Record;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Attachment, McapError};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Chunks are smaller by far, before they are compressed \[bytes\].
+const LARGEST: usize = 1 << 30;
+
+/// A channel, and how its messages are read; `None` where nobody here knows.
+struct Channel {
+    topic: String,
+    kind: String,
+    reads: Option<Arc<MessageType>>,
+}
+
+/// What is told of a file.
+enum Told<'r> {
+    Message { channel: &'r Channel, time: u64, data: &'r [u8] },
+    Attachment(Attachment<'r>),
+}
+
+/// Reads a whole file, and tells what is in it.
+fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()> {
+    let failed = |error: std::io::Error| RecordError::file(path, error);
+    let file = File::open(path).map_err(failed)?;
+    let bytes = file.metadata().map_err(failed)?.len();
+    let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
+    let torn =
+        || malformed("it ends in the middle; record::recover makes a whole file of what a killed recorder left".into());
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(LARGEST));
+    let (mut reader, mut file) = (LinearReader::new_with_options(options), BufReader::with_capacity(1 << 20, file));
+    let mut schemas: BTreeMap<u16, (String, Option<Arc<MessageType>>)> = BTreeMap::new();
+    let mut channels: BTreeMap<u16, Channel> = BTreeMap::new();
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let count = file.read(reader.insert(wanted)).map_err(failed)?;
+                reader.notify_read(count);
+            }
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                match mcap::parse_record(opcode, data).map_err(|error| malformed(error.to_string()))? {
+                    Record::Schema { header, data } => {
+                        let text = (header.encoding == "ros2msg").then(|| std::str::from_utf8(&data).ok()).flatten();
+                        let reads = text.and_then(MessageType::parse).map(Arc::new);
+                        schemas.insert(header.id, (header.name, reads));
+                    }
+                    Record::Channel(channel) => {
+                        let (kind, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                        let reads = reads.filter(|_| channel.message_encoding == "cdr");
+                        channels.insert(channel.id, Channel { topic: channel.topic, kind, reads });
+                    }
+                    Record::Message { header, data } => {
+                        let Some(channel) = channels.get(&header.channel_id) else {
+                            return Err(malformed(format!(
+                                "a message is of channel {}, which is not there",
+                                header.channel_id
+                            )));
+                        };
+                        tell(Told::Message { channel, time: header.log_time, data: &data })?;
+                    }
+                    Record::Attachment { header, data, .. } => {
+                        let mcap::records::AttachmentHeader { log_time, create_time, name, media_type } = header;
+                        tell(Told::Attachment(Attachment { log_time, create_time, name, media_type, data }))?;
+                    }
+                    _ => {}
+                }
+            }
+            Err(McapError::UnexpectedEof) => return Err(torn()),
+            Err(McapError::BadMagic) => return Err(malformed("this is no MCAP file, or it is not whole".into())),
+            Err(error) => return Err(malformed(error.to_string())),
+        }
+    }
+    Ok(())
+}
+
+fn unreadable(path: &Path, channel: &Channel) -> RecordError {
+    let (topic, kind) = (&channel.topic, &channel.kind);
+    RecordError::Malformed { path: path.into(), what: format!("a message of {topic} is no {kind}") }
+}
+
+/// What there is.
+pub(super) fn topics(path: &Path) -> Result<Vec<RecordedTopic>> {
+    /// A topic on its way; fields are kept in the order in which they were seen.
+    #[derive(Default)]
+    struct Found {
+        kind: String,
+        count: u64,
+        fields: Vec<String>,
+        known: BTreeSet<String>,
+        varies: bool,
+    }
+    let mut all: BTreeMap<String, Found> = BTreeMap::new();
+    walk(path, |told| {
+        let Told::Message { channel, data, .. } = told else { return Ok(()) };
+        if !all.contains_key(&channel.topic) {
+            all.insert(channel.topic.clone(), Found { kind: channel.kind.clone(), ..Found::default() });
+        }
+        let Some(found) = all.get_mut(&channel.topic) else { return Ok(()) };
+        found.count += 1;
+        if found.count > 1 && !found.varies {
+            return Ok(());
+        }
+        let Some(reads) = &channel.reads else { return Ok(()) };
+        let value = reads.read(data).ok_or_else(|| unreadable(path, channel))?;
+        found.varies = value.varies();
+        let mut fields = Vec::new();
+        value.fields("", &mut fields);
+        let known = &mut found.known;
+        found.fields.extend(fields.into_iter().filter(|field| known.insert(field.clone())));
+        Ok(())
+    })?;
+    let topic = |(name, Found { kind, count, fields, .. })| RecordedTopic { name, kind, count, fields };
+    Ok(all.into_iter().map(topic).collect())
+}
+
+/// The numbers that are wanted.
+pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
+    let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<Step>)>> = BTreeMap::new();
+    for (place, Wanted { topic, field }) in wanted.iter().enumerate() {
+        by_topic.entry(topic).or_default().push((place, Step::of(field)));
+    }
+    let mut samples = vec![Samples::default(); wanted.len()];
+    walk(path, |told| {
+        let Told::Message { channel, time, data } = told else { return Ok(()) };
+        let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else {
+            return Ok(());
+        };
+        let value: Value = reads.read(data).ok_or_else(|| unreadable(path, channel))?;
+        for (place, steps) in of_topic {
+            if let Some(number) = value.number(steps) {
+                samples[*place].times.push(time as f64 / 1e9);
+                samples[*place].values.push(number);
+            }
+        }
+        Ok(())
+    })?;
+    Ok(samples)
+}
+
+/// A file that is in the recording.
+pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
+    let mut found = None;
+    walk(path, |told| {
+        if let Told::Attachment(attachment) = told
+            && attachment.name == name
+        {
+            found = Some(attachment.data.into_owned());
+        }
+        Ok(())
+    })?;
+    Ok(found)
+}

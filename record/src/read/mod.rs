@@ -1,0 +1,202 @@
+//! Recordings read again: what is in them, and the numbers of it over time.
+//!
+//! ```no_run
+//! use record::{Recording, Wanted};
+//!
+//! let recording = Recording::open("run.mcap")?;
+//! let topic = recording.topic("arm/joint_states", None)?;
+//! let samples = recording.samples(&[Wanted::new(&topic.name, "position[J1]")])?;
+//! println!("{} numbers", samples[0].values.len());
+//! # Ok::<(), record::RecordError>(())
+//! ```
+
+mod mcap;
+mod npz;
+
+use crate::archive::Archive;
+use crate::error::{RecordError, Result};
+use crate::format::Format;
+use scene::pattern::closest;
+use std::path::{Path, PathBuf};
+
+/// A recording that was opened: an MCAP file of ROS 2 messages, of this program or another, or a NumPy archive of a recorder.
+#[derive(Debug)]
+pub struct Recording {
+    path: PathBuf,
+    topics: Vec<RecordedTopic>,
+    content: Content,
+}
+
+#[derive(Debug)]
+enum Content {
+    /// Read from the file whenever something is wanted.
+    Mcap,
+    Npz(Box<Archive>),
+}
+
+/// Something that was recorded of one environment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedTopic {
+    /// Such as `/env_0/arm/joint_states`; of archives too.
+    pub name: String,
+    /// What it is: the type of its messages, or the array of an archive.
+    pub kind: String,
+    /// How many messages or rows there are.
+    pub count: u64,
+    /// Names of its numbers, such as `position[J1]`; none for pictures and texts.
+    pub fields: Vec<String>,
+}
+
+/// A number that is wanted of every message of a topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// The topic, in full.
+    pub topic: String,
+    /// The number.
+    pub field: String,
+}
+
+impl Wanted {
+    /// A number of a topic.
+    pub fn new(topic: impl Into<String>, field: impl Into<String>) -> Self {
+        Self { topic: topic.into(), field: field.into() }
+    }
+}
+
+/// A number over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// When it was captured, on the clock of the recording, which goes on over resets \[s\].
+    pub times: Vec<f64>,
+    /// What it was, as often.
+    pub values: Vec<f64>,
+}
+
+impl Recording {
+    /// Opens a recording, and reads what is in it.
+    ///
+    /// # Errors
+    /// There is no such file; it is neither an MCAP file of ROS 2 messages nor a NumPy archive of a recorder, or is not whole.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
+        let (content, topics) = match Format::of_path(path) {
+            Ok(Format::Mcap) => (Content::Mcap, mcap::topics(path)?),
+            Ok(Format::Npz) => {
+                let archive = Archive::read(path)?;
+                let topics = npz::topics(&archive)?;
+                (Content::Npz(Box::new(archive)), topics)
+            }
+            _ if path.extension().is_some_and(|end| end == "part") => {
+                return Err(malformed(
+                    "this recording was not finished; record::recover makes a whole file of a .mcap.part",
+                ));
+            }
+            _ => return Err(malformed("recordings that can be read are called .mcap or .npz")),
+        };
+        Ok(Self { path: path.into(), topics, content })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What was recorded, in the order of its names.
+    pub fn topics(&self) -> &[RecordedTopic] {
+        &self.topics
+    }
+
+    /// The topic of a name, or of the end of one: `arm/joint_states` and `/joint_states` are `/env_0/arm/joint_states` where there
+    /// is one arm. Without `env` it is that of the first environment.
+    ///
+    /// # Errors
+    /// No topic ends so, or more than one; the error names the nearest, or those.
+    pub fn topic(&self, name: &str, env: Option<usize>) -> Result<&RecordedTopic> {
+        if let Some(topic) = self.topics.iter().find(|topic| topic.name == name) {
+            return Ok(topic);
+        }
+        let end = format!("/{}", name.trim_start_matches('/'));
+        let of = |topic: &RecordedTopic| env_of(&topic.name);
+        let ends: Vec<&RecordedTopic> = self.topics.iter().filter(|topic| topic.name.ends_with(&end)).collect();
+        let first = env.or_else(|| ends.iter().filter_map(|topic| of(topic)).min());
+        let found: Vec<&RecordedTopic> = ends.into_iter().filter(|topic| of(topic) == first).collect();
+        match found[..] {
+            [topic] => Ok(topic),
+            [] => {
+                let inside = |topic: &&RecordedTopic| env.is_none() || of(topic) == env;
+                let short = |topic: &RecordedTopic| match (name.starts_with("/env_"), of(topic)) {
+                    (false, Some(env)) => topic.name.trim_start_matches(&format!("/env_{env}")).to_string(),
+                    _ => topic.name.clone(),
+                };
+                let mut known: Vec<String> = self.topics.iter().filter(inside).map(short).collect();
+                known.sort_unstable();
+                known.dedup();
+                let name = env.map_or_else(|| name.to_string(), |env| format!("{name} of environment {env}"));
+                Err(RecordError::UnknownName { what: "topic", candidates: nearest(&name, &known), name })
+            }
+            _ => Err(RecordError::Ambiguous {
+                what: "topic",
+                name: name.into(),
+                found: found.iter().map(|topic| topic.name.clone()).collect(),
+            }),
+        }
+    }
+
+    /// The environments that something was recorded of, in order.
+    pub fn env_ids(&self) -> Vec<usize> {
+        let mut envs: Vec<usize> = self.topics.iter().filter_map(|topic| env_of(&topic.name)).collect();
+        envs.sort_unstable();
+        envs.dedup();
+        envs
+    }
+
+    /// Numbers over time, one series for each that is wanted, in the order of the file. A message without that number, such as one
+    /// of transforms of other frames, has no sample.
+    ///
+    /// # Errors
+    /// A topic or a field that is not known, with the nearest ones; a file that is not what it was when it was opened.
+    pub fn samples(&self, wanted: &[Wanted]) -> Result<Vec<Samples>> {
+        for Wanted { topic, field } in wanted {
+            let topic = match self.topics.iter().find(|known| known.name == *topic) {
+                Some(topic) => topic,
+                None => self.topic(topic, None)?,
+            };
+            if !topic.fields.iter().any(|known| known == field) {
+                let what = "number that can be read, called";
+                let candidates = nearest(field, &topic.fields);
+                return Err(RecordError::UnknownName { what, name: format!("{field} in {}", topic.name), candidates });
+            }
+        }
+        match &self.content {
+            Content::Mcap => mcap::samples(&self.path, wanted),
+            Content::Npz(archive) => npz::samples(archive, wanted),
+        }
+    }
+
+    /// A file that the recording holds beside the numbers, by its name, such as the scene.
+    pub(crate) fn attachment(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        match &self.content {
+            Content::Mcap => mcap::attachment(&self.path, name),
+            Content::Npz(_) => npz::member(&self.path, name),
+        }
+    }
+
+    /// Whether it is an archive.
+    pub(crate) fn is_archive(&self) -> bool {
+        matches!(self.content, Content::Npz(_))
+    }
+}
+
+/// The environment of a topic.
+fn env_of(topic: &str) -> Option<usize> {
+    topic.strip_prefix("/env_")?.split('/').next()?.parse().ok()
+}
+
+fn nearest(name: &str, known: &[String]) -> Vec<String> {
+    closest(name, known.iter().map(String::as_str)).into_iter().map(String::from).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests;

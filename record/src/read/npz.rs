@@ -1,0 +1,155 @@
+//! NumPy archives of a recorder, by environment.
+
+use super::{RecordedTopic, Samples, Wanted};
+use crate::archive::Archive;
+use crate::error::{RecordError, Result};
+use crate::zip;
+use serde_json::Value;
+use std::path::Path;
+
+/// The numbers of a pose.
+const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
+
+/// A quantity of a stream.
+struct Part<'a> {
+    /// The array.
+    array: &'a str,
+    /// Names of its numbers in an environment, in order.
+    fields: Vec<String>,
+    of_forces: bool,
+}
+
+/// A stream, as `recording.json` describes it.
+struct Stream<'a> {
+    name: &'a str,
+    env_ids: Vec<usize>,
+    parts: Vec<Part<'a>>,
+}
+
+fn streams(archive: &Archive) -> Vec<Stream<'_>> {
+    let all = archive.about["streams"].as_array().into_iter().flatten();
+    all.filter_map(|stream| {
+        let name = stream["name"].as_str()?;
+        let columns = stream["columns"].as_array().into_iter().flatten();
+        let columns: Vec<String> = columns.map(|of| of.as_str().unwrap_or_default().to_string()).collect();
+        let envs = stream["env_ids"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+        let parts = stream["arrays"].as_array().into_iter().flatten().filter_map(|part| {
+            // Pictures are none of the arrays that were read.
+            let array = part["name"].as_str().filter(|array| archive.arrays.contains_key(*array))?;
+            let shape = part["shape"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+            let shape: Vec<usize> = shape.filter_map(|length| usize::try_from(length).ok()).collect();
+            let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
+            let of_forces = part["of_forces"].as_bool().unwrap_or(false);
+            Some(Part { array, fields: fields(own, &columns, &shape), of_forces })
+        });
+        let env_ids = envs.filter_map(|env| usize::try_from(env).ok()).collect();
+        Some(Stream { name, env_ids, parts: parts.collect() })
+    })
+    .collect()
+}
+
+/// Names of the numbers of a quantity: those of joints as in messages, poses by their frames, others by their places.
+fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
+    let named = match own {
+        "positions" => "position",
+        "velocities" => "velocity",
+        "efforts" => "effort",
+        "" => "value",
+        other => other,
+    };
+    match shape {
+        [count] if *count == columns.len() => columns.iter().map(|of| format!("{named}[{of}]")).collect(),
+        [count, 7] if *count == columns.len() => {
+            columns.iter().flat_map(|of| POSE.map(|number| format!("pose[{of}].{number}"))).collect()
+        }
+        shape => (0..shape.iter().product()).map(|k| format!("{named}[{k}]")).collect(),
+    }
+}
+
+/// What there is.
+pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
+    let mut topics = Vec::new();
+    for stream in streams(archive) {
+        let count = archive.steps(stream.name)?.len() as u64;
+        let fields: Vec<String> = stream.parts.iter().flat_map(|part| part.fields.iter().cloned()).collect();
+        for env in &stream.env_ids {
+            let kind = if fields.is_empty() { "pictures" } else { "numbers" };
+            let name = format!("/env_{env}/{}", stream.name);
+            topics.push(RecordedTopic { name, kind: kind.into(), count, fields: fields.clone() });
+        }
+    }
+    topics.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(topics)
+}
+
+/// The numbers that are wanted; rows in which an environment has nothing new, its time being that of the row before, are left out.
+pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Samples>> {
+    let streams = streams(archive);
+    let mut samples = Vec::with_capacity(wanted.len());
+    for Wanted { topic, field } in wanted {
+        let missing = || archive.malformed(format!("there is no {field} in {topic}"));
+        let of_env =
+            |stream: &Stream<'_>| stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name));
+        let (stream, row) = streams.iter().find_map(|stream| Some((stream, of_env(stream)?))).ok_or_else(missing)?;
+        let place = |part: &Part<'_>| part.fields.iter().position(|known| known == field);
+        let (part, column) = stream.parts.iter().find_map(|part| Some((part, place(part)?))).ok_or_else(missing)?;
+        let times = times(archive, stream, row, part.of_forces)?;
+        let mut found = Samples::default();
+        for (k, time) in times.into_iter().enumerate() {
+            let Some(time) = time else { continue };
+            let number = archive.rows(part.array, k)?.get((row, column)).copied().ok_or_else(missing)?;
+            found.times.push(time);
+            found.values.push(number);
+        }
+        samples.push(found);
+    }
+    Ok(samples)
+}
+
+/// Times of the rows of a stream in an environment, on a clock that goes on over resets \[s\]; `None` where a row holds nothing new.
+fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) -> Result<Vec<Option<f64>>> {
+    let forces = format!("{}/force_time", stream.name);
+    let array =
+        if of_forces && archive.arrays.contains_key(&forces) { forces } else { format!("{}/time", stream.name) };
+    let steps = archive.steps(stream.name)?;
+    let dt = archive.about["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
+    let dt = dt.ok_or_else(|| archive.malformed("it does not say its time step".into()))?;
+    let env = stream.env_ids.get(row).copied().unwrap_or_default();
+    let column = |array: &str| -> Result<Vec<f64>> {
+        (0..steps.len()).map(|k| Ok(archive.rows(array, k)?.get((row, 0)).copied().unwrap_or(f64::NAN))).collect()
+    };
+    let captured = column(&array)?;
+    let Some((first, step)) = captured.first().zip(steps.first()) else { return Ok(Vec::new()) };
+    // What states begin with is exact; a sensor that is late begins so much later.
+    let start = if *step == 0.0 { *first } else { first - step * dt };
+    let events = archive.happened(env)?;
+    let (mut offset, mut next, mut last) = (0.0, 0, None);
+    let mut times = Vec::with_capacity(captured.len());
+    for (&time, &step) in captured.iter().zip(steps) {
+        let now = start + step * dt;
+        while let Some((at, after)) = events.get(next) {
+            // At its own step, the row before an event has the time before it.
+            let renewed = start + at * dt - after;
+            let jumps = (after + offset - (start + at * dt)).abs() > 0.5 * dt;
+            if *at > step || (*at == step && jumps && (time + offset - now).abs() <= 0.5 * dt) {
+                break;
+            }
+            if jumps {
+                offset = renewed;
+                last = None;
+            }
+            next += 1;
+        }
+        let is_new = last != Some(time) || events.iter().any(|(at, _)| *at == step);
+        times.push(is_new.then_some(time + offset));
+        last = Some(time);
+    }
+    Ok(times)
+}
+
+/// A file of the archive.
+pub(super) fn member(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
+    let bytes = std::fs::read(path).map_err(|error| RecordError::file(path, error))?;
+    let members = zip::parse(&bytes).unwrap_or_default();
+    Ok(members.into_iter().find(|(known, _)| *known == name).map(|(_, data)| data.to_vec()))
+}

@@ -1,0 +1,149 @@
+use super::*;
+use crate::cfg::RecorderCfg;
+use crate::recorder::Record;
+use sim::{DriveCfg, DriveType, EnvId, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
+
+/// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
+const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">
+    <joint name="x" type="slide" axis="1 0 0" stiffness="40"/><geom type="sphere" size="0.1" mass="1"/></body></worldbody></mujoco>"#;
+const STEPS: u32 = 300;
+
+fn carts(names: &[&str]) -> SimulationManager {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    for name in names {
+        let mjcf = Some(MjcfFile { path: "cart.xml".into(), text: Some(SPRING.into()) });
+        let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
+        let cart = sim.add_robot(RobotCfg { uid: (*name).into(), mjcf, drive, ..Default::default() }).unwrap();
+        sim.robot_mut(cart).write_qpos(&ndarray::array![[0.3], [0.1]], None, None).unwrap();
+    }
+    sim
+}
+
+fn recorded(path: &Path, reset_at: Option<u32>) {
+    let mut sim = carts(&["cart"]);
+    let recorder = sim.record(RecorderCfg::new(path)).unwrap();
+    for step in 0..STEPS {
+        if reset_at == Some(step) {
+            sim.reset(Some(&[EnvId(1)])).unwrap();
+        }
+        sim.update(1);
+    }
+    sim.finish_recording(recorder).unwrap();
+}
+
+/// What MuJoCo's Euler steps of length h make of a spring, exactly: v' = v - h w² x and x' = x + h v' give
+/// x'' - 2 x' + x = -(h w)² x', whose solution from rest at `start` is start (cos(k a) - tan(a/2) sin(k a)) with 2 cos(a) = 2 - (h w)².
+fn swing(start: f64, step: u32) -> f64 {
+    let (h, w2) = (0.01_f64, 40.0);
+    let a = (1.0 - 0.5 * h * h * w2).acos();
+    let k = f64::from(step);
+    start * ((k * a).cos() - (0.5 * a).tan() * (k * a).sin())
+}
+
+#[test]
+fn a_recorded_swing_is_the_swing_of_the_formula_in_both_formats() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = Vec::new();
+    for name in ["run.mcap", "run.npz"] {
+        let path = folder.path().join(name);
+        recorded(&path, None);
+        let recording = Recording::open(&path).unwrap();
+        assert_eq!(recording.env_ids(), [0, 1]);
+        let [first, second] = [None, Some(1)].map(|env| recording.topic("joint_states", env).unwrap());
+        assert_eq!(
+            (first.name.as_str(), second.name.as_str()),
+            ("/env_0/cart/joint_states", "/env_1/cart/joint_states")
+        );
+        assert_eq!(first.count, u64::from(STEPS) + 1);
+        let wanted = [first, second].map(|topic| Wanted::new(&topic.name, "position[x]"));
+        let samples = recording.samples(&wanted).unwrap();
+        for (samples, start) in samples.iter().zip([0.3, 0.1]) {
+            assert_eq!((samples.times.len(), samples.values.len()), (301, 301));
+            for (step, (time, x)) in (0..).zip(samples.times.iter().zip(&samples.values)) {
+                // Times are whole nanoseconds; each of 300 steps rounds numbers below 4 (velocities) to the last bit.
+                assert!((time - 0.01 * f64::from(step)).abs() < 1e-9, "{name}: {time}");
+                assert!((x - swing(start, step)).abs() < 1e-12, "{name}: {x} at step {step}");
+            }
+        }
+        // The control: a spring that is a thousandth stiffer is told apart.
+        let off = (0..=STEPS).map(|k| (swing(0.3, k) - 0.3 * (0.01 * f64::from(k) * 40.04_f64.sqrt()).cos()).abs());
+        assert!(off.fold(0.0, f64::max) > 1e-3);
+        all.push(samples.into_iter().map(|samples| samples.values).collect::<Vec<_>>());
+    }
+    assert_eq!(all[0], all[1], "the same bits in both formats");
+}
+
+#[test]
+fn time_goes_on_over_a_reset_in_both_formats() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| {
+        let path = folder.path().join(name);
+        recorded(&path, Some(100));
+        let recording = Recording::open(&path).unwrap();
+        recording
+            .samples(&[0, 1].map(|env| Wanted::new(format!("/env_{env}/cart/joint_states"), "position[x]")))
+            .unwrap()
+    };
+    let [mcap, npz] = ["run.mcap", "run.npz"].map(read);
+    for (a, b) in mcap.iter().zip(&npz) {
+        assert_eq!(a.values, b.values);
+        assert!(a.times.iter().zip(&b.times).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}\n{:?}", a.times, b.times);
+        assert!(a.times.is_sorted() && (a.times[a.times.len() - 1] - 3.0).abs() < 1e-6);
+    }
+    // The reset has a row of its own in its environment, at the time that it has: twice there at 1 s.
+    assert_eq!((npz[0].times.len(), npz[1].times.len()), (301, 302));
+    assert!((npz[1].times[100] - 1.0).abs() < 1e-6 && (npz[1].times[101] - 1.0).abs() < 1e-6);
+    assert_eq!(npz[1].values[101], 0.0, "a reset is to the initial state");
+}
+
+#[test]
+fn what_is_not_there_is_said_with_what_is() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.npz"] {
+        let path = folder.path().join(name);
+        let mut sim = carts(&["left", "right"]);
+        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+        sim.update(3);
+        sim.finish_recording(recorder).unwrap();
+        let recording = Recording::open(&path).unwrap();
+        let said = |name: &str, env| recording.topic(name, env).unwrap_err().to_string();
+        let error = said("joint_states", None);
+        assert!(error.contains("/env_0/left/joint_states, /env_0/right/joint_states"), "{error}");
+        assert!(
+            said("left/joint_state", None).contains("known are /left/joint_states"),
+            "{}",
+            said("left/joint_state", None)
+        );
+        assert!(said("left/joint_states", Some(2)).contains("environment 2"));
+        assert_eq!(recording.topic("/left/joint_states", Some(1)).unwrap().name, "/env_1/left/joint_states");
+        let error =
+            recording.samples(&[Wanted::new("/env_0/left/joint_states", "position[y]")]).unwrap_err().to_string();
+        assert!(error.contains("position[x]"), "{error}");
+        let error = recording.samples(&[Wanted::new("/env_9/left", "position[x]")]).unwrap_err();
+        assert!(matches!(error, RecordError::UnknownName { what: "topic", .. }), "{error}");
+    }
+}
+
+#[test]
+fn what_is_no_whole_recording_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.npz"] {
+        let path = folder.path().join(name);
+        recorded(&path, None);
+        let whole = std::fs::read(&path).unwrap();
+        for end in [0, 5, 100, whole.len() / 2, whole.len() - 3] {
+            std::fs::write(&path, &whole[..end]).unwrap();
+            let error = Recording::open(&path).unwrap_err();
+            assert!(matches!(error, RecordError::Malformed { .. }), "{name} {end}: {error}");
+        }
+        let mut damaged = whole.clone();
+        let middle = whole.len() / 2;
+        damaged[middle..middle + 16].iter_mut().for_each(|byte| *byte ^= 0x5a);
+        std::fs::write(&path, &damaged).unwrap();
+        assert!(Recording::open(&path).is_err(), "{name}");
+    }
+    for (name, words) in [("none.mcap", "No such file"), ("a.mcap.part", "recover"), ("a.bag", ".mcap or .npz")] {
+        let error = Recording::open(folder.path().join(name)).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}

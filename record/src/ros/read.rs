@@ -1,0 +1,467 @@
+//! Messages read again, of any type that a file describes: the numbers in them, by name.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Types in types, at most: deeper is a circle.
+const DEEPEST: usize = 12;
+
+/// What a message is made of.
+#[derive(Clone, Debug)]
+pub(crate) struct MessageType {
+    /// Fields by the name of the type; that of the message itself is empty.
+    types: BTreeMap<String, Vec<Field>>,
+}
+
+#[derive(Clone, Debug)]
+struct Field {
+    name: Arc<str>,
+    kind: Kind,
+    many: Many,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    Number(Number),
+    Text,
+    Other(String),
+}
+
+/// A type of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Number {
+    Bool,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// How many there are of a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Many {
+    One,
+    Fixed(usize),
+    List,
+}
+
+/// What stands in a message.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Value {
+    Number(f64),
+    Numbers(Vec<f64>),
+    Text(String),
+    Texts(Vec<String>),
+    /// Bytes, which are pictures or points: they are no numbers of their own.
+    Bytes,
+    Struct(Vec<(Arc<str>, Value)>),
+    List(Vec<Value>),
+}
+
+impl Number {
+    fn of(word: &str) -> Option<Self> {
+        Some(match word {
+            "bool" => Self::Bool,
+            "int8" => Self::I8,
+            "byte" | "char" | "uint8" => Self::U8,
+            "int16" => Self::I16,
+            "uint16" => Self::U16,
+            "int32" => Self::I32,
+            "uint32" => Self::U32,
+            "int64" => Self::I64,
+            "uint64" => Self::U64,
+            "float32" => Self::F32,
+            "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+impl MessageType {
+    /// Reads a description in the words of ROS (`ros2msg`): fields, then those of the types in them behind a line of `=`. `None`
+    /// for one that is no such description.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let mut types = BTreeMap::new();
+        let mut name = String::new();
+        let mut fields = Vec::new();
+        for line in text.lines() {
+            let line = line.split('#').next().unwrap_or_default().trim();
+            if let Some(other) = line.strip_prefix("MSG:") {
+                types.insert(std::mem::replace(&mut name, short(other.trim())), std::mem::take(&mut fields));
+            } else if !line.is_empty() && !line.starts_with("==") && !is_constant(line) {
+                fields.push(Field::parse(line)?);
+            }
+        }
+        types.insert(name, fields);
+        Some(Self { types })
+    }
+
+    /// Reads a message in little-endian CDR; `None` for one that is not as the description says.
+    pub(crate) fn read(&self, message: &[u8]) -> Option<Value> {
+        // The kind of encoding, then options: as written by every ROS 2 on machines of today.
+        let ([0, 1, _, _], rest) = message.split_first_chunk::<4>()? else { return None };
+        let mut bytes = Bytes { all: rest, at: 0 };
+        self.structure(&mut bytes, self.types.get("")?, 0)
+    }
+
+    fn structure(&self, bytes: &mut Bytes<'_>, fields: &[Field], depth: usize) -> Option<Value> {
+        if depth > DEEPEST {
+            return None;
+        }
+        let mut values = Vec::with_capacity(fields.len());
+        for field in fields {
+            values.push((Arc::clone(&field.name), self.value(bytes, field, depth)?));
+        }
+        Some(Value::Struct(values))
+    }
+
+    fn value(&self, bytes: &mut Bytes<'_>, field: &Field, depth: usize) -> Option<Value> {
+        let count = match field.many {
+            Many::One => None,
+            Many::Fixed(count) => Some(count),
+            Many::List => Some(bytes.count()?),
+        };
+        // Each takes a byte at least: no message makes anybody ask for more memory than it has itself.
+        if count.is_some_and(|count| count > bytes.left()) {
+            return None;
+        }
+        match (&field.kind, count) {
+            (Kind::Number(number), None) => bytes.number(*number).map(Value::Number),
+            (Kind::Number(number), Some(count)) if number.size() == 1 => bytes.skip(count).map(|()| Value::Bytes),
+            (Kind::Number(number), Some(count)) => {
+                (0..count).map(|_| bytes.number(*number)).collect::<Option<_>>().map(Value::Numbers)
+            }
+            (Kind::Text, None) => bytes.text().map(Value::Text),
+            (Kind::Text, Some(count)) => (0..count).map(|_| bytes.text()).collect::<Option<_>>().map(Value::Texts),
+            (Kind::Other(name), count) => {
+                let fields = self.fields_of(name)?;
+                match count {
+                    None => self.structure(bytes, fields, depth + 1),
+                    Some(count) => {
+                        let each = (0..count).map(|_| self.structure(bytes, fields, depth + 1));
+                        each.collect::<Option<_>>().map(Value::List)
+                    }
+                }
+            }
+        }
+    }
+
+    /// The fields of a type, which may be called without its package.
+    fn fields_of(&self, name: &str) -> Option<&[Field]> {
+        let name = short(name);
+        let own = self.types.get(&name).or_else(|| {
+            let end = format!("/{name}");
+            self.types.iter().find(|(known, _)| known.ends_with(&end)).map(|(_, fields)| fields)
+        });
+        own.map(Vec::as_slice)
+    }
+}
+
+/// `package/msg/Type` is `package/Type`.
+fn short(name: &str) -> String {
+    name.replace("/msg/", "/")
+}
+
+/// Constants are no fields: `uint8 FLOAT32=7`.
+fn is_constant(line: &str) -> bool {
+    line.split_once(char::is_whitespace)
+        .is_some_and(|(_, rest)| rest.split(['"', '\'']).next().is_some_and(|rest| rest.contains('=')))
+}
+
+impl Field {
+    fn parse(line: &str) -> Option<Self> {
+        let mut words = line.split_whitespace();
+        let (kind, name) = (words.next()?, words.next()?);
+        let (kind, many) = match kind.split_once('[') {
+            None => (kind, Many::One),
+            Some((kind, count)) => {
+                let count = count.strip_suffix(']')?;
+                let bounded = count.is_empty() || count.starts_with("<=");
+                (kind, if bounded { Many::List } else { Many::Fixed(count.parse().ok()?) })
+            }
+        };
+        // A text may have a largest length.
+        let word = kind.split("<=").next()?;
+        let kind = match Number::of(word) {
+            Some(number) => Kind::Number(number),
+            None if word == "string" => Kind::Text,
+            None => Kind::Other(word.into()),
+        };
+        Some(Self { name: name.into(), kind, many })
+    }
+}
+
+/// Bytes behind the header, and how far they were read.
+struct Bytes<'b> {
+    all: &'b [u8],
+    at: usize,
+}
+
+impl Bytes<'_> {
+    fn left(&self) -> usize {
+        self.all.len() - self.at.min(self.all.len())
+    }
+
+    fn skip(&mut self, count: usize) -> Option<()> {
+        self.at = self.at.checked_add(count).filter(|at| *at <= self.all.len())?;
+        Some(())
+    }
+
+    /// Numbers stand at multiples of their size.
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let at = self.at.checked_next_multiple_of(N)?;
+        let array = *self.all.get(at..)?.first_chunk::<N>()?;
+        self.at = at + N;
+        Some(array)
+    }
+
+    fn number(&mut self, kind: Number) -> Option<f64> {
+        Some(match kind {
+            Number::Bool | Number::U8 => f64::from(u8::from_le_bytes(self.array()?)),
+            Number::I8 => f64::from(i8::from_le_bytes(self.array()?)),
+            Number::I16 => f64::from(i16::from_le_bytes(self.array()?)),
+            Number::U16 => f64::from(u16::from_le_bytes(self.array()?)),
+            Number::I32 => f64::from(i32::from_le_bytes(self.array()?)),
+            Number::U32 => f64::from(u32::from_le_bytes(self.array()?)),
+            Number::I64 => i64::from_le_bytes(self.array()?) as f64,
+            Number::U64 => u64::from_le_bytes(self.array()?) as f64,
+            Number::F32 => f64::from(f32::from_le_bytes(self.array()?)),
+            Number::F64 => f64::from_le_bytes(self.array()?),
+        })
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        usize::try_from(u32::from_le_bytes(self.array()?)).ok()
+    }
+
+    /// A text, whose zero at the end is counted.
+    fn text(&mut self) -> Option<String> {
+        let count = self.count()?;
+        let bytes = self.all.get(self.at..self.at.checked_add(count)?)?;
+        self.at += count;
+        Some(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
+    }
+}
+
+impl Value {
+    fn field(&self, name: &str) -> Option<&Self> {
+        let Self::Struct(fields) = self else { return None };
+        fields.iter().find(|(known, _)| **known == *name).map(|(_, value)| value)
+    }
+
+    /// What tells elements of a list apart: names beside a list of numbers, `child_frame_id` or `name` in a list of structures.
+    fn own_name(&self) -> Option<&str> {
+        let named = self.field("child_frame_id").or_else(|| self.field("name"))?;
+        if let Self::Text(name) = named { Some(name) } else { None }
+    }
+
+    fn names_beside(&self, count: usize) -> Option<&[String]> {
+        match self.field("name") {
+            Some(Self::Texts(names)) if names.len() == count => Some(names),
+            _ => None,
+        }
+    }
+
+    /// Names of all numbers in it, such as `position[J1]` or `orientation.w`.
+    pub(crate) fn fields(&self, before: &str, out: &mut Vec<String>) {
+        let Self::Struct(fields) = self else { return };
+        for (name, value) in fields {
+            let name = if before.is_empty() { name.to_string() } else { format!("{before}.{name}") };
+            match value {
+                Self::Number(_) => out.push(name),
+                Self::Numbers(numbers) => match self.names_beside(numbers.len()) {
+                    Some(names) => out.extend(names.iter().map(|of| format!("{name}[{of}]"))),
+                    None => out.extend((0..numbers.len()).map(|k| format!("{name}[{k}]"))),
+                },
+                Self::Struct(_) => value.fields(&name, out),
+                Self::List(values) => {
+                    for (k, value) in values.iter().enumerate() {
+                        let of = value.own_name().map_or_else(|| k.to_string(), String::from);
+                        value.fields(&format!("{name}[{of}]"), out);
+                    }
+                }
+                Self::Text(_) | Self::Texts(_) | Self::Bytes => {}
+            }
+        }
+    }
+
+    /// Whether other messages of the same type may have other fields.
+    pub(crate) fn varies(&self) -> bool {
+        let Self::Struct(fields) = self else { return false };
+        fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.varies())
+    }
+
+    /// The number that [`fields`](Self::fields) calls so, in parts; `None` where there is none in this message.
+    pub(crate) fn number(&self, path: &[Step]) -> Option<f64> {
+        let (first, rest) = path.split_first()?;
+        let value = self.field(&first.name)?;
+        let Some(key) = &first.key else {
+            return match value {
+                Self::Number(number) if rest.is_empty() => Some(*number),
+                other => other.number(rest),
+            };
+        };
+        let index = |count: usize| key.parse::<usize>().ok().filter(|index| *index < count);
+        match value {
+            Self::Numbers(numbers) if rest.is_empty() => {
+                let place = match self.names_beside(numbers.len()) {
+                    Some(names) => names.iter().position(|name| name == key),
+                    None => index(numbers.len()),
+                };
+                numbers.get(place?).copied()
+            }
+            Self::List(values) => {
+                let named = values.iter().find(|value| value.own_name() == Some(key));
+                named
+                    .or_else(|| values.get(index(values.len())?).filter(|value| value.own_name().is_none()))?
+                    .number(rest)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A part of the name of a field.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Step {
+    name: String,
+    /// What stands in brackets behind it.
+    key: Option<String>,
+}
+
+impl Step {
+    /// `transforms[env_0/arm/link].transform.translation.x` in its parts; what is in brackets may hold dots.
+    pub(crate) fn of(field: &str) -> Vec<Self> {
+        let (mut steps, mut depth, mut from) = (Vec::new(), 0_usize, 0);
+        let mut push = |text: &str| {
+            let key = text.split_once('[').and_then(|(name, key)| Some((name, key.strip_suffix(']')?)));
+            steps.push(match key {
+                Some((name, key)) => Self { name: name.into(), key: Some(key.into()) },
+                None => Self { name: text.into(), key: None },
+            });
+        };
+        for (at, letter) in field.char_indices() {
+            match letter {
+                '[' => depth += 1,
+                ']' => depth = depth.saturating_sub(1),
+                '.' if depth == 0 => {
+                    push(&field[from..at]);
+                    from = at + 1;
+                }
+                _ => {}
+            }
+        }
+        push(&field[from..]);
+        steps
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::super::{Cdr, Schema, Stamp, imu, joint_state, numbers, points, transforms};
+    use super::*;
+
+    const STAMP: Stamp<'_> = Stamp { nanos: 1_500_000_000, frame: "env_0" };
+
+    fn read(schema: Schema, write: impl FnOnce(&mut Cdr)) -> Value {
+        let mut cdr = Cdr::default();
+        cdr.begin();
+        write(&mut cdr);
+        MessageType::parse(&schema.text()).unwrap().read(cdr.bytes()).unwrap()
+    }
+
+    fn number(value: &Value, field: &str) -> Option<f64> {
+        value.number(&Step::of(field))
+    }
+
+    #[test]
+    fn numbers_of_messages_have_names() {
+        let names = ["J1".to_string(), "J.2".to_string()];
+        let joints = read(Schema::JointState, |cdr| joint_state(cdr, STAMP, &names, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+        let mut fields = Vec::new();
+        joints.fields("", &mut fields);
+        assert_eq!(
+            fields,
+            [
+                "header.stamp.sec",
+                "header.stamp.nanosec",
+                "position[J1]",
+                "position[J.2]",
+                "velocity[J1]",
+                "velocity[J.2]",
+                "effort[J1]",
+                "effort[J.2]"
+            ]
+        );
+        let values = fields.iter().map(|field| number(&joints, field).unwrap()).collect::<Vec<_>>();
+        assert_eq!(values, [1.0, 500_000_000.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        for unknown in
+            ["position[J3]", "position", "position[0]", "header", "header.stamp", "", "x.y[", "header.stamp.sec.x"]
+        {
+            assert_eq!(number(&joints, unknown), None, "{unknown}");
+        }
+    }
+
+    #[test]
+    fn structures_in_lists_go_by_their_names() {
+        let frames = ["a".to_string(), "b/c".to_string()];
+        let poses: Vec<f64> = (0..14).map(f64::from).collect();
+        let value = read(Schema::TfMessage, |cdr| transforms(cdr, STAMP, "env_0/", &frames, &poses));
+        assert!(value.varies());
+        assert_eq!(number(&value, "transforms[env_0/b/c].transform.translation.y"), Some(8.0));
+        // ROS has w last.
+        assert_eq!(number(&value, "transforms[env_0/a].transform.rotation.w"), Some(3.0));
+        assert_eq!(number(&value, "transforms[0].transform.rotation.w"), None);
+    }
+
+    #[test]
+    fn fixed_lists_bytes_and_plain_lists_are_read() {
+        let value = read(Schema::Imu, |cdr| imu(cdr, STAMP, &[0.1, 0.2, 0.3, 0.4], &[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]));
+        assert_eq!(number(&value, "linear_acceleration.z"), Some(6.0));
+        assert_eq!(number(&value, "orientation_covariance[8]"), Some(0.0));
+        assert_eq!(number(&value, "orientation_covariance[9]"), None);
+        let value = read(Schema::Float64MultiArray, |cdr| numbers(cdr, "forces", &[2, 2], &[1.0, 2.0, 3.0, 4.0]));
+        assert_eq!(number(&value, "data[3]"), Some(4.0));
+        assert_eq!(number(&value, "layout.dim[1].size"), Some(2.0));
+        let value = read(Schema::PointCloud2, |cdr| points(cdr, STAMP, &[1.0, 2.0, 3.0]));
+        assert_eq!((number(&value, "width"), number(&value, "is_dense")), (Some(1.0), Some(1.0)));
+    }
+
+    #[test]
+    fn what_is_no_message_is_refused() {
+        let kind = MessageType::parse(&Schema::JointState.text()).unwrap();
+        let mut cdr = Cdr::default();
+        cdr.begin();
+        joint_state(&mut cdr, STAMP, &["J".to_string()], &[1.0, 2.0, 3.0]);
+        let whole = cdr.bytes().to_vec();
+        assert!(kind.read(&whole).is_some());
+        for end in 0..whole.len() {
+            assert_eq!(kind.read(&whole[..end]), None, "{end}");
+        }
+        // A count of four thousand million.
+        let mut absurd = whole.clone();
+        absurd[24..28].fill(0xff);
+        assert_eq!(kind.read(&absurd), None);
+        // A type that holds itself.
+        let circle = MessageType::parse("A a\n====\nMSG: p/A\np/A a\n").unwrap();
+        assert_eq!(circle.read(&whole), None);
+        assert!(MessageType::parse("float64").is_none());
+        assert!(MessageType::parse("uint8 X=7 # a constant\nstring<=5 s 'a=b'\nfloat64[<=3] x\n").is_some());
+    }
+}

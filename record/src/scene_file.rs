@@ -1,0 +1,92 @@
+//! The scene inside of a recording: what is needed to show it without the program that recorded it.
+//!
+//! A ZIP archive called `scene.zip`, an attachment of an MCAP file or a member of a NumPy archive. In it are the scene as MJCF for
+//! both lines of MuJoCo, as [`SimulationManager::dump`] writes it, with meshes, textures and terrains, and `stage.json` with what
+//! MJCF has no place for. Any program that reads ZIP archives takes them out.
+
+use crate::error::{RecordError, Result};
+use crate::zip;
+use serde_json::{Value, json};
+use sim::mj::{TARGET, Target};
+use sim::{MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg};
+use std::fs;
+use std::io::{self, Cursor};
+use std::path::{Component, Path, PathBuf};
+
+/// What the archive is called in a recording.
+pub(crate) const SCENE: &str = "scene.zip";
+/// What MJCF has no place for.
+const STAGE: &str = "stage.json";
+/// Name of the part that is the recorded scene.
+pub(crate) const PART: &str = "scene";
+/// The files that MuJoCo reads, for each of its lines.
+const MJCF: [&str; 2] = ["robot.mjcf2.xml", "robot.mjcf4.xml"];
+
+/// The scene of a simulation as an archive, and what could not be put into it.
+pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
+    let failed = |error: io::Error| RecordError::file(Path::new(SCENE), error);
+    let folder = tempfile::tempdir().map_err(failed)?;
+    let left_out = sim.dump(folder.path())?.iter().map(|diagnostic| diagnostic.message.clone()).collect();
+    let mut archive = zip::Archive::new(Cursor::new(Vec::new()));
+    let stage = json!({ "num_envs": sim.num_envs(), "arena_space": sim.cfg().arena_space });
+    archive.add(STAGE, b"", &mut stage.to_string().as_bytes()).map_err(failed)?;
+    for file in files(folder.path()).map_err(failed)? {
+        let name = file.strip_prefix(folder.path()).unwrap_or(&file).to_string_lossy().replace('\\', "/");
+        // What the run itself used, and what is for people to read, shows nothing.
+        if name.ends_with(".txt") || name.ends_with(".urdf") || name == "run.mjcf.xml" {
+            continue;
+        }
+        archive.add_packed(&name, &fs::read(&file).map_err(failed)?).map_err(failed)?;
+    }
+    Ok((archive.finish().map_err(failed)?.into_inner(), left_out))
+}
+
+/// All files below a folder, in order.
+fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() { folders.push(path) } else { found.push(path) }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// A simulation of a packed scene, in as many environments as were recorded: one part that holds everything. It is there to be
+/// shown; nothing in it is driven.
+///
+/// # Errors
+/// The archive is damaged, or its scene cannot be compiled. `path` is the recording, for errors.
+pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, MjcfId)> {
+    let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: format!("its scene: {what}") };
+    let failed = |error: io::Error| RecordError::file(Path::new(SCENE), error);
+    let files = zip::unpack(bytes).ok_or_else(|| malformed("the archive is damaged"))?;
+    let folder = tempfile::tempdir().map_err(failed)?;
+    let mut stage = Value::Null;
+    for (name, data) in &files {
+        if name == STAGE {
+            stage = serde_json::from_slice(data).map_err(|_| malformed("stage.json is no JSON"))?;
+            continue;
+        }
+        // A name that leads out of the folder is none of a recorder.
+        let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+        if !inside {
+            return Err(malformed(&format!("{name:?} is no name of a file in it")));
+        }
+        let file = folder.path().join(name);
+        if let Some(parent) = file.parent() {
+            fs::create_dir_all(parent).map_err(failed)?;
+        }
+        fs::write(&file, data).map_err(failed)?;
+    }
+    let number = |name: &str| stage[name].as_u64().and_then(|number| usize::try_from(number).ok());
+    let num_envs = number("num_envs").ok_or_else(|| malformed("it does not say how many environments there are"))?;
+    let arena_space = stage["arena_space"].as_f64().unwrap_or(SimulationManagerCfg::default().arena_space);
+    let cfg = SimulationManagerCfg { num_envs, arena_space, ground: None, lights: Vec::new(), ..Default::default() };
+    let mut sim = SimulationManager::new(cfg)?;
+    let mjcf = MJCF[usize::from(TARGET == Target::V4)];
+    let part = sim.add_mjcf(MjcfCfg::file(PART, folder.path().join(mjcf)))?;
+    Ok((sim, part))
+}

@@ -1,0 +1,354 @@
+//! What was recorded, shown to viewers as a simulation is: they pause it, step, and go to and fro.
+
+use super::{Conductor, PATIENCE};
+use crate::control::hub::Mail;
+use crate::control::{Command, Speed};
+use crate::stage::{Run, Timeline};
+use sim::SimulationManager;
+use std::time::{Duration, Instant};
+
+/// Something that is known at each of some times, such as a recording.
+pub trait Film {
+    /// The times \[s\], in ascending order.
+    fn times(&self) -> &[f64];
+
+    /// Puts the simulation where it was at one of them.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String>;
+}
+
+/// Why a film is not shown, or not to its end.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlayError {
+    /// There is no time at which anything is known.
+    #[error("there is nothing to show: not a single moment was recorded")]
+    Empty,
+    /// A moment of it cannot be shown.
+    #[error("{0}")]
+    Frame(String),
+}
+
+/// Simulations that something recorded can be shown in.
+pub trait Play {
+    /// Shows a film to the viewers that the simulation has, windows and browsers, instead of stepping, as long as `go_on` says so;
+    /// it is asked many times a second. It begins at the beginning and holds at the end. Viewers pause it, do single frames, change
+    /// its speed, and seek ([`Command::Seek`]); a reset goes to the beginning. Nothing is interpolated: at each time the last moment
+    /// before is shown.
+    ///
+    /// # Errors
+    /// There is nothing to show, or a moment cannot be shown.
+    fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
+}
+
+impl Play for SimulationManager {
+    fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
+        let mut head = Playhead::new(film.times()).ok_or(PlayError::Empty)?;
+        let known = self.observer_ids::<Conductor>().first().copied();
+        // Taken out, so that it hears of nothing that the film writes.
+        let taken = known.and_then(|id| self.remove_observer(id).ok());
+        let mut conductor = taken.unwrap_or_else(Conductor::new);
+        let result = conductor.play(self, film, &mut head, go_on);
+        self.add_observer(conductor);
+        result
+    }
+}
+
+/// Where in a film somebody is.
+#[derive(Clone, Debug)]
+struct Playhead {
+    times: Vec<f64>,
+    /// The time that is shown \[s\].
+    now: f64,
+    frame: usize,
+    plays: bool,
+    speed: Speed,
+    /// When `now` was right.
+    at: Instant,
+}
+
+impl Playhead {
+    fn new(times: &[f64]) -> Option<Self> {
+        let first = *times.first()?;
+        Some(Self { times: times.to_vec(), now: first, frame: 0, plays: true, speed: Speed::REAL, at: Instant::now() })
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        [self.times[0], self.times[self.times.len() - 1]]
+    }
+
+    /// Goes to a time; the frame is the last one that is not later.
+    fn seek(&mut self, time: f64) {
+        let [start, end] = self.ends();
+        self.now = time.clamp(start, end);
+        self.frame = self.times.partition_point(|frame| *frame <= self.now).saturating_sub(1);
+    }
+
+    fn go_to_frame(&mut self, frame: usize) {
+        self.frame = frame.min(self.times.len() - 1);
+        self.now = self.times[self.frame];
+    }
+
+    /// Time has passed outside.
+    fn advance(&mut self, now: Instant) {
+        let passed = now.saturating_duration_since(self.at).as_secs_f64();
+        self.at = now;
+        if let (true, Speed::Times(factor)) = (self.plays, self.speed) {
+            self.seek(self.now + passed * factor);
+        }
+        self.stop_at_the_end();
+    }
+
+    fn stop_at_the_end(&mut self) {
+        self.plays &= self.frame + 1 < self.times.len();
+    }
+
+    /// A picture was shown: as fast as can be, each of them is another frame.
+    fn was_shown(&mut self) {
+        if self.plays && self.speed == Speed::Free {
+            self.go_to_frame(self.frame + 1);
+        }
+    }
+
+    /// How long nothing changes.
+    fn rest(&self) -> Duration {
+        match (self.plays, self.speed) {
+            (false, _) => PATIENCE,
+            (true, Speed::Free) => Duration::ZERO,
+            (true, Speed::Times(factor)) => {
+                let next = self.times.get(self.frame + 1).copied().unwrap_or(self.now);
+                Duration::from_secs_f64(((next - self.now) / factor).clamp(0.0, PATIENCE.as_secs_f64()))
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command) -> Result<(), String> {
+        match command {
+            Command::Pause => self.plays = false,
+            Command::Resume => self.resume(),
+            Command::TogglePause if self.plays => self.plays = false,
+            Command::TogglePause => self.resume(),
+            Command::Step(count) => {
+                self.plays = false;
+                self.go_to_frame(self.frame.saturating_add(count as usize));
+            }
+            Command::SetSpeed(speed) if speed.is_valid() => self.speed = speed,
+            Command::SetSpeed(speed) => {
+                let [slow, fast] = Speed::RANGE;
+                return Err(format!("speed {speed:?}: the factor must be {slow} to {fast}"));
+            }
+            Command::Reset(_) => self.go_to_frame(0),
+            Command::Seek(time) if time.is_finite() => self.seek(time),
+            Command::Seek(time) => return Err(format!("{time} is no time to go to")),
+            Command::Release => {}
+            Command::SetTarget { .. } | Command::Drag { .. } => {
+                return Err("this is a recording: nothing in it can be moved".into());
+            }
+            Command::Record(_) => return Err("this is a recording: its file is there already".into()),
+        }
+        Ok(())
+    }
+
+    /// Goes on; from the end it begins again.
+    fn resume(&mut self) {
+        if self.frame + 1 >= self.times.len() {
+            self.go_to_frame(0);
+        }
+        self.plays = true;
+    }
+}
+
+impl Conductor {
+    fn play(
+        &mut self,
+        sim: &mut SimulationManager,
+        film: &mut dyn Film,
+        head: &mut Playhead,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), PlayError> {
+        let mut shown = None;
+        while go_on() {
+            let Mail { commands, wants, .. } = self.hub.collect();
+            self.dirty |= wants != self.wants || !commands.is_empty();
+            self.wants = wants;
+            head.advance(Instant::now());
+            for (_, command) in commands {
+                if let Err(reason) = head.obey(command) {
+                    self.refused = Some(reason);
+                }
+            }
+            head.stop_at_the_end();
+            self.dirty |= shown != Some((head.frame, head.plays));
+            let rest = self.rest();
+            if self.dirty && rest.is_zero() {
+                film.show(sim, head.frame).map_err(PlayError::Frame)?;
+                shown = Some((head.frame, head.plays));
+                self.present(sim, head);
+                if !self.dirty {
+                    head.was_shown();
+                }
+            }
+            // Where the newest picture is just being taken, the next attempt comes soon.
+            let wait =
+                if self.dirty { self.rest().max(Duration::from_millis(2)) } else { head.rest().max(self.rest()) };
+            self.hub.wait_for_news(wait.clamp(Duration::from_millis(1), PATIENCE));
+        }
+        Ok(())
+    }
+
+    /// Shows the simulation as it is, which is as it was.
+    fn present(&mut self, sim: &mut SimulationManager, head: &Playhead) {
+        let [start, end] = head.ends();
+        let run = Run {
+            steps: head.frame as u64,
+            paused: !head.plays,
+            speed: head.speed,
+            measured_speed: None,
+            refused: self.refused.clone(),
+            recording: None,
+            timeline: Some(Timeline { now: head.times[head.frame], start, end }),
+        };
+        self.shown = Some(Instant::now());
+        let taken = self.pool.take(sim, self.hub.viewers() + 2, &self.wants, run);
+        self.dirty = !taken.is_some_and(|snapshot| self.hub.show(snapshot));
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::control::{Viewer, Viewing, Wants};
+    use crate::sample::sample;
+    use crate::stage::Snapshot;
+    use ndarray::array;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// Ends the showing, however it ends.
+    struct Ends<'a>(&'a AtomicBool);
+
+    impl Drop for Ends<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Release);
+        }
+    }
+
+    /// A cube that rises by a metre each second, seen ten times a second.
+    struct Rising(Vec<f64>);
+
+    impl Film for Rising {
+        fn times(&self) -> &[f64] {
+            &self.0
+        }
+
+        fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String> {
+            let cube = sim.rigid_object_id("cube").map_err(|error| error.to_string())?;
+            let row = array![[0.0, 0.0, self.0[frame], 1.0, 0.0, 0.0, 0.0]];
+            sim.rigid_object_mut(cube).write_pose(&row, None).map_err(|error| error.to_string())
+        }
+    }
+
+    fn height(snapshot: &Snapshot) -> f64 {
+        let cube = snapshot.names.bodies.iter().position(|name| name == "cube").unwrap();
+        snapshot.envs[0].look.bodies[cube].translation.z
+    }
+
+    /// What a viewer sees after commands, when the film rests: a copy, because who keeps snapshots gets no more.
+    fn watched(viewer: &Viewer, commands: &[Command]) -> Snapshot {
+        let before = viewer.newest().unwrap().number;
+        commands.iter().for_each(|command| assert!(viewer.send(*command)));
+        let mut newest = viewer.wait(before, Duration::from_secs(20)).unwrap();
+        while let Some(newer) = viewer.wait(newest.number, Duration::from_millis(400)) {
+            newest = newer;
+        }
+        Snapshot::clone(&newest)
+    }
+
+    fn playing(act: impl FnOnce(&Viewer) + Send) {
+        let mut sim = sample(1).sim;
+        let steps = sim.steps();
+        let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
+        // Times that do not begin at 0, as those of a recording that was begun late.
+        let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
+        let over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let _ends = Ends(&over);
+                act(&viewer);
+            });
+            sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
+        });
+        assert_eq!(sim.steps(), steps, "nothing was stepped");
+        // The conductor is there again: the simulation goes on as it would have.
+        drop(viewer);
+        sim.update(1);
+        assert_eq!(sim.steps(), steps + 1);
+    }
+
+    #[test]
+    fn viewers_seek_step_and_play_to_the_end() {
+        playing(|viewer| {
+            let seen = watched(viewer, &[Command::Pause, Command::Seek(5.05)]);
+            let timeline = seen.run.timeline.unwrap();
+            assert_eq!([timeline.start, timeline.end], [3.0, 7.0]);
+            // The last moment that is not later than what was asked for.
+            assert!((timeline.now - 5.0).abs() < 1e-9 && (height(&seen) - 5.0).abs() < 1e-9, "{timeline:?}");
+            assert!(seen.run.paused && (seen.envs[0].look.time - 5.0).abs() < 1e-9);
+            let seen = watched(viewer, &[Command::Step(3)]);
+            assert!((height(&seen) - 5.3).abs() < 1e-9 && seen.run.steps == 23);
+            for (time, expected) in [(-1e9, 3.0), (1e9, 7.0), (3.0, 3.0)] {
+                let seen = watched(viewer, &[Command::Seek(time)]);
+                assert!((height(&seen) - expected).abs() < 1e-9, "{time}");
+            }
+            // Ten times as fast as time: at the end after less than half a second, where it holds.
+            let seen = watched(viewer, &[Command::SetSpeed(Speed::Times(10.0)), Command::Resume]);
+            assert!((height(&seen) - 7.0).abs() < 1e-9 && seen.run.paused, "{:?}", seen.run);
+            // From there it begins again.
+            let seen = watched(viewer, &[Command::SetSpeed(Speed::Free), Command::TogglePause]);
+            assert!((height(&seen) - 7.0).abs() < 1e-9 && seen.run.paused);
+            let seen = watched(viewer, &[Command::Reset(None)]);
+            assert!((height(&seen) - 3.0).abs() < 1e-9);
+        });
+    }
+
+    #[test]
+    fn time_passes_as_it_does_outside() {
+        playing(|viewer| {
+            let begun = watched(viewer, &[Command::Pause, Command::Seek(3.0)]);
+            assert!((height(&begun) - 3.0).abs() < 1e-9);
+            let start = Instant::now();
+            viewer.send(Command::Resume);
+            std::thread::sleep(Duration::from_millis(1000));
+            let seen = watched(viewer, &[Command::Pause]);
+            let passed = start.elapsed().as_secs_f64();
+            // A frame is 0.1 s long; commands are obeyed within PATIENCE; `watched` waited 0.4 s at least.
+            let moved = height(&seen) - 3.0;
+            assert!(moved > 0.75 && moved < passed + 0.01, "{moved} m in {passed} s");
+        });
+    }
+
+    #[test]
+    fn what_makes_no_sense_for_a_recording_is_refused() {
+        playing(|viewer| {
+            for (command, words) in [
+                (Command::Seek(f64::NAN), "no time"),
+                (Command::SetSpeed(Speed::Times(0.0)), "factor"),
+                (Command::Drag { env: sim::EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] }, "recording"),
+            ] {
+                let refused = watched(viewer, &[Command::Pause, command]).run.refused.clone().unwrap();
+                assert!(refused.contains(words), "{refused}");
+            }
+        });
+        let error = sample(1).sim.play(&mut Rising(Vec::new()), &mut || true).unwrap_err();
+        assert_eq!(error, PlayError::Empty);
+        // The control: a simulation that runs has no time line.
+        let mut sim = sample(1).sim;
+        let viewer = sim.viewer(Wants::default());
+        viewer.send(Command::Seek(1.0));
+        sim.update(1);
+        let newest = viewer.newest().unwrap();
+        assert!(newest.run.timeline.is_none());
+    }
+}

@@ -1,0 +1,96 @@
+//! One axis: from values to pixels, and the values that have a tick.
+
+/// From values to the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Axis {
+    low: f64,
+    high: f64,
+    /// Where `low` and `high` are \[pixels\].
+    ends: [f64; 2],
+}
+
+/// Ticks are about as far apart as this \[pixels\].
+const BETWEEN: f64 = 80.0;
+
+impl Axis {
+    /// An axis on which all values have a place, with a margin; `ends` are where it begins and ends \[pixels\].
+    pub(super) fn new(values: impl Iterator<Item = f64>, ends: [f64; 2]) -> Self {
+        let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        // Values that are all the same, or nearly: there must be something between two ticks.
+        let least = 1e-9 * high.abs().max(low.abs());
+        if high / 2.0 - low / 2.0 <= least {
+            let half = if least > 0.0 { (0.5_f64).min(high.abs()).max(2.0 * least) } else { 0.5 };
+            (low, high) = (low - half, high + half);
+        }
+        // Half as large, so that the largest numbers there are have a difference.
+        let margin = 0.04 * (high / 2.0 - low / 2.0);
+        Self { low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), ends }
+    }
+
+    /// Where a value is \[pixels\].
+    pub(super) fn place(&self, value: f64) -> f64 {
+        let share = (value - self.low) / (self.high - self.low);
+        self.ends[0] + share * (self.ends[1] - self.ends[0])
+    }
+
+    /// Values with a tick and what is written there: 1, 2 or 5 times a power of ten.
+    pub(super) fn ticks(&self) -> Vec<(f64, String)> {
+        let wanted = ((self.ends[1] - self.ends[0]).abs() / BETWEEN).clamp(2.0, 20.0);
+        let raw = (self.high - self.low) / wanted;
+        let power = 10.0_f64.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power);
+        let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
+        // Not more than a screen is wide, whatever was rounded.
+        let count = (last - first).clamp(0.0, 100.0) as u32;
+        let ticks = (0..=count).map(|k| (first + f64::from(k)) * step).filter(|tick| tick.is_finite());
+        ticks.map(|tick| (tick, self.label(tick, step))).collect()
+    }
+
+    /// So many digits that neighbours differ.
+    fn label(&self, tick: f64, step: f64) -> String {
+        // Adding 0 makes -0 a 0.
+        let (tick, largest) = (tick + 0.0, self.low.abs().max(self.high.abs()));
+        // A tenth more than a whole power is that power: logarithms are rounded.
+        let of_step = (step.log10() + 1e-9).floor();
+        if largest < 1e6 && of_step >= -6.0 {
+            return format!("{tick:.*}", (-of_step).clamp(0.0, 6.0) as usize);
+        }
+        let of_tick = if tick == 0.0 { of_step } else { tick.abs().log10().floor() };
+        format!("{tick:.*e}", (of_tick - of_step).clamp(0.0, 12.0) as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(values: [f64; 2]) -> Vec<String> {
+        Axis::new(values.into_iter(), [0.0, 400.0]).ticks().into_iter().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_numbers_that_differ() {
+        assert_eq!(labels([0.0, 1.0]), ["0.0", "0.5", "1.0"].map(String::from));
+        assert_eq!(labels([-3.0, 40.0]), ["0", "10", "20", "30", "40"].map(String::from));
+        assert_eq!(labels([100.0, 100.02]), ["100.000", "100.005", "100.010", "100.015", "100.020"].map(String::from));
+        for values in [[1e9, 1e9 + 50.0], [1e-9, 5e-9], [-1e300, 1e300], [f64::MIN, f64::MAX], [7.0, 7.0], [0.0, 0.0]] {
+            let labels = labels(values);
+            assert!((2..=12).contains(&labels.len()), "{values:?}: {labels:?}");
+            assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{values:?}: {labels:?}");
+            assert!(labels.iter().all(|label| label.parse::<f64>().is_ok_and(f64::is_finite)), "{labels:?}");
+        }
+    }
+
+    #[test]
+    fn values_have_their_places() {
+        let axis = Axis::new([0.0, 10.0].into_iter(), [0.0, 540.0]);
+        // A margin of 2 % of the span on both sides: 10.4 values on 540 pixels.
+        assert!((axis.place(0.0) - 0.2 / 10.4 * 540.0).abs() < 1e-9);
+        assert!((axis.place(10.0) - axis.place(5.0) - 5.0 / 10.4 * 540.0).abs() < 1e-9);
+        assert!(Axis::new([f64::MIN, f64::MAX].into_iter(), [0.0, 1.0]).place(0.0).is_finite());
+        assert!(Axis::new(std::iter::empty(), [0.0, 1.0]).place(0.5).is_finite());
+    }
+}

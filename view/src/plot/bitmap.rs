@@ -1,0 +1,126 @@
+//! A plot as pixels.
+
+use super::layout::{Anchor, Curve, Drawing, Label};
+use crate::stage::Canvas;
+use embedded_graphics::mono_font::MonoTextStyle;
+use embedded_graphics::mono_font::iso_8859_1::FONT_7X13;
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+
+const GREY: [u8; 3] = [221; 3];
+const BLACK: [u8; 3] = [0; 3];
+/// Half the width of a curve \[pixels\].
+const CURVE: f64 = 0.75;
+
+/// The picture.
+pub(super) fn picture(drawing: &Drawing) -> Canvas {
+    let Drawing { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, keys } = drawing;
+    let mut canvas = Canvas::new(*width, *height);
+    canvas.bytes_mut().fill(255);
+    let mut pen = Pen { cover: vec![0; width * height], touched: Vec::new(), size: [*width, *height] };
+    for [from, to] in grid {
+        pen.stroke(*from, *to, 0.5);
+    }
+    pen.ink(&mut canvas, GREY);
+    for Curve { color, pieces } in curves {
+        for piece in pieces {
+            for pair in piece.windows(2) {
+                pen.stroke(pair[0], pair[1], CURVE);
+            }
+            if let [one] = piece[..] {
+                pen.stroke(one, one, 2.0);
+            }
+        }
+        pen.ink(&mut canvas, *color);
+    }
+    let corners = [[*left, *top], [*right, *top], [*right, *bottom], [*left, *bottom]];
+    for k in 0..4 {
+        pen.stroke(corners[k], corners[(k + 1) % 4], 0.5);
+    }
+    pen.ink(&mut canvas, BLACK);
+    for ([from, to], color) in keys {
+        pen.stroke(*from, *to, 1.5);
+        pen.ink(&mut canvas, *color);
+    }
+    for label in labels {
+        write(&mut canvas, label);
+    }
+    canvas
+}
+
+fn write(canvas: &mut Canvas, Label { text, at, anchor }: &Label) {
+    let alignment = match anchor {
+        Anchor::Start => Alignment::Left,
+        Anchor::Middle => Alignment::Center,
+        Anchor::End => Alignment::Right,
+    };
+    let style = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Alphabetic).build();
+    let [x, y] = at.map(|x| x.round() as i32);
+    let Ok(_) = Text::with_text_style(text, Point::new(x, y), MonoTextStyle::new(&FONT_7X13, Rgb888::BLACK), style)
+        .draw(canvas);
+}
+
+/// Draws soft lines. What the lines of one curve cover is collected first: where they meet, nothing is darker.
+struct Pen {
+    /// How much of each pixel is covered, of 255.
+    cover: Vec<u8>,
+    touched: Vec<usize>,
+    size: [usize; 2],
+}
+
+impl Pen {
+    /// A line of twice the width `half` \[pixels\]; pixels are covered as far as their centres are inside, within a pixel.
+    fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64) {
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let length = way[0].hypot(way[1]);
+        // Points of a plot are in its frame, so that a line is as long as a picture at most.
+        let steps = length.ceil().clamp(1.0, 1e5) as u32;
+        let reach = (half + 1.0).ceil() as i64;
+        let mut last = None;
+        for k in 0..=steps {
+            let t = f64::from(k) / f64::from(steps);
+            let near = [0, 1].map(|axis| (from[axis] + t * way[axis]).floor() as i64);
+            if last == Some(near) {
+                continue;
+            }
+            last = Some(near);
+            for y in near[1] - reach..=near[1] + reach {
+                for x in near[0] - reach..=near[0] + reach {
+                    let center = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
+                    let along = if length > 0.0 {
+                        ((center[0] * way[0] + center[1] * way[1]) / (length * length)).clamp(0.0, 1.0)
+                    } else {
+                        0.0
+                    };
+                    let off = (center[0] - along * way[0]).hypot(center[1] - along * way[1]);
+                    self.touch([x, y], (half + 0.5 - off).clamp(0.0, 1.0));
+                }
+            }
+        }
+    }
+
+    fn touch(&mut self, [x, y]: [i64; 2], share: f64) {
+        let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
+        let covered = (255.0 * share).round() as u8;
+        if x >= self.size[0] || y >= self.size[1] || covered == 0 {
+            return;
+        }
+        let at = y * self.size[0] + x;
+        if self.cover[at] == 0 {
+            self.touched.push(at);
+        }
+        self.cover[at] = self.cover[at].max(covered);
+    }
+
+    /// Puts what was collected on the canvas.
+    fn ink(&mut self, canvas: &mut Canvas, color: [u8; 3]) {
+        let (pixels, _) = canvas.bytes_mut().as_chunks_mut::<4>();
+        for at in self.touched.drain(..) {
+            let a = u32::from(std::mem::take(&mut self.cover[at]));
+            for (to, new) in pixels[at].iter_mut().zip(color) {
+                *to = ((u32::from(*to) * (255 - a) + u32::from(new) * a + 127) / 255) as u8;
+            }
+        }
+    }
+}

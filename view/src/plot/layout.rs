@@ -1,0 +1,125 @@
+//! Where everything of a plot is, before it is text or pixels.
+
+use super::Plot;
+use super::axis::Axis;
+use super::thin::thinned;
+
+/// Everything that is drawn, in pixels from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Drawing {
+    pub(super) size: [usize; 2],
+    /// Left, top, right and bottom of the frame.
+    pub(super) frame: [f64; 4],
+    /// Lines of the grid.
+    pub(super) grid: Vec<[[f64; 2]; 2]>,
+    pub(super) labels: Vec<Label>,
+    pub(super) curves: Vec<Curve>,
+    /// The strokes of the legend, with their colours.
+    pub(super) keys: Vec<([[f64; 2]; 2], [u8; 3])>,
+}
+
+/// Some letters.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Label {
+    pub(super) text: String,
+    /// A point of the line that letters stand on.
+    pub(super) at: [f64; 2],
+    /// What of the text is there.
+    pub(super) anchor: Anchor,
+}
+
+/// What of a text is at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// A curve in pieces that hang together.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Curve {
+    pub(super) color: [u8; 3],
+    pub(super) pieces: Vec<Vec<[f64; 2]>>,
+}
+
+/// Colours that people with any eyes tell apart. Source: Okabe and Ito, Color Universal Design.
+const COLORS: [[u8; 3]; 7] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [0, 0, 0]];
+/// Width and height of a letter \[pixels\].
+pub(super) const LETTER: [f64; 2] = [7.0, 13.0];
+/// A stroke of the legend, and the gaps around it \[pixels\].
+const KEY: f64 = 24.0;
+const GAP: f64 = 8.0;
+const TOP: f64 = 46.0;
+const BOTTOM: f64 = 46.0;
+
+impl Drawing {
+    pub(super) fn of(plot: &Plot) -> Self {
+        let [width, height] = plot.size.map(|n| n as f64);
+        let finite = |p: &&[f64; 2]| p.iter().all(|x| x.is_finite());
+        let values = |k: usize| plot.series.iter().flat_map(|s| &s.points).filter(finite).map(move |p| p[k]);
+        let letters = plot.series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
+        let room = (((0.4 * width - KEY - 3.0 * GAP) / LETTER[0]) as usize).min(letters);
+        let beside = if letters == 0 { 0.0 } else { KEY + 2.0 * GAP + LETTER[0] * room as f64 };
+        let (top, right, bottom) = (TOP, width - 2.0 * GAP - beside, height - BOTTOM);
+        let across = Axis::new(values(1), [bottom, top]);
+        let rows = across.ticks();
+        let longest = rows.iter().map(|(_, label)| label.len()).max().unwrap_or(0);
+        let left = LETTER[0] * longest as f64 + 3.0 * GAP;
+        let along = Axis::new(values(0), [left, right]);
+        let mut drawing = Self {
+            size: plot.size,
+            frame: [left, top, right, bottom],
+            grid: Vec::new(),
+            labels: Vec::new(),
+            curves: Vec::new(),
+            keys: Vec::new(),
+        };
+        for (tick, label) in along.ticks() {
+            let x = along.place(tick);
+            drawing.grid.push([[x, bottom], [x, top]]);
+            drawing.label(label, [x, bottom + LETTER[1] + 3.0], Anchor::Middle);
+        }
+        for (tick, label) in rows {
+            let y = across.place(tick);
+            drawing.grid.push([[left, y], [right, y]]);
+            drawing.label(label, [left - GAP, y + 4.0], Anchor::End);
+        }
+        let middle = (left + right) / 2.0;
+        drawing.label(plot.title.clone(), [middle, 18.0], Anchor::Middle);
+        drawing.label(plot.axes[0].clone(), [middle, height - GAP], Anchor::Middle);
+        drawing.label(plot.axes[1].clone(), [GAP, top - GAP], Anchor::Start);
+        let most = ((bottom - top) / (LETTER[1] + 3.0)) as usize;
+        for (k, series) in plot.series.iter().enumerate() {
+            let color = COLORS[k % COLORS.len()];
+            let pieces = series.points.split(|p| !finite(&p)).filter(|piece| !piece.is_empty());
+            let places = |piece: &[[f64; 2]]| piece.iter().map(|p| [along.place(p[0]), across.place(p[1])]).collect();
+            let pieces = pieces.map(|piece| thinned(places(piece))).collect();
+            drawing.curves.push(Curve { color, pieces });
+            let [from, y] = [right + GAP, top + (LETTER[1] + 3.0) * (k as f64 + 0.5)];
+            let more = plot.series.len() - k;
+            if k + 1 < most || more == 1 && k < most {
+                drawing.keys.push(([[from, y], [from + KEY, y]], color));
+                drawing.label(shortened(&series.name, room), [from + KEY + GAP, y + 4.0], Anchor::Start);
+            } else if k + 1 == most {
+                drawing.label(format!("and {more} more"), [from, y + 4.0], Anchor::Start);
+            }
+        }
+        drawing
+    }
+
+    fn label(&mut self, text: String, at: [f64; 2], anchor: Anchor) {
+        self.labels.push(Label { text, at, anchor });
+    }
+}
+
+/// The end of a name, where it is too long: there names differ.
+fn shortened(name: &str, room: usize) -> String {
+    let count = name.chars().count();
+    if count <= room {
+        return name.into();
+    }
+    let end = name.chars().skip(count - room.saturating_sub(3));
+    ["..".chars(), ".".chars()].into_iter().flatten().take(room).chain(end).collect()
+}

@@ -1,0 +1,146 @@
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use super::*;
+
+/// Numbers of an attribute, such as `x="1.5"`.
+fn attribute(line: &str, name: &str) -> f64 {
+    let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+    rest.split('"').next().unwrap().parse().unwrap()
+}
+
+/// The labels of an axis: those that stand at the frame's side. Values and pixels of the two that are farthest apart.
+fn two_ticks(svg: &str, anchor: &str, name: &str) -> [(f64, f64); 2] {
+    let labels = svg.lines().filter(|line| line.starts_with("<text") && line.contains(anchor));
+    let ticks: Vec<(f64, f64)> = labels
+        .filter_map(|line| {
+            let text = line.split_once('>').unwrap().1.trim_end_matches("</text>");
+            Some((text.parse().ok()?, attribute(line, name)))
+        })
+        .collect();
+    [ticks[0], ticks[ticks.len() - 1]]
+}
+
+/// From pixels back to values, as a reader does it who sees only the labels.
+pub(crate) fn values(svg: &str) -> Vec<Vec<[f64; 2]>> {
+    let along = two_ticks(svg, "\"middle\"", "x");
+    // Labels of rows stand 4 pixels below their lines.
+    let across = two_ticks(svg, "\"end\"", "y").map(|(value, y)| (value, y - 4.0));
+    let back = |[(a, x), (b, y)]: [(f64, f64); 2], pixel: f64| a + (pixel - x) / (y - x) * (b - a);
+    let lines = svg.lines().filter(|line| line.starts_with("<polyline"));
+    let points = lines.map(|line| line.split_once("points=\"").unwrap().1.trim_end_matches("\"/>"));
+    points
+        .map(|points| {
+            let of_one = |point: &str| {
+                let (x, y) = point.split_once(',').unwrap();
+                [back(along, x.parse().unwrap()), back(across, y.parse().unwrap())]
+            };
+            points.split(' ').map(of_one).collect()
+        })
+        .collect()
+}
+
+fn sine(points: u32) -> Plot {
+    let wave = (0..points).map(|k| f64::from(k) * 2.0 / f64::from(points)).map(|t| [t, 0.3 * (5.0 * t).sin()]);
+    Plot::over_time("a wave", "angle [rad]").with(Series::new("hinge", wave))
+}
+
+#[test]
+fn the_line_of_a_sine_lies_on_the_sine() {
+    let svg = sine(300).to_svg().unwrap();
+    let lines = values(&svg);
+    assert_eq!((lines.len(), lines[0].len()), (1, 300));
+    // Pixels have two decimals, and so have the labels: 2 s on some 800 pixels, 0.6 rad on some 430.
+    let (time, angle) = (0.02 * 2.0 / 700.0, 0.02 * 0.6 / 400.0);
+    for (k, [t, y]) in (0..).zip(&lines[0]) {
+        let exact = f64::from(k) * 2.0 / 300.0;
+        assert!((t - exact).abs() < time, "{t} instead of {exact}");
+        assert!((y - 0.3 * (5.0 * exact).sin()).abs() < angle, "{y} at {t}");
+    }
+    // The control: a wave that is a thousandth faster does not.
+    let off = lines[0].iter().map(|[t, y]| (y - 0.3 * (5.005 * t).sin()).abs()).fold(0.0, f64::max);
+    assert!(off > 10.0 * angle, "{off}");
+}
+
+#[test]
+fn the_picture_has_ink_where_the_line_of_the_text_is() {
+    let plot = sine(300);
+    let (canvas, drawing) = (plot.to_canvas().unwrap(), plot.drawing().unwrap());
+    let blue = |x: f64, y: f64| {
+        let [r, g, b] = canvas.pixel(x.floor() as usize, y.floor() as usize).unwrap();
+        r < 128 && g < 190 && b > 150
+    };
+    for point in &drawing.curves[0].pieces[0] {
+        assert!(blue(point[0], point[1]), "{point:?}");
+        // The control: ten pixels beside it there is none, but where the line is steep.
+        let flat = (point[1] - drawing.curves[0].pieces[0][15][1]).abs() < 20.0;
+        assert!(flat || !blue(point[0], point[1] + 12.0) || !blue(point[0], point[1] - 12.0), "{point:?}");
+    }
+    // All ink of the curve is near it: a line of 1.5 pixels and half a pixel of edge to both sides.
+    let [left, top, right, bottom] = drawing.frame.map(|x| x as usize);
+    let piece = &drawing.curves[0].pieces[0];
+    for y in top + 2..bottom - 2 {
+        for x in (left + 2..right - 2).filter(|x| blue(*x as f64, y as f64)) {
+            let [px, py] = [x as f64 + 0.5, y as f64 + 0.5];
+            let near = piece.windows(2).any(|pair| {
+                let way = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+                let to = [px - pair[0][0], py - pair[0][1]];
+                let t = ((to[0] * way[0] + to[1] * way[1]) / (way[0] * way[0] + way[1] * way[1])).clamp(0.0, 1.0);
+                (to[0] - t * way[0]).hypot(to[1] - t * way[1]) < 1.3
+            });
+            assert!(near, "ink at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn curves_stay_in_the_frame_and_break_where_there_is_no_number() {
+    let points = [[0.0, 1.0], [1.0, f64::NAN], [2.0, -5.0], [3.0, 2.0], [f64::INFINITY, 0.0], [4.0, 1e3]];
+    let plot = Plot::over_time("a < b & c", "x").with(Series::new("one", points)).with(Series::new("two", []));
+    let svg = plot.to_svg().unwrap();
+    assert!(svg.contains("a &lt; b &amp; c") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    // Two points alone, one line.
+    assert_eq!((svg.matches("<circle").count(), svg.matches("<polyline").count()), (2, 1));
+    let drawing = plot.drawing().unwrap();
+    let [left, top, right, bottom] = drawing.frame;
+    for [x, y] in drawing.curves.iter().flat_map(|curve| &curve.pieces).flatten() {
+        assert!((left..right).contains(x) && (top..bottom).contains(y), "{x}, {y}");
+    }
+    plot.to_canvas().unwrap();
+}
+
+#[test]
+fn many_curves_and_long_names_leave_room_for_the_plot() {
+    let series =
+        (0..90).map(|k| Series::new(format!("{}end{k}", "long/".repeat(40)), [[0.0, 1.0], [1.0, f64::from(k)]]));
+    let plot = Plot { series: series.collect(), ..Plot::default() };
+    let svg = plot.to_svg().unwrap();
+    assert!(svg.contains("...") && svg.contains("end3</text>") && svg.contains("more</text>"), "{svg}");
+    let [left, _, right, _] = plot.drawing().unwrap().frame;
+    assert!(right - left > 0.4 * 960.0);
+    let small = Plot { size: [200, 200], ..plot.clone() };
+    small.to_canvas().unwrap();
+    // Nothing at all is a frame.
+    assert!(Plot::default().to_svg().unwrap().ends_with("</svg>\n"));
+}
+
+#[test]
+fn files_are_what_their_names_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let plot = sine(50);
+    let [svg, png] = ["a.svg", "a.PNG"].map(|name| folder.path().join(name));
+    std::fs::write(&svg, "what was there before").unwrap();
+    plot.write(&svg).unwrap();
+    plot.write(&png).unwrap();
+    assert_eq!(std::fs::read_to_string(&svg).unwrap(), plot.to_svg().unwrap());
+    let image = image::load_from_memory(&std::fs::read(&png).unwrap()).unwrap().to_rgba8();
+    assert_eq!(image.dimensions(), (960, 540));
+    assert_eq!(image.into_raw(), plot.to_canvas().unwrap().bytes());
+    let files = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, 2, "nothing else is left");
+    for (name, words) in [("a.gif", ".svg or .png"), ("a", ".svg or .png"), ("no/such/folder/a.svg", "No such file")] {
+        let error = plot.write(folder.path().join(name)).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    let error = Plot { size: [20, 540], ..plot }.write(&svg).unwrap_err();
+    assert!(matches!(error, PlotError::Size { width: 20, .. }), "{error}");
+}

@@ -1,0 +1,110 @@
+//! The time line of what was recorded, along the lower edge of a window.
+
+use crate::stage::{Canvas, Snapshot, Timeline};
+use embedded_graphics::mono_font::ascii::FONT_6X10;
+
+const DARK: [u8; 3] = [20, 22, 26];
+const GREY: [u8; 3] = [170; 3];
+const YELLOW: [u8; 3] = [255, 210, 60];
+
+/// From the sides of the window to the line \[pixels\].
+const SIDE: f64 = 70.0;
+/// Height of the strip at the lower edge in which it can be grasped \[pixels\].
+const HEIGHT: f64 = 16.0;
+
+/// Where the line begins and ends \[pixels\].
+fn ends(width: usize) -> [f64; 2] {
+    let width = width as f64;
+    [SIDE.min(width / 2.0), (width - SIDE).max(width / 2.0)]
+}
+
+/// Draws it, where there is one.
+pub(super) fn draw(canvas: &mut Canvas, snapshot: &Snapshot) {
+    let Some(Timeline { now, start, end }) = snapshot.run.timeline else { return };
+    let [width, height] = canvas.dimensions();
+    let [left, right] = ends(width).map(|x| x as i32);
+    let top = i32::try_from(height).unwrap_or(i32::MAX) - HEIGHT as i32;
+    canvas.fill([0, top], [i32::try_from(width).unwrap_or(i32::MAX), HEIGHT as i32], DARK, 200);
+    canvas.fill([left, top + 6], [right - left, 4], GREY, 110);
+    let share = if end > start { (now - start) / (end - start) } else { 0.0 };
+    let at = left + (share.clamp(0.0, 1.0) * f64::from(right - left)) as i32;
+    canvas.fill([left, top + 6], [at - left, 4], YELLOW, 160);
+    canvas.fill([at - 1, top + 2], [3, 12], YELLOW, 255);
+    canvas.text(&format!("{start:.2}"), [4, top + 3], &FONT_6X10, GREY);
+    canvas.text(&format!("{end:.2} s"), [right + 8, top + 3], &FONT_6X10, GREY);
+}
+
+/// The time at a pixel, where that is on the line.
+pub(super) fn time_at(snapshot: &Snapshot, size: [usize; 2], [x, y]: [f64; 2]) -> Option<f64> {
+    snapshot.run.timeline?;
+    (y >= size[1] as f64 - HEIGHT).then(|| time_beside(snapshot, size[0], x))?
+}
+
+/// The time that the line has where the mouse is, above and beside it too.
+pub(super) fn time_beside(snapshot: &Snapshot, width: usize, x: f64) -> Option<f64> {
+    let Timeline { start, end, .. } = snapshot.run.timeline?;
+    let [left, right] = ends(width);
+    let share = if right > left { ((x - left) / (right - left)).clamp(0.0, 1.0) } else { 0.0 };
+    Some(start + share * (end - start))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::control::Command;
+    use crate::stage::Run;
+    use crate::window::{App, Input, Modifiers};
+    use std::sync::Arc;
+
+    fn at(now: f64) -> Snapshot {
+        let timeline = Some(Timeline { now, start: 2.0, end: 6.0 });
+        Snapshot { run: Run { timeline, ..Run::default() }, ..Snapshot::default() }
+    }
+
+    #[test]
+    fn the_mark_is_where_a_click_goes_to() {
+        let size = [400, 300];
+        for now in [2.0, 3.0, 5.5, 6.0] {
+            let mut canvas = Canvas::new(size[0], size[1]);
+            draw(&mut canvas, &at(now));
+            let row: Vec<usize> = (0..400).filter(|x| canvas.pixel(*x, 287) == Some(YELLOW)).collect();
+            assert_eq!(row.len(), 3, "{row:?}");
+            // 260 pixels are 4 s.
+            let time = time_at(&at(now), size, [row[1] as f64 + 0.5, 287.0]).unwrap();
+            assert!((time - now).abs() < 4.0 / 260.0, "{time} instead of {now}");
+        }
+        assert_eq!(time_at(&at(3.0), size, [200.0, 250.0]), None, "above the line");
+        assert_eq!([-50.0, 900.0].map(|x| time_beside(&at(3.0), 400, x).unwrap()), [2.0, 6.0]);
+    }
+
+    #[test]
+    fn a_window_seeks_where_its_line_is_pressed_and_dragged() {
+        let mut app = App::new([400, 300], 1);
+        let mut press = |snapshot: Snapshot, at: [f64; 2]| {
+            app.show(Arc::new(snapshot));
+            app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+            app.handle(Input::Move([200.0, 100.0]));
+            app.handle(Input::ButtonRelease(1, [200.0, 100.0]));
+            app.take_commands()
+        };
+        // The middle of 2 s to 6 s, wherever the mouse went above it.
+        assert_eq!(press(at(3.0), [70.0, 290.0]), [Command::Seek(2.0), Command::Seek(4.0)]);
+        // The controls: above the line, and where there is none.
+        assert_eq!(press(at(3.0), [70.0, 200.0]), []);
+        assert_eq!(press(Snapshot::default(), [70.0, 290.0]), []);
+    }
+
+    #[test]
+    fn without_a_recording_and_in_the_smallest_windows_nothing_is_wrong() {
+        let mut canvas = Canvas::new(50, 50);
+        let plain = canvas.clone();
+        draw(&mut canvas, &Snapshot::default());
+        assert_eq!(canvas, plain);
+        assert_eq!(time_at(&Snapshot::default(), [50, 50], [25.0, 49.0]), None);
+        for size in [[1, 1], [3, 100], [0, 0]] {
+            draw(&mut Canvas::new(size[0], size[1]), &at(3.0));
+            assert!(time_beside(&at(3.0), size[0], 1.0).unwrap().is_finite());
+        }
+    }
+}
