@@ -5,8 +5,8 @@ use crate::{Ending, Result, excerpt};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A model as it moves: in a window, or in a browser with --serve
@@ -24,6 +24,9 @@ pub(crate) struct Args {
     /// Environments, side by side
     #[arg(long, alias = "num_envs", default_value_t = 1)]
     num_envs: usize,
+    /// Distance of environments, in metres
+    #[arg(long, alias = "arena_space", default_value_t = 2.0)]
+    arena_space: f64,
     /// Threads that step [default: every core]
     #[arg(long)]
     threads: Option<usize>,
@@ -47,12 +50,21 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(slow..=fast).contains(&args.speed) {
         return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
     }
-    let cfg = SimulationManagerCfg { num_envs: args.num_envs, threads: args.threads, ..Default::default() };
+    let cfg = SimulationManagerCfg {
+        num_envs: args.num_envs,
+        arena_space: args.arena_space,
+        threads: args.threads,
+        ..Default::default()
+    };
     let mut sim = args.model.scene(cfg)?;
     let warned = excerpt::print_warnings(sim.diagnostics());
     let files = Arc::new(Mutex::new(args.recording()));
     if args.record.is_some() {
-        files.lock().unwrap_or_else(PoisonError::into_inner).begin(&mut sim).map_err(|error| format!("--record {error}"))?;
+        files
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(&mut sim)
+            .map_err(|error| format!("--record {error}"))?;
     }
     let window = args.show(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let interrupted = on_ctrl_c(&mut sim);

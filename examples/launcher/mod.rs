@@ -237,7 +237,10 @@ impl Launcher {
         FILES.get_or_init(|| {
             let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
             let path = self.record.clone().unwrap_or_else(folder);
-            Arc::new(Mutex::new(FileRecording::new(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) })))
+            Arc::new(Mutex::new(FileRecording::new(RecorderCfg {
+                overwrite: self.overwrite,
+                ..RecorderCfg::new(path)
+            })))
         })
     }
 

@@ -61,7 +61,7 @@ fn the_page_shows_the_simulation_and_acts_on_it() {
     let Some(browser) = browser() else { return };
     let running = Running::start(2);
     let mut tab = page(&browser, &running);
-    assert_eq!(tab.evaluate("document.title"), "arm – Kinetoscope");
+    tab.wait_until("its title", "document.title === 'arm – Kinetoscope'");
 
     // A picture arrives, as large as it is shown, with the cube in it.
     tab.wait_until("a picture", "document.getElementById('cover').hidden");
@@ -210,7 +210,10 @@ fn the_record_button_writes_a_file() {
     tab.wait_until("a button", &format!("!{button}.hidden && {button}.textContent === 'Record'"));
     tab.click(button);
     tab.wait_until("it records", &format!("{button}.textContent === 'Stop recording'"));
-    tab.wait_until("rows are told", "/^run.npz: \\d\\d+ rows$/.test(document.getElementById('record-text').textContent)");
+    tab.wait_until(
+        "rows are told",
+        "/^run.npz: \\d\\d+ rows$/.test(document.getElementById('record-text').textContent)",
+    );
     tab.click(button);
     tab.wait_until("it has ended", &format!("{button}.textContent === 'Record'"));
     assert!(path.is_file());

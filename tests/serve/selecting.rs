@@ -25,9 +25,8 @@ fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
     visitor.ask(json!({"do": "size", "width": 640, "height": 360}));
     visitor.ask(json!({"do": "environment", "env": env}));
     // It starts where it stands, and sinks in by the softness of the contact.
-    visitor.wait_state("the cube is at rest", |state| {
-        state["environment"] == env && state["time"].as_f64() > Some(1.5)
-    });
+    visitor
+        .wait_state("the cube is at rest", |state| state["environment"] == env && state["time"].as_f64() > Some(1.5));
     let mut found = None;
     visitor.wait_picture("stage", |_, picture| {
         found = middle_of_the_cube(picture).filter(|_| picture.dimensions() == (640, 360));

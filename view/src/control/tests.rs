@@ -6,8 +6,8 @@ use crate::sample::{MASS, sample};
 use crate::stage::Snapshot;
 use scene::Pose;
 use sim::{BodyMotion, RigidObjectCfg, SimulationManagerCfg};
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 

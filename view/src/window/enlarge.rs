@@ -48,7 +48,8 @@ impl Enlarged {
         factor: usize,
     ) -> Result<Self, Failure> {
         let [width, height] = size.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
-        let [pixmap, source, target] = [connection.generate_id()?, connection.generate_id()?, connection.generate_id()?];
+        let [pixmap, source, target] =
+            [connection.generate_id()?, connection.generate_id()?, connection.generate_id()?];
         connection.create_pixmap(depth, pixmap, window, width, height)?;
         // Beyond its edge its last pixels are seen, where the window is not a multiple of it.
         let repeat = CreatePictureAux::new().repeat(Repeat::PAD);
@@ -56,8 +57,7 @@ impl Enlarged {
         connection.render_create_picture(target, window, format, &CreatePictureAux::new())?;
         // From pixels of the window to those of the picture.
         let scale = ONE / i32::try_from(factor.max(1)).unwrap_or(i32::MAX);
-        let transform =
-            Transform { matrix11: scale, matrix22: scale, matrix33: ONE, ..Transform::default() };
+        let transform = Transform { matrix11: scale, matrix22: scale, matrix33: ONE, ..Transform::default() };
         connection.render_set_picture_transform(source, transform)?;
         connection.render_set_picture_filter(source, b"nearest", &[])?;
         Ok(Self { pixmap, source, target, size, factor })
