@@ -24,6 +24,9 @@ pub(crate) struct Args {
     /// Environments, side by side
     #[arg(long, alias = "num_envs", default_value_t = 1)]
     num_envs: usize,
+    /// Distance of environments, in metres
+    #[arg(long, alias = "arena_space", default_value_t = 2.0)]
+    arena_space: f64,
     /// Threads that step [default: every core]
     #[arg(long)]
     threads: Option<usize>,
@@ -47,7 +50,12 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(slow..=fast).contains(&args.speed) {
         return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
     }
-    let cfg = SimulationManagerCfg { num_envs: args.num_envs, threads: args.threads, ..Default::default() };
+    let cfg = SimulationManagerCfg {
+        num_envs: args.num_envs,
+        arena_space: args.arena_space,
+        threads: args.threads,
+        ..Default::default()
+    };
     let mut sim = args.model.scene(cfg)?;
     let warned = excerpt::print_warnings(sim.diagnostics());
     let files = Arc::new(Mutex::new(args.recording()));

@@ -3,13 +3,16 @@
 use super::assembly::{Assembly, MARKERS, chosen};
 use super::canvas::Canvas;
 use super::color;
-use super::overlay::Overlays;
+use super::overlay::{Overlays, in_overview};
 use super::pick::Picked;
 use super::snapshot::{Shown, Snapshot};
 use super::trail::Trails;
 use scene::Marker;
 use sensors::camera::{FrameMut, ParallelRasterizer, RasterCfg, Shot};
 use sensors::visibility::{RenderError, View};
+
+/// Radius of the ball where something was clicked on \[pixels\].
+const BALL: f32 = 4.0;
 
 /// Draws pictures of snapshots. It keeps its memory: use one for all pictures of a window.
 #[derive(Debug)]
@@ -62,6 +65,13 @@ impl Painter {
         let mut markers = look.overlays.markers(snapshot, look.shown);
         if let Some((picked, pose)) = look.picked.and_then(|picked| Some((picked, picked.pose(snapshot)?))) {
             markers.push((picked.env, Marker::axes(pose, 0.12)));
+        }
+        if let Some((picked, env)) = look.picked.and_then(|picked| Some((picked, snapshot.envs.get(picked.env)?))) {
+            // A ball on it, also where its frame is inside of it.
+            let point = picked.point_now(snapshot);
+            let [.., depth] = view.world_from_camera.apply_inverse(in_overview(env, point).map(|x| x as f32));
+            let ball = Marker::sphere(point, BALL * depth / view.fx, color::CHOSEN);
+            markers.extend((depth > view.near).then_some((picked.env, ball)));
         }
         if let Some((env, [from, to])) = look.spring {
             let way = [0, 1, 2].map(|k| to[k] - from[k]);

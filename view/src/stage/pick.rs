@@ -81,12 +81,19 @@ pub fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
         return lines;
     };
     let (t, q) = (pose.translation.vector, pose.rotation);
-    lines.push(format!("position  {:+.3} {:+.3} {:+.3} m", t.x, t.y, t.z));
-    lines.push(format!("quaternion w x y z  {:+.3} {:+.3} {:+.3} {:+.3}", q.w, q.i, q.j, q.k));
-    lines.extend(picked.contact_force(snapshot).map(|(count, [x, y, z])| match count {
-        0 => "no contact".into(),
-        1 => format!("1 contact: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
-        n => format!("{n} contacts: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
+    // No zero has a sign that means nothing.
+    let tidy = |number: f64, least: f64| if number.abs() < least { 0.0 } else { number };
+    let [x, y, z] = [t.x, t.y, t.z].map(|x| tidy(x, 5e-4));
+    lines.push(format!("position  {x:+.3} {y:+.3} {z:+.3} m"));
+    let [w, x, y, z] = [q.w, q.i, q.j, q.k].map(|x| tidy(x, 5e-4));
+    lines.push(format!("quaternion w x y z  {w:+.3} {x:+.3} {y:+.3} {z:+.3}"));
+    lines.extend(picked.contact_force(snapshot).map(|(count, force)| {
+        let [x, y, z] = force.map(|x| tidy(x, 5e-3));
+        match count {
+            0 => "no contact".into(),
+            1 => format!("1 contact: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
+            n => format!("{n} contacts: force on it  {x:+.2} {y:+.2} {z:+.2} N"),
+        }
     }));
     lines
 }

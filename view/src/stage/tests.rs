@@ -197,3 +197,23 @@ fn pictures_of_every_size_can_be_drawn() {
     sample.sim.update(1);
     assert!(sample.sim.contacts(Some(&[EnvId(5)])).is_err());
 }
+
+/// The place that was clicked on has a ball, as large from near as from far, which is no obstacle to the next click.
+#[test]
+fn what_was_clicked_on_is_marked() {
+    let (_sample, snapshot) = stage(1);
+    let mut painter = Painter::new(1);
+    for distance in [0.8, 3.0] {
+        let eye = Eye { distance, ..Eye::looking([0.3, 0.2, 1.5], [0.0, 0.0, 2.0 * HALF]).unwrap() };
+        let view = eye.view(201, 101);
+        let picked = painter.pick(&snapshot, &view, &Look::default(), [100.5, 50.5]).unwrap();
+        let (mut with, mut without) = (Canvas::default(), Canvas::default());
+        painter.draw(&snapshot, &view, &Look::default(), &mut without).unwrap();
+        let look = Look { picked: Some(&picked), ..Look::default() };
+        painter.draw(&snapshot, &view, &look, &mut with).unwrap();
+        // A disc of radius 4 has 50 pixels; half of the ball or more is above the face, and so is the tip of no axis.
+        let marked = unlike(&with, &without);
+        assert!((25..90).contains(&marked), "{marked} pixels from {distance} m");
+        assert_eq!(painter.pick(&snapshot, &view, &look, [100.5, 50.5]), Some(picked));
+    }
+}

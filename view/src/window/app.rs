@@ -488,7 +488,12 @@ impl App {
         if self.panel.draw(snapshot, camera, self.env, PANEL, &mut self.small) {
             let [width, height] = self.small.dimensions();
             let left = self.size[0].saturating_sub(width + self.aside() + 6);
-            canvas.paste(&self.small, [left, self.size[1].saturating_sub(height + 6)]);
+            let top = self.size[1].saturating_sub(height + 6);
+            canvas.paste(&self.small, [left, top]);
+            if let Some(name) = snapshot.names.cameras.get(camera) {
+                let text = format!("camera {name}, environment {}", self.env);
+                hud::caption(canvas, &text, [left + 4, top.saturating_sub(13)]);
+            }
         }
     }
 }

@@ -46,7 +46,7 @@ pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, vie
         Shown::One(env) => format!("environment {env} of {}", snapshot.envs.len()),
     };
     let state = if run.paused { "paused".into() } else { format!("speed {wanted}{measured}") };
-    let mut lines = vec![format!("{time:9.3} s   step {}   {state}", run.steps), format!("{which}   {view}")];
+    let mut lines = vec![format!("{time:.3} s   step {}   {state}", run.steps), format!("{which}   {view}")];
     lines.push(format!("{frames_per_second:.0} pictures per second   H: help"));
     let color = if run.paused { YELLOW } else { WHITE };
     canvas.text(&lines.join("\n"), [8, 6], FONT, color);
@@ -91,6 +91,11 @@ pub(super) fn record_button(canvas: &mut Canvas, aside: usize, recording: &Recor
 pub(super) fn note(canvas: &mut Canvas, lines: &[String]) {
     let height = int(canvas.dimensions()[1]);
     canvas.text(&lines.join("\n"), [8, height - 13 * int(lines.len()) - 6], FONT, WHITE);
+}
+
+/// What something is, at a corner.
+pub(super) fn caption(canvas: &mut Canvas, text: &str, [x, y]: [usize; 2]) {
+    canvas.text(text, [int(x), int(y)], SMALL, WHITE);
 }
 
 /// All keys, in the middle.
@@ -140,7 +145,9 @@ pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, firs
         }
         let [position, target, ..] = *values;
         let short = name.name.rsplit('/').next().unwrap_or(&name.name);
-        canvas.text(&format!("{short:<20.20} {position:+.3}"), [left + 8, top], SMALL, WHITE);
+        // No zero has a sign that means nothing.
+        let shown = if position.abs() < 5e-4 { 0.0 } else { position };
+        canvas.text(&format!("{short:<20.20} {shown:+.3}"), [left + 8, top], SMALL, WHITE);
         let [low, high] = ends(values);
         let place = |value: f64| {
             left + 8

@@ -117,7 +117,7 @@ pub(crate) const TABLE: &[Binding] = &[
     key(Key::Char('l'), Action::Trails, "trails"),
     key(Key::Char('k'), Action::Collisions, "collision shapes"),
     key(Key::Char('u'), Action::Visuals, "visual shapes"),
-    key(Key::Char('i'), Action::Panel, "colour, depth, mask, normals of a camera"),
+    key(Key::Char('i'), Action::Panel, "what a camera sees, in four ways"),
     key(Key::Tab, Action::Sliders, "joint sliders"),
     key(Key::Escape, Action::Unselect, "select nothing, close the help"),
 ];
@@ -177,6 +177,9 @@ mod tests {
             assert!(help.iter().any(said), "{binding:?} is not in the help");
         }
         assert_eq!(action(Key::Char(' ')), Some(Action::Pause));
+        // Letters are 6 pixels wide; columns have 84 and 229.
+        let long = |[keys, text]: &[String; 2]| keys.len() > 13 || text.len() > 37;
+        assert!(!help.iter().any(long), "a line does not fit into the help");
         assert_eq!(action(Key::Char('~')), None);
     }
 }

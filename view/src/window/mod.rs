@@ -51,7 +51,8 @@ pub enum WindowError {
     /// There is no display, or it cannot be reached.
     #[error(
         "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
-         desktops have too (XWayland), or run without a window: the examples with --headless",
+         desktops have too (XWayland), or run without a window: the examples with --headless, or with --serve for a \
+         browser",
         shown(.display), shown(.wayland)
     )]
     NoDisplay {
