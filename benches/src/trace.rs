@@ -38,14 +38,16 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let shot = still.shot(&view);
     let pixels = (SIZE[0] * SIZE[1]) as f64;
     let geometry = Channels { depth: true, mask: true, ..Channels::default() };
-    let rays = pixels / seconds(settings, Renderer::FastRayTraced, geometry, &shot)?;
+    let (time, _) = seconds(settings, Renderer::FastRayTraced, geometry, &shot)?;
+    let rays = pixels / time;
 
     let (scene, poses) = boxed(&still, &shot)?;
     let inside = View::look_at(SIZE, 0.9, [1.2, -1.1, 1.1], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0])?;
     let shot = Shot { scene: &scene, poses: &poses, view: &inside, lights: None, lens: None, before: None };
     let color = Channels { color: true, ..Channels::default() };
     let renderer = Renderer::RayTraced { samples: 1, max_bounces: 4, denoise: false, seed: 0 };
-    let paths = pixels / seconds(settings, renderer, color, &shot)?;
+    let (time, cast) = seconds(settings, renderer, color, &shot)?;
+    let paths = pixels / time;
 
     let scene = still.visible().scene();
     let mut times = Vec::new();
@@ -62,14 +64,17 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     Ok(vec![
         at_least(format!("{name}, what is seen, 640x480"), "rays/s", rays, RAYS),
         at_least(format!("{name} in a lit box, 4 bounces"), "paths/s", paths, PATHS),
+        // Where the time of a path goes: rays that go on and shadow rays.
+        Row::new("trace", format!("{name} in a lit box, rays of a path"), "rays/path", 1, cast as f64 / pixels),
+        Row::new("trace", format!("{name} in a lit box, rays of paths"), "rays/s", 1, cast as f64 / time),
         Row::new("trace", format!("{name}, trees"), "ns/triangle", 1, build)
             .against("aim", BUILD, BUILD / build)
             .wanted(1.0),
     ])
 }
 
-/// Time of a picture \[s\].
-fn seconds(settings: &Settings, renderer: Renderer, channels: Channels, shot: &Shot<'_>) -> Outcome<f64> {
+/// Time of a picture \[s\], and how many rays were cast for its paths.
+fn seconds(settings: &Settings, renderer: Renderer, channels: Channels, shot: &Shot<'_>) -> Outcome<(f64, u64)> {
     let mut rasterizer = ParallelRasterizer::new(RasterCfg { samples: 1, ..RasterCfg::default() }, 1);
     rasterizer.set_renderer(renderer);
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
@@ -81,7 +86,7 @@ fn seconds(settings: &Settings, renderer: Renderer, channels: Channels, shot: &S
         rasterizer.render(&mut [(*shot, frame.as_mut())]).map_err(|(_, error)| error)?;
         times.push(start.elapsed().as_secs_f64());
     }
-    Ok(median(times.split_off(1)))
+    Ok((median(times.split_off(1)), rasterizer.progress().rays()))
 }
 
 /// A view of which the robot covers about [`COVERED`].

@@ -1,8 +1,10 @@
 //! The camera: captures what there is to see, draws when somebody looks.
 
+mod drawing;
+
 use super::captures::Captures;
 use super::cfg::{CameraCfg, DepthMiss};
-use super::channel::{Channels, FrameMut, Listed, PictureView, Pictures};
+use super::channel::{Channels, Listed, PictureView, Pictures};
 use super::earlier::Earlier;
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
@@ -15,9 +17,8 @@ use super::mounts::{Mount, Mounts, chosen_rows};
 use super::opening::Opening;
 use super::parallel::{Job, ParallelRasterizer};
 use super::progress::RenderProgress;
-use super::rasterizer::Shot;
-use super::shutter::{Opened, Take};
-use super::ticket::{Stream, Ticket};
+use super::shutter::Take;
+use super::ticket::Ticket;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor, SensorContext};
@@ -714,92 +715,6 @@ impl Camera {
         }
     }
 
-    /// Draws what is stale.
-    fn draw(&self) -> Canvas {
-        let rows = self.mounts.len();
-        let canvas = self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas.take();
-        // It is missing only where a drawing panicked.
-        let mut canvas = canvas.unwrap_or_else(|| {
-            Canvas::new(Pictures::new(self.channels, rows, self.lens.width, self.lens.height), rows)
-        });
-        let Canvas { pictures, stale, failure } = &mut canvas;
-        let is_stale = |row: &usize| stale[*row];
-        let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row)).map(|(_, frame)| frame);
-        let stale_rows = (0..rows).filter(is_stale).map(|row| (row, row));
-        let look = |row: usize| (self.mounts.row(row), self.rays.row(row));
-        let result = self.develop(&self.captures, look, stale_rows, frames);
-        *failure = result.err().and_then(|(job, error)| {
-            let row = (0..rows).filter(is_stale).nth(job)?;
-            Some(CameraError::Draw { env: self.env_ids[row], error })
-        });
-        // After a failure it is not known which are good.
-        if failure.is_none() {
-            stale.fill(false);
-        }
-        canvas
-    }
-
-    /// Draws captures, those of some rows at some places, into frames, and does to them what the camera does; `look` says from
-    /// where, and through which lens, a place was captured.
-    pub(super) fn develop<'a>(
-        &self,
-        captures: &Captures,
-        look: impl Fn(usize) -> (&'a Mount, Option<&'a LensRays>),
-        places: impl Iterator<Item = (usize, usize)> + Clone,
-        frames: impl Iterator<Item = FrameMut<'a>>,
-    ) -> Result<(), (usize, RenderError)> {
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let Desk { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults, .. } = &mut *desk;
-        views.clear();
-        views.extend(places.clone().map(|(_, place)| {
-            let (mount, _) = look(place);
-            let pose = self.world_from(mount, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
-            self.lens.view(&mount.pixels, PoseF32::from(&pose))
-        }));
-        tickets.clear();
-        let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
-        let mut takes: Vec<Take<'_>> = emptied(std::mem::take(kept_takes));
-        for (((row, place), frame), view) in places.zip(frames).zip(&*views) {
-            let poses = row_of(&captures.poses, place);
-            let lights = Some(row_of(&captures.lights, place));
-            let scene = captures.scenes[place].0.as_deref().unwrap_or(&self.scene);
-            let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
-            jobs.push((Shot { scene, poses, view, lights, lens: look(place).1, before }, frame));
-            tickets.push(captures.tickets[place]);
-            let opened = captures.opened(place).and_then(|(poses, parent)| {
-                let camera = self.world_from(look(place).0, Some(parent))?;
-                let before = self.opening.as_ref()?.seconds();
-                Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
-            });
-            takes.push(Take { noise: captures.tickets[place].bits(Stream::PATHS), opened });
-        }
-        let result = rasterizer.render_takes(&mut jobs, &takes);
-        *kept_takes = emptied(takes);
-        if let Some(faults) = faults {
-            faults.spoil(&mut jobs, tickets);
-        }
-        let miss = match self.depth_miss {
-            DepthMiss::Inf => None,
-            DepthMiss::Far => Some(self.lens.far),
-            DepthMiss::Zero => Some(0.0),
-        };
-        for (_, frame) in &mut jobs {
-            miss.into_iter().for_each(|value| frame.replace_misses(value));
-        }
-        self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
-        *kept = emptied(jobs);
-        result
-    }
-
-    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
-    pub(super) fn shot_of<T>(&self, row: usize, act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T) -> T {
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let view = &self.view_of(row);
-        let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
-        let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
-    }
-
     /// Fails before the first reset or update of a row, when poses of things are not known yet.
     pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
         let captured = self.captures.world_from_parent[row].is_some();
@@ -835,17 +750,4 @@ impl fmt::Display for Camera {
         writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
         write!(f, "  channels           : {}", self.channels.names().join(", "))
     }
-}
-
-/// The memory of a list for another list: of the same type, but for what it borrows.
-fn emptied<T, U>(mut list: Vec<T>) -> Vec<U> {
-    list.clear();
-    // Collected in place.
-    list.into_iter().filter_map(|_| None).collect()
-}
-
-/// A row of an array that the camera allocated itself, in C order.
-fn row_of<T>(array: &Array2<T>, row: usize) -> &[T] {
-    let width = array.ncols();
-    array.as_slice().map_or(&[], |flat| &flat[row * width..(row + 1) * width])
 }
