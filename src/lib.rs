@@ -3,6 +3,7 @@
 
 pub mod assets;
 
+pub use env;
 pub use ndarray;
 pub use record;
 pub use scene;
