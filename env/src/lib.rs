@@ -25,7 +25,7 @@
 //! })?;
 //! let mut env = EnvBuilder::new(sim, EnvCfg { episode_steps: Some(100), ..Default::default() })
 //!     .action(ActionTerm::new("push", Space::uniform(["slide"], [-5.0, 5.0])?, move |sim, forces| {
-//!         Ok(sim.robot_mut(cart).set_qf(&forces, None, None)?)
+//!         Ok(sim.robot_mut(cart).set_qf(forces, None, None)?)
 //!     }))
 //!     .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).get_qpos())))
 //!     .reward(RewardTerm::new("near", -1.0, move |now| {

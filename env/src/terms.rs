@@ -88,12 +88,12 @@ pub fn joint_efforts(
 ) -> Result<ActionTerm> {
     let (names, joints) = joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-bound, bound])?, move |sim, efforts| {
-        Ok(sim.robot_mut(robot).set_qf(&efforts, Some(&joints), None)?)
+        Ok(sim.robot_mut(robot).set_qf(efforts, Some(&joints), None)?)
     }))
 }
 
-/// Changes of the position targets of joints in a step: actions are from -1 to 1 and mean as many `steps` \[rad or m\]. Targets
-/// stay within the limits of the joints.
+/// Changes of the position targets of joints: actions are from -1 to 1, and `step` is what 1 changes a target by in a step of the
+/// task \[rad or m\]. Targets stay within the limits of the joints.
 ///
 /// # Errors
 /// A pattern that matches nothing.

@@ -85,7 +85,7 @@ fn cart_and_pole_are_the_loop_that_is_written_by_hand() {
     let space = Space::uniform(["force"], [-BOUND, BOUND]).unwrap();
     let mut env = EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(LIMIT) })
         .action(ActionTerm::new("push", space, move |sim, forces| {
-            Ok(sim.robot_mut(robot).set_qf(&forces, Some(&[slide]), None)?)
+            Ok(sim.robot_mut(robot).set_qf(forces, Some(&[slide]), None)?)
         }))
         .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| Ok(look(now.sim(), robot))))
         .reward(RewardTerm::new("alive", 1.0, |now| Ok(Array1::ones(now.num_envs()))))

@@ -11,7 +11,7 @@ fn env(num_envs: usize) -> kinetoscope::env::Env {
     let space = Space::uniform(["force"], [-1e308, 1e308]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: 3, episode_steps: Some(50) })
         .action(ActionTerm::new("push", space, move |sim, forces| {
-            Ok(sim.robot_mut(robot).set_qf(&forces, None, None)?)
+            Ok(sim.robot_mut(robot).set_qf(forces, None, None)?)
         }))
         .observation(ObservationTerm::new("x", ["x"], move |now| Ok(now.sim().robot(robot).get_qpos())))
         .observation(ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).get_qvel())))
