@@ -155,6 +155,10 @@ const TABLE: &[Run] = &[
     // Drawers that are stuck: the control of the run above.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
+    trial_of("balance", &[0], "--headless --out {out}/balance --report {out}/balance.json", balanced),
+    // Wheels that stand still: the control of the run above.
+    trial_of("balance", &[1], "--headless --no-feedback --report {out}/balance_falls.json", all_fell),
+    run_of("balance", &[2], "--headless --push=-1"),
     trial_of(
         "visual_servo",
         &[0],
@@ -310,6 +314,22 @@ fn none_lifted(report: &Value) -> Result<(), String> {
 /// No environment succeeded, though hands went everywhere, because no drawer opened as far as it should.
 fn none_opened(report: &Value) -> Result<(), String> {
     none(report, |row| Ok(row["planned"] != true || number(row, "open")? >= 0.15))
+}
+
+/// As [`enough_succeeded`], and pushes were pushes: all robots lost the floor, and tilted by more than what counts as upright.
+fn balanced(report: &Value) -> Result<(), String> {
+    enough_succeeded(report)?;
+    for row in trials(report)? {
+        if number(row, "airborne")? < 0.05 || number(row, "largest_tilt")? < 0.1 {
+            return Err(format!("this robot was hardly pushed: {row}"));
+        }
+    }
+    Ok(())
+}
+
+/// No environment succeeded, because every body touched the floor.
+fn all_fell(report: &Value) -> Result<(), String> {
+    none(report, |row| Ok(row["body_touched_floor"] != true))
 }
 
 /// No environment succeeded, though cubes were found and hands went there: as far beside them as cameras were from where they
@@ -489,7 +509,12 @@ mod tests {
     }
 
     #[test]
-    fn policies_have_to_learn() {
+    fn robots_have_to_be_pushed_and_policies_to_learn() {
+        let row = |tilt: f64, airborne: f64| json!({ "success": true, "diverged": null, "largest_tilt": tilt, "airborne": airborne });
+        let good = row(0.3, 0.2);
+        assert_eq!(balanced(&trial(16, &good, &good)), Ok(()));
+        assert!(balanced(&trial(16, &row(0.05, 0.2), &good)).is_err(), "hardly tilted");
+        assert!(balanced(&trial(16, &row(0.3, 0.0), &good)).is_err(), "never in the air");
         let report = |before: f64, after: f64, needed: f64, envs: u64| {
             json!({ "reached_before": before, "reached_after": after,
                     "needed": needed, "num_envs": envs })
@@ -529,6 +554,7 @@ mod tests {
                     "body_touched_floor": fell })
         };
         for (control, good, bad) in [
+            (all_fell as Requirement, row(true, 0.0, true), row(true, 0.0, false)),
             (all_beside as Requirement, row(true, 0.027, true), row(true, 0.003, true)),
             (none_found as Requirement, row(false, 0.2, true), row(true, 0.2, true)),
         ] {
