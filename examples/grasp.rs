@@ -175,7 +175,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     }
     let count = Count {
         what: "cubes were lifted, held and put down",
-        friction: ("friction", args.friction),
+        setting: ("friction", args.friction),
         table,
         steps,
         rate,

@@ -159,7 +159,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     }
     let count = Count {
         what: "drawers were opened",
-        friction: ("slide_friction", args.slide_friction),
+        setting: ("slide_friction", args.slide_friction),
         table,
         steps,
         rate,

@@ -5,6 +5,7 @@ pub mod assets;
 #[cfg(all(feature = "record", feature = "view"))]
 mod record_button;
 
+pub use env;
 pub use ndarray;
 #[cfg(feature = "record")]
 pub use record;

@@ -3,6 +3,7 @@
 
 pub(crate) mod arm;
 pub(crate) mod cloud;
+pub(crate) mod curve;
 pub(crate) mod grip;
 pub(crate) mod motion;
 pub(crate) mod npy;

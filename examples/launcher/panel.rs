@@ -94,7 +94,7 @@ pub(crate) fn tile(pictures: &[RgbImage]) -> RgbImage {
     out
 }
 
-struct Canvas(RgbImage);
+pub(crate) struct Canvas(pub(crate) RgbImage);
 
 impl Canvas {
     fn title(&mut self, text: &str, [x, y]: [u32; 2]) {

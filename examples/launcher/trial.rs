@@ -46,8 +46,8 @@ pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
 pub(crate) struct Count<'a> {
     /// What a success is, behind their number and "of 16".
     pub(crate) what: &'a str,
-    /// The friction of the run, as its report calls it \[N, or without unit\].
-    pub(crate) friction: (&'a str, f64),
+    /// The setting that decides the run, as its report calls it, in its unit.
+    pub(crate) setting: (&'a str, f64),
     /// A row for each environment, with `success`.
     pub(crate) table: Vec<Value>,
     pub(crate) steps: u64,
@@ -62,7 +62,7 @@ pub(crate) struct Count<'a> {
 /// # Errors
 /// A file cannot be written.
 pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: Count<'_>) -> Result<bool> {
-    let Count { what, friction, table, steps, rate, overview } = count;
+    let Count { what, setting, table, steps, rate, overview } = count;
     let successes = table.iter().filter(|row| row["success"] == true).count();
     let needed = needed(sim.num_envs());
     println!("\n{successes} of {} {what}; {needed} are enough", sim.num_envs());
@@ -75,7 +75,7 @@ pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: 
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),
         "steps": steps,
-        (friction.0): friction.1,
+        (setting.0): setting.1,
         "successes": successes,
         "needed": needed,
         "success_rate": successes as f64 / sim.num_envs() as f64,

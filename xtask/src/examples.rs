@@ -155,6 +155,30 @@ const TABLE: &[Run] = &[
     // Drawers that are stuck: the control of the run above.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
+    trial_of("balance", &[0], "--headless --out {out}/balance --report {out}/balance.json", balanced),
+    // Wheels that stand still: the control of the run above.
+    trial_of("balance", &[1], "--headless --no-feedback --report {out}/balance_falls.json", all_fell),
+    run_of("balance", &[2], "--headless --push=-1"),
+    trial_of(
+        "visual_servo",
+        &[0],
+        "--headless --out {out}/visual_servo --report {out}/visual_servo.json",
+        enough_succeeded,
+    ),
+    // Cameras that are not where they are thought to be, and masks that are empty: the controls of the run above.
+    trial_of(
+        "visual_servo",
+        &[1],
+        "--headless --miscalibrated 0.02 --report {out}/visual_servo_beside.json",
+        all_beside,
+    ),
+    trial_of("visual_servo", &[1], "--headless --blind --report {out}/visual_servo_blind.json", none_found),
+    run_of("visual_servo", &[2], "--headless --miscalibrated inf"),
+    trial_of("train_reach", &[0], "--headless --out {out}/train_reach --report {out}/train_reach.json", learned),
+    // Nothing is tried: the control of the run above.
+    trial_of("train_reach", &[1], "--headless --iterations 0 --report {out}/train_reach_idle.json", not_learned),
+    run_of("train_reach", &[2], "--headless --num-envs 100"),
+    run_of("train_reach", &[2], "--headless --noise 0"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/sr5 --raw --qpos 0,0.5,-1.5,0.3,-0.5,0"),
     run_of(
         "render_model",
@@ -290,6 +314,55 @@ fn none_lifted(report: &Value) -> Result<(), String> {
 /// No environment succeeded, though hands went everywhere, because no drawer opened as far as it should.
 fn none_opened(report: &Value) -> Result<(), String> {
     none(report, |row| Ok(row["planned"] != true || number(row, "open")? >= 0.15))
+}
+
+/// As [`enough_succeeded`], and pushes were pushes: all robots lost the floor, and tilted by more than what counts as upright.
+fn balanced(report: &Value) -> Result<(), String> {
+    enough_succeeded(report)?;
+    for row in trials(report)? {
+        if number(row, "airborne")? < 0.05 || number(row, "largest_tilt")? < 0.1 {
+            return Err(format!("this robot was hardly pushed: {row}"));
+        }
+    }
+    Ok(())
+}
+
+/// No environment succeeded, because every body touched the floor.
+fn all_fell(report: &Value) -> Result<(), String> {
+    none(report, |row| Ok(row["body_touched_floor"] != true))
+}
+
+/// No environment succeeded, though cubes were found and hands went there: as far beside them as cameras were from where they
+/// were thought to be. That is 2 cm along both axes of the picture, one of which is tilted by atan(0.12 / 0.4): 27.7 mm.
+fn all_beside(report: &Value) -> Result<(), String> {
+    none(report, |row| {
+        let beside = number(row, "beside")?;
+        Ok(row["found"] != true || row["planned"] != true || !(0.025..0.031).contains(&beside))
+    })
+}
+
+/// No environment succeeded, because no cube was found.
+fn none_found(report: &Value) -> Result<(), String> {
+    none(report, |row| Ok(row["found"] != false))
+}
+
+/// Of many targets few were reached before, and enough after. Ending anywhere in the box of targets reaches 0.26 % of them.
+fn learned(report: &Value) -> Result<(), String> {
+    let (before, after) = (number(report, "reached_before")?, number(report, "reached_after")?);
+    let (needed, envs) = (number(report, "needed")?, number(report, "num_envs")?);
+    if envs < 128.0 || needed < 0.9 {
+        return Err(format!("{envs} targets, of which {needed} are enough: there should be 128 and 0.9 at least"));
+    }
+    if before > 0.05 || after < needed {
+        return Err(format!("{before} of all targets were reached before, {after} after"));
+    }
+    Ok(())
+}
+
+/// As few targets were reached after as before.
+fn not_learned(report: &Value) -> Result<(), String> {
+    let (before, after) = (number(report, "reached_before")?, number(report, "reached_after")?);
+    if before == after && after <= 0.05 { Ok(()) } else { Err(format!("{before} were reached before, {after} after")) }
 }
 
 /// No environment succeeded, and in none is true what should not be; all of them ran to the end.
@@ -436,6 +509,31 @@ mod tests {
     }
 
     #[test]
+    fn robots_have_to_be_pushed_and_policies_to_learn() {
+        let row = |tilt: f64, airborne: f64| json!({ "success": true, "diverged": null, "largest_tilt": tilt, "airborne": airborne });
+        let good = row(0.3, 0.2);
+        assert_eq!(balanced(&trial(16, &good, &good)), Ok(()));
+        assert!(balanced(&trial(16, &row(0.05, 0.2), &good)).is_err(), "hardly tilted");
+        assert!(balanced(&trial(16, &row(0.3, 0.0), &good)).is_err(), "never in the air");
+        let report = |before: f64, after: f64, needed: f64, envs: u64| {
+            json!({ "reached_before": before, "reached_after": after,
+                    "needed": needed, "num_envs": envs })
+        };
+        assert_eq!(learned(&report(0.01, 0.95, 0.9, 256)), Ok(()));
+        for bad in [
+            report(0.2, 0.95, 0.9, 256),
+            report(0.0, 0.89, 0.9, 256),
+            report(0.0, 0.95, 0.5, 256),
+            report(0.0, 0.95, 0.9, 16),
+        ] {
+            assert!(learned(&bad).is_err(), "{bad}");
+        }
+        assert_eq!(not_learned(&report(0.01, 0.01, 0.9, 256)), Ok(()));
+        assert!(not_learned(&report(0.01, 0.02, 0.9, 256)).is_err());
+        assert!(not_learned(&json!({})).is_err());
+    }
+
+    #[test]
     fn controls_have_to_fail_as_they_should() {
         let row = |lifted: bool, planned: bool, open: f64| {
             let diverged = Value::Null;
@@ -451,5 +549,18 @@ mod tests {
         assert!(none_lifted(&trial(0, &row(true, true, 0.0), &good)).is_err());
         assert!(none_opened(&trial(0, &row(false, true, 0.16), &good)).is_err());
         assert!(none_opened(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
+        let row = |found: bool, beside: f64, fell: bool| {
+            json!({ "success": false, "diverged": null, "found": found, "planned": true, "beside": beside,
+                    "body_touched_floor": fell })
+        };
+        for (control, good, bad) in [
+            (all_fell as Requirement, row(true, 0.0, true), row(true, 0.0, false)),
+            (all_beside as Requirement, row(true, 0.027, true), row(true, 0.003, true)),
+            (none_found as Requirement, row(false, 0.2, true), row(true, 0.2, true)),
+        ] {
+            assert_eq!(control(&trial(0, &good, &good)), Ok(()));
+            assert!(control(&trial(0, &bad, &good)).is_err());
+            assert!(control(&trial(1, &good, &good)).is_err());
+        }
     }
 }

@@ -1,0 +1,42 @@
+//! What agents do to environments.
+
+use crate::error::TermResult;
+use crate::space::Space;
+use ndarray::ArrayView2;
+use sim::SimulationManager;
+use std::fmt;
+
+type Apply = Box<dyn Fn(&mut SimulationManager, ArrayView2<'_, f64>) -> TermResult + Send>;
+
+/// Columns of the actions, and what they do.
+pub struct ActionTerm {
+    pub(crate) name: String,
+    pub(crate) space: Space,
+    pub(crate) every_physics_step: bool,
+    pub(crate) apply: Apply,
+}
+
+impl ActionTerm {
+    /// A term with the columns of `space`. `apply` gets rows for all environments, within the bounds, shape
+    /// (N, columns of the term), and tells the simulation of them: targets, efforts, wrenches. It is called once in a step, before
+    /// its first physics step.
+    pub fn new(
+        name: impl Into<String>,
+        space: Space,
+        apply: impl Fn(&mut SimulationManager, ArrayView2<'_, f64>) -> TermResult + Send + 'static,
+    ) -> Self {
+        Self { name: name.into(), space, every_physics_step: false, apply: Box::new(apply) }
+    }
+
+    /// `apply` is called before every physics step: for a control law that looks at the state.
+    #[must_use]
+    pub fn every_physics_step(self) -> Self {
+        Self { every_physics_step: true, ..self }
+    }
+}
+
+impl fmt::Debug for ActionTerm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ActionTerm").field("name", &self.name).field("space", &self.space).finish_non_exhaustive()
+    }
+}

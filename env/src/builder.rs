@@ -1,0 +1,135 @@
+//! Tasks put together from terms.
+
+use crate::action::ActionTerm;
+use crate::cfg::EnvCfg;
+use crate::command::CommandTerm;
+use crate::environment::Env;
+use crate::error::{EnvError, Result, TermKind};
+use crate::event::EventTerm;
+use crate::observation::ObservationTerm;
+use crate::reward::RewardTerm;
+use crate::space::Space;
+use crate::termination::TerminationTerm;
+use sim::SimulationManager;
+
+/// A task in the making. Terms act in the order in which they are added.
+#[derive(Debug)]
+pub struct EnvBuilder {
+    sim: SimulationManager,
+    cfg: EnvCfg,
+    terms: Terms,
+}
+
+/// The terms of a task.
+#[derive(Debug, Default)]
+pub(crate) struct Terms {
+    pub(crate) actions: Vec<ActionTerm>,
+    pub(crate) commands: Vec<CommandTerm>,
+    pub(crate) events: Vec<EventTerm>,
+    pub(crate) observations: Vec<ObservationTerm>,
+    pub(crate) rewards: Vec<RewardTerm>,
+    pub(crate) terminations: Vec<TerminationTerm>,
+}
+
+impl EnvBuilder {
+    /// A task in the environments of `sim`, with its robots, objects and sensors.
+    pub fn new(sim: SimulationManager, cfg: EnvCfg) -> Self {
+        Self { sim, cfg, terms: Terms::default() }
+    }
+
+    /// The simulation so far: for what needs it between the terms.
+    pub fn sim(&self) -> &SimulationManager {
+        &self.sim
+    }
+
+    /// Adds columns to the actions.
+    #[must_use]
+    pub fn action(mut self, term: ActionTerm) -> Self {
+        self.terms.actions.push(term);
+        self
+    }
+
+    /// Adds something that is wanted of environments.
+    #[must_use]
+    pub fn command(mut self, term: CommandTerm) -> Self {
+        self.terms.commands.push(term);
+        self
+    }
+
+    /// Adds something that happens.
+    #[must_use]
+    pub fn event(mut self, term: EventTerm) -> Self {
+        self.terms.events.push(term);
+        self
+    }
+
+    /// Adds columns to the observations.
+    #[must_use]
+    pub fn observation(mut self, term: ObservationTerm) -> Self {
+        self.terms.observations.push(term);
+        self
+    }
+
+    /// Adds a part of the reward.
+    #[must_use]
+    pub fn reward(mut self, term: RewardTerm) -> Self {
+        self.terms.rewards.push(term);
+        self
+    }
+
+    /// Adds a reason to end.
+    #[must_use]
+    pub fn termination(mut self, term: TerminationTerm) -> Self {
+        self.terms.terminations.push(term);
+        self
+    }
+
+    /// Checks everything that can be checked now, and lets the events of [`When::Startup`](crate::When::Startup) happen.
+    ///
+    /// # Errors
+    /// No action or observation, two terms of one name, numbers that are out of range, an event that fails.
+    pub fn build(self) -> Result<Env> {
+        let Self { sim, cfg, terms } = self;
+        cfg.check()?;
+        terms.check()?;
+        let observation_spaces =
+            terms.observations.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
+        let observations = terms.observations.iter().map(|term| term.name.as_str()).zip(&observation_spaces);
+        let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
+        let spaces = [Space::joined(observations), Space::joined(actions)];
+        Env::new(sim, cfg, terms, spaces)
+    }
+}
+
+impl Terms {
+    fn check(&self) -> Result<()> {
+        let missing = |kind| Err(EnvError::NoTerm { kind });
+        if self.actions.iter().all(|term| term.space.is_empty()) {
+            return missing(TermKind::Action);
+        }
+        if self.observations.iter().all(|term| term.columns.is_empty()) {
+            return missing(TermKind::Observation);
+        }
+        distinct(TermKind::Action, self.actions.iter().map(|term| &term.name))?;
+        distinct(TermKind::Command, self.commands.iter().map(|term| &term.name))?;
+        distinct(TermKind::Event, self.events.iter().map(|term| &term.name))?;
+        distinct(TermKind::Observation, self.observations.iter().map(|term| &term.name))?;
+        distinct(TermKind::Reward, self.rewards.iter().map(|term| &term.name))?;
+        distinct(TermKind::Termination, self.terminations.iter().map(|term| &term.name))?;
+        self.commands.iter().try_for_each(CommandTerm::check)?;
+        self.events.iter().try_for_each(EventTerm::check)?;
+        self.rewards.iter().try_for_each(RewardTerm::check)
+    }
+}
+
+#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+fn distinct<'n>(kind: TermKind, names: impl Iterator<Item = &'n String>) -> Result<()> {
+    let mut seen: Vec<&String> = Vec::new();
+    for name in names {
+        if seen.contains(&name) {
+            return Err(EnvError::RepeatedTerm { kind, name: name.clone() });
+        }
+        seen.push(name);
+    }
+    Ok(())
+}

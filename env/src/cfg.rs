@@ -1,0 +1,32 @@
+//! Lengths of steps and episodes.
+
+use crate::error::{EnvError, Result};
+
+/// How a task is stepped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EnvCfg {
+    /// Physics steps in one step of the task.
+    pub decimation: u32,
+    /// Steps of the task after which an episode is truncated; `None` for no limit.
+    pub episode_steps: Option<u64>,
+}
+
+impl Default for EnvCfg {
+    /// One physics step in a step, and no limit.
+    fn default() -> Self {
+        Self { decimation: 1, episode_steps: None }
+    }
+}
+
+impl EnvCfg {
+    pub(crate) fn check(&self) -> Result<()> {
+        let wrong = |field: &str, expected| Err(EnvError::Config { field: field.into(), value: "0".into(), expected });
+        if self.decimation == 0 {
+            return wrong("decimation", "a step has at least 1 physics step");
+        }
+        if self.episode_steps == Some(0) {
+            return wrong("episode_steps", "an episode has at least 1 step; leave it out for no limit");
+        }
+        Ok(())
+    }
+}

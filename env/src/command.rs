@@ -1,0 +1,51 @@
+//! What is wanted of an environment in an episode.
+
+use crate::dice::Dice;
+use crate::error::{EnvError, Result};
+use crate::space::Space;
+use std::fmt;
+
+type Draw = Box<dyn Fn(&mut Dice) -> Vec<f64> + Send>;
+
+/// Numbers that are drawn for an environment when an episode begins, and stay until it ends: where to reach, how fast to walk.
+/// Other terms read them with [`Now::command`](crate::Now::command).
+pub struct CommandTerm {
+    pub(crate) name: String,
+    pub(crate) columns: Vec<String>,
+    draw: Draw,
+}
+
+impl CommandTerm {
+    /// Named columns that `draw` gives the numbers of.
+    pub fn new<const K: usize>(
+        name: impl Into<String>,
+        columns: [&str; K],
+        draw: impl Fn(&mut Dice) -> [f64; K] + Send + 'static,
+    ) -> Self {
+        let columns = columns.map(String::from).to_vec();
+        Self { name: name.into(), columns, draw: Box::new(move |dice| draw(dice).to_vec()) }
+    }
+
+    pub(crate) fn check(&self) -> Result<()> {
+        Space::uniform(self.columns.iter().map(String::as_str), [f64::NEG_INFINITY, f64::INFINITY]).map(drop)
+    }
+
+    /// The numbers of an episode.
+    pub(crate) fn values(&self, dice: &mut Dice) -> Result<Vec<f64>> {
+        let values = (self.draw)(dice);
+        match values.iter().position(|value| !value.is_finite()) {
+            None => Ok(values),
+            Some(k) => {
+                let what = format!("what the command term {:?} draws", self.name);
+                let (env, column) = (dice.env().0, self.columns[k].clone());
+                Err(EnvError::NotFinite { what, env, column, value: values[k] })
+            }
+        }
+    }
+}
+
+impl fmt::Debug for CommandTerm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("CommandTerm").field("name", &self.name).field("columns", &self.columns).finish_non_exhaustive()
+    }
+}

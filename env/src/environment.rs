@@ -1,0 +1,410 @@
+//! The batch of environments with a task.
+
+use crate::builder::Terms;
+use crate::cfg::EnvCfg;
+use crate::dice::{Dice, Key};
+use crate::error::{EnvError, Result, TermKind};
+use crate::event::When;
+use crate::now::{Now, Present};
+use crate::space::Space;
+use crate::step::{EndReason, Ended, Step};
+use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
+use scene::Random;
+use sim::{EnvId, SimulationManager};
+
+/// Environments with a task: reset, then stepped.
+///
+/// What a [`step`](Self::step) does, in this order, which is Isaac Lab's:
+///
+/// 1. actions are put between their bounds and applied, and [`EnvCfg::decimation`] physics steps are done;
+/// 2. episodes are one step longer; terms say which of them end, and why;
+/// 3. rewards are computed;
+/// 4. events of [`When::Interval`] happen where they are due and the episode goes on;
+/// 5. observations are made: the final ones of episodes that ended are among them;
+/// 6. environments whose episode ended go back to the initial state, get new commands, events of [`When::Reset`] happen, and they
+///    are observed again.
+///
+/// So episodes begin in the step in which the last ones end (Gymnasium's `AutoresetMode.SAME_STEP`), and no step is lost.
+pub struct Env {
+    present: Present,
+    cfg: EnvCfg,
+    terms: Terms,
+    observation_space: Space,
+    action_space: Space,
+    rows: Vec<Row>,
+    /// Sums of the weighted rewards of each episode, shape (N, reward terms).
+    reward_sums: Array2<f64>,
+    /// What was seen last.
+    observations: Array2<f64>,
+}
+
+/// What an environment has for itself beside the simulation.
+#[derive(Debug)]
+struct Row {
+    key: Key,
+    /// Number of the next episode.
+    next_episode: u64,
+    /// Whether it has an episode.
+    runs: bool,
+    /// Noise of each observation term.
+    noise: Vec<Random>,
+    /// The step of the episode at which each event happens next, of those that do so at intervals.
+    events: Vec<u64>,
+}
+
+impl std::fmt::Debug for Env {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Env").field("cfg", &self.cfg).field("terms", &self.terms).finish_non_exhaustive()
+    }
+}
+
+/// Reading.
+impl Env {
+    /// The simulation.
+    pub fn sim(&self) -> &SimulationManager {
+        &self.present.sim
+    }
+
+    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step.
+    pub fn sim_mut(&mut self) -> &mut SimulationManager {
+        &mut self.present.sim
+    }
+
+    /// The simulation, as the last step left it.
+    pub fn into_sim(self) -> SimulationManager {
+        self.present.sim
+    }
+
+    /// What terms see at present.
+    pub fn now(&self) -> Now<'_> {
+        self.present.now()
+    }
+
+    /// How it is stepped.
+    pub fn cfg(&self) -> &EnvCfg {
+        &self.cfg
+    }
+
+    /// Number of environments.
+    pub fn num_envs(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Length of a step \[s\].
+    pub fn step_dt(&self) -> f64 {
+        f64::from(self.cfg.decimation) * self.present.sim.cfg().physics_dt
+    }
+
+    /// Columns of the observations, `term/column`. The noise of a term without a clip has no bound.
+    pub fn observation_space(&self) -> &Space {
+        &self.observation_space
+    }
+
+    /// Columns of the actions, `term/column`.
+    pub fn action_space(&self) -> &Space {
+        &self.action_space
+    }
+
+    /// Names of the reward terms.
+    pub fn reward_names(&self) -> Vec<&str> {
+        self.terms.rewards.iter().map(|term| term.name.as_str()).collect()
+    }
+
+    /// What was seen last, shape (N, columns of [`observation_space`](Self::observation_space)); 0 before the first reset.
+    pub fn observations(&self) -> ArrayView2<'_, f64> {
+        self.observations.view()
+    }
+}
+
+/// Running.
+impl Env {
+    /// An environment of checked terms, whose spaces are those of observations and actions.
+    pub(crate) fn new(sim: SimulationManager, cfg: EnvCfg, terms: Terms, spaces: [Space; 2]) -> Result<Self> {
+        let [observation_space, action_space] = spaces;
+        let (n, seed, first) = (sim.num_envs(), sim.cfg().seed, sim.cfg().first_env());
+        let row = |env: usize| {
+            let key = Key { seed, global: first + env, episode: 0 };
+            Row { key, next_episode: 0, runs: false, noise: Vec::new(), events: vec![0; terms.events.len()] }
+        };
+        let actions = Array2::zeros((n, action_space.len()));
+        let commands = terms.commands.iter();
+        let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
+        let previous = actions.clone();
+        let mut env = Self {
+            rows: (0..n).map(row).collect(),
+            reward_sums: Array2::zeros((n, terms.rewards.len())),
+            observations: Array2::zeros((n, observation_space.len())),
+            present: Present { sim, actions, previous, steps: vec![0; n], commands },
+            cfg,
+            terms,
+            observation_space,
+            action_space,
+        };
+        let all: Vec<usize> = (0..n).collect();
+        env.happen(&all, |when| when == When::Startup, |event| format!("event/{event}"))?;
+        Ok(env)
+    }
+
+    /// Begins new episodes where `mask` is true (everywhere where it is `None`), and gives what is seen in all environments,
+    /// shape (N, columns of [`observation_space`](Self::observation_space)). Episodes elsewhere go on as if nothing had happened.
+    ///
+    /// With a seed, random numbers of these environments start again: the same seed gives the same episodes. Without one they go
+    /// on, as they do when episodes end by themselves; at first the seed is the simulation's. (Noise of sensors and of
+    /// [`randomize`](SimulationManager::randomize) goes by the simulation's seed alone.)
+    ///
+    /// # Errors
+    /// A mask of another length, or a term that fails; then the environments have no episode until they are reset.
+    pub fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>> {
+        let n = self.num_envs();
+        if let Some(mask) = mask.filter(|mask| mask.len() != n) {
+            let (what, found, expected) = ("the mask".into(), vec![mask.len()], vec![n]);
+            return Err(EnvError::Shape { what, found, expected, meaning: "environments" });
+        }
+        let envs: Vec<usize> = (0..n).filter(|&env| mask.is_none_or(|mask| mask[env])).collect();
+        for &env in &envs {
+            let row = &mut self.rows[env];
+            row.runs = false;
+            if let Some(seed) = seed {
+                row.key.seed = seed;
+                row.next_episode = 0;
+            }
+        }
+        self.begin(&envs)?;
+        self.observations = self.observe(&envs)?;
+        envs.iter().for_each(|&env| self.rows[env].runs = true);
+        Ok(self.observations.clone())
+    }
+
+    /// Does one step in all environments. `actions` has a row for each environment and the columns of
+    /// [`action_space`](Self::action_space); what is beyond the bounds becomes the bound.
+    ///
+    /// An environment in which a step cannot be done ends as terminated, with [`EndReason::Diverged`]: what is observed last and
+    /// rewarded is of its last good state. The others do not notice.
+    ///
+    /// # Errors
+    /// Actions of another shape or that are not finite, or an environment without an episode: then nothing was done. A term that
+    /// fails, or gives what is of another shape or not finite: then the step is broken off, and every environment has to be reset.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
+        let actions = self.within_bounds(actions.into())?;
+        if let Some(env) = self.rows.iter().position(|row| !row.runs) {
+            return Err(EnvError::ResetFirst { env });
+        }
+        let step = self.advance(actions);
+        if step.is_err() {
+            self.rows.iter_mut().for_each(|row| row.runs = false);
+        }
+        step
+    }
+
+    fn within_bounds(&self, actions: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let (found, expected) = (actions.shape().to_vec(), vec![self.num_envs(), self.action_space.len()]);
+        if found != expected {
+            let what = "the table of actions".into();
+            return Err(EnvError::Shape {
+                what,
+                found,
+                expected,
+                meaning: "environments, columns of the action space",
+            });
+        }
+        if let Some(((env, k), &value)) = actions.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            let column = self.action_space.names()[k].clone();
+            return Err(EnvError::NotFinite { what: "the action".into(), env, column, value });
+        }
+        Ok(Array2::from_shape_fn(actions.dim(), |(env, k)| self.action_space.clamp(k, actions[(env, k)])))
+    }
+
+    fn advance(&mut self, actions: Array2<f64>) -> Result<Step> {
+        self.present.previous = std::mem::replace(&mut self.present.actions, actions);
+        self.act()?;
+        self.present.steps.iter_mut().for_each(|steps| *steps += 1);
+        let (terminated, truncated, reasons) = self.ends()?;
+        let reward_terms = self.rewards()?;
+        self.reward_sums += &reward_terms;
+        let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
+        self.happen_at_intervals(&going_on)?;
+        let all: Vec<usize> = (0..self.num_envs()).collect();
+        let final_observations = self.observe(&all)?;
+        self.observations = final_observations.clone();
+        let mut ended = Vec::new();
+        for (env, reason) in reasons.into_iter().enumerate() {
+            if let Some(reason) = reason {
+                let (steps, reward_sums) = (self.present.steps[env], self.reward_sums.row(env).to_vec());
+                ended.push(Ended { env: EnvId(env), reason, steps, reward_sums });
+            }
+        }
+        if !ended.is_empty() {
+            let envs: Vec<usize> = ended.iter().map(|ended| ended.env.0).collect();
+            self.begin(&envs)?;
+            self.observations = self.observe(&envs)?;
+        }
+        Ok(Step {
+            observations: self.observations.clone(),
+            final_observations,
+            // In the order of the terms.
+            rewards: reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward)),
+            reward_terms,
+            terminated,
+            truncated,
+            ended,
+        })
+    }
+
+    /// Applies the actions and does the physics steps.
+    fn act(&mut self) -> Result<()> {
+        let apply = |present: &mut Present, again: bool| -> Result<()> {
+            let mut first = 0;
+            for term in &self.terms.actions {
+                let end = first + term.space.len();
+                if !again || term.every_physics_step {
+                    let columns = present.actions.slice_axis(Axis(1), Slice::from(first..end));
+                    let applied = (term.apply)(&mut present.sim, columns);
+                    applied.map_err(|e| EnvError::term(TermKind::Action, &term.name, e))?;
+                }
+                first = end;
+            }
+            Ok(())
+        };
+        let present = &mut self.present;
+        apply(present, false)?;
+        if self.terms.actions.iter().any(|term| term.every_physics_step) {
+            present.sim.update(1);
+            for _ in 1..self.cfg.decimation {
+                apply(present, true)?;
+                present.sim.update(1);
+            }
+        } else {
+            present.sim.update(self.cfg.decimation);
+        }
+        Ok(())
+    }
+
+    /// Which episodes end, and the first reason of each.
+    #[expect(clippy::type_complexity, reason = "three columns of a step")]
+    fn ends(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
+        let n = self.num_envs();
+        let (mut terminated, mut truncated) = (Array1::from_elem(n, false), Array1::from_elem(n, false));
+        let mut reasons: Vec<Option<EndReason>> = vec![None; n];
+        for (env, why) in self.present.sim.diverged() {
+            terminated[env.0] = true;
+            reasons[env.0] = Some(EndReason::Diverged(why));
+        }
+        for term in &self.terms.terminations {
+            for (env, _) in term.ends(&self.now())?.indexed_iter().filter(|(_, ends)| **ends) {
+                if term.truncates {
+                    truncated[env] = true
+                } else {
+                    terminated[env] = true
+                }
+                reasons[env].get_or_insert_with(|| EndReason::Term(term.name.clone()));
+            }
+        }
+        for (env, steps) in self.present.steps.iter().enumerate() {
+            if self.cfg.episode_steps.is_some_and(|limit| *steps >= limit) {
+                truncated[env] = true;
+                reasons[env].get_or_insert(EndReason::TimeLimit);
+            }
+        }
+        Ok((terminated, truncated, reasons))
+    }
+
+    /// The weighted rewards of each term.
+    fn rewards(&self) -> Result<Array2<f64>> {
+        let mut table = Array2::zeros((self.num_envs(), self.terms.rewards.len()));
+        for (mut column, term) in table.columns_mut().into_iter().zip(&self.terms.rewards) {
+            column.assign(&term.rewards(&self.now())?);
+        }
+        Ok(table)
+    }
+
+    /// What was seen last, with `envs` looked at again.
+    fn observe(&mut self, envs: &[usize]) -> Result<Array2<f64>> {
+        let mut seen = self.observations.clone();
+        let mut first = 0;
+        for (k, term) in self.terms.observations.iter().enumerate() {
+            let values = term.rows(&self.present.now())?;
+            for &env in envs {
+                for (column, &value) in values.row(env).iter().enumerate() {
+                    let value = term.seen(value, &mut self.rows[env].noise[k]);
+                    if !value.is_finite() {
+                        let what = format!("what the observation term {:?} gives", term.name);
+                        let column = term.columns[column].clone();
+                        return Err(EnvError::NotFinite { what, env, column, value });
+                    }
+                    seen[(env, first + column)] = value;
+                }
+            }
+            first += term.columns.len();
+        }
+        Ok(seen)
+    }
+
+    /// Begins an episode in each of `envs`.
+    fn begin(&mut self, envs: &[usize]) -> Result<()> {
+        if envs.is_empty() {
+            return Ok(());
+        }
+        let ids: Vec<EnvId> = envs.iter().map(|&env| EnvId(env)).collect();
+        self.present.sim.reset(Some(&ids))?;
+        for &env in envs {
+            let row = &mut self.rows[env];
+            row.key.episode = row.next_episode;
+            row.next_episode += 1;
+            let noise = |name: &String| row.key.random(&format!("observation/{name}"));
+            row.noise = self.terms.observations.iter().map(|term| noise(&term.name)).collect();
+            for (next, event) in row.events.iter_mut().zip(&self.terms.events) {
+                if let When::Interval { steps } = event.when {
+                    *next = wait(row.key, env, &event.name, 0, steps);
+                }
+            }
+            for (term, (name, values)) in self.terms.commands.iter().zip(&mut self.present.commands) {
+                let drawn = term.values(&mut row.key.dice(env, &format!("command/{name}")))?;
+                values.row_mut(env).iter_mut().zip(drawn).for_each(|(to, from)| *to = from);
+            }
+            self.present.steps[env] = 0;
+            self.present.actions.row_mut(env).fill(0.0);
+            self.present.previous.row_mut(env).fill(0.0);
+            self.reward_sums.row_mut(env).fill(0.0);
+        }
+        self.happen(envs, |when| when == When::Reset, |event| format!("event/{event}"))
+    }
+
+    /// Lets those events happen in `envs` that are `due`, with dice that are called as `named` says.
+    fn happen(&mut self, envs: &[usize], due: impl Fn(When) -> bool, named: impl Fn(&str) -> String) -> Result<()> {
+        for event in self.terms.events.iter().filter(|event| due(event.when)) {
+            let what = named(&event.name);
+            let mut dice: Vec<Dice> = envs.iter().map(|&env| self.rows[env].key.dice(env, &what)).collect();
+            (event.act)(&mut self.present.sim, &mut dice)
+                .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
+        }
+        Ok(())
+    }
+
+    /// Lets events happen where their time has come.
+    fn happen_at_intervals(&mut self, envs: &[usize]) -> Result<()> {
+        for (k, event) in self.terms.events.iter().enumerate() {
+            let When::Interval { steps } = event.when else { continue };
+            let mut dice = Vec::new();
+            for &env in envs {
+                let (row, now) = (&mut self.rows[env], self.present.steps[env]);
+                if row.events[k] == now {
+                    row.events[k] = now.saturating_add(wait(row.key, env, &event.name, now, steps));
+                    dice.push(row.key.dice(env, &format!("event/{}/{now}", event.name)));
+                }
+            }
+            if !dice.is_empty() {
+                (event.act)(&mut self.present.sim, &mut dice)
+                    .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Steps from step `now` until an event happens again.
+fn wait(key: Key, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
+    let share = key.dice(env, &format!("interval/{event}/{now}")).uniform();
+    // Rounding may make the product of a share below 1 the whole width.
+    low + ((share * (high - low + 1) as f64) as u64).min(high - low)
+}

@@ -1,0 +1,56 @@
+//! What agents get for what they do.
+
+use crate::error::{EnvError, Result, TermKind, TermResult};
+use crate::now::Now;
+use ndarray::Array1;
+use std::fmt;
+
+type Reward = Box<dyn Fn(&Now<'_>) -> TermResult<Array1<f64>> + Send>;
+
+/// A part of the reward of a step: a number for each environment, times a weight. (In Isaac Lab weights are of rates, and the
+/// products are multiplied by the length of a step: multiply weights by it to take them over.)
+pub struct RewardTerm {
+    pub(crate) name: String,
+    pub(crate) weight: f64,
+    reward: Reward,
+}
+
+impl RewardTerm {
+    /// `weight` times what `reward` gives for each environment, shape (N,).
+    pub fn new(
+        name: impl Into<String>,
+        weight: f64,
+        reward: impl Fn(&Now<'_>) -> TermResult<Array1<f64>> + Send + 'static,
+    ) -> Self {
+        Self { name: name.into(), weight, reward: Box::new(reward) }
+    }
+
+    pub(crate) fn check(&self) -> Result<()> {
+        if self.weight.is_finite() {
+            return Ok(());
+        }
+        let field = format!("the weight of the reward term {:?}", self.name);
+        Err(EnvError::Config { field, value: self.weight.to_string(), expected: "it must be finite" })
+    }
+
+    /// The weighted rewards of all environments.
+    pub(crate) fn rewards(&self, now: &Now<'_>) -> Result<Array1<f64>> {
+        let mut rewards = (self.reward)(now).map_err(|e| EnvError::term(TermKind::Reward, &self.name, e))?;
+        let what = || format!("what the reward term {:?} gives", self.name);
+        if rewards.len() != now.num_envs() {
+            let (found, expected) = (vec![rewards.len()], vec![now.num_envs()]);
+            return Err(EnvError::Shape { what: what(), found, expected, meaning: "environments" });
+        }
+        rewards.mapv_inplace(|value| self.weight * value);
+        if let Some((env, &value)) = rewards.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            return Err(EnvError::NotFinite { what: what(), env, column: self.name.clone(), value });
+        }
+        Ok(rewards)
+    }
+}
+
+impl fmt::Debug for RewardTerm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RewardTerm").field("name", &self.name).field("weight", &self.weight).finish_non_exhaustive()
+    }
+}

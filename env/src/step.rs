@@ -1,0 +1,69 @@
+//! What comes of a step.
+
+use ndarray::{Array1, Array2};
+use sim::EnvId;
+use std::fmt;
+
+/// What comes of a step of all environments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// What is seen now, shape (N, columns of [`Env::observation_space`](crate::Env::observation_space)): where an episode
+    /// ended, the first observation of the next one.
+    pub observations: Array2<f64>,
+    /// What the actions led to, shaped as the observations: where an episode ended, its last observation, elsewhere the same
+    /// numbers as there.
+    pub final_observations: Array2<f64>,
+    /// Rewards, shape (N,): the sums of [`reward_terms`](Self::reward_terms).
+    pub rewards: Array1<f64>,
+    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)).
+    pub reward_terms: Array2<f64>,
+    /// Whether the episode ended by itself, shape (N,): a termination term, or a step that could not be done.
+    pub terminated: Array1<bool>,
+    /// Whether the episode was broken off, shape (N,): the limit of steps, or a term that truncates.
+    pub truncated: Array1<bool>,
+    /// The episodes that ended, by environment.
+    pub ended: Vec<Ended>,
+}
+
+/// An episode that ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// Where.
+    pub env: EnvId,
+    /// Why.
+    pub reason: EndReason,
+    /// Steps it had.
+    pub steps: u64,
+    /// Sum of its weighted rewards by term, in the order of [`Env::reward_names`](crate::Env::reward_names).
+    pub reward_sums: Vec<f64>,
+}
+
+impl Ended {
+    /// Sum of all its rewards.
+    pub fn total(&self) -> f64 {
+        self.reward_sums.iter().sum()
+    }
+}
+
+/// Why an episode ended. Where there are several reasons, the first of this list, and of the terms the one that was added
+/// first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EndReason {
+    /// A step could not be done: the environment stood in its last good state, and was revived.
+    Diverged(String),
+    /// A termination term, by name.
+    Term(String),
+    /// The limit of [`EnvCfg::episode_steps`](crate::EnvCfg::episode_steps).
+    TimeLimit,
+}
+
+impl fmt::Display for EndReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Diverged(why) => write!(f, "diverged: {why}"),
+            Self::Term(name) => f.write_str(name),
+            Self::TimeLimit => f.write_str("time limit"),
+        }
+    }
+}

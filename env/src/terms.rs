@@ -1,0 +1,128 @@
+//! Terms that most tasks of robots have; what else a task needs is a function away.
+
+use crate::action::ActionTerm;
+use crate::error::{Result, TermResult};
+use crate::now::Now;
+use crate::observation::ObservationTerm;
+use crate::reward::RewardTerm;
+use crate::space::Space;
+use ndarray::{Array1, Array2, Axis};
+use sim::{JointIndex, RobotId, SimulationManager};
+
+/// Names and columns of the joints of a robot that match `patterns`.
+fn joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
+    let robot = sim.robot(robot);
+    let joints = robot.find_joints(patterns)?;
+    Ok((joints.iter().map(|joint| robot.joint_names()[joint.0].clone()).collect(), joints))
+}
+
+fn columns(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
+    of.select(Axis(1), &joints.iter().map(|joint| joint.0).collect::<Vec<_>>())
+}
+
+/// Positions of joints from their start \[rad or m\]; one column for each joint that matches `patterns` (whole names).
+///
+/// # Errors
+/// A pattern that matches nothing.
+///
+/// # Panics
+/// The robot is of another manager.
+pub fn joint_positions(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+) -> Result<ObservationTerm> {
+    let (names, joints) = joints(sim, robot, patterns)?;
+    Ok(ObservationTerm::new(name, names, move |now| {
+        let robot = now.sim().robot(robot);
+        Ok(columns(&(robot.get_qpos() - robot.get_default_qpos()), &joints))
+    }))
+}
+
+/// Velocities of joints \[rad/s or m/s\], as [`joint_positions`].
+///
+/// # Errors
+/// A pattern that matches nothing.
+///
+/// # Panics
+/// The robot is of another manager.
+pub fn joint_velocities(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+) -> Result<ObservationTerm> {
+    let (names, joints) = joints(sim, robot, patterns)?;
+    Ok(ObservationTerm::new(name, names, move |now| Ok(columns(&now.sim().robot(robot).get_qvel(), &joints))))
+}
+
+/// The last actions, one column for each of `names`, the columns of the action space.
+pub fn last_actions<N: Into<String>>(name: &str, names: impl IntoIterator<Item = N>) -> ObservationTerm {
+    ObservationTerm::new(name, names, |now| Ok(now.actions().to_owned()))
+}
+
+/// The numbers of a command, one column for each of `names`.
+pub fn commanded<N: Into<String>>(
+    name: &str,
+    command: impl Into<String>,
+    names: impl IntoIterator<Item = N>,
+) -> ObservationTerm {
+    let command = command.into();
+    ObservationTerm::new(name, names, move |now| Ok(now.command(&command)?.to_owned()))
+}
+
+/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf`](sim::RobotMut::set_qf) takes them.
+///
+/// # Errors
+/// A pattern that matches nothing, or a bound that is negative or not a number.
+///
+/// # Panics
+/// The robot is of another manager.
+pub fn joint_efforts(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+    bound: f64,
+) -> Result<ActionTerm> {
+    let (names, joints) = joints(sim, robot, patterns)?;
+    Ok(ActionTerm::new(name, Space::uniform(names, [-bound, bound])?, move |sim, efforts| {
+        Ok(sim.robot_mut(robot).set_qf(efforts, Some(&joints), None)?)
+    }))
+}
+
+/// Changes of the position targets of joints: actions are from -1 to 1, and `step` is what 1 changes a target by in a step of the
+/// task \[rad or m\]. Targets stay within the limits of the joints.
+///
+/// # Errors
+/// A pattern that matches nothing.
+///
+/// # Panics
+/// The robot is of another manager.
+pub fn target_changes(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+    step: f64,
+) -> Result<ActionTerm> {
+    let (names, joints) = joints(sim, robot, patterns)?;
+    Ok(ActionTerm::new(name, Space::uniform(names, [-1.0, 1.0])?, move |sim, actions| {
+        let targets = columns(&sim.robot(robot).get_target_qpos(), &joints) + actions.mapv(|action| step * action);
+        Ok(sim.robot_mut(robot).set_qpos(&targets, Some(&joints), None)?)
+    }))
+}
+
+/// 1 in every step: for being there still.
+pub fn alive(name: &str, weight: f64) -> RewardTerm {
+    RewardTerm::new(name, weight, |now| Ok(Array1::ones(now.num_envs())))
+}
+
+/// Sum of the squares of what the actions have changed by since the step before.
+pub fn action_rate(name: &str, weight: f64) -> RewardTerm {
+    RewardTerm::new(name, weight, |now: &Now<'_>| -> TermResult<Array1<f64>> {
+        let change = &now.actions() - &now.previous_actions();
+        Ok(change.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum()))
+    })
+}

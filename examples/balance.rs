@@ -1,0 +1,359 @@
+//! Robots on two wheels stay upright by what an IMU and contact sensors say, in 16 environments: dropped from 3 cm, then
+//! pushed four times, at other times and with other forces in each; once so far up that they lose the floor.
+//!
+//! ```text
+//! cargo run --release --example balance -- --headless --out pictures
+//! cargo run --release --example balance -- --headless --no-feedback
+//! ```
+//!
+//! What the controller knows: a gyroscope and an accelerometer, both with noise and bias, whether wheels are on the floor, and
+//! what it asked of its own motors. No pose, no velocity and no joint is read; those are looked at to judge in the end.
+//!
+//! The exit code is 0 where at least 15 of 16 robots stand in the end and their bodies have never touched the floor, 1 where
+//! fewer do (the second command, whose wheels stand still), 2 where something is wrong.
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::ndarray::{Array2, Array3};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Random;
+use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sim::WrenchFrame;
+use launcher::trial::{self, Album, Count};
+use launcher::{Launcher, Progress, grip, user_or_asset};
+use nalgebra::{Matrix4, RowVector4, Vector3, Vector4};
+use serde_json::json;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Balances robots that are pushed, and counts.
+#[derive(Debug, Parser)]
+#[command(name = "balance")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// The controller does nothing: wheels stand still
+    #[arg(long, alias = "no_feedback")]
+    no_feedback: bool,
+    /// Pushes are as many times as strong
+    #[arg(long, default_value_t = 1.0)]
+    push: f64,
+}
+
+const DT: f64 = 0.002;
+/// How long it goes on \[s\].
+const DURATION: f64 = 14.0;
+
+/// From the file of the robot: radius of the wheels \[m\], masses of the body and of both wheels \[kg\], height of the centre of
+/// mass above the axle \[m\], inertia of the body about it and of both wheels about the axle \[kg m²\].
+const RADIUS: f64 = 0.1;
+const BODY: f64 = 8.0;
+const WHEELS: f64 = 1.6;
+const HEIGHT: f64 = 0.35;
+const BODY_INERTIA: f64 = 0.173333;
+const WHEEL_INERTIA: f64 = 0.008;
+const G: f64 = 9.81;
+
+/// Most acceleration that is asked for \[m/s²\]: tyres with friction 1 slip at 9.8.
+const MOST: f64 = 6.0;
+/// Time in which the accelerometer corrects what the gyroscope says \[s\].
+const CORRECTION: f64 = 0.5;
+/// Stiffness of the wheels' speed controllers \[N m s/rad\].
+const GRIP: f64 = 20.0;
+
+/// Pushes: when they may begin \[s\], how long they last \[s\], how strong they are \[N\], fore or aft, in the centre of mass of
+/// the body.
+const PUSHES: [[f64; 2]; 4] = [[2.0, 2.5], [4.5, 5.0], [7.0, 7.5], [10.0, 10.5]];
+const LENGTH: f64 = 0.15;
+const FORCES: [f64; 2] = [20.0, 35.0];
+/// The third one also lifts \[N\]: the robot weighs 94 N, and leaves the floor for about a quarter of a second.
+const LIFT: f64 = 120.0;
+
+/// In the end they stand: tilted by no more than this \[rad\], no faster than this \[m/s\], no farther from their start \[m\].
+const UPRIGHT: f64 = 0.05;
+const SLOW: f64 = 0.1;
+const AT_HOME: f64 = 0.5;
+
+fn main() -> ExitCode {
+    trial::run("balance", || run(&trial::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result<bool> {
+    if !(args.push.is_finite() && args.push >= 0.0) {
+        return Err(format!("--push {}: it must be 0 or more", args.push).into());
+    }
+    let legged = SimulationManagerCfg::legged();
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        physics_dt: DT,
+        cone: legged.cone,
+        impratio: legged.impratio,
+        arena_space: args.launcher.arena_space.unwrap_or(1.6),
+        ..args.launcher.simulation()?
+    })?;
+    let robot = sim.add_robot(RobotCfg {
+        uid: "balancer".into(),
+        urdf: UrdfCfg::single(user_or_asset(Path::new("balancer/balancer.urdf"))?),
+        fix_base: false,
+        init_pose: Pose::translation(0.0, 0.0, RADIUS + 0.03),
+        // Speed controllers.
+        drive: DriveCfg { stiffness: 0.0.into(), damping: GRIP.into(), ..Default::default() },
+        ..Default::default()
+    })?;
+    let imu = sim.add_sensor("imu", imu_cfg())?;
+    let touch = sim.add_sensor("touch", ContactSensorCfg::of("balancer/.*"))?;
+    let out = args.launcher.out.clone();
+    let mut album = Album::new(&mut sim, "balance", out, [2.2, -2.6, 1.1], [0.2, 0.0, 0.3])?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    args.launcher.write_dump(&sim)?;
+    // They start a little tilted.
+    let tilts = grip::scatter::<1>(&sim, "tilt");
+    let start: Vec<Pose> =
+        tilts.iter().map(|[tilt]| from_xyz_rpy([0.0, 0.0, RADIUS + 0.03], [0.0, 0.05 * tilt, 0.0])).collect();
+    sim.robot_mut(robot).write_root_pose(&trial::rows(&start), None)?;
+    let pushes: Vec<Pushes> = (0..sim.num_envs()).map(|env| Pushes::draw(&sim, env, args.push)).collect();
+    let (body, tyres) = (sim.robot(robot).link_id("body")?, ["left_tyre", "right_tyre"]);
+    let watched: Vec<usize> = tyres
+        .iter()
+        .chain(&["body"])
+        .map(|link| Ok(sim.sensor(touch)?.find_bodies(&format!("balancer/{link}"))?[0]))
+        .collect::<launcher::Result<_>>()?;
+
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
+    let steps = (DURATION / DT).round() as u64;
+    let progress = Progress::new(&args.launcher, steps);
+    let gains = gains();
+    // When pictures are taken: before all pushes, after the first, in the air, landed, in the end.
+    let end_of = |push: usize| pushes[0].list[push].time[1];
+    let moments = [1.0, end_of(0) + 0.1, end_of(2) + 0.04, end_of(2) + 0.4, DURATION];
+    progress.say(&format!("Gains on distance, speed, tilt and its rate: {:.3?}", gains.as_slice()));
+    let mut controllers = vec![Controller::default(); sim.num_envs()];
+    let mut records = vec![Record::default(); sim.num_envs()];
+    let mut speeds = Array2::zeros((sim.num_envs(), 2));
+    let mut step = 0;
+    while step < steps && !progress.stop(step) {
+        let time = step as f64 * DT;
+        let (read, forces) = (sim.sensor(imu)?, sim.sensor(touch)?.net_forces_w());
+        for (env, (controller, record)) in controllers.iter_mut().zip(&mut records).enumerate() {
+            let felt = Felt {
+                spin: Vector3::from_fn(|k, _| read.ang_vel_b()[(env, k)]),
+                acceleration: Vector3::from_fn(|k, _| read.lin_acc_b()[(env, k)]),
+                grounded: watched[..2].iter().all(|&tyre| forces[(env, tyre, 2)] > 1.0),
+            };
+            let speed = if args.no_feedback { 0.0 } else { controller.wheels(&felt, &gains) };
+            speeds.row_mut(env).fill(speed);
+            // To judge: the controller does not know.
+            record.airborne += u64::from(!felt.grounded && time > 1.0);
+            let touching = (0..3).map(|k| forces[(env, watched[2], k)].powi(2)).sum::<f64>().sqrt();
+            record.fell |= touching > 1.0;
+        }
+        let push = Array3::from_shape_fn((sim.num_envs(), 1, 3), |(env, _, k)| pushes[env].force(time)[k]);
+        let turn = Array3::zeros(push.dim());
+        let mut robot_now = sim.robot_mut(robot);
+        robot_now.set_external_wrench(&push, &turn, WrenchFrame::World, Some(&[body]), None)?;
+        robot_now.set_qvel(&speeds, None, None)?;
+        sim.update(1);
+        step += 1;
+        progress.advance(step);
+        let poses = trial::poses(&sim.robot(robot).get_root_pose());
+        for (record, pose) in records.iter_mut().zip(&poses) {
+            record.tilt = record.tilt.max(tilt(pose));
+        }
+        if moments.iter().any(|at| (at / DT).round() as u64 == step) {
+            album.add(&sim)?;
+        }
+    }
+
+    let rate = progress.env_steps_per_second(step, sim.num_envs());
+    let (poses, velocities) = (trial::poses(&sim.robot(robot).get_root_pose()), sim.robot(robot).get_root_velocity());
+    let diverged = trial::diverged(&sim);
+    let mut table = Vec::new();
+    for env in 0..sim.num_envs() {
+        let (pose, record) = (&poses[env], &records[env]);
+        let away = pose.translation.x.hypot(pose.translation.y);
+        let speed = velocities[(env, 0)].hypot(velocities[(env, 1)]);
+        let (last, airborne) = (tilt(pose), record.airborne as f64 * DT);
+        let stands = !record.fell && last < UPRIGHT && speed < SLOW && away < AT_HOME;
+        let success = step == steps && stands && diverged[env].is_none();
+        table.push(json!({
+            "env": env, "pushes": pushes[env].list.iter().map(|push| push.force).collect::<Vec<_>>(),
+            "largest_tilt": record.tilt, "end_tilt": last, "end_speed": speed, "end_distance": away,
+            "airborne": airborne, "body_touched_floor": record.fell, "diverged": diverged[env], "success": success,
+        }));
+        println!(
+            "environment {env:>2}: tilted by {:.3} rad at most, in the air for {airborne:.2} s, {away:.3} m from the start, \
+             {speed:.3} m/s: {}",
+            record.tilt,
+            if success {
+                "stands"
+            } else if record.fell {
+                "fell"
+            } else {
+                "does not stand still"
+            },
+        );
+    }
+    let count = Count {
+        what: "robots stand",
+        setting: ("push", args.push),
+        table,
+        steps: step,
+        rate,
+        overview: ("balance_all.png", [3.6, -4.2, 3.0], [0.0, 0.0, 0.2]),
+    };
+    recording.finish(&mut sim)?;
+    trial::conclude(&args.launcher, &mut sim, count)
+}
+
+/// On the axle, where tilting does not accelerate it: what a cheap one measures.
+fn imu_cfg() -> ImuCfg {
+    let noise = [
+        ("ang_vel_b".to_string(), NoiseCfg { bias_std: 0.01, ..NoiseCfg::white(0.005) }),
+        ("lin_acc_b".to_string(), NoiseCfg { bias_std: 0.02, ..NoiseCfg::white(0.05) }),
+    ];
+    ImuCfg { sampling: SamplingCfg { noise: noise.into(), ..Default::default() }, ..ImuCfg::on("balancer/body") }
+}
+
+/// Gains on distance, speed, tilt and rate of tilt, of the acceleration that is asked for.
+///
+/// With the axle accelerated by a, the body (mass m, its centre h above the axle, inertia I about that) tilts by θ. The wheels
+/// (mass M, inertia J, radius r) are driven by a torque T, which acts on the body the other way. For small angles, with H the
+/// force of the axle on the body and F that of the floor on the wheels:
+///
+/// ```text
+/// body, along:  m (a + h θ") = H             wheels, along:  M a = F - H
+/// body, turn:   I θ" = m g h θ - h H - T     wheels, turn:   J a / r = T - r F
+/// so            (I + m h² + m h r) θ" = m g h θ - (m h + (M + m) r + J / r) a
+/// ```
+///
+/// The gains are those of the linear-quadratic regulator of x' = v, v' = a, θ' = ω, ω' = A θ - B a in steps of dt, with costs
+/// by Bryson's rule: one over the square of what is thought large. Its Riccati equation is solved by going back in time
+/// until nothing changes any more.
+fn gains() -> RowVector4<f64> {
+    let inertia = BODY_INERTIA + BODY * HEIGHT * HEIGHT + BODY * HEIGHT * RADIUS;
+    let (a, b) =
+        (BODY * G * HEIGHT / inertia, (BODY * HEIGHT + (WHEELS + BODY) * RADIUS + WHEEL_INERTIA / RADIUS) / inertia);
+    #[rustfmt::skip]
+    let forward = Matrix4::new(
+        1.0, DT,  0.0,    0.0,
+        0.0, 1.0, 0.0,    0.0,
+        0.0, 0.0, 1.0,    DT,
+        0.0, 0.0, a * DT, 1.0,
+    );
+    let input = Vector4::new(0.0, DT, 0.0, -b * DT);
+    // 0.5 m, 1 m/s, 0.2 rad, 1 rad/s, and 3 m/s².
+    let cost = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 25.0, 1.0));
+    let effort = 1.0 / 9.0;
+    let mut value = cost;
+    let mut gains = RowVector4::zeros();
+    loop {
+        let weight = effort + input.dot(&(value * input));
+        let next = (input.transpose() * value * forward) / weight;
+        let change = (next - gains).abs().max();
+        gains = next;
+        value = cost + forward.transpose() * value * (forward - input * gains);
+        if change < 1e-12 {
+            return gains;
+        }
+    }
+}
+
+/// What a robot feels.
+struct Felt {
+    /// Angular velocity in its axes \[rad/s\].
+    spin: Vector3<f64>,
+    /// Acceleration and weight in its axes \[m/s²\].
+    acceleration: Vector3<f64>,
+    /// Both wheels are on the floor.
+    grounded: bool,
+}
+
+/// What a controller remembers: what it thinks and what it has asked for.
+#[derive(Clone, Debug, Default)]
+struct Controller {
+    /// How far the body is tilted forwards, as it thinks \[rad\].
+    tilt: f64,
+    /// Acceleration, speed and distance that it has asked for, or felt in the air \[m/s², m/s, m\].
+    acceleration: f64,
+    speed: f64,
+    distance: f64,
+}
+
+impl Controller {
+    /// Speed of both wheels relative to the body \[rad/s\].
+    fn wheels(&mut self, felt: &Felt, gains: &RowVector4<f64>) -> f64 {
+        self.tilt += DT * felt.spin.y;
+        let (sin, cos) = self.tilt.sin_cos();
+        self.acceleration = if felt.grounded {
+            // At a tilt of θ, with the axle accelerated by a, what is felt is along (a cos θ - g sin θ, a sin θ + g cos θ), at an angle
+            // of θ - atan(a / g).
+            let leans = (-felt.acceleration.x).atan2(felt.acceleration.z) + self.acceleration.atan2(G);
+            self.tilt += DT / CORRECTION * (leans - self.tilt);
+            let state = Vector4::new(self.distance, self.speed, self.tilt, felt.spin.y);
+            -(gains * state)[0].clamp(-MOST, MOST)
+        } else {
+            // In the air there is no weight to tell where down is, and no floor to push against. What is felt along the floor is what
+            // pushes: wheels turn as fast as the floor will come.
+            felt.acceleration.x * cos + felt.acceleration.z * sin
+        };
+        self.speed += DT * self.acceleration;
+        self.distance += DT * self.speed;
+        // A wheel that stands still on the floor turns backwards in a body that tilts forwards.
+        self.speed / RADIUS - felt.spin.y
+    }
+}
+
+/// A push.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    /// When it begins and ends \[s\].
+    time: [f64; 2],
+    /// Forwards and up \[N\].
+    force: [f64; 2],
+}
+
+/// The pushes of an environment.
+#[derive(Clone, Debug)]
+struct Pushes {
+    list: Vec<Push>,
+}
+
+impl Pushes {
+    fn draw(sim: &SimulationManager, env: usize, strength: f64) -> Self {
+        let mut random = Random::keyed(sim.cfg().seed, (sim.cfg().first_env() + env) as u64, "pushes");
+        let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.uniform();
+        let mut push = |(k, window): (usize, [f64; 2])| {
+            let begin = between(window);
+            let side = if between([-1.0, 1.0]) < 0.0 { -1.0 } else { 1.0 };
+            let force = [side * strength * between(FORCES), if k == 2 { strength * LIFT } else { 0.0 }];
+            Push { time: [begin, begin + LENGTH], force }
+        };
+        Self { list: PUSHES.into_iter().enumerate().map(&mut push).collect() }
+    }
+
+    /// The force at a time, in world axes \[N\].
+    fn force(&self, time: f64) -> [f64; 3] {
+        let now = self.list.iter().find(|push| (push.time[0]..push.time[1]).contains(&time));
+        now.map_or([0.0; 3], |push| [push.force[0], 0.0, push.force[1]])
+    }
+}
+
+/// What happened to a robot.
+#[derive(Clone, Debug, Default)]
+struct Record {
+    /// The largest tilt \[rad\].
+    tilt: f64,
+    /// Steps without both wheels on the floor, once it has landed.
+    airborne: u64,
+    /// The body has touched the floor.
+    fell: bool,
+}
+
+/// Angle between the body and the vertical \[rad\].
+fn tilt(pose: &Pose) -> f64 {
+    (pose.rotation * Vector3::z()).angle(&Vector3::z())
+}

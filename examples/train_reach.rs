@@ -1,0 +1,325 @@
+//! An arm learns to reach: a linear policy, found by augmented random search in 256 environments at once.
+//!
+//! ```text
+//! cargo run --release --example train_reach -- --headless --out pictures
+//! cargo run --release --example train_reach -- --headless --iterations 0
+//! ```
+//!
+//! Each iteration tries the policy with random changes of its weights, each change with both signs, on the same eight
+//! targets, and moves the weights along those changes that earned more (Mania, Guy and Recht: *Simple random search of static
+//! linear policies is competitive for reinforcement learning*, 2018; version V1 without the choice of the best directions).
+//! Everything that is random is keyed by `--seed`: curve and policy are the same for any number of threads.
+//!
+//! The exit code is 0 where the arm has learned it, 1 where it has not (the second command), 2 where something is wrong.
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::env::{CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, terms};
+use kinetoscope::ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::{Marker, Random};
+use launcher::{Launcher, Progress, curve, picture, stage, trial, user_or_asset};
+use serde_json::json;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Learns to reach random targets and counts before and after.
+#[derive(Debug, Parser)]
+#[command(name = "train_reach", mut_arg("num_envs", |arg| arg.default_value("256")))]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// Changes of the policy
+    #[arg(long, default_value_t = 32)]
+    iterations: usize,
+    /// Size of the changes that are tried
+    #[arg(long, default_value_t = 0.15)]
+    noise: f64,
+    /// How far the weights move in an iteration
+    #[arg(long, alias = "step_size", default_value_t = 0.15)]
+    step_size: f64,
+}
+
+/// Targets that every change is tried on.
+const TARGETS: usize = 8;
+/// The box of targets: its middle and half of its sides \[m\]. The tip starts at (0.54, 0.14, 0.37).
+const MIDDLE: [f64; 3] = [0.5, 0.1, 0.45];
+const HALF: [f64; 3] = [0.12, 0.3, 0.15];
+/// Steps of an episode: 3 s.
+const EPISODE: u64 = 60;
+/// Physics steps of 10 ms in a step: decisions at 20 Hz.
+const DECIMATION: u32 = 5;
+/// Most that a joint's target changes by in a step \[rad\]: 2 rad/s.
+const TURN: f64 = 0.1;
+/// Observed distances are multiplied by this \[1/m\], so that they are about as large as joint angles.
+const SCALE: f64 = 10.0;
+
+/// A target is reached when the tip is as near to it at the end of an episode \[m\]. The ball of this radius is 0.26 % of the
+/// box: as many targets would be reached by ending anywhere in it.
+const NEAR: f64 = 0.03;
+/// Share of targets that has to be reached in the end.
+const LEARNED: f64 = 0.9;
+
+fn main() -> ExitCode {
+    trial::run("train_reach", || run(&Args::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result<bool> {
+    let num_envs = args.launcher.num_envs;
+    if num_envs == 0 || num_envs % (2 * TARGETS) != 0 {
+        let block = 2 * TARGETS;
+        return Err(format!(
+            "--num-envs {num_envs}: it must be a multiple of {block}, both signs on {TARGETS} targets"
+        )
+        .into());
+    }
+    for (flag, value) in [("--noise", args.noise), ("--step-size", args.step_size)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(format!("{flag} {value}: it must be above 0").into());
+        }
+    }
+    // How many targets there are: few while learning, so that changes are compared on the same ones, then one for each.
+    let targets = Arc::new(AtomicUsize::new(num_envs));
+    let mut env = task(args, Arc::clone(&targets))?;
+    args.launcher.write_dump(env.sim())?;
+    args.launcher.serve(env.sim_mut())?;
+    args.launcher.open_window(env.sim_mut());
+    let recording = args.launcher.start_recording(env.sim_mut())?;
+    let progress = Progress::new(&args.launcher, (args.iterations as u64 + 2) * EPISODE);
+    let mut run = Run { env: &mut env, progress: &progress, step: 0 };
+
+    let mut policy = Policy::idle(run.env);
+    // Targets of their own, which are not learned on.
+    let unseen = args.launcher.seed.wrapping_add(1);
+    let before = run.reached(&policy, unseen)?;
+    progress.say(&format!("Before: {} of {num_envs} targets are reached", count(&before)));
+    targets.store(TARGETS, Ordering::Relaxed);
+    let mut rows: Vec<[f64; 3]> = Vec::new();
+    let mut seen = run.env.reset(None, Some(args.launcher.seed))?;
+    for iteration in 0..args.iterations {
+        let tried = Tried::new(&policy, args, iteration);
+        let Some((returns, distances)) = run.episode(&mut seen, |env| tried.policies[env / TARGETS].view())? else {
+            break;
+        };
+        policy.learn(&tried, &returns, args.step_size);
+        let share = |hits: usize| hits as f64 / num_envs as f64;
+        let reached = share(distances.iter().filter(|d| **d < NEAR).count());
+        let (mean, apart) = (returns.mean().unwrap_or_default(), distances.mean().unwrap_or_default());
+        rows.push([mean, apart, reached]);
+        if iteration % 5 == 4 {
+            let text = format!(
+                "Iteration {:>3}: return {mean:8.3}, {apart:.3} m from the target, {:.1} % reached",
+                iteration + 1,
+                100.0 * reached
+            );
+            progress.say(&text);
+        }
+    }
+    targets.store(num_envs, Ordering::Relaxed);
+    let after = run.reached(&policy, unseen)?;
+
+    let steps = run.step;
+    let rate = progress.env_steps_per_second(steps * u64::from(DECIMATION), num_envs);
+    let [before, after] = [before, after].map(|reached| count(&reached) as f64 / num_envs as f64);
+    println!("\nTargets that are reached, to {NEAR} m: {:.1} % before, {:.1} % after", 100.0 * before, 100.0 * after);
+    println!("{} iterations, {rate:.0} physics steps of an environment per second", rows.len());
+    if let Some(out) = &args.launcher.out {
+        write_curve(&rows, out)?;
+        draw_reaching(&mut env, &policy, unseen, &out.join("train_reach_all.png"))?;
+        println!("Curve and picture written to {}", out.display());
+    }
+    recording.finish(env.sim_mut())?;
+    args.launcher.write_report(&json!({
+        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "num_envs": num_envs,
+        "seed": args.launcher.seed,
+        "iterations": rows.len(),
+        "near": NEAR,
+        "reached_before": before,
+        "reached_after": after,
+        "needed": LEARNED,
+        "curve": rows.iter().map(|[mean, apart, reached]| json!({ "return": mean, "distance": apart, "reached": reached })).collect::<Vec<_>>(),
+        "policy": policy.weights.iter().collect::<Vec<_>>(),
+        "env_steps_per_second": rate,
+        "warnings": env.sim().warning_counts(),
+    }))?;
+    Ok(after >= LEARNED)
+}
+
+/// The arm, what it is to do, what it sees and is rewarded for.
+fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<Env> {
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        arena_space: args.launcher.arena_space.unwrap_or(1.6),
+        ..args.launcher.simulation()?
+    })?;
+    let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6)];
+    let arm = sim.add_robot(RobotCfg {
+        uid: "sr5".into(),
+        urdf: UrdfCfg::single(user_or_asset(Path::new("sr5/SR5.urdf"))?),
+        init_qpos: elbow.map(|(joint, q)| (joint.to_string(), q)).to_vec(),
+        ..Default::default()
+    })?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    let turns = terms::target_changes(&sim, "turn", arm, &["JOINT[1-6]"], TURN)?;
+    let angles = terms::joint_positions(&sim, "angle", arm, &["JOINT[1-6]"])?;
+    // From the tip to the target [m].
+    let apart = move |now: &Now<'_>| -> TermResult<Array2<f64>> {
+        let tip = now.sim().robot(arm).link_pose("ee_link")?;
+        Ok(Array2::from_shape_fn((now.num_envs(), 3), |(env, k)| -tip[(env, k)]) + now.command("target")?)
+    };
+    let distance = move |now: &Now<'_>| -> TermResult<Array1<f64>> {
+        Ok(apart(now)?.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum::<f64>().sqrt()))
+    };
+    Ok(EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
+        .action(turns)
+        .command(CommandTerm::new("target", ["x", "y", "z"], move |dice| {
+            // The same for all who are compared, another in every episode.
+            let target = (dice.global_env() % targets.load(Ordering::Relaxed)) as u64;
+            let mut random = Random::keyed(dice.seed(), target, &format!("target {}", dice.episode()));
+            std::array::from_fn(|k| MIDDLE[k] + HALF[k] * (2.0 * random.uniform() - 1.0))
+        }))
+        .observation(ObservationTerm::new("to target", ["x", "y", "z"], apart).scaled(SCALE))
+        .observation(angles)
+        .reward(RewardTerm::new("far", -1.0, distance))
+        .reward(RewardTerm::new("near", 0.5, move |now| Ok(distance(now)?.mapv(|d| 1.0 - (d / 0.1).tanh()))))
+        .reward(terms::action_rate("smooth", -1e-3))
+        .build()?)
+}
+
+/// What is observed, and 1, times weights: shape (observations + 1, actions).
+#[derive(Clone, Debug)]
+struct Policy {
+    weights: Array2<f64>,
+}
+
+impl Policy {
+    /// Does nothing.
+    fn idle(env: &Env) -> Self {
+        Self { weights: Array2::zeros((env.observation_space().len() + 1, env.action_space().len())) }
+    }
+
+    /// Moves along the changes that earned more: by the step size, times the mean of the changes, each times the difference of
+    /// what it earned with both signs, over the standard deviation of all that was earned.
+    fn learn(&mut self, tried: &Tried, returns: &Array1<f64>, step_size: f64) {
+        let earned = |policy: usize| (0..TARGETS).map(|t| returns[policy * TARGETS + t]).sum::<f64>() / TARGETS as f64;
+        let all: Vec<f64> = (0..tried.policies.len()).map(earned).collect();
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        let spread = (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64).sqrt().max(1e-9);
+        let rate = step_size / (tried.changes.len() as f64 * spread);
+        for (pair, change) in all.chunks_exact(2).zip(&tried.changes) {
+            self.weights.scaled_add(rate * (pair[0] - pair[1]), change);
+        }
+    }
+}
+
+/// Policies that are tried: with each change of the weights, and with its opposite.
+struct Tried {
+    changes: Vec<Array2<f64>>,
+    policies: Vec<Array2<f64>>,
+}
+
+impl Tried {
+    fn new(policy: &Policy, args: &Args, iteration: usize) -> Self {
+        let change = |direction: usize| {
+            let mut random = Random::keyed(args.launcher.seed, direction as u64, &format!("change {iteration}"));
+            Array2::from_shape_simple_fn(policy.weights.dim(), || random.normal())
+        };
+        let changes: Vec<Array2<f64>> = (0..args.launcher.num_envs / (2 * TARGETS)).map(change).collect();
+        let both = |change: &Array2<f64>| [args.noise, -args.noise].map(|by| &policy.weights + &(by * change));
+        let policies = changes.iter().flat_map(both).collect();
+        Self { changes, policies }
+    }
+}
+
+/// Episodes of all environments, one after the other.
+struct Run<'r> {
+    env: &'r mut Env,
+    progress: &'r Progress,
+    /// Steps so far.
+    step: u64,
+}
+
+impl Run<'_> {
+    /// One episode in all environments, from what is `seen` there: what was earned, and how far the tip was from the target in the
+    /// end \[m\]. The next episode has begun then. `None` where somebody has stopped it.
+    fn episode<'p>(
+        &mut self,
+        seen: &mut Array2<f64>,
+        policy: impl Fn(usize) -> ArrayView2<'p, f64>,
+    ) -> launcher::Result<Option<(Array1<f64>, Array1<f64>)>> {
+        let mut returns = Array1::zeros(self.env.num_envs());
+        let mut actions = Array2::zeros((self.env.num_envs(), self.env.action_space().len()));
+        for k in 1..=EPISODE {
+            if self.progress.stop(self.step) {
+                return Ok(None);
+            }
+            act(seen, &policy, &mut actions);
+            let step = self.env.step(&actions)?;
+            self.step += 1;
+            self.progress.advance(self.step);
+            returns += &step.rewards;
+            *seen = step.observations;
+            if k == EPISODE {
+                let apart =
+                    |row: ArrayView1<'_, f64>| row.iter().take(3).map(|x| (x / SCALE).powi(2)).sum::<f64>().sqrt();
+                return Ok(Some((returns, step.final_observations.map_axis(Axis(1), apart))));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether the policy reaches the target of each environment, of one episode with the seed; none where somebody has stopped
+    /// it.
+    fn reached(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Vec<bool>> {
+        let mut seen = self.env.reset(None, Some(seed))?;
+        let done = self.episode(&mut seen, |_| policy.weights.view())?;
+        Ok(done.map_or_else(Vec::new, |(_, distances)| distances.iter().map(|d| *d < NEAR).collect()))
+    }
+}
+
+/// What the policy of each environment does about what is `seen` there.
+fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, actions: &mut Array2<f64>) {
+    for ((env, mut action), row) in actions.rows_mut().into_iter().enumerate().zip(seen.rows()) {
+        let weights = policy(env);
+        action.assign(&weights.row(row.len()));
+        row.iter().zip(weights.rows()).for_each(|(&x, weights)| action.scaled_add(x, &weights));
+    }
+}
+
+/// Draws all environments with their targets, a step before the end of an episode.
+fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> launcher::Result {
+    let mut seen = env.reset(None, Some(seed))?;
+    let mut actions = Array2::zeros((env.num_envs(), env.action_space().len()));
+    for _ in 1..EPISODE {
+        act(&seen, |_| policy.weights.view(), &mut actions);
+        seen = env.step(&actions)?.observations;
+    }
+    let targets = env.now().command("target")?;
+    let ball = |row: ArrayView1<'_, f64>| Marker::sphere([row[0], row[1], row[2]], NEAR as f32, [0.9, 0.2, 0.1, 1.0]);
+    let balls: Vec<_> = targets.rows().into_iter().enumerate().map(|(env, row)| (EnvId(env), ball(row))).collect();
+    let far = env.sim().env_origins().iter().fold(0.0, |most: f64, x| most.max(*x));
+    stage::write(env.sim_mut(), &balls, [far + 2.0, -far - 1.6, 2.2], [far - 1.0, 1.0 - far, 0.0], file)
+}
+
+fn count(reached: &[bool]) -> usize {
+    reached.iter().filter(|reached| **reached).count()
+}
+
+/// The learning curve, as numbers and drawn.
+fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
+    launcher::make_folder(out)?;
+    let mut text = String::from("iteration,return,distance_m,reached\n");
+    for (k, [mean, apart, reached]) in rows.iter().enumerate() {
+        text += &format!("{},{mean},{apart},{reached}\n", k + 1);
+    }
+    let file = out.join("curve.csv");
+    std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+    let reached: Vec<f64> = rows.iter().map(|row| row[2]).collect();
+    let drawn = curve::draw("share of targets reached while trying changes, by iteration", &reached);
+    picture::write_png(&out.join("curve.png"), &drawn)
+}

@@ -1,0 +1,308 @@
+//! A camera on the hand finds a cube, and the arm moves the hand over it by what the camera sees, in 16 environments with
+//! cubes at other places. Mask and depth of each picture say where the cube is from the camera; joint encoders and the
+//! calibration of the camera say where the camera is from the robot. Where the cube really is, is looked at to judge in the end,
+//! and never before.
+//!
+//! ```text
+//! cargo run --release --example visual_servo -- --headless --out pictures
+//! cargo run --release --example visual_servo -- --headless --miscalibrated 0.02
+//! cargo run --release --example visual_servo -- --headless --blind
+//! ```
+//!
+//! The exit code is 0 where at least 15 of 16 hands are above their cubes in the end, 1 where fewer are (the second command,
+//! whose cameras are not where they are thought to be, and the third, whose pictures have no mask), 2 where something is wrong.
+
+mod launcher;
+
+use clap::Parser;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
+use kinetoscope::sensors::camera::PixelIntrinsics;
+use launcher::motion::Motion;
+use launcher::panel::{self, Views};
+use launcher::trial::{self, Album, Count};
+use launcher::{Launcher, Progress, arm, grip, picture};
+use nalgebra::{Point3, Vector3};
+use serde_json::json;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::process::ExitCode;
+
+/// Moves hands over cubes by images, and counts.
+#[derive(Debug, Parser)]
+#[command(name = "visual_servo")]
+struct Args {
+    #[command(flatten)]
+    launcher: Launcher,
+    /// Cameras are as far from where they are thought to be \[m\], along x and y of the picture
+    #[arg(long, default_value_t = 0.0)]
+    miscalibrated: f64,
+    /// Masks are empty
+    #[arg(long)]
+    blind: bool,
+}
+
+/// Edge of the cube, and height of the table \[m\].
+const EDGE: f64 = 0.06;
+const TABLE: f64 = 0.06;
+/// Middle of where cubes lie, and how far from there at most \[m\]; they are turned by at most 45°.
+const PLACE: [f64; 2] = [0.48, 0.1];
+const SCATTER: [f64; 2] = [0.1, 0.17];
+
+/// Pixels of the camera, and its field of view.
+const PIXELS: usize = 160;
+const FOVY: f64 = 60.0 * PI / 180.0;
+/// Where the camera is on the flange \[m\], and what it looks at there: past the back of the straight hand, whose tips are at
+/// z = 0.21.
+const EYE: [f64; 3] = [0.0, 0.12, 0.0];
+const LOOKS_AT: [f64; 3] = [0.0, 0.0, 0.4];
+/// Standard deviation of each depth \[m\].
+const DEPTH_NOISE: f64 = 0.002;
+
+/// Height of the flange above the table while it looks for cubes, and above the top of a cube in the end \[m\]: then the tips are
+/// 0.1 m above it.
+const LOOK_HEIGHT: f64 = 0.6;
+const END_HEIGHT: f64 = 0.31;
+/// Looks, and part of what is missing that the hand moves by after each.
+const LOOKS: usize = 12;
+const GAIN: f64 = 0.6;
+/// Pixels of the cube that are needed to say where it is.
+const FEW: usize = 20;
+
+/// The hand is above the cube when the axis of the flange passes the middle of the cube's top as near as this \[m\]: what a
+/// pixel sees there, 0.33 m away, with a focal length of 80 / tan 30° = 139 pixels, ...
+const NEAR: f64 = 0.0024;
+/// ... and is as high as it should be, this much more or less \[m\].
+const HEIGHT_ERROR: f64 = DEPTH_NOISE;
+
+fn main() -> ExitCode {
+    trial::run("visual_servo", || run(&trial::parse()))
+}
+
+fn run(args: &Args) -> launcher::Result<bool> {
+    if !args.miscalibrated.is_finite() {
+        return Err(format!("--miscalibrated {}: it must be a distance in metres", args.miscalibrated).into());
+    }
+    let mut sim = SimulationManager::new(SimulationManagerCfg {
+        physics_dt: 0.005,
+        arena_space: args.launcher.arena_space.unwrap_or(1.8),
+        ..args.launcher.simulation()?
+    })?;
+    // The tool points down: the pitches of JOINT2, -JOINT3 and -JOINT5 add up to half a turn.
+    let down = [("JOINT2", 0.0), ("JOINT3", -1.6), ("JOINT5", -1.54), ("JOINT6", -FRAC_PI_2)];
+    let init_qpos = down.map(|(joint, q)| (joint.to_string(), q)).to_vec();
+    let robot = sim.add_robot(RobotCfg { init_qpos, ..arm::bundled()? })?;
+    let cube = add_things(&mut sim)?;
+    let camera = sim.add_sensor("hand_camera", camera_cfg())?;
+    let out = args.launcher.out.clone();
+    let mut album = Album::new(&mut sim, "visual_servo", out.clone(), [1.35, -0.75, 0.8], [0.4, 0.08, 0.3])?;
+    for diagnostic in sim.diagnostics() {
+        eprintln!("warning: {diagnostic}");
+    }
+    args.launcher.write_dump(&sim)?;
+    scatter(&mut sim, cube)?;
+
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
+    let progress = Progress::new(&args.launcher, ((2.5 + 0.4 * LOOKS as f64 + 0.5) / sim.cfg().physics_dt) as u64);
+    let eyes = Eyes {
+        camera,
+        cube: if args.blind { i32::MIN } else { mask_id(&sim, "cube")? },
+        intrinsics: Intrinsics::Fovy { radians: FOVY }.to_pixels(PIXELS, PIXELS)?,
+        flange_from_camera: camera_cfg().extrinsics.parent_from_camera()?
+            * Pose::translation(args.miscalibrated, args.miscalibrated, 0.0),
+    };
+    let tip = Tip::of_part("arm").at("ee_link");
+    let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
+    progress.say("To where the whole table is seen...");
+    let mut commands = vec![above([PLACE[0], PLACE[1], TABLE + LOOK_HEIGHT]); motion.sim.num_envs()];
+    motion.reach(&commands, 2.5)?;
+    let mut found = vec![false; commands.len()];
+    for look in 0..LOOKS {
+        if [0, 2, LOOKS - 1].contains(&look) {
+            album.add(motion.sim)?;
+            eyes.write_picture(motion.sim, &out, look)?;
+        }
+        let flanges = trial::poses(&motion.sim.robot(robot).compute_fk(&positions(motion.sim, robot)?, tip, None)?);
+        let mut missing = Vec::new();
+        for (env, (command, flange)) in commands.iter_mut().zip(&flanges).enumerate() {
+            let Some(top) = eyes.top_of_cube(motion.sim, env, flange)? else { continue };
+            found[env] = true;
+            // What is missing is added to what was asked for, not to where the hand is: that corrects what gravity pulls it down by.
+            let wanted = top + Vector3::new(0.0, 0.0, END_HEIGHT);
+            let error = wanted.coords - flange.translation.vector;
+            command.translation.vector += GAIN * error;
+            missing.push(error.norm());
+        }
+        let largest = missing.iter().fold(0.0, |most: f64, x| most.max(*x));
+        let (seen, all) = (missing.len(), commands.len());
+        progress.say(&format!(
+            "Look {:>2}: {seen} of {all} cubes are seen, {:.1} mm away at most",
+            look + 1,
+            1e3 * largest
+        ));
+        motion.line(&commands, 0.4)?;
+    }
+    motion.wait(0.5, |_| ())?;
+    album.add(motion.sim)?;
+    eyes.write_picture(motion.sim, &out, LOOKS)?;
+
+    let (steps, planned) = (motion.step(), motion.planned().to_vec());
+    let rate = progress.env_steps_per_second(steps, sim.num_envs());
+    // To judge: nothing was moved by these.
+    let cubes = trial::poses(&sim.rigid_object(cube).get_pose());
+    let (flanges, diverged) = (trial::poses(&sim.robot(robot).link_pose("ee_link")?), trial::diverged(&sim));
+    let mut table = Vec::new();
+    for env in 0..sim.num_envs() {
+        let top = cubes[env] * Pose::translation(0.0, 0.0, EDGE / 2.0);
+        // The middle of the cube's top in the frame of the flange, whose axis is z.
+        let place = flanges[env].inverse_transform_point(&Point3::from(top.translation.vector));
+        let (beside, height) = (place.x.hypot(place.y), place.z);
+        let is_above = beside < NEAR && (height - END_HEIGHT).abs() < HEIGHT_ERROR;
+        let success = planned[env] && found[env] && is_above && diverged[env].is_none();
+        table.push(json!({
+            "env": env, "cube": to_row(&cubes[env]), "found": found[env], "planned": planned[env], "beside": beside,
+            "height": height, "diverged": diverged[env], "success": success,
+        }));
+        println!(
+            "environment {env:>2}: cube found: {}, way planned: {}, {:.2} mm beside it, {:.2} mm too high: {}",
+            trial::word(found[env]),
+            trial::word(planned[env]),
+            1e3 * beside,
+            1e3 * (height - END_HEIGHT),
+            if is_above { "above" } else { "not above" },
+        );
+    }
+    let count = Count {
+        what: "hands are above their cubes",
+        setting: ("miscalibrated", args.miscalibrated),
+        table,
+        steps,
+        rate,
+        overview: ("visual_servo_all.png", [4.2, -4.8, 3.6], [0.4, 0.1, 0.0]),
+    };
+    recording.finish(&mut sim)?;
+    trial::conclude(&args.launcher, &mut sim, count)
+}
+
+/// The flange at a place, pointing down; the camera on it is on the far side of the hand.
+fn above(place: [f64; 3]) -> Pose {
+    from_xyz_rpy(place, [PI, 0.0, FRAC_PI_2])
+}
+
+/// What the encoders of the arm say \[rad\].
+fn positions(sim: &SimulationManager, robot: RobotId) -> launcher::Result<kinetoscope::ndarray::Array2<f64>> {
+    let robot = sim.robot(robot);
+    let columns: Vec<usize> = robot.get_joint_ids("arm")?.iter().map(|joint| joint.0).collect();
+    Ok(robot.get_qpos().select(kinetoscope::ndarray::Axis(1), &columns))
+}
+
+/// What mask pictures say of the thing called `name`.
+fn mask_id(sim: &SimulationManager, name: &str) -> launcher::Result<i32> {
+    let id =
+        sim.mask_ids().iter().find(|id| id.object == name).ok_or(format!("nothing is called {name:?} in masks"))?;
+    Ok(id.id)
+}
+
+fn camera_cfg() -> CameraCfg {
+    CameraCfg {
+        width: PIXELS,
+        height: PIXELS,
+        intrinsics: Intrinsics::Fovy { radians: FOVY },
+        extrinsics: Extrinsics {
+            parent: Some("sr5/ee_link".into()),
+            placement: Placement::LookAt { eye: EYE, target: LOOKS_AT, up: [0.0, 1.0, 0.0] },
+            ..Default::default()
+        },
+        channels: Channels { color: true, depth: true, mask: true, normal: true, ..Default::default() },
+        noise: [("depth".to_string(), NoiseCfg::white(DEPTH_NOISE))].into(),
+        ..Default::default()
+    }
+}
+
+/// A camera, and what is thought to be known of it.
+struct Eyes {
+    camera: SensorId<Camera>,
+    /// What masks say of the cube.
+    cube: i32,
+    intrinsics: PixelIntrinsics,
+    /// The calibration: where the optical frame is on the flange.
+    flange_from_camera: Pose,
+}
+
+impl Eyes {
+    /// Middle of the top of the cube in the frame of the environment \[m\], with the flange where it is thought to be; `None` where
+    /// too little of a cube is seen.
+    ///
+    /// Points of the cube are those of its mask, as far away as the depth says. Those of its top are the highest: a cube has
+    /// no others within half of its edge below them but on its sides, of which few are seen from above.
+    fn top_of_cube(&self, sim: &SimulationManager, env: usize, flange: &Pose) -> launcher::Result<Option<Point3<f64>>> {
+        let camera = sim.sensor(self.camera)?;
+        let (mask, depth) = (camera.mask()?, camera.depth()?);
+        let world_from_camera = flange * self.flange_from_camera;
+        let PixelIntrinsics { fx, fy, cx, cy } = self.intrinsics;
+        let mut points = Vec::new();
+        for ((row, v, u), _) in mask.indexed_iter().filter(|((row, _, _), id)| *row == env && **id == self.cube) {
+            let z = f64::from(depth[(row, v, u)]);
+            if z.is_finite() {
+                let (x, y) = ((u as f64 + 0.5 - cx) / fx, (v as f64 + 0.5 - cy) / fy);
+                points.push(world_from_camera * Point3::new(x * z, y * z, z));
+            }
+        }
+        if points.len() < FEW {
+            return Ok(None);
+        }
+        // Noise makes single points high: the height that a tenth of them is above.
+        let mut heights: Vec<f64> = points.iter().map(|point| point.z).collect();
+        heights.sort_by(|a, b| b.total_cmp(a));
+        let high = heights[heights.len() / 10];
+        let top: Vec<&Point3<f64>> = points.iter().filter(|point| point.z > high - 4.0 * DEPTH_NOISE).collect();
+        let sum: Vector3<f64> = top.iter().map(|point| point.coords).sum();
+        Ok(Some(Point3::from(sum / top.len() as f64)))
+    }
+
+    /// What the camera of the first environment sees.
+    fn write_picture(
+        &self,
+        sim: &SimulationManager,
+        out: &Option<std::path::PathBuf>,
+        look: usize,
+    ) -> launcher::Result {
+        let Some(out) = out else { return Ok(()) };
+        let views = Views::of(sim.sensor(self.camera)?, 0)?;
+        picture::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
+    }
+}
+
+/// A cube on a table.
+fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
+    let [x, y] = PLACE;
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "table".into(),
+        shape: ObjectShape::Box { size: [0.5, 0.6, TABLE] },
+        body_type: BodyType::Static,
+        init_pose: Pose::translation(x, y, TABLE / 2.0),
+        rgba: [0.72, 0.58, 0.42, 1.0],
+        semantic_class: Some("furniture".into()),
+        ..Default::default()
+    })?;
+    Ok(sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(EDGE),
+        mass: Some(0.2),
+        init_pose: Pose::translation(x, y, TABLE + EDGE / 2.0),
+        rgba: [0.85, 0.2, 0.15, 1.0],
+        ..Default::default()
+    })?)
+}
+
+/// Puts each cube elsewhere on its table.
+fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result {
+    let place = |[x, y, turn]: [f64; 3]| {
+        let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, TABLE + EDGE / 2.0];
+        from_xyz_rpy(place, [0.0, 0.0, FRAC_PI_2 / 2.0 * turn])
+    };
+    let poses: Vec<Pose> = grip::scatter(sim, "cube").into_iter().map(place).collect();
+    sim.rigid_object_mut(cube).write_pose(&trial::rows(&poses), None)?;
+    Ok(())
+}

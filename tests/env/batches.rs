@@ -1,0 +1,57 @@
+//! The same bits for any number of threads, environments and processes.
+
+use super::tasks::{cfg, everything, policy};
+use kinetoscope::env::Ended;
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+
+/// All bits of 150 steps, by environment, and the reasons of all ends.
+fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
+    let mut env = everything(settings);
+    let n = env.num_envs();
+    let mut seen = env.reset(None, Some(77)).unwrap();
+    let (mut bits, mut ends) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+    let put = |bits: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
+        bits.iter_mut().zip(of.rows()).for_each(|(bits, row)| bits.extend(row.iter().map(|x| x.to_bits())));
+    };
+    put(&mut bits, &seen);
+    for _ in 0..150 {
+        let step = env.step(&policy(seen.view())).unwrap();
+        put(&mut bits, &step.observations);
+        put(&mut bits, &step.final_observations);
+        put(&mut bits, &step.reward_terms);
+        for e in 0..n {
+            bits[e].extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
+        }
+        for Ended { env, reason, steps, reward_sums } in step.ended {
+            ends[env.0].push(format!("{reason} {steps} {reward_sums:?}"));
+        }
+        seen = step.observations;
+    }
+    (bits, ends)
+}
+
+#[test]
+fn threads_do_not_matter() {
+    let one = run(cfg(9, 1));
+    for threads in [2, 3, 5] {
+        assert!(run(cfg(9, threads)) == one, "{threads} threads");
+    }
+    // There was something to compare: episodes that ended for both reasons, differently in each environment.
+    let reasons: Vec<&str> = one.1.iter().flatten().filter_map(|end| end.split(' ').next()).collect();
+    assert!(reasons.contains(&"fell") && reasons.contains(&"time"), "{reasons:?}");
+    assert!((1..9).all(|e| one.0[e] != one.0[0]));
+}
+
+#[test]
+fn eight_environments_are_twice_four_and_eight_times_one() {
+    let eight = run(cfg(8, 2));
+    for world in [2, 8] {
+        let share = |rank| run(SimulationManagerCfg { shard: Shard { rank, world }, ..cfg(8 / world, 1) });
+        let (bits, ends): (Vec<_>, Vec<_>) = (0..world).map(share).unzip();
+        assert!(bits.concat() == eight.0 && ends.concat() == eight.1, "{world} processes");
+    }
+    // Control: without its rank a process repeats the first one.
+    assert!(run(cfg(4, 1)).0[..] != eight.0[4..]);
+    assert!(run(cfg(4, 1)).0[..] == eight.0[..4]);
+}

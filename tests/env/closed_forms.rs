@@ -1,0 +1,88 @@
+//! What is rewarded and seen against what follows from Newton's law.
+
+use super::tasks::{cart_env, cart_task, cfg, world};
+use kinetoscope::env::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
+use kinetoscope::ndarray::{Array2, array};
+
+const DT: f64 = 0.01;
+const FORCE: f64 = 4.0;
+
+/// Where a cart of 1 kg is after k steps under a constant force. MuJoCo's Euler is semi-implicit: v_k = k h F / m, and
+/// x_k = x_(k-1) + h v_k, so x_k = h² F / m (1 + 2 + ... + k).
+fn place(k: u64) -> f64 {
+    DT * DT * FORCE * (k * (k + 1) / 2) as f64
+}
+
+/// Sums of 60 numbers below 1: rounding is below 60 x 60 / 2 x 2^-53 of the largest.
+const ROUNDING: f64 = 1e-12;
+
+#[test]
+fn a_pushed_cart_is_where_newton_says_and_rewards_sum_up() {
+    let mut env = cart_env(3, Some(60));
+    env.reset(None, None).unwrap();
+    let forces = array![[FORCE], [0.0], [-FORCE]];
+    let mut sums = [0.0; 3];
+    for k in 1..=60 {
+        let step = env.step(&forces).unwrap();
+        for (e, sign) in [1.0, 0.0, -1.0].into_iter().enumerate() {
+            assert!((step.final_observations[(e, 0)] - sign * place(k)).abs() < ROUNDING, "step {k}");
+            assert!((step.rewards[e] + sign * place(k)).abs() < ROUNDING, "step {k}");
+            assert_eq!(step.rewards[e], step.reward_terms[(e, 0)]);
+            sums[e] -= sign * place(k);
+        }
+        if k == 60 {
+            assert_eq!(step.ended.len(), 3);
+            for ended in &step.ended {
+                assert!((ended.total() - sums[ended.env.0]).abs() < 60.0 * ROUNDING, "{ended:?}");
+                assert_eq!((ended.steps, ended.reward_sums.len()), (60, 1));
+            }
+        }
+    }
+    // Control: the same with another force is told apart.
+    assert!((place(60) - 1.01 * place(60)).abs() > 1e6 * ROUNDING);
+}
+
+#[test]
+fn decimation_is_physics_steps_and_actions_are_applied_once_or_before_each() {
+    let run = |every: bool| {
+        let (sim, robot) = world(cfg(1, 1), false);
+        let space = Space::uniform(["force"], [-10.0, 10.0]).unwrap();
+        // Pushes until the cart is 5 mm away: with a look at the state before each physics step, or only before the first.
+        let push = ActionTerm::new("push", space, move |sim, forces| {
+            let far = sim.robot(robot).get_qpos()[(0, 0)] > 0.005;
+            let force = if far { Array2::zeros((1, 1)) } else { forces.to_owned() };
+            Ok(sim.robot_mut(robot).set_qf(&force, None, None)?)
+        });
+        let push = if every { push.every_physics_step() } else { push };
+        let velocity = ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).get_qvel()));
+        let mut env = EnvBuilder::new(sim, EnvCfg { decimation: 10, ..EnvCfg::default() })
+            .action(push)
+            .observation(velocity)
+            .build()
+            .unwrap();
+        env.reset(None, None).unwrap();
+        let seen = env.step(&array![[FORCE]]).unwrap().observations[(0, 0)];
+        (seen, env.sim().time()[0])
+    };
+    // x_k = 0.0004 k (k + 1) / 2 is above 0.005 from k = 5 on (0.006): five physics steps with the force, or all ten.
+    let ((each, time), (once, _)) = (run(true), run(false));
+    assert!((each - 5.0 * DT * FORCE).abs() < ROUNDING, "{each}");
+    assert!((once - 10.0 * DT * FORCE).abs() < ROUNDING, "{once}");
+    assert!((time - 0.1).abs() < ROUNDING);
+}
+
+#[test]
+fn actions_beyond_the_bounds_are_the_bounds() {
+    let (sim, robot) = world(cfg(1, 1), false);
+    let mut env = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
+    let mut run = |force: f64| {
+        env.reset(None, None).unwrap();
+        let seen = (0..10).map(|_| env.step(&array![[force]]).unwrap().observations[(0, 0)].to_bits()).collect();
+        let now = env.now();
+        (seen, now.actions()[(0, 0)])
+    };
+    let (bound, beyond): ((Vec<u64>, f64), _) = (run(10.0), run(1e9));
+    assert_eq!(bound, beyond);
+    assert_eq!(bound.1, 10.0);
+    assert_ne!(run(9.0).0, bound.0);
+}

@@ -1,0 +1,205 @@
+//! Where episodes begin and end, and what is seen there.
+
+use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
+use kinetoscope::env::{EndReason, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm, When};
+use kinetoscope::ndarray::{Array1, Array2, array};
+use kinetoscope::prelude::*;
+use std::sync::{Arc, Mutex};
+
+fn bits(of: &Array2<f64>) -> Vec<u64> {
+    of.iter().map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_before_the_reset() {
+    for limit in [1, 2, 7] {
+        let mut env = cart_env(2, Some(limit));
+        let start = env.reset(None, None).unwrap();
+        assert_eq!(start, array![[0.0], [0.0]]);
+        for episode in 0..3 {
+            for k in 1..=limit {
+                let step = env.step(&array![[1.0], [2.0]]).unwrap();
+                let last = k == limit;
+                assert_eq!(step.truncated, Array1::from_elem(2, last), "step {k} of {limit}");
+                assert_eq!(step.terminated, Array1::from_elem(2, false));
+                assert_eq!(step.ended.iter().map(|e| e.steps).collect::<Vec<_>>(), vec![limit; 2 * usize::from(last)]);
+                // h² F k (k + 1) / 2.
+                let away = |f: f64| 1e-4 * f * (k * (k + 1) / 2) as f64;
+                for (e, f) in [1.0, 2.0].into_iter().enumerate() {
+                    assert!((step.final_observations[(e, 0)] - away(f)).abs() < 1e-12, "episode {episode}, step {k}");
+                }
+                let seen = if last { &start } else { &step.final_observations };
+                assert_eq!(bits(&step.observations), bits(seen));
+                assert!(step.ended.iter().all(|ended| ended.reason == EndReason::TimeLimit));
+            }
+        }
+    }
+    // Without a limit nothing ends.
+    let mut env = cart_env(1, None);
+    env.reset(None, None).unwrap();
+    assert!((0..100).all(|_| !env.step(&array![[1.0]]).unwrap().truncated[0]));
+}
+
+#[test]
+fn both_ends_in_one_step_are_both_said_and_the_first_reason_counts() {
+    let (sim, robot) = world(cfg(3, 1), false);
+    let at = |step: u64| {
+        move |now: &kinetoscope::env::Now<'_>| -> kinetoscope::env::TermResult<Array1<bool>> {
+            Ok(now.episode_steps().iter().enumerate().map(|(env, &k)| env > 0 && k == step).collect())
+        }
+    };
+    let mut env = cart_task(sim, robot, EnvCfg { episode_steps: Some(3), ..EnvCfg::default() })
+        .termination(TerminationTerm::new("seen enough", at(2)).truncating())
+        .termination(TerminationTerm::new("done", move |now| {
+            Ok(at(2)(now)?.iter().enumerate().map(|(env, ends)| *ends && env == 2).collect())
+        }))
+        .build()
+        .unwrap();
+    env.reset(None, None).unwrap();
+    let idle = Array2::zeros((3, 1));
+    env.step(&idle).unwrap();
+    let step = env.step(&idle).unwrap();
+    assert_eq!(step.truncated, array![false, true, true]);
+    assert_eq!(step.terminated, array![false, false, true]);
+    let reasons: Vec<String> = step.ended.iter().map(|ended| format!("{} {}", ended.env.0, ended.reason)).collect();
+    assert_eq!(reasons, ["1 seen enough", "2 seen enough"]);
+    let step = env.step(&idle).unwrap();
+    assert_eq!(
+        (step.truncated.to_vec(), step.ended[0].reason.to_string()),
+        (vec![true, false, false], "time limit".into())
+    );
+}
+
+#[test]
+fn a_seed_begins_the_same_episodes_again_and_no_seed_goes_on() {
+    let run = |env: &mut kinetoscope::env::Env, seed: Option<u64>| {
+        let mut seen = env.reset(None, seed).unwrap();
+        let mut all = bits(&seen);
+        for _ in 0..100 {
+            let step = env.step(&policy(seen.view())).unwrap();
+            all.extend(bits(&step.observations));
+            all.extend(bits(&step.final_observations));
+            all.extend(step.rewards.iter().map(|x| x.to_bits()));
+            seen = step.observations;
+        }
+        all
+    };
+    let (mut env, mut other) = (everything(cfg(4, 2)), everything(cfg(4, 2)));
+    let first = run(&mut env, Some(5));
+    assert_ne!(run(&mut env, None), first, "the next episodes");
+    assert_ne!(run(&mut env, Some(6)), first, "another seed");
+    assert_eq!(run(&mut env, Some(5)), first, "again");
+    assert_eq!(run(&mut other, Some(5)), first, "another batch");
+    // At first the seed is the simulation's.
+    assert_eq!(run(&mut everything(cfg(4, 2)), None), run(&mut env, Some(cfg(4, 2).seed)));
+}
+
+#[test]
+fn a_mask_resets_what_it_names_and_the_others_do_not_notice() {
+    let (mut env, mut calm) = (everything(cfg(5, 2)), everything(cfg(5, 2)));
+    let (mut seen, mut undisturbed) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
+    for k in 0..60 {
+        if k == 17 {
+            let again = env.reset(Some(&[false, true, false, false, true]), Some(9)).unwrap();
+            for e in 0..5 {
+                assert_eq!(again.row(e) == seen.row(e), ![1, 4].contains(&e), "environment {e}");
+            }
+            seen = again;
+            assert_eq!(env.now().episode_steps(), [17, 0, 17, 17, 0]);
+        }
+        seen = env.step(&policy(seen.view())).unwrap().observations;
+        undisturbed = calm.step(&policy(undisturbed.view())).unwrap().observations;
+        for e in [0, 2, 3] {
+            let same = seen.row(e).iter().zip(undisturbed.row(e)).all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(same, "step {k}, environment {e}");
+        }
+    }
+    // Those that were reset are where a batch with that seed is.
+    let mut with_seed = everything(cfg(5, 2));
+    let mut expected = with_seed.reset(None, Some(9)).unwrap();
+    for _ in 17..60 {
+        expected = with_seed.step(&policy(expected.view())).unwrap().observations;
+    }
+    assert_eq!(
+        (bits(&expected.row(1).to_owned().insert_axis(kinetoscope::ndarray::Axis(0)))),
+        bits(&seen.row(1).to_owned().insert_axis(kinetoscope::ndarray::Axis(0)))
+    );
+}
+
+/// Environments and their steps, of each time that an event happened.
+type Log = Arc<Mutex<Vec<(usize, u64, u64)>>>;
+
+#[test]
+fn events_happen_when_they_should() {
+    let log = |times: &Log, name: &'static str, when: When| {
+        let times = Arc::clone(times);
+        EventTerm::new(name, when, move |_, dice| {
+            let mut times = times.lock().unwrap();
+            times.extend(dice.iter().map(|die| (die.env().0, die.episode(), die.seed())));
+            Ok(())
+        })
+    };
+    let [startup, reset, fixed, drawn]: [Log; 4] = std::array::from_fn(|_| Log::default());
+    let (sim, _) = world(cfg(3, 1), false);
+    let mut env = EnvBuilder::new(sim, EnvCfg { episode_steps: Some(10), ..EnvCfg::default() })
+        .action(idle())
+        .observation(ObservationTerm::new("k", ["k"], |now| {
+            Ok(Array2::from_shape_fn((now.num_envs(), 1), |(env, _)| now.episode_steps()[env] as f64))
+        }))
+        .event(log(&startup, "startup", When::Startup))
+        .event(log(&reset, "reset", When::Reset))
+        .event(log(&fixed, "fixed", When::Interval { steps: [4, 4] }))
+        .event(log(&drawn, "drawn", When::Interval { steps: [1, 6] }))
+        .build()
+        .unwrap();
+    let taken = |log: &Log| std::mem::take(&mut *log.lock().unwrap());
+    assert_eq!(taken(&startup), [(0, 0, 3), (1, 0, 3), (2, 0, 3)]);
+    assert_eq!(taken(&reset), []);
+    env.reset(None, Some(8)).unwrap();
+    assert_eq!(taken(&reset), [(0, 0, 8), (1, 0, 8), (2, 0, 8)]);
+    let actions = Array2::zeros((3, 1));
+    let mut gaps = Vec::new();
+    let mut last = [0; 3];
+    for k in 1..=200_u64 {
+        let step = env.step(&actions).unwrap();
+        let of_episode = (k - 1) % 10 + 1;
+        assert_eq!(step.final_observations[(0, 0)], of_episode as f64);
+        // In steps 4 and 8; step 10 ends the episode, and events do not happen to what has ended.
+        let happened = if [4, 8].contains(&of_episode) { 3 } else { 0 };
+        assert_eq!(taken(&fixed).len(), happened, "step {of_episode}");
+        assert_eq!(taken(&reset).len(), if of_episode == 10 { 3 } else { 0 });
+        for (e, _, _) in taken(&drawn) {
+            gaps.push(of_episode - last[e]);
+            last[e] = of_episode;
+        }
+        if of_episode == 10 {
+            last = [0; 3];
+        }
+    }
+    gaps.sort_unstable();
+    let distinct: std::collections::BTreeSet<u64> = gaps.iter().copied().collect();
+    assert_eq!(distinct.into_iter().collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6], "every wait was drawn at some time");
+    assert_eq!(taken(&startup), []);
+}
+
+#[test]
+fn commands_stay_for_an_episode() {
+    let mut env = everything(cfg(4, 2));
+    let mut seen = env.reset(None, Some(1)).unwrap();
+    let goal = env.observation_space().column("goal/x").unwrap();
+    let mut of_episode = seen.column(goal).to_owned();
+    assert!(of_episode.iter().all(|x| (-0.5..0.5).contains(x)) && of_episode[0] != of_episode[1]);
+    let mut changes = 0;
+    for _ in 0..120 {
+        let step = env.step(&policy(seen.view())).unwrap();
+        assert_eq!(step.final_observations.column(goal), of_episode, "the goal of the episode that ended");
+        for ended in &step.ended {
+            let EnvId(e) = ended.env;
+            assert_ne!(step.observations[(e, goal)], of_episode[e]);
+            of_episode[e] = step.observations[(e, goal)];
+            changes += 1;
+        }
+        seen = step.observations;
+    }
+    assert!(changes >= 12, "{changes}");
+}

@@ -1,0 +1,11 @@
+//! Tasks: against loops over the plain API, closed forms, and themselves in other batches.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod batches;
+mod cart_pole;
+mod closed_forms;
+mod episodes;
+mod mistakes;
+mod noise;
+mod quarantine;
+mod tasks;

@@ -1,0 +1,122 @@
+//! The worlds and tasks of these tests.
+
+use kinetoscope::env::{
+    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
+    TerminationTerm, When, terms,
+};
+use kinetoscope::ndarray::{Array2, ArrayView2, array};
+use kinetoscope::prelude::*;
+use kinetoscope::sim::WrenchFrame;
+
+/// A cart of 1 kg on a rail and, where it is wanted, a pole of 0.1 kg and 0.5 m on it.
+pub(crate) fn cart(with_pole: bool) -> String {
+    let pole = r#"<body name="pole"><joint name="hinge" type="hinge" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.02" mass="0.1"/></body>"#;
+    format!(
+        r#"<mujoco><worldbody><body name="rail" pos="0 0 1"><geom size="0.01" mass="1"/><body name="cart">
+             <joint name="slide" type="slide" axis="1 0 0"/><geom type="box" size="0.1 0.05 0.05" mass="1"/>
+             {}</body></body></worldbody></mujoco>"#,
+        if with_pole { pole } else { "" }
+    )
+}
+
+pub(crate) fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs, threads: Some(threads), ground: None, seed: 3, ..Default::default() }
+}
+
+/// A world with a cart whose joints are passive.
+pub(crate) fn world(cfg: SimulationManagerCfg, with_pole: bool) -> (SimulationManager, RobotId) {
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let robot = RobotCfg {
+        uid: "cart".into(),
+        mjcf: Some(MjcfFile::text(cart(with_pole))),
+        drive: DriveCfg { drive_type: DriveType::None, ..Default::default() },
+        ..Default::default()
+    };
+    let robot = sim.add_robot(robot).unwrap();
+    (sim, robot)
+}
+
+/// Pushes the cart, sees where it is, is rewarded for staying near 0.
+pub(crate) fn cart_task(sim: SimulationManager, robot: RobotId, cfg: EnvCfg) -> EnvBuilder {
+    let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
+    EnvBuilder::new(sim, cfg)
+        .action(push)
+        .observation(ObservationTerm::new("place", ["x"], move |now| {
+            Ok(now.sim().robot(robot).get_qpos().select(kinetoscope::ndarray::Axis(1), &[0]))
+        }))
+        .reward(RewardTerm::new("x", -1.0, move |now| Ok(now.sim().robot(robot).get_qpos().column(0).to_owned())))
+}
+
+/// A cart task without a pole.
+pub(crate) fn cart_env(num_envs: usize, episode_steps: Option<u64>) -> Env {
+    let (sim, robot) = world(cfg(num_envs, 2), false);
+    cart_task(sim, robot, EnvCfg { episode_steps, ..Default::default() }).build().unwrap()
+}
+
+/// A task that uses every kind of term: a pole on a cart with noise, commands, pushes, other masses, random starts.
+pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
+    let (sim, robot) = world(cfg, true);
+    let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
+    let positions = terms::joint_positions(&sim, "positions", robot, &[".*"]).unwrap();
+    let velocities = terms::joint_velocities(&sim, "velocities", robot, &["hinge", "slide"]).unwrap();
+    let pole = sim.robot(robot).link_id("pole").unwrap();
+    EnvBuilder::new(sim, EnvCfg { decimation: 2, episode_steps: Some(40) })
+        .action(push)
+        .command(CommandTerm::new("goal", ["x"], |dice| [dice.between(-0.5, 0.5)]))
+        .event(EventTerm::new("masses", When::Startup, |sim, dice| {
+            for die in dice {
+                let mass = die.between(0.5, 2.0);
+                sim.randomize_with(Some(&[die.env()]), |_, _, properties| {
+                    properties.set(Property::Mass, "cart/cart", &[mass])?;
+                    Ok(())
+                })?;
+            }
+            Ok(())
+        }))
+        .event(EventTerm::on_reset("start", move |sim, dice| {
+            for die in dice {
+                let start = array![[die.between(-0.2, 0.2), die.between(-0.1, 0.1)]];
+                sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
+            }
+            Ok(())
+        }))
+        .event(EventTerm::new("gust", When::Interval { steps: [5, 15] }, move |sim, dice| {
+            for die in dice {
+                let force = array![[[0.2 * die.normal(), 0.0, 0.0]]];
+                let none = Array2::zeros((1, 3)).insert_axis(kinetoscope::ndarray::Axis(0));
+                let frame = WrenchFrame::World;
+                sim.robot_mut(robot).set_external_wrench(&force, &none, frame, Some(&[pole]), Some(&[die.env()]))?;
+            }
+            Ok(())
+        }))
+        .observation(positions.with_noise(Noise::Normal { std: 0.01 }))
+        .observation(velocities.with_noise(Noise::Uniform { low: -0.1, high: 0.1 }).clipped([-5.0, 5.0]).scaled(0.1))
+        .observation(terms::commanded("goal", "goal", ["x"]))
+        .observation(terms::last_actions("action", ["slide"]))
+        .reward(terms::alive("alive", 1.0))
+        .reward(RewardTerm::new("near", -0.5, move |now| {
+            let (qpos, goal) = (now.sim().robot(robot).get_qpos(), now.command("goal")?);
+            Ok((&qpos.column(0) - &goal.column(0)).mapv(f64::abs))
+        }))
+        .reward(terms::action_rate("smooth", -1e-3))
+        .termination(TerminationTerm::new("fell", move |now| {
+            Ok(now.sim().robot(robot).get_qpos().column(1).mapv(|angle| angle.abs() > 0.3))
+        }))
+        .build()
+        .unwrap()
+}
+
+/// A policy that holds the pole for a while: a function of the row alone.
+pub(crate) fn policy(observations: ArrayView2<'_, f64>) -> Array2<f64> {
+    let of = |env: usize| {
+        let row = observations.row(env);
+        25.0 * row[1] + 30.0 * row[2] + 3.0 * (row[0] - row[4])
+    };
+    Array2::from_shape_fn((observations.nrows(), 1), |(env, _)| of(env))
+}
+
+/// An action that does nothing, of one column.
+pub(crate) fn idle() -> ActionTerm {
+    ActionTerm::new("idle", Space::uniform(["a"], [-1.0, 1.0]).unwrap(), |_, _| Ok(()))
+}
