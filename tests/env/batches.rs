@@ -20,8 +20,8 @@ fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
         put(&mut bits, &step.observations);
         put(&mut bits, &step.final_observations);
         put(&mut bits, &step.reward_terms);
-        for e in 0..n {
-            bits[e].extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
+        for (e, bits) in bits.iter_mut().enumerate() {
+            bits.extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
         }
         for Ended { env, reason, steps, reward_sums } in step.ended {
             ends[env.0].push(format!("{reason} {steps} {reward_sums:?}"));
