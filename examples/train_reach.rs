@@ -69,7 +69,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result<bool> {
     let num_envs = args.launcher.num_envs;
-    if num_envs == 0 || num_envs % (2 * TARGETS) != 0 {
+    if num_envs == 0 || !num_envs.is_multiple_of(2 * TARGETS) {
         let block = 2 * TARGETS;
         return Err(format!(
             "--num-envs {num_envs}: it must be a multiple of {block}, both signs on {TARGETS} targets"
