@@ -99,6 +99,11 @@ fn holds() {
         let slide = 2.0 * 0.1 * LIMIT / MASS - G;
         let sliding = ((0.1 * slips.hops + 1e-4 * LIMIT) / MASS, "momentum of the fingers, tolerance of the solver");
         m.row("acceleration with a tenth of the friction", "m/s²", slide, slips.acceleration, sliding);
+        let quantity = "acceleration with a tenth of the friction";
+        m.lines_differ_in(
+            quantity,
+            "fingers of 10 g hop on what slides, each line's solver in its own way; momentum counts them",
+        );
         let loose = pinch(stiff, 0.5 * LIMIT, 0.1);
         m.control("acceleration with a tenth of the friction", "with half of the limit", loose.acceleration);
     });
