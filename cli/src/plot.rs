@@ -18,7 +18,7 @@ pub(crate) struct Args {
     /// A topic, or the end of its name; may be repeated
     #[arg(long, value_name = "NAME")]
     topic: Vec<String>,
-    /// A number of these topics, such as position[JOINT1]; * stands for anything; may be repeated
+    /// A number of these topics, such as `position[JOINT1]`; * stands for anything; may be repeated
     #[arg(long, value_name = "NAME")]
     field: Vec<String>,
     /// The environment, where the topic does not say it [default: the first that was recorded]
