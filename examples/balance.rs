@@ -21,10 +21,9 @@ use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::WrenchFrame;
 use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, grip, user_or_asset};
+use launcher::{Launcher, Progress, grip};
 use nalgebra::{Matrix4, RowVector4, Vector3, Vector4};
 use serde_json::json;
-use std::path::Path;
 use std::process::ExitCode;
 
 /// Balances robots that are pushed, and counts.
@@ -93,7 +92,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     })?;
     let robot = sim.add_robot(RobotCfg {
         uid: "balancer".into(),
-        urdf: UrdfCfg::single(user_or_asset(Path::new("balancer/balancer.urdf"))?),
+        urdf: UrdfCfg::single(assets::path("balancer/balancer.urdf")?),
         fix_base: false,
         init_pose: Pose::translation(0.0, 0.0, RADIUS + 0.03),
         // Speed controllers.

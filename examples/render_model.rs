@@ -61,7 +61,7 @@ struct Args {
     /// Rays for ambient occlusion, with --renderer hybrid
     #[arg(long, default_value_t = 0)]
     ao_rays: u16,
-    /// Give up after so many seconds, with an error
+    /// Give up after so many seconds, with an error; of path tracing only
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
     /// Geom groups that are drawn, as in MuJoCo's viewers

@@ -19,7 +19,7 @@ use kinetoscope::env::{CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTer
 use kinetoscope::ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, Random};
-use launcher::{Launcher, Progress, curve, picture, stage, trial, user_or_asset};
+use launcher::{Launcher, Progress, curve, picture, stage, trial};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -88,14 +88,16 @@ fn run(args: &Args) -> launcher::Result<bool> {
     args.launcher.serve(env.sim_mut())?;
     args.launcher.open_window(env.sim_mut());
     let recording = args.launcher.start_recording(env.sim_mut())?;
-    let progress = Progress::new(&args.launcher, (args.iterations as u64 + 2) * EPISODE);
+    let progress = Progress::new(&args.launcher, (args.iterations as u64).saturating_add(2).saturating_mul(EPISODE));
     let mut run = Run { env: &mut env, progress: &progress, step: 0 };
 
     let mut policy = Policy::idle(run.env);
     // Targets of their own, which are not learned on.
     let unseen = args.launcher.seed.wrapping_add(1);
     let before = run.reached(&policy, unseen)?;
-    progress.say(&format!("Before: {} of {num_envs} targets are reached", count(&before)));
+    if let Some(before) = before {
+        progress.say(&format!("Before: {:.1} % of {num_envs} targets are reached", 100.0 * before));
+    }
     targets.store(TARGETS, Ordering::Relaxed);
     let mut rows: Vec<[f64; 3]> = Vec::new();
     let mut seen = run.env.reset(None, Some(args.launcher.seed))?;
@@ -105,8 +107,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             break;
         };
         policy.learn(&tried, &returns, args.step_size);
-        let share = |hits: usize| hits as f64 / num_envs as f64;
-        let reached = share(distances.iter().filter(|d| **d < NEAR).count());
+        let reached = count(&distances) as f64 / num_envs as f64;
         let (mean, apart) = (returns.mean().unwrap_or_default(), distances.mean().unwrap_or_default());
         rows.push([mean, apart, reached]);
         if iteration % 5 == 4 {
@@ -123,15 +124,15 @@ fn run(args: &Args) -> launcher::Result<bool> {
 
     let steps = run.step;
     let rate = progress.env_steps_per_second(steps * u64::from(DECIMATION), num_envs);
-    let [before, after] = [before, after].map(|reached| count(&reached) as f64 / num_envs as f64);
-    println!("\nTargets that are reached, to {NEAR} m: {:.1} % before, {:.1} % after", 100.0 * before, 100.0 * after);
+    let share = |reached: Option<f64>| reached.map_or("not measured".into(), |share| format!("{:.1} %", 100.0 * share));
+    println!("\nTargets that are reached, to {NEAR} m: {} before, {} after", share(before), share(after));
     println!("{} iterations, {rate:.0} physics steps of an environment per second", rows.len());
+    recording.finish(env.sim_mut())?;
     if let Some(out) = &args.launcher.out {
         write_curve(&rows, out)?;
         draw_reaching(&mut env, &policy, unseen, &out.join("train_reach_all.png"))?;
         println!("Curve and picture written to {}", out.display());
     }
-    recording.finish(env.sim_mut())?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": num_envs,
@@ -146,7 +147,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         "env_steps_per_second": rate,
         "warnings": env.sim().warning_counts(),
     }))?;
-    Ok(after >= LEARNED)
+    Ok(after.is_some_and(|after| after >= LEARNED))
 }
 
 /// The arm, what it is to do, what it sees and is rewarded for.
@@ -158,7 +159,7 @@ fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<Env> {
     let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6)];
     let arm = sim.add_robot(RobotCfg {
         uid: "sr5".into(),
-        urdf: UrdfCfg::single(user_or_asset(Path::new("sr5/SR5.urdf"))?),
+        urdf: UrdfCfg::single(assets::path("sr5/SR5.urdf")?),
         init_qpos: elbow.map(|(joint, q)| (joint.to_string(), q)).to_vec(),
         ..Default::default()
     })?;
@@ -273,12 +274,12 @@ impl Run<'_> {
         Ok(None)
     }
 
-    /// Whether the policy reaches the target of each environment, of one episode with the seed; none where somebody has stopped
-    /// it.
-    fn reached(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Vec<bool>> {
+    /// In which part of the environments the policy reaches the target, in one episode with the seed; `None` where somebody has
+    /// stopped it.
+    fn reached(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Option<f64>> {
         let mut seen = self.env.reset(None, Some(seed))?;
         let done = self.episode(&mut seen, |_| policy.weights.view())?;
-        Ok(done.map_or_else(Vec::new, |(_, distances)| distances.iter().map(|d| *d < NEAR).collect()))
+        Ok(done.map(|(_, distances)| count(&distances) as f64 / distances.len() as f64))
     }
 }
 
@@ -306,8 +307,9 @@ fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> laun
     stage::write(env.sim_mut(), &balls, [far + 2.0, -far - 1.6, 2.2], [far - 1.0, 1.0 - far, 0.0], file)
 }
 
-fn count(reached: &[bool]) -> usize {
-    reached.iter().filter(|reached| **reached).count()
+/// How many of these distances from a target are near \[m\].
+fn count(distances: &Array1<f64>) -> usize {
+    distances.iter().filter(|distance| **distance < NEAR).count()
 }
 
 /// The learning curve, as numbers and drawn.

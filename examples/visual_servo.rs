@@ -235,7 +235,7 @@ impl Eyes {
     /// too little of a cube is seen.
     ///
     /// Points of the cube are those of its mask, as far away as the depth says. Those of its top are the highest: a cube has
-    /// no others within half of its edge below them but on its sides, of which few are seen from above.
+    /// no others within four deviations of the depth below them but on its sides, of which few are seen from above.
     fn top_of_cube(&self, sim: &SimulationManager, env: usize, flange: &Pose) -> launcher::Result<Option<Point3<f64>>> {
         let camera = sim.sensor(self.camera)?;
         let (mask, depth) = (camera.mask()?, camera.depth()?);

@@ -126,6 +126,10 @@ impl Terms {
 fn distinct<'n>(kind: TermKind, names: impl Iterator<Item = &'n String>) -> Result<()> {
     let mut seen: Vec<&String> = Vec::new();
     for name in names {
+        // Names are parts of the keys of random numbers and of the names of columns, with a slash between.
+        if name.is_empty() || name.contains('/') {
+            return Err(EnvError::TermName { kind, name: name.clone() });
+        }
         if seen.contains(&name) {
             return Err(EnvError::RepeatedTerm { kind, name: name.clone() });
         }

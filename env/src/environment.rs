@@ -14,7 +14,8 @@ use sim::{EnvId, SimulationManager};
 
 /// Environments with a task: reset, then stepped.
 ///
-/// What a [`step`](Self::step) does, in this order, which is Isaac Lab's:
+/// What a [`step`](Self::step) does, in this order (Isaac Lab's, which resets before events of intervals and has no final
+/// observations):
 ///
 /// 1. actions are put between their bounds and applied, and [`EnvCfg::decimation`] physics steps are done;
 /// 2. episodes are one step longer; terms say which of them end, and why;
@@ -65,7 +66,8 @@ impl Env {
         &self.present.sim
     }
 
-    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step.
+    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step. Resetting
+    /// it, as viewers may, begins no episode: [`reset`](Self::reset) does.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.present.sim
     }
@@ -150,7 +152,8 @@ impl Env {
     ///
     /// With a seed, random numbers of these environments start again: the same seed gives the same episodes. Without one they go
     /// on, as they do when episodes end by themselves; at first the seed is the simulation's. (Noise of sensors and of
-    /// [`randomize`](SimulationManager::randomize) goes by the simulation's seed alone.)
+    /// [`randomize`](SimulationManager::randomize) goes by the simulation's seed alone.) Properties, such as masses and gains, stay
+    /// as events have left them: an event that changes them at a reset sets them, instead of scaling what it finds.
     ///
     /// # Errors
     /// A mask of another length, or a term that fails; then the environments have no episode until they are reset.

@@ -65,6 +65,14 @@ pub enum EnvError {
         /// What is missing.
         kind: TermKind,
     },
+    /// A name that cannot be a part of others.
+    #[error("{kind} term {name:?}: a name must not be empty, and without a slash")]
+    TermName {
+        /// The kind of the term.
+        kind: TermKind,
+        /// Its name.
+        name: String,
+    },
     /// Two terms of one kind have the same name.
     #[error("there are two {kind} terms called {name:?}; give each a name of its own")]
     RepeatedTerm {

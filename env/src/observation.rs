@@ -100,6 +100,8 @@ impl ObservationTerm {
         if !(self.scale.is_finite() && self.scale != 0.0) {
             return wrong("scale", self.scale.to_string(), "it must be finite and not 0");
         }
+        // What the user wrote, before what becomes of it.
+        Space::uniform(self.columns.iter().map(String::as_str), self.clip)?;
         let ends = self.clip.map(|end| self.scale * end);
         let bounds = if self.scale > 0.0 { ends } else { [ends[1], ends[0]] };
         Space::uniform(self.columns.iter().map(String::as_str), bounds)

@@ -46,7 +46,10 @@ impl Archive {
                 "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect(),
                 _ => data.iter().map(|byte| f64::from(*byte)).collect(),
             };
-            if shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis)) != Some(numbers.len()) {
+            let product = |shape: &[usize]| shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis));
+            // Also where an axis is empty, the others have a product.
+            let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
+            if product(&shape) != Some(numbers.len()) || product(&filled).is_none() {
                 return Err(malformed(&format!("{name} has not as many numbers as its shape says")));
             }
             arrays.insert(name.to_string(), (shape, numbers));

@@ -110,6 +110,8 @@ impl Film {
         }
         let samples = recording.samples(&wanted)?;
         let mut times: Vec<f64> = samples.iter().flat_map(|samples| samples.times.iter().copied()).collect();
+        // What diverged may have no time any more.
+        times.retain(|time| time.is_finite());
         times.sort_by(f64::total_cmp);
         // Of two formats, one has whole nanoseconds.
         times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
@@ -136,13 +138,14 @@ impl Film {
     /// Puts the simulation where it was at one of the [`times`](Self::times): each number is the last that was recorded until then.
     ///
     /// # Errors
-    /// What was recorded is no position: not finite, a quaternion of length zero.
+    /// What was recorded is no position: a quaternion of length zero. Numbers that are not finite are passed over.
     pub fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
         let Some(&time) = self.times.get(frame.min(self.times.len().saturating_sub(1))) else { return Ok(()) };
         for Track { env, column, samples } in &self.tracks {
             // Before its first time, it is where it will be then.
             let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
-            let Some(&value) = samples.values.get(last) else { continue };
+            // What diverged stays where it last was.
+            let Some(&value) = samples.values.get(last).filter(|value| value.is_finite()) else { continue };
             match *column {
                 Column::Joint(column) => self.qpos[(*env, column)] = value,
                 Column::Hand(hand, number) => self.hands[hand].poses[(*env, number)] = value,

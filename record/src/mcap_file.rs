@@ -315,7 +315,7 @@ fn sound_messages(bytes: &[u8]) -> (usize, Vec<Attachment<'static>>, Option<Stri
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(bytes.len().max(LARGEST_CHUNK));
     let (mut reader, mut rest, mut messages) = (LinearReader::new_with_options(options), bytes, 0);
-    let mut attachments = Vec::new();
+    let (mut attachments, mut lost) = (Vec::new(), None);
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -329,10 +329,15 @@ fn sound_messages(bytes: &[u8]) -> (usize, Vec<Attachment<'static>>, Option<Stri
                 if opcode != mcap::records::op::ATTACHMENT {
                     continue;
                 }
-                if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(opcode, data) {
-                    let AttachmentHeader { log_time, create_time, name, media_type } = header;
-                    let data = data.into_owned().into();
-                    attachments.push(Attachment { log_time, create_time, name, media_type, data });
+                match mcap::parse_record(opcode, data) {
+                    Ok(Record::Attachment { header, data, .. }) => {
+                        let AttachmentHeader { log_time, create_time, name, media_type } = header;
+                        let data = data.into_owned().into();
+                        attachments.push(Attachment { log_time, create_time, name, media_type, data });
+                    }
+                    Ok(_) => {}
+                    // The messages may be whole; that something is lost is said.
+                    Err(error) => lost = Some(error.to_string()),
                 }
             }
             // Where the process was killed.
@@ -340,7 +345,7 @@ fn sound_messages(bytes: &[u8]) -> (usize, Vec<Attachment<'static>>, Option<Stri
             Err(error) => return (messages, attachments, Some(error.to_string())),
         }
     }
-    (messages, attachments, None)
+    (messages, attachments, lost)
 }
 
 /// Chunks are smaller by far, before they are compressed \[bytes\].

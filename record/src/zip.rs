@@ -22,7 +22,7 @@ const EXTENSION_64: u16 = 1;
 /// How files are in the archive.
 const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
-/// No file of a scene is larger, unpacked \[bytes\].
+/// The files of a scene are together no larger, unpacked \[bytes\].
 const LARGEST: u64 = 1 << 31;
 
 /// Writes an archive.
@@ -169,7 +169,7 @@ pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
     let unpacked = |found: Found<'_>| {
         let data = match found.method {
             STORED => found.data.to_vec(),
-            DEFLATED if found.unpacked <= LARGEST => {
+            DEFLATED => {
                 let mut data = Vec::new();
                 // One more than there should be tells what lies about its size.
                 DeflateDecoder::new(found.data).take(found.unpacked + 1).read_to_end(&mut data).ok()?;
@@ -180,7 +180,12 @@ pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
         let whole = data.len() as u64 == found.unpacked && crc_of(&data) == found.crc;
         whole.then(|| (found.name.to_string(), data))
     };
-    find(bytes)?.into_iter().map(unpacked).collect()
+    let files = find(bytes)?;
+    let all = files.iter().try_fold(0_u64, |all, file| all.checked_add(file.unpacked));
+    if all.is_none_or(|all| all > LARGEST) {
+        return None;
+    }
+    files.into_iter().map(unpacked).collect()
 }
 
 fn crc_of(data: &[u8]) -> u64 {
@@ -203,7 +208,7 @@ fn find(bytes: &[u8]) -> Option<Vec<Found<'_>>> {
     }
     let end_64 = place(locator + 8, 8)?;
     let (count, mut at) = (place(end_64.checked_add(32)?, 8)?, place(end_64.checked_add(48)?, 8)?);
-    let mut files = Vec::new();
+    let (mut files, mut sum) = (Vec::new(), 0_usize);
     for _ in 0..count {
         bytes.get(at..)?;
         let name_length = place(at.checked_add(28)?, 2)?;
@@ -215,6 +220,8 @@ fn find(bytes: &[u8]) -> Option<Vec<Found<'_>>> {
         let begin = offset.checked_add(30 + place(offset.checked_add(26)?, 2)? + place(offset.checked_add(28)?, 2)?)?;
         let data = bytes.get(begin..begin.checked_add(size)?)?;
         let method = u16::try_from(place(at + 10, 2)?).ok()?;
+        // Each has its own bytes of the archive: several that share some would be read again and again.
+        sum = sum.checked_add(size).filter(|sum| *sum <= bytes.len())?;
         files.push(Found { name, method, data, unpacked, crc: number(bytes, at + 16, 4)? });
         at = extension + 24;
     }
@@ -251,6 +258,14 @@ mod tests {
         assert_eq!(parse(&bytes), None);
         assert_eq!(unpack(&bytes), None);
         bytes[place] ^= 1;
+        // Entries that share their bytes, each of which would be read again.
+        let mut archive = Archive::new(Cursor::new(Vec::new()));
+        archive.add("a", b"", &mut &[7; 1000][..]).unwrap();
+        let again = archive.entries.remove(0);
+        let Entry { offset, size, unpacked, crc, .. } = again;
+        archive.entries.extend(["a", "b"].map(|name| Entry { name: name.into(), offset, size, unpacked, crc }));
+        let shared = archive.finish().unwrap().into_inner();
+        assert!(parse(&shared).is_none() && unpack(&shared).is_none());
         let name = bytes.windows(12).position(|name| name == b"meshes/a.obj").unwrap();
         bytes[name + 12 + 20 + 5] ^= 1;
         assert_eq!(unpack(&bytes), None, "what is packed is compared with its checksum too");

@@ -52,6 +52,10 @@ fn terms_that_cannot_be_are_refused() {
         let error = twice.build().unwrap_err();
         assert!(matches!(&error, EnvError::RepeatedTerm { kind: of, .. } if *of == kind), "{kind}: {error}");
     }
+    for name in ["", "a/b"] {
+        let error = builder().reward(terms::alive(name, 1.0)).build().unwrap_err();
+        assert!(matches!(&error, EnvError::TermName { kind: TermKind::Reward, .. }), "{name:?}: {error}");
+    }
     let nan = f64::NAN;
     let named = |name: &str, term: ObservationTerm| (name.to_string(), builder().observation(term));
     let other = || ObservationTerm::new("other", ["a"], |now| Ok(Array2::ones((now.num_envs(), 1))));

@@ -36,11 +36,11 @@ fn streams(archive: &Archive) -> Vec<Stream<'_>> {
         let parts = stream["arrays"].as_array().into_iter().flatten().filter_map(|part| {
             // Pictures are none of the arrays that were read.
             let array = part["name"].as_str().filter(|array| archive.arrays.contains_key(*array))?;
-            let shape = part["shape"].as_array().into_iter().flatten().filter_map(Value::as_u64);
-            let shape: Vec<usize> = shape.filter_map(|length| usize::try_from(length).ok()).collect();
+            // What the array has, not what is said of it.
+            let shape = archive.arrays.get(array)?.0.get(2..)?;
             let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
             let of_forces = part["of_forces"].as_bool().unwrap_or(false);
-            Some(Part { array, fields: fields(own, &columns, &shape), of_forces })
+            Some(Part { array, fields: fields(own, &columns, shape), of_forces })
         });
         let env_ids = envs.filter_map(|env| usize::try_from(env).ok()).collect();
         Some(Stream { name, env_ids, parts: parts.collect() })
@@ -140,7 +140,8 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
             }
             next += 1;
         }
-        let is_new = last != Some(time) || events.iter().any(|(at, _)| *at == step);
+        let happened = || events.binary_search_by(|(at, _)| at.total_cmp(&step)).is_ok();
+        let is_new = last != Some(time) || happened();
         times.push(is_new.then_some(time + offset));
         last = Some(time);
     }

@@ -136,7 +136,7 @@ impl MessageType {
             Many::Fixed(count) => Some(count),
             Many::List => Some(bytes.count()?),
         };
-        // Each takes a byte at least: no message makes anybody ask for more memory than it has itself.
+        // Each takes a byte at least, which is checked below where it is not plain: no message makes anybody ask for more memory than it has itself.
         if count.is_some_and(|count| count > bytes.left()) {
             return None;
         }
@@ -153,7 +153,11 @@ impl MessageType {
                 match count {
                     None => self.structure(bytes, fields, depth + 1),
                     Some(count) => {
-                        let each = (0..count).map(|_| self.structure(bytes, fields, depth + 1));
+                        // A type without fields takes nothing: there may be as many of it as anybody says.
+                        let each = (0..count).map(|_| {
+                            let begin = bytes.at;
+                            self.structure(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
+                        });
                         each.collect::<Option<_>>().map(Value::List)
                     }
                 }
@@ -461,6 +465,9 @@ mod tests {
         // A type that holds itself.
         let circle = MessageType::parse("A a\n====\nMSG: p/A\np/A a\n").unwrap();
         assert_eq!(circle.read(&whole), None);
+        // A million times a million of a type that takes no byte.
+        let schema = "B[1000000] b\n====\nMSG: p/B\nC[1000000] c\n====\nMSG: p/C\n";
+        assert_eq!(MessageType::parse(schema).unwrap().read(&vec![0; 1 << 21]), None);
         assert!(MessageType::parse("float64").is_none());
         assert!(MessageType::parse("uint8 X=7 # a constant\nstring<=5 s 'a=b'\nfloat64[<=3] x\n").is_some());
     }

@@ -56,6 +56,14 @@ impl Aperture {
         if focus_distance.is_nan() || focus_distance <= focal_length {
             return wrong("focus_distance", focus_distance, "larger than the focal length; infinite is possible");
         }
+        // Far wider than any lens; squares of it are finite in single precision.
+        if self.diameter() > 1e6 {
+            return wrong(
+                "f_number",
+                f_number,
+                "such that the opening, focal length / f_number, is at most 1e6 m wide",
+            );
+        }
         Ok(())
     }
 }

@@ -44,6 +44,11 @@ impl Landed {
         self.drawn = OnceLock::new();
     }
 
+    /// What is shown has changed.
+    pub(super) fn outdate(&mut self) {
+        self.drawn = OnceLock::new();
+    }
+
     pub(super) fn forget(&mut self, row: usize) {
         self.looks[row] = None;
         self.drawn = OnceLock::new();

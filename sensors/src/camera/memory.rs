@@ -125,6 +125,9 @@ impl Memory {
     pub(super) fn refresh(&mut self, row: usize, step: u64) {
         self.refreshed[row] = step;
         self.past.shown[row] = false;
+        if let Some(landed) = &mut self.past.landed {
+            landed.outdate();
+        }
     }
 
     /// Forgets what is on its way and what was, in `row`.

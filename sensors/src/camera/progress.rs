@@ -65,12 +65,13 @@ impl RenderProgress {
         Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - done) / done).ok()
     }
 
-    /// Breaks off what is drawn now, and whatever is begun later until [`resume`](Self::resume).
+    /// Breaks off the paths that are followed now, and whatever is begun later until [`resume`](Self::resume). What comes after
+    /// the paths, other channels and smoothing, is done to its end.
     pub fn cancel(&self) {
         self.0.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Pictures that are begun from now on are drawn again.
+    /// Pictures that are begun from now on are drawn again; one that was broken off stays so until the camera captures the next.
     pub fn resume(&self) {
         self.0.cancelled.store(false, Ordering::Relaxed);
     }

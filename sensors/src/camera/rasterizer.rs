@@ -31,7 +31,8 @@ pub struct RasterCfg {
     pub shadow_size: usize,
     /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`] only; 0 is none. Ambient light is then
     /// what arrives of [`RenderScene::ambient`] past what is in the way, as [`Renderer::RayTraced`] has it without bounces:
-    /// exact where nothing is, with the noise of so many rays elsewhere, which depends on the point and nothing else.
+    /// exact where nothing is in the way of flat surfaces (of a mesh with smooth normals, what lies below a facet is in the way),
+    /// with the noise of so many rays elsewhere, which depends on the point and nothing else.
     pub occlusion_rays: u16,
     /// Geom groups that are drawn: bit k is group k.
     pub groups: u32,
@@ -204,8 +205,8 @@ impl Rasterizer {
         take: &Take<'_>,
         frame: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
+        self.progress.begin(self.renderer.paths(shot, frame));
         if self.renderer.follows_paths() {
-            self.progress.begin(self.renderer.paths(shot, frame));
             return expose(&Crew::default(), std::slice::from_mut(self), (shot, take), frame);
         }
         let Self { cfg, renderer, aperture, shutter, assets, level, plan, brush, .. } = self;

@@ -214,6 +214,8 @@ pub(crate) fn shade<S: Simd>(
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
         let [above, below] = rays.blocked(s, (at.position, at.normal, n, at.along), lanes);
+        // What is counted with rays may be more than there is: light is never taken twice.
+        let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
         }

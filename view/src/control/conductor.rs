@@ -99,6 +99,9 @@ impl Conductor {
     fn record(&mut self, sim: &mut SimulationManager, viewer: u64, on: bool) -> Result<(), String> {
         let button = self.button.as_ref().ok_or("there is no record button here: the program has given none")?;
         let was = button.state(sim).is_some_and(|state| state.on);
+        if was && !on && self.recorded_by.is_none() {
+            return Err("the program itself records this, and ends it".into());
+        }
         button.set(sim, on)?;
         if !on {
             self.recorded_by = None;

@@ -260,7 +260,11 @@ impl OwnEyes {
 
     fn grab(&mut self, at: [f64; 2]) -> Result<(), String> {
         self.pull = self.with_seen(at, Pull::at);
-        let Some(pull) = &self.pull else { return Err("there is nothing here that can be pulled at".into()) };
+        let Some(pull) = &self.pull else {
+            // What was held before is let go.
+            self.send_own(control::Command::Release)?;
+            return Err("there is nothing here that can be pulled at".into());
+        };
         let picked = pull.picked().clone();
         self.select(Some(picked))?;
         self.send_pull()

@@ -170,6 +170,7 @@ fn apertures_and_shutters_that_no_camera_has_are_refused() {
         (Aperture { focal_length: f64::INFINITY, ..good }, "focal_length"),
         (Aperture { f_number: -1.0, ..good }, "f_number"),
         (Aperture { f_number: f64::NAN, ..good }, "f_number"),
+        (Aperture { f_number: 1e-300, ..good }, "f_number"),
         (Aperture { focus_distance: 0.05, ..good }, "focus_distance"),
         (Aperture { focus_distance: f64::NAN, ..good }, "focus_distance"),
     ] {

@@ -26,6 +26,9 @@ pub enum PlayError {
     /// There is no time at which anything is known.
     #[error("there is nothing to show: not a single moment was recorded")]
     Empty,
+    /// Times that cannot be put on a line.
+    #[error("there is nothing to show: the times of a film must be finite and in ascending order")]
+    Times,
     /// A moment of it cannot be shown.
     #[error("{0}")]
     Frame(String),
@@ -45,7 +48,7 @@ pub trait Play {
 
 impl Play for SimulationManager {
     fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
-        let mut head = Playhead::new(film.times()).ok_or(PlayError::Empty)?;
+        let mut head = Playhead::new(film.times())?;
         let known = self.observer_ids::<Conductor>().first().copied();
         // Taken out, so that it hears of nothing that the film writes.
         let taken = known.and_then(|id| self.remove_observer(id).ok());
@@ -70,9 +73,12 @@ struct Playhead {
 }
 
 impl Playhead {
-    fn new(times: &[f64]) -> Option<Self> {
-        let first = *times.first()?;
-        Some(Self { times: times.to_vec(), now: first, frame: 0, plays: true, speed: Speed::REAL, at: Instant::now() })
+    fn new(times: &[f64]) -> Result<Self, PlayError> {
+        let first = *times.first().ok_or(PlayError::Empty)?;
+        if !(times.is_sorted() && times.iter().all(|time| time.is_finite())) {
+            return Err(PlayError::Times);
+        }
+        Ok(Self { times: times.to_vec(), now: first, frame: 0, plays: true, speed: Speed::REAL, at: Instant::now() })
     }
 
     fn ends(&self) -> [f64; 2] {
@@ -247,6 +253,14 @@ mod tests {
             let cube = sim.rigid_object_id("cube").map_err(|error| error.to_string())?;
             let row = array![[0.0, 0.0, self.0[frame], 1.0, 0.0, 0.0, 0.0]];
             sim.rigid_object_mut(cube).write_pose(&row, None).map_err(|error| error.to_string())
+        }
+    }
+
+    #[test]
+    fn films_without_a_line_of_times_are_refused() {
+        assert!(matches!(Playhead::new(&[]), Err(PlayError::Empty)));
+        for times in [[0.0, f64::NAN], [f64::NEG_INFINITY, 0.0], [1.0, 0.0]] {
+            assert!(matches!(Playhead::new(&times), Err(PlayError::Times)), "{times:?}");
         }
     }
 
