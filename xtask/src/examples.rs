@@ -65,7 +65,7 @@ const TABLE: &[Run] = &[
         "--headless --steps 1 --attach-sensor --attach-link ee_link --width 160 --height 120 --out {out}/attached",
     ),
     run_of("create_sensor", &[2], "--headless --steps 1 --attach-sensor --attach-link no_such_link --out {out}/none"),
-    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng"),
+    run_of("create_sensor", &[0], "--headless --steps 300 --record {out}/create_sensor.apng --out {out}/recorded"),
     run_of("create_sensor", &[2], "--headless --steps 1 --width 0 --out {out}/none"),
     run_of(
         "create_sensor",
