@@ -144,8 +144,10 @@ impl Film {
         for Track { env, column, samples } in &self.tracks {
             // Before its first time, it is where it will be then.
             let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
-            // What diverged stays where it last was.
-            let Some(&value) = samples.values.get(last).filter(|value| value.is_finite()) else { continue };
+            // What diverged stays where it last was, also where somebody seeks to a time after that.
+            let until = samples.values.get(..=last);
+            let value = until.and_then(|until| until.iter().rev().find(|value| value.is_finite()));
+            let Some(&value) = value else { continue };
             match *column {
                 Column::Joint(column) => self.qpos[(*env, column)] = value,
                 Column::Hand(hand, number) => self.hands[hand].poses[(*env, number)] = value,

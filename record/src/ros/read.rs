@@ -136,7 +136,8 @@ impl MessageType {
             Many::Fixed(count) => Some(count),
             Many::List => Some(bytes.count()?),
         };
-        // Each takes a byte at least, which is checked below where it is not plain: no message makes anybody ask for more memory than it has itself.
+        // Each takes a byte at least, which is checked below where it is not plain: no message makes anybody ask for more memory
+        // than it has itself.
         if count.is_some_and(|count| count > bytes.left()) {
             return None;
         }
