@@ -54,8 +54,30 @@ struct Taken<'a> {
 /// slower at 3 MB and 7 % faster at 11 MB.
 const CACHE: usize = 8 << 20;
 
-/// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, a pause costs nothing.
-const SPINS_BEFORE_SLEEP: u32 = 20_000;
+/// How long a thread that waits for others spins before it lets others have its core, each time.
+const SPINS_BEFORE_YIELD: u32 = 1_000;
+
+/// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, while what paces its steps leaves its
+/// core to others, to a window that draws for one. Whoever spun in vain spins half as long the next time, and an eighth longer
+/// where that was enough: gaps that are short all the time are met awake, a pause in each step is slept through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Patience(u32);
+
+impl Patience {
+    /// About a millisecond.
+    const LONGEST: Self = Self(20_000);
+    /// The gaps between the jobs of one step.
+    const SHORTEST: Self = Self(500);
+
+    fn spins(self) -> u32 {
+        self.0
+    }
+
+    fn after(self, in_vain: bool) -> Self {
+        let next = if in_vain { self.0 / 2 } else { self.0 + self.0 / 8 };
+        Self(next.clamp(Self::SHORTEST.0, Self::LONGEST.0))
+    }
+}
 
 /// An error of [`Batch::new`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -321,7 +343,7 @@ impl Batch {
         let mut spins = 0_u32;
         while shared.finished.load(Ordering::Acquire) < self.workers.len() {
             spins += 1;
-            if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::yield_now() }
+            if spins < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
         if !self.workers.is_empty() {
             lock(&shared.job).job = None;
@@ -418,13 +440,12 @@ impl Shared {
     }
 
     /// Waits for a job newer than `seen`: spins first, then sleeps.
-    fn wait_for_job(&self, seen: u64) -> Option<(u64, Job)> {
-        for _ in 0..SPINS_BEFORE_SLEEP {
-            if self.epoch.load(Ordering::Acquire) != seen {
-                break;
-            }
+    fn wait_for_job(&self, seen: u64, patience: &mut Patience) -> Option<(u64, Job)> {
+        let came = (0..patience.spins()).any(|_| {
             std::hint::spin_loop();
-        }
+            self.epoch.load(Ordering::Acquire) != seen
+        });
+        *patience = patience.after(!came);
         let mut slot = lock(&self.job);
         while slot.epoch == seen && !slot.stop {
             slot = self.wake.wait(slot).unwrap_or_else(PoisonError::into_inner);
@@ -434,8 +455,8 @@ impl Shared {
 }
 
 fn work(shared: &Shared, thread: usize) {
-    let mut seen = 0;
-    while let Some((epoch, job)) = shared.wait_for_job(seen) {
+    let (mut seen, mut patience) = (0, Patience::LONGEST);
+    while let Some((epoch, job)) = shared.wait_for_job(seen, &mut patience) {
         seen = epoch;
         if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(thread, &mut |taken| job.act(taken)))).is_err() {
             shared.panicked.store(true, Ordering::Relaxed);
@@ -470,6 +491,17 @@ mod tests {
         let mut batch = Batch::new(&model, &Arc::default(), envs, threads).expect("small");
         batch.run(Arc::new(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64)));
         batch
+    }
+
+    #[test]
+    fn a_worker_spins_where_gaps_are_short_and_sleeps_where_steps_are_paced() {
+        let after = |gaps: &[bool]| gaps.iter().fold(Patience::LONGEST, |patience, &in_vain| patience.after(in_vain));
+        assert_eq!(after(&[false; 100]), Patience::LONGEST);
+        // A few jobs of a step, then a pause, again and again.
+        let paced = [false, false, false, true].repeat(20);
+        assert_eq!(after(&paced), Patience::SHORTEST);
+        // Back at full speed.
+        assert_eq!(after(&[paced, vec![false; 40]].concat()), Patience::LONGEST);
     }
 
     #[test]

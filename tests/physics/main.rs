@@ -7,6 +7,7 @@
 //! physics-report` makes `docs/physics.md` of it.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod bounce;
 mod lab;
 mod law;
 mod rows;

@@ -257,7 +257,10 @@ impl<S: Simd> V3<S> {
     /// Rotates by the rows of a matrix.
     #[inline(always)]
     pub(crate) fn rotate(self, r: &[[f32; 3]; 3]) -> Self {
-        let row = |r: &[f32; 3]| self.x * r[0] + self.y * r[1] + self.z * r[2];
+        let row = {
+            #[inline(always)]
+            |r: &[f32; 3]| self.x * r[0] + self.y * r[1] + self.z * r[2]
+        };
         Self { x: row(&r[0]), y: row(&r[1]), z: row(&r[2]) }
     }
 

@@ -180,9 +180,12 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
 pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>) -> V3<S> {
     let k = root(s, min(abs(direction.z), splat(s, 1.0)));
     let up = direction.z.simd_gt(splat(s, 0.0));
-    let mix = |c: usize| {
-        let (h, z, n) = (lighting.horizon[c], lighting.zenith[c], lighting.nadir[c]);
-        k * select(up, splat(s, z - h), splat(s, n - h)) + h
+    let mix = {
+        #[inline(always)]
+        |c: usize| {
+            let (h, z, n) = (lighting.horizon[c], lighting.zenith[c], lighting.nadir[c]);
+            k * select(up, splat(s, z - h), splat(s, n - h)) + h
+        }
     };
     V3 { x: mix(0), y: mix(1), z: mix(2) }
 }
@@ -210,7 +213,10 @@ pub(crate) fn shade<S: Simd>(
     // Ambient: between ground and sky by the normal's height.
     let up = n.z * 0.5 + 0.5;
     let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
-    let ambient = |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission);
+    let ambient = {
+        #[inline(always)]
+        |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission)
+    };
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
         let [above, below] = rays.blocked(s, (at.position, at.normal, n, at.along), lanes);

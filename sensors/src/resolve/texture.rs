@@ -48,12 +48,18 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
     let (ax, ay, az) = (abs(d.x), abs(d.y), abs(d.z));
     let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
     let by_y = !by_x & ay.simd_ge(az);
-    let axis = |x: F<S>, y: F<S>, z: F<S>| select(by_x, x, select(by_y, y, z));
+    let axis = {
+        #[inline(always)]
+        |x: F<S>, y: F<S>, z: F<S>| select(by_x, x, select(by_y, y, z))
+    };
     let major = axis(ax, ay, az);
     // Faces +x, -x, +y, -y, +z, -z, from top to bottom of the image.
     let back = axis(d.x, d.y, d.z).simd_gt(zero);
     let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(back, zero, splat(s, 1.0));
-    let turned = |x: F<S>| select(back, x, -x);
+    let turned = {
+        #[inline(always)]
+        |x: F<S>| select(back, x, -x)
+    };
     let (u, v) = (axis(-turned(d.z), d.x, turned(d.x)), axis(-d.y, turned(d.z), -d.y));
     let k = 0.5 / select(major.simd_gt(zero), major, splat(s, 1.0));
     let (u, v) = (u * k + 0.5, v * k + 0.5);
@@ -67,7 +73,10 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
         |level, wanted| {
             let side = level.width() as f32;
             // Nothing is blended across the edge of a face.
-            let inside = |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0));
+            let inside = {
+                #[inline(always)]
+                |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0))
+            };
             let (x, y) = (inside(u), inside(v));
             let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
             bilinear(s, level, [ix, iy + face * side], [x - ix, y - iy], wanted)

@@ -101,7 +101,10 @@ pub(crate) fn plane_nearness<S: Simd>(down: F<S>, height: f32) -> F<S> {
 #[inline(always)]
 pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: f32) -> PrimitiveHit<S> {
     let zero = splat(s, 0.0);
-    let none = || PrimitiveHit { hit: zero.simd_gt(zero), t: zero, normal: V3::splat(s, [0.; 3]), face: splat_u(s, 0) };
+    let none = {
+        #[inline(always)]
+        || PrimitiveHit { hit: zero.simd_gt(zero), t: zero, normal: V3::splat(s, [0.; 3]), face: splat_u(s, 0) }
+    };
     match shape {
         Shape::Plane(plane) => {
             let t = -(o.z / nonzero(s, d.z));
@@ -120,7 +123,10 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
         }
         Shape::Ellipsoid(ellipsoid) => {
             let k = ellipsoid.radii.map(|r| 1.0 / r);
-            let by = |v: V3<S>| V3 { x: v.x * k[0], y: v.y * k[1], z: v.z * k[2] };
+            let by = {
+                #[inline(always)]
+                |v: V3<S>| V3 { x: v.x * k[0], y: v.y * k[1], z: v.z * k[2] }
+            };
             let (o, d) = (by(o), by(d));
             let (hit, t, _) = first(s, ball(s, o, d, 1.0), near);
             // The gradient of x²/a² + ...: the unit ball's normal, scaled once more; of about unit length.
@@ -176,10 +182,16 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             let p = o.add(d.scale(t));
             let by_x = t.simd_eq(select(outside, x.enter, x.leave));
             let by_y = t.simd_eq(select(outside, y.enter, y.leave));
-            let axis = |n: [f32; 3], p: F<S>| V3::splat(s, n).scale(sign(s, p));
+            let axis = {
+                #[inline(always)]
+                |n: [f32; 3], p: F<S>| V3::splat(s, n).scale(sign(s, p))
+            };
             let normal = V3::select(by_y, axis([0., 1., 0.], p.y), axis([0., 0., 1.], p.z));
             let normal = V3::select(by_x, axis([1., 0., 0.], p.x), normal);
-            let one = |k: u32, p: F<S>| select_u(p.simd_lt(zero), splat_u(s, k), splat_u(s, k + 1));
+            let one = {
+                #[inline(always)]
+                |k: u32, p: F<S>| select_u(p.simd_lt(zero), splat_u(s, k), splat_u(s, k + 1))
+            };
             let face = select_u(by_x, one(0, p.x), select_u(by_y, one(2, p.y), one(4, p.z)));
             PrimitiveHit { hit, t, normal, face }
         }

@@ -1,9 +1,11 @@
 //! A ball meets a row of four that stand a little apart: each hands its whole velocity on, and the last goes on alone.
 //! m v = m Σ v, m v² = m Σ v² for two equal masses has no other solution.
 //!
-//! Tolerance: each of the four bounces is known to 0.003 (`RigidObjectCfg::restitution`): 0.012 for the last, 0.006 for what
-//! the others keep.
+//! Tolerance: a bounce of restitution e hands on (1 + e)/2 of the velocity and keeps (1 - e)/2. The ten steps of a contact
+//! leave e within off of 1 (`bounce.rs`): the last has four times off/2, the others keep off/2 of what they got, which is
+//! three bounces' off/2 too much at most.
 
+use crate::bounce::off;
 use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
@@ -36,9 +38,10 @@ fn knocked(restitution: Option<f64>, linear_damping: f64) -> Vec<f64> {
 fn holds() {
     law(module_path!(), "the last goes with v, the others rest; Σ v = v", |m| {
         let (elastic, soft) = (knocked(Some(1.0), 0.0), knocked(None, 0.0));
-        m.row("velocity of the last", "m/s", 1.0, elastic[4], (0.012, "four bounces, 0.003 each"));
+        let kept = off(1.0) / 2.0 * (1.0 + off(1.0) / 2.0).powi(3);
+        m.row("velocity of the last", "m/s", 1.0, elastic[4], (2.0 * off(1.0), "four bounces"));
         for (k, &velocity) in elastic.iter().enumerate().take(4) {
-            m.row(&format!("velocity of ball {k}"), "m/s", 0.0, velocity, (0.006, "two bounces, 0.003 each"));
+            m.row(&format!("velocity of ball {k}"), "m/s", 0.0, velocity, (kept, "the steps of a contact"));
         }
         m.row("sum of the velocities", "m/s", 1.0, elastic.iter().sum(), (1e-10, "rounding"));
         let dull = knocked(Some(0.5), 0.0);

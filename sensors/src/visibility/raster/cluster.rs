@@ -99,7 +99,10 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
         let from = cluster.first_lane as usize + i;
         let [x, y, z] = mesh.lanes();
         let (x, y, z) = (load(s, &x[from..]), load(s, &y[from..]), load(s, &z[from..]));
-        let row = |k: usize| x * r[k][0] + y * r[k][1] + z * r[k][2] + t[k];
+        let row = {
+            #[inline(always)]
+            |k: usize| x * r[k][0] + y * r[k][1] + z * r[k][2] + t[k]
+        };
         let c = [row(0), row(1), row(2)];
         let nearness = projection.nearness_lanes(c[2]);
         let (sx, sy) = if projection.parallel {

@@ -68,7 +68,10 @@ pub(crate) fn draw<S: Simd>(
     let column: I<S> = load_i(s, &column);
     let in_second_row = load(s, &ROW).simd_gt(splat(s, 0.5));
     let zero = splat_i(s, 0);
-    let edge = |k: usize| column * a[k] + select_i(in_second_row, splat_i(s, b[k]), zero);
+    let edge = {
+        #[inline(always)]
+        |k: usize| column * a[k] + select_i(in_second_row, splat_i(s, b[k]), zero)
+    };
     let edges = [edge(0), edge(1), edge(2)];
     let steps: F<S> = load(s, &COLUMN) * g.step[0] + load(s, &ROW) * g.step[1];
     let (low, high) = (splat(s, g.low), splat(s, g.high));
@@ -98,7 +101,10 @@ pub(crate) fn draw<S: Simd>(
                     + (g.step[0] * (offset[0] as f32 * (1.0 / SUB)) + g.step[1] * (offset[1] as f32 * (1.0 / SUB)));
                 let samples = tile.samples(block, plane);
                 for row in first_row..=last_row {
-                    let at = |k: usize| edges[k] + (e[k] + 2 * row as i32 * b[k]);
+                    let at = {
+                        #[inline(always)]
+                        |k: usize| edges[k] + (e[k] + 2 * row as i32 * b[k])
+                    };
                     let inside = (at(0) | at(1) | at(2)).simd_ge(zero);
                     let q = steps + (q0 + g.step[1] * (2 * row) as f32);
                     let q = min(max(q, low), high);
