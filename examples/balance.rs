@@ -20,6 +20,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::WrenchFrame;
+use kinetoscope::sim::description::{Geometry, RobotDescription};
+use kinetoscope::sim::urdf::assemble;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip};
 use nalgebra::{Matrix4, RowVector4, Vector3, Vector4};
@@ -44,15 +46,9 @@ const DT: f64 = 0.002;
 /// How long it goes on \[s\].
 const DURATION: f64 = 14.0;
 
-/// From the file of the robot: radius of the wheels \[m\], masses of the body and of both wheels \[kg\], height of the centre of
-/// mass above the axle \[m\], inertia of the body about it and of both wheels about the axle \[kg m²\].
-const RADIUS: f64 = 0.1;
-const BODY: f64 = 8.0;
-const WHEELS: f64 = 1.6;
-const HEIGHT: f64 = 0.35;
-const BODY_INERTIA: f64 = 0.173333;
-const WHEEL_INERTIA: f64 = 0.008;
 const G: f64 = 9.81;
+/// How far above the floor they are dropped \[m\].
+const DROP: f64 = 0.03;
 
 /// Most acceleration that is asked for \[m/s²\]: tyres with friction 1 slip at 9.8.
 const MOST: f64 = 6.0;
@@ -90,11 +86,13 @@ fn run(args: &Args) -> launcher::Result<bool> {
         arena_space: args.launcher.arena_space.unwrap_or(1.6),
         ..args.launcher.simulation()?
     })?;
+    let urdf = UrdfCfg::single(assets::path("balancer/balancer.urdf")?);
+    let plant = Plant::of(&assemble(&urdf)?.description)?;
     let robot = sim.add_robot(RobotCfg {
         uid: "balancer".into(),
-        urdf: UrdfCfg::single(assets::path("balancer/balancer.urdf")?),
+        urdf,
         fix_base: false,
-        init_pose: Pose::translation(0.0, 0.0, RADIUS + 0.03),
+        init_pose: Pose::translation(0.0, 0.0, plant.radius + DROP),
         // Speed controllers.
         drive: DriveCfg { stiffness: 0.0.into(), damping: GRIP.into(), ..Default::default() },
         ..Default::default()
@@ -110,7 +108,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     // They start a little tilted.
     let tilts = grip::scatter::<1>(&sim, "tilt");
     let start: Vec<Pose> =
-        tilts.iter().map(|[tilt]| from_xyz_rpy([0.0, 0.0, RADIUS + 0.03], [0.0, 0.05 * tilt, 0.0])).collect();
+        tilts.iter().map(|[tilt]| from_xyz_rpy([0.0, 0.0, plant.radius + DROP], [0.0, 0.05 * tilt, 0.0])).collect();
     sim.robot_mut(robot).write_root_pose(&trial::rows(&start), None)?;
     let pushes: Vec<Pushes> = (0..sim.num_envs()).map(|env| Pushes::draw(&sim, env, args.push)).collect();
     let (body, tyres) = (sim.robot(robot).link_id("body")?, ["left_tyre", "right_tyre"]);
@@ -125,7 +123,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let recording = args.launcher.start_recording(&mut sim)?;
     let steps = (DURATION / DT).round() as u64;
     let progress = Progress::new(&args.launcher, steps);
-    let gains = gains();
+    let gains = plant.gains();
     // When pictures are taken: before all pushes, after the first, in the air, landed, in the end.
     let end_of = |push: usize| pushes[0].list[push].time[1];
     let moments = [1.0, end_of(0) + 0.1, end_of(2) + 0.04, end_of(2) + 0.4, DURATION];
@@ -143,7 +141,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
                 acceleration: Vector3::from_fn(|k, _| read.lin_acc_b()[(env, k)]),
                 grounded: watched[..2].iter().all(|&tyre| forces[(env, tyre, 2)] > 1.0),
             };
-            let speed = if args.no_feedback { 0.0 } else { controller.wheels(&felt, &gains) };
+            let speed = if args.no_feedback { 0.0 } else { controller.wheels(&felt, &gains, plant.radius) };
             speeds.row_mut(env).fill(speed);
             // To judge: the controller does not know.
             record.airborne += u64::from(!felt.grounded && time > 1.0);
@@ -217,46 +215,86 @@ fn imu_cfg() -> ImuCfg {
     ImuCfg { sampling: SamplingCfg { noise: noise.into(), ..Default::default() }, ..ImuCfg::on("balancer/body") }
 }
 
-/// Gains on distance, speed, tilt and rate of tilt, of the acceleration that is asked for.
-///
-/// With the axle accelerated by a, the body (mass m, its centre h above the axle, inertia I about that) tilts by θ. The wheels
-/// (mass M, inertia J, radius r) are driven by a torque T, which acts on the body the other way. For small angles, with H the
-/// force of the axle on the body and F that of the floor on the wheels:
-///
-/// ```text
-/// body, along:  m (a + h θ") = H             wheels, along:  M a = F - H
-/// body, turn:   I θ" = m g h θ - h H - T     wheels, turn:   J a / r = T - r F
-/// so            (I + m h² + m h r) θ" = m g h θ - (m h + (M + m) r + J / r) a
-/// ```
-///
-/// The gains are those of the linear-quadratic regulator of x' = v, v' = a, θ' = ω, ω' = A θ - B a in steps of dt, with costs
-/// by Bryson's rule: one over the square of what is thought large. Its Riccati equation is solved by going back in time
-/// until nothing changes any more.
-fn gains() -> RowVector4<f64> {
-    let inertia = BODY_INERTIA + BODY * HEIGHT * HEIGHT + BODY * HEIGHT * RADIUS;
-    let (a, b) =
-        (BODY * G * HEIGHT / inertia, (BODY * HEIGHT + (WHEELS + BODY) * RADIUS + WHEEL_INERTIA / RADIUS) / inertia);
-    #[rustfmt::skip]
-    let forward = Matrix4::new(
-        1.0, DT,  0.0,    0.0,
-        0.0, 1.0, 0.0,    0.0,
-        0.0, 0.0, 1.0,    DT,
-        0.0, 0.0, a * DT, 1.0,
-    );
-    let input = Vector4::new(0.0, DT, 0.0, -b * DT);
-    // 0.5 m, 1 m/s, 0.2 rad, 1 rad/s, and 3 m/s².
-    let cost = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 25.0, 1.0));
-    let effort = 1.0 / 9.0;
-    let mut value = cost;
-    let mut gains = RowVector4::zeros();
-    loop {
-        let weight = effort + input.dot(&(value * input));
-        let next = (input.transpose() * value * forward) / weight;
-        let change = (next - gains).abs().max();
-        gains = next;
-        value = cost + forward.transpose() * value * (forward - input * gains);
-        if change < 1e-12 {
-            return gains;
+/// A robot, as its controller thinks of it: what its file says.
+#[derive(Clone, Copy, Debug)]
+struct Plant {
+    /// Of the wheels \[m\].
+    radius: f64,
+    /// Mass of the body, and of both wheels \[kg\].
+    body: f64,
+    wheels: f64,
+    /// Of the body's centre of mass above the axle \[m\].
+    height: f64,
+    /// Of the body about its centre of mass, and of both wheels about the axle \[kg m²\].
+    body_inertia: f64,
+    wheel_inertia: f64,
+}
+
+impl Plant {
+    /// From the links `body`, whose frame is in the middle of the axle, and the two tyres.
+    fn of(robot: &RobotDescription) -> launcher::Result<Self> {
+        let link = |name: &str| robot.links.iter().find(|link| link.name == name).ok_or(format!("no link {name}"));
+        let inertial = |name: &str| {
+            let inertial = link(name)?.inertial.as_ref().ok_or(format!("the link {name} has no mass"))?;
+            // About y, the axle, in the axes of the link.
+            let turn = inertial.link_from_com.rotation.to_rotation_matrix();
+            let about_y = (turn.matrix() * inertial.inertia * turn.matrix().transpose())[(1, 1)];
+            Ok::<_, String>((inertial.mass, inertial.link_from_com.translation.z, about_y))
+        };
+        let Some(Geometry::Sphere { radius }) = link("left_tyre")?.collisions.first().map(|shape| &shape.geometry)
+        else {
+            return Err("the left tyre touches the floor with something else than a ball".into());
+        };
+        let ((body, height, body_inertia), left, right) =
+            (inertial("body")?, inertial("left_tyre")?, inertial("right_tyre")?);
+        let (wheels, wheel_inertia) = (left.0 + right.0, left.2 + right.2);
+        Ok(Self { radius: *radius, body, wheels, height, body_inertia, wheel_inertia })
+    }
+
+    /// Gains on distance, speed, tilt and rate of tilt, of the acceleration that is asked for.
+    ///
+    /// With the axle accelerated by a, the body (mass m, its centre h above the axle, inertia I about that) tilts by θ. The wheels
+    /// (mass M, inertia J, radius r) are driven by a torque T, which acts on the body the other way. For small angles, with H the
+    /// force of the axle on the body and F that of the floor on the wheels:
+    ///
+    /// ```text
+    /// body, along:  m (a + h θ") = H             wheels, along:  M a = F - H
+    /// body, turn:   I θ" = m g h θ - h H - T     wheels, turn:   J a / r = T - r F
+    /// so            (I + m h² + m h r) θ" = m g h θ - (m h + (M + m) r + J / r) a
+    /// ```
+    ///
+    /// The gains are those of the linear-quadratic regulator of x' = v, v' = a, θ' = ω, ω' = A θ - B a in steps of dt, with costs
+    /// by Bryson's rule: one over the square of what is thought large. Its Riccati equation is solved by going back in time
+    /// until nothing changes any more.
+    fn gains(&self) -> RowVector4<f64> {
+        let Self { radius, body, wheels, height, body_inertia, wheel_inertia } = *self;
+        let inertia = body_inertia + body * height * height + body * height * radius;
+        let (a, b) = (
+            body * G * height / inertia,
+            (body * height + (wheels + body) * radius + wheel_inertia / radius) / inertia,
+        );
+        #[rustfmt::skip]
+        let forward = Matrix4::new(
+            1.0, DT,  0.0,    0.0,
+            0.0, 1.0, 0.0,    0.0,
+            0.0, 0.0, 1.0,    DT,
+            0.0, 0.0, a * DT, 1.0,
+        );
+        let input = Vector4::new(0.0, DT, 0.0, -b * DT);
+        // 0.5 m, 1 m/s, 0.2 rad, 1 rad/s, and 3 m/s².
+        let cost = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 25.0, 1.0));
+        let effort = 1.0 / 9.0;
+        let mut value = cost;
+        let mut gains = RowVector4::zeros();
+        loop {
+            let weight = effort + input.dot(&(value * input));
+            let next = (input.transpose() * value * forward) / weight;
+            let change = (next - gains).abs().max();
+            gains = next;
+            value = cost + forward.transpose() * value * (forward - input * gains);
+            if change < 1e-12 {
+                return gains;
+            }
         }
     }
 }
@@ -283,8 +321,8 @@ struct Controller {
 }
 
 impl Controller {
-    /// Speed of both wheels relative to the body \[rad/s\].
-    fn wheels(&mut self, felt: &Felt, gains: &RowVector4<f64>) -> f64 {
+    /// Speed of both wheels of this radius \[m\] relative to the body \[rad/s\].
+    fn wheels(&mut self, felt: &Felt, gains: &RowVector4<f64>, radius: f64) -> f64 {
         self.tilt += DT * felt.spin.y;
         let (sin, cos) = self.tilt.sin_cos();
         self.acceleration = if felt.grounded {
@@ -302,7 +340,7 @@ impl Controller {
         self.speed += DT * self.acceleration;
         self.distance += DT * self.speed;
         // A wheel that stands still on the floor turns backwards in a body that tilts forwards.
-        self.speed / RADIUS - felt.spin.y
+        self.speed / radius - felt.spin.y
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --example train_reach -- --headless --out pictures
-//! cargo run --release --example train_reach -- --headless --iterations 0
+//! cargo run --release --example train_reach -- --headless --no-signal
 //! ```
 //!
 //! Each iteration tries the policy with random changes of its weights, each change with both signs, on the same eight
@@ -10,12 +10,17 @@
 //! linear policies is competitive for reinforcement learning*, 2018; version V1 without the choice of the best directions).
 //! Everything that is random is keyed by `--seed`: curve and policy are the same for any number of threads.
 //!
-//! The exit code is 0 where the arm has learned it, 1 where it has not (the second command), 2 where something is wrong.
+//! What learns knows of the arm only what a [`VectorEnv`] tells; a few lines around it count who reaches the targets.
+//!
+//! The exit code is 0 where the arm has learned it, 1 where it has not (the second command, in which policies are told what others
+//! have earned), 2 where something is wrong.
 
 mod launcher;
 
 use clap::Parser;
-use kinetoscope::env::{CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, terms};
+use kinetoscope::env::{
+    CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, VectorEnv, terms,
+};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, Random};
@@ -41,6 +46,9 @@ struct Args {
     /// How far the weights move in an iteration
     #[arg(long, alias = "step_size", default_value_t = 0.15)]
     step_size: f64,
+    /// Policies are told what others have earned, at random: nothing is to be learned from it
+    #[arg(long, alias = "no_signal")]
+    no_signal: bool,
 }
 
 /// Targets that every change is tried on.
@@ -106,7 +114,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let Some((returns, distances)) = run.episode(&mut seen, |env| tried.policies[env / TARGETS].view())? else {
             break;
         };
-        policy.learn(&tried, &returns, args.step_size);
+        let told = if args.no_signal { shuffled(&returns, args.launcher.seed, iteration) } else { returns.clone() };
+        policy.learn(&tried, &told, args.step_size);
         let reached = count(&distances) as f64 / num_envs as f64;
         let (mean, apart) = (returns.mean().unwrap_or_default(), distances.mean().unwrap_or_default());
         rows.push([mean, apart, reached]);
@@ -142,6 +151,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         "reached_before": before,
         "reached_after": after,
         "needed": LEARNED,
+        "signal": !args.no_signal,
         "curve": rows.iter().map(|[mean, apart, reached]| json!({ "return": mean, "distance": apart, "reached": reached })).collect::<Vec<_>>(),
         "policy": policy.weights.iter().collect::<Vec<_>>(),
         "env_steps_per_second": rate,
@@ -200,7 +210,7 @@ struct Policy {
 
 impl Policy {
     /// Does nothing.
-    fn idle(env: &Env) -> Self {
+    fn idle(env: &impl VectorEnv) -> Self {
         Self { weights: Array2::zeros((env.observation_space().len() + 1, env.action_space().len())) }
     }
 
@@ -237,15 +247,27 @@ impl Tried {
     }
 }
 
+/// What was earned, in another order.
+fn shuffled(returns: &Array1<f64>, seed: u64, iteration: usize) -> Array1<f64> {
+    let mut random = Random::keyed(seed, iteration as u64, "no signal");
+    let mut told = returns.clone();
+    // Fisher and Yates: each order is as probable as any other.
+    for k in (1..told.len()).rev() {
+        let other = (random.uniform() * (k + 1) as f64) as usize;
+        told.swap(k, other.min(k));
+    }
+    told
+}
+
 /// Episodes of all environments, one after the other.
-struct Run<'r> {
-    env: &'r mut Env,
+struct Run<'r, E> {
+    env: &'r mut E,
     progress: &'r Progress,
     /// Steps so far.
     step: u64,
 }
 
-impl Run<'_> {
+impl<E: VectorEnv> Run<'_, E> {
     /// One episode in all environments, from what is `seen` there: what was earned, and how far the tip was from the target in the
     /// end \[m\]. The next episode has begun then. `None` where somebody has stopped it.
     fn episode<'p>(
@@ -260,7 +282,7 @@ impl Run<'_> {
                 return Ok(None);
             }
             act(seen, &policy, &mut actions);
-            let step = self.env.step(&actions)?;
+            let step = self.env.step(actions.view())?;
             self.step += 1;
             self.progress.advance(self.step);
             returns += &step.rewards;

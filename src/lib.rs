@@ -4,6 +4,8 @@
 pub mod assets;
 #[cfg(all(feature = "record", feature = "view"))]
 mod record_button;
+#[cfg(all(feature = "record", feature = "view"))]
+mod recorded_film;
 
 pub use env;
 pub use ndarray;
@@ -11,6 +13,8 @@ pub use ndarray;
 pub use record;
 #[cfg(all(feature = "record", feature = "view"))]
 pub use record_button::FileRecording;
+#[cfg(all(feature = "record", feature = "view"))]
+pub use recorded_film::RecordedFilm;
 pub use scene;
 pub use sensors;
 pub use sim;

@@ -2,7 +2,7 @@
 //! holds physics up.
 //!
 //! Sixteen of the vendor's arms with the bundled hand move all the time; of 960 x 540 pixels each picture shows them all. It
-//! is drawn as the window draws it, on half of the machine's cores, without an X server.
+//! is drawn as the window draws it, without an X server.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{arm_with_hand, drive_sr5};
@@ -91,7 +91,7 @@ impl Drop for Worker {
 
 /// Draws every snapshot as a window does, and counts them.
 fn window(viewer: Viewer, drawn: Arc<AtomicU64>) -> Worker {
-    let mut app = App::new(SIZE, (cores() / 2).max(1));
+    let mut app = App::new(SIZE, cores());
     viewer.set_wants(app.wants());
     let (mut canvas, mut last) = (Canvas::default(), 0);
     Worker::start(move || {

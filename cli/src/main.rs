@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod convert;
 mod excerpt;
+mod interrupt;
 mod model;
 mod picture;
 mod plot;

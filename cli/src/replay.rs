@@ -1,10 +1,13 @@
 //! `kinetoscope replay`: a recording shown again, drawn, or run again.
 
-use crate::{Ending, Result, excerpt};
+use crate::{Ending, Result, excerpt, interrupt};
+use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
-use kinetoscope::view::control::{Film as Shows, Play, Speed};
+use kinetoscope::view::Closed;
+use kinetoscope::view::control::{Play, Speed};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 /// Shows a recording in a window or a browser with a time line, draws pictures of it, or runs its actions again
 ///
@@ -43,7 +46,8 @@ pub(crate) struct Args {
 }
 
 const ENDINGS: &str = "\
-Exit codes: 0 shown, drawn, or the same to the last bit; 1 --verify found a difference, or something was left out; 2 refused.";
+Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 --verify found a difference, or something was left
+out; 2 refused, or the display was lost.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     if args.verify {
@@ -103,36 +107,32 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
     Ok(())
 }
 
-/// A film for viewers.
-struct Shown(Film);
-
-impl Shows for Shown {
-    fn times(&self) -> &[f64] {
-        self.0.times()
-    }
-
-    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> std::result::Result<(), String> {
-        self.0.show(sim, frame).map_err(|error| error.to_string())
-    }
-}
-
-fn show(args: &Args, film: Film, mut sim: SimulationManager) -> Result<()> {
+fn show(args: &Args, mut film: Film, mut sim: SimulationManager) -> Result<()> {
     let begun = std::time::Instant::now();
-    let mut film = Shown(film);
     // Whoever opens it sees the beginning at once, not the scene as it was built.
-    film.0.show(&mut sim, 0)?;
-    let in_time = || args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds);
+    film.show(&mut sim, 0)?;
+    let mut film = RecordedFilm(film);
+    // Nothing is held: it is asked many times a second whether to go on.
+    let interrupted = interrupt::on_ctrl_c(|| ());
+    let goes_on = || {
+        let in_time = args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds);
+        in_time && !interrupted.load(Ordering::SeqCst)
+    };
     match &args.serve {
         Some(address) => {
             let served = sim.serve_with(address, ServeCfg { speed: Speed::REAL, ..ServeCfg::default() })?;
             println!("Look at {}; Ctrl+C ends it.", served.url());
-            sim.play(&mut film, &mut || in_time())?;
+            sim.play(&mut film, &mut || goes_on())?;
             served.close(&mut sim)?;
         }
         None => {
             let title = format!("{} - Kinetoscope", args.file.display());
             let window = sim.open_window_with(WindowCfg { title, ..WindowCfg::default() })?;
-            sim.play(&mut film, &mut || window.is_open() && in_time())?;
+            println!("A window shows {}: closing it, or Ctrl+C here, ends it.", args.file.display());
+            sim.play(&mut film, &mut || window.is_open() && goes_on())?;
+            if let Some(Closed::DisplayLost(reason)) = window.closed() {
+                return Err(format!("the window is gone: {reason}").into());
+            }
             window.close();
         }
     }

@@ -1,13 +1,12 @@
 //! `kinetoscope view`: a model as it moves, in a window or in a browser.
 
 use crate::model::ModelArgs;
-use crate::{Ending, Result, excerpt};
+use crate::{Ending, Result, excerpt, interrupt};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
 /// A model as it moves: in a window, or in a browser with --serve
 ///
@@ -133,24 +132,12 @@ fn no_window(error: &WindowError, names: &str) -> String {
     }
 }
 
-/// Raised by Ctrl+C, which also lets the simulation go on where a viewer holds it; a second Ctrl+C ends the program at once.
+/// Raised by Ctrl+C, which also lets the simulation go on where a viewer holds it.
 fn on_ctrl_c(sim: &mut SimulationManager) -> Arc<AtomicBool> {
     let wants = Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
     let key: Viewer = sim.viewer(wants);
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    // Some programs send the signal to a process and to its group: that is one Ctrl+C.
-    let mut first: Option<Instant> = None;
-    let handler = ctrlc::set_handler(move || {
-        flag.store(true, Ordering::SeqCst);
+    interrupt::on_ctrl_c(move || {
         key.send(Command::Resume);
         key.send(Command::SetSpeed(Speed::Free));
-        if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = handler {
-        eprintln!("warning: Ctrl+C will end the program at once: {error}");
-    }
-    interrupted
+    })
 }

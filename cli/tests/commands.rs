@@ -1,36 +1,10 @@
 //! The commands as somebody types them: what they print, what they write, and how they end.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod support;
+
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn kinetoscope(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_kinetoscope")).args(args).env("NO_COLOR", "1").output().unwrap()
-}
-
-fn said(output: &Output) -> (String, String, i32) {
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (text(&output.stdout), text(&output.stderr), output.status.code().unwrap())
-}
-
-fn write(folder: &Path, name: &str, content: &str) -> String {
-    let path = folder.join(name);
-    std::fs::write(&path, content).unwrap();
-    path.to_str().unwrap().to_owned()
-}
-
-const ARM: &str = r#"<robot name="arm">
-  <link name="base"/>
-  <link name="rod">
-    <inertial><origin xyz="0 0 0.5"/><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <visual><origin xyz="0 0 0.5"/><geometry><box size="0.1 0.1 1"/></geometry></visual>
-  </link>
-  <joint name="hinge" type="revolute">
-    <parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="50" velocity="1"/>
-  </joint>
-</robot>
-"#;
+use support::{ARM, kinetoscope, said, write};
 
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
   <joint name="pin" type="hinge" axis="0 1 0" range="-90 90" limited="true"/>

@@ -1,19 +1,12 @@
 //! `kinetoscope plot`, held against a motion that is known in closed form.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod support;
+
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn kinetoscope(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_kinetoscope")).args(args).env("NO_COLOR", "1").output().unwrap()
-}
-
-fn said(output: &Output) -> (String, String, i32) {
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (text(&output.stdout), text(&output.stderr), output.status.code().unwrap())
-}
+use support::{kinetoscope, said};
 
 /// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
 const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">

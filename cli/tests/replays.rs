@@ -1,24 +1,15 @@
 //! `kinetoscope replay`: what it draws, what it serves, and how it verifies.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod support;
+#[path = "support/windows.rs"]
+mod windows;
+
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn kinetoscope(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_kinetoscope"))
-        .args(args)
-        .env("NO_COLOR", "1")
-        .env_remove("DISPLAY")
-        .output()
-        .unwrap()
-}
-
-fn said(output: &Output) -> (String, String, i32) {
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (text(&output.stdout), text(&output.stderr), output.status.code().unwrap())
-}
+use std::path::{Path, PathBuf};
+use support::{Running, command, kinetoscope, said, until};
+use windows::{Display, SIZE, close, colors, screenshot, window_of};
 
 const SCENE: &str = r#"
 [simulation]
@@ -152,4 +143,67 @@ fn it_is_served_and_what_cannot_be_shown_is_said() {
         assert_eq!(code, 2, "{args:?}: {out}{err}");
         assert!(err.contains(words), "{args:?}: {err}");
     }
+}
+
+/// A cart that swings for a second: the file, and the folder that holds it.
+fn swing() -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut scene, _) = scene(folder.path());
+    let sim = scene.sim_mut();
+    let cart = sim.robot_id("cart").unwrap();
+    sim.robot_mut(cart).write_qpos(&array![[0.8]], None, None).unwrap();
+    let path = folder.path().join("swing.mcap");
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(100);
+    sim.finish_recording(recorder).unwrap();
+    (folder, path.to_str().unwrap().to_owned())
+}
+
+#[test]
+fn ctrl_c_is_a_good_end_of_a_page() {
+    let (_folder, path) = swing();
+    let mut running = Running::start(&mut command(&["replay", &path, "--serve", "127.0.0.1:0"]));
+    assert!(running.line().contains("Ctrl+C ends it"));
+    running.interrupt();
+    assert_eq!(running.ended().code(), Some(0));
+}
+
+/// Where the mark of the time line is: the middle column of what is bright yellow in the lowest rows of the window.
+fn mark(picture: &[[u8; 3]]) -> Option<f64> {
+    let [width, height] = SIZE;
+    let bright = |column: &usize| (height - 14..height - 2).all(|row| picture[row * width + column] == [255, 210, 60]);
+    let columns: Vec<usize> = (0..width).filter(bright).collect();
+    (columns.len() == 3).then(|| columns[1] as f64)
+}
+
+#[test]
+fn a_window_shows_a_recording_with_its_time_line_until_it_is_closed() {
+    let Some(mut display) = Display::start("1280x800") else { return };
+    let (_folder, path) = swing();
+    let connection = display.connect();
+    let start = || {
+        let mut running = Running::start(command(&["replay", &path]).env("DISPLAY", &display.name));
+        assert!(running.line().contains("swing.mcap"));
+        let window = until("a window", || window_of(&connection, "swing.mcap"));
+        until("the recording is drawn", || (colors(&connection) > 50).then_some(()));
+        (running, window)
+    };
+    let (mut running, window) = start();
+    // It holds at the end, where the mark is at the right end of the line: 70 pixels from the side.
+    until("the end", || mark(&screenshot(&connection)).filter(|mark| (*mark - (SIZE[0] as f64 - 70.0)).abs() < 2.0));
+    if let Some(folder) = std::env::var_os("KINETOSCOPE_SCREENSHOTS") {
+        let bytes = screenshot(&connection).concat();
+        let picture = image::RgbImage::from_raw(SIZE[0] as u32, SIZE[1] as u32, bytes).unwrap();
+        picture.save(PathBuf::from(folder).join("replay_window.png")).unwrap();
+    }
+    assert!(running.0.try_wait().unwrap().is_none(), "it does not end by itself");
+    close(&connection, window);
+    assert_eq!(running.ended().code(), Some(0));
+    let (mut running, _) = start();
+    running.interrupt();
+    assert_eq!(running.ended().code(), Some(0));
+    // The display is lost: that is an end, not a good one.
+    let (mut running, _) = start();
+    display.server.kill().unwrap();
+    assert_eq!(running.ended().code(), Some(2));
 }

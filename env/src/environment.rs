@@ -7,10 +7,11 @@ use crate::error::{EnvError, Result, TermKind};
 use crate::event::When;
 use crate::now::{Now, Present};
 use crate::space::Space;
-use crate::step::{EndReason, Ended, Step};
+use crate::step::{EndReason, Ended, Info, Step};
+use crate::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 use scene::Random;
-use sim::{EnvId, SimulationManager};
+use sim::{EnvId, ObserverId, SimulationManager};
 
 /// Environments with a task: reset, then stepped.
 ///
@@ -37,6 +38,8 @@ pub struct Env {
     reward_sums: Array2<f64>,
     /// What was seen last.
     observations: Array2<f64>,
+    /// Who was reset, and how the simulation calls what notes it.
+    watch: (Watch, ObserverId<Watch>),
 }
 
 /// What an environment has for itself beside the simulation.
@@ -66,15 +69,21 @@ impl Env {
         &self.present.sim
     }
 
-    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step. Resetting
-    /// it, as viewers may, begins no episode: [`reset`](Self::reset) does.
+    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step. Where it is
+    /// reset, as viewers may do too, the episode ends with the next step ([`EndReason::Reset`]) and another one begins:
+    /// [`reset`](Self::reset) begins one at once.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.present.sim
     }
 
     /// The simulation, as the last step left it.
     pub fn into_sim(self) -> SimulationManager {
-        self.present.sim
+        let (mut sim, (_, id)) = (self.present.sim, self.watch);
+        // It may be another simulation than at first: then there is nothing to take away.
+        if sim.has_observer(id) {
+            let _ = sim.remove_observer(id);
+        }
+        sim
     }
 
     /// What terms see at present.
@@ -121,7 +130,7 @@ impl Env {
 /// Running.
 impl Env {
     /// An environment of checked terms, whose spaces are those of observations and actions.
-    pub(crate) fn new(sim: SimulationManager, cfg: EnvCfg, terms: Terms, spaces: [Space; 2]) -> Result<Self> {
+    pub(crate) fn new(mut sim: SimulationManager, cfg: EnvCfg, terms: Terms, spaces: [Space; 2]) -> Result<Self> {
         let [observation_space, action_space] = spaces;
         let (n, seed, first) = (sim.num_envs(), sim.cfg().seed, sim.cfg().first_env());
         let row = |env: usize| {
@@ -132,7 +141,9 @@ impl Env {
         let commands = terms.commands.iter();
         let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
         let previous = actions.clone();
+        let watch = Watch::new(n);
         let mut env = Self {
+            watch: (watch.clone(), sim.add_observer(watch)),
             rows: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
             observations: Array2::zeros((n, observation_space.len())),
@@ -230,7 +241,7 @@ impl Env {
         let all: Vec<usize> = (0..self.num_envs()).collect();
         let final_observations = self.observe(&all)?;
         self.observations = final_observations.clone();
-        let mut ended = Vec::new();
+        let mut ended: Vec<Ended> = Vec::new();
         for (env, reason) in reasons.into_iter().enumerate() {
             if let Some(reason) = reason {
                 let (steps, reward_sums) = (self.present.steps[env], self.reward_sums.row(env).to_vec());
@@ -247,10 +258,9 @@ impl Env {
             final_observations,
             // In the order of the terms.
             rewards: reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward)),
-            reward_terms,
             terminated,
             truncated,
-            ended,
+            info: Info { reward_terms, ended },
         })
     }
 
@@ -293,6 +303,10 @@ impl Env {
             terminated[env.0] = true;
             reasons[env.0] = Some(EndReason::Diverged(why));
         }
+        for env in (0..n).filter(|&env| self.watch.0.was_reset(env)) {
+            truncated[env] = true;
+            reasons[env].get_or_insert(EndReason::Reset);
+        }
         for term in &self.terms.terminations {
             for (env, _) in term.ends(&self.now())?.indexed_iter().filter(|(_, ends)| **ends) {
                 if term.truncates {
@@ -331,7 +345,7 @@ impl Env {
                 for (column, &value) in values.row(env).iter().enumerate() {
                     let value = term.seen(value, &mut self.rows[env].noise[k]);
                     if !value.is_finite() {
-                        let what = format!("what the observation term {:?} gives", term.name);
+                        let what = TermKind::Observation.gives(&term.name);
                         let column = term.columns[column].clone();
                         return Err(EnvError::NotFinite { what, env, column, value });
                     }
@@ -370,7 +384,10 @@ impl Env {
             self.present.previous.row_mut(env).fill(0.0);
             self.reward_sums.row_mut(env).fill(0.0);
         }
-        self.happen(envs, |when| when == When::Reset, |event| format!("event/{event}"))
+        self.happen(envs, |when| when == When::Reset, |event| format!("event/{event}"))?;
+        // These were this task's own.
+        envs.iter().for_each(|&env| self.watch.0.clear(env));
+        Ok(())
     }
 
     /// Lets those events happen in `envs` that are `due`, with dice that are called as `named` says.

@@ -29,6 +29,13 @@ pub enum TermKind {
     Termination,
 }
 
+impl TermKind {
+    /// What errors call what the function of a term gives.
+    pub(crate) fn gives(self, name: &str) -> String {
+        format!("what the {self} term {name:?} gives")
+    }
+}
+
 impl fmt::Display for TermKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -4,8 +4,8 @@
 //! actions -> ActionTerm -> SimulationManager -> TerminationTerm, RewardTerm -> EventTerm -> ObservationTerm -> Step
 //! ```
 //!
-//! An [`Env`] is what Gymnasium calls a `VectorEnv`, made of terms as tasks of Isaac Lab are: each term is a plain value
-//! with a name and a function of the simulation ([`Now`]). Environments whose episode ends begin the next one in the same
+//! [`VectorEnv`] is what Gymnasium calls so: spaces, `reset`, `step`. An [`Env`] is one that is made of terms as tasks of Isaac Lab
+//! are: each term is a plain value with a name and a function of the simulation ([`Now`]). Environments whose episode ends begin the next one in the same
 //! step ([`Env::step`] says what can be relied on). Random numbers of a task are keyed by its seed, the global index of
 //! the environment, the number of the episode and the name of the term: bits depend neither on the number of environments, of
 //! threads and of processes, nor on what other environments do.
@@ -68,6 +68,8 @@ mod space;
 mod step;
 mod termination;
 pub mod terms;
+mod vector;
+mod watch;
 
 pub use action::ActionTerm;
 pub use builder::EnvBuilder;
@@ -81,5 +83,6 @@ pub use now::Now;
 pub use observation::{Noise, ObservationTerm};
 pub use reward::RewardTerm;
 pub use space::Space;
-pub use step::{EndReason, Ended, Step};
+pub use step::{EndReason, Ended, Info, Step};
 pub use termination::TerminationTerm;
+pub use vector::VectorEnv;

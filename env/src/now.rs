@@ -1,7 +1,7 @@
 //! What terms see.
 
-use crate::error::{EnvError, Result};
-use ndarray::{Array2, ArrayView2};
+use crate::error::{EnvError, Result, TermKind, TermResult};
+use ndarray::{Array1, Array2, ArrayView2};
 use sim::SimulationManager;
 
 /// The present of all environments: what functions of terms look at.
@@ -67,5 +67,20 @@ impl<'e> Now<'e> {
         found
             .map(|(_, values)| values.view())
             .ok_or_else(|| EnvError::unknown("command", name, commands.iter().map(|(of, _)| of.as_str())))
+    }
+
+    /// What the function of a term gave, which is a number for each environment.
+    pub(crate) fn for_each_env<T>(
+        &self,
+        kind: TermKind,
+        name: &str,
+        given: TermResult<Array1<T>>,
+    ) -> Result<Array1<T>> {
+        let given = given.map_err(|error| EnvError::term(kind, name, error))?;
+        if given.len() == self.num_envs() {
+            return Ok(given);
+        }
+        let (found, expected) = (vec![given.len()], vec![self.num_envs()]);
+        Err(EnvError::Shape { what: kind.gives(name), found, expected, meaning: "environments" })
     }
 }

@@ -114,7 +114,7 @@ impl ObservationTerm {
         if rows.shape() == expected {
             return Ok(rows);
         }
-        let (what, found) = (format!("what the observation term {:?} gives", self.name), rows.shape().to_vec());
+        let (what, found) = (TermKind::Observation.gives(&self.name), rows.shape().to_vec());
         Err(EnvError::Shape { what, found, expected, meaning: "environments, columns of the term" })
     }
 

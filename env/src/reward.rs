@@ -35,15 +35,11 @@ impl RewardTerm {
 
     /// The weighted rewards of all environments.
     pub(crate) fn rewards(&self, now: &Now<'_>) -> Result<Array1<f64>> {
-        let mut rewards = (self.reward)(now).map_err(|e| EnvError::term(TermKind::Reward, &self.name, e))?;
-        let what = || format!("what the reward term {:?} gives", self.name);
-        if rewards.len() != now.num_envs() {
-            let (found, expected) = (vec![rewards.len()], vec![now.num_envs()]);
-            return Err(EnvError::Shape { what: what(), found, expected, meaning: "environments" });
-        }
+        let mut rewards = now.for_each_env(TermKind::Reward, &self.name, (self.reward)(now))?;
         rewards.mapv_inplace(|value| self.weight * value);
         if let Some((env, &value)) = rewards.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            return Err(EnvError::NotFinite { what: what(), env, column: self.name.clone(), value });
+            let what = TermKind::Reward.gives(&self.name);
+            return Err(EnvError::NotFinite { what, env, column: self.name.clone(), value });
         }
         Ok(rewards)
     }

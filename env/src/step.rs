@@ -4,23 +4,32 @@ use ndarray::{Array1, Array2};
 use sim::EnvId;
 use std::fmt;
 
-/// What comes of a step of all environments.
+/// What comes of a step of all environments of a [`VectorEnv`](crate::VectorEnv).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Step {
-    /// What is seen now, shape (N, columns of [`Env::observation_space`](crate::Env::observation_space)): where an episode
+pub struct Step<I = Info> {
+    /// What is seen now, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)): where an episode
     /// ended, the first observation of the next one.
     pub observations: Array2<f64>,
     /// What the actions led to, shaped as the observations: where an episode ended, its last observation, elsewhere the same
     /// numbers as there.
     pub final_observations: Array2<f64>,
-    /// Rewards, shape (N,): the sums of [`reward_terms`](Self::reward_terms).
+    /// Rewards, shape (N,).
     pub rewards: Array1<f64>,
-    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)).
-    pub reward_terms: Array2<f64>,
-    /// Whether the episode ended by itself, shape (N,): a termination term, or a step that could not be done.
+    /// Whether the episode ended by itself, shape (N,): after that nothing more could be earned. Of an [`Env`](crate::Env), by a
+    /// termination term or a step that could not be done.
     pub terminated: Array1<bool>,
-    /// Whether the episode was broken off, shape (N,): the limit of steps, or a term that truncates.
+    /// Whether the episode was broken off, shape (N,). Of an [`Env`](crate::Env), by the limit of steps, a term that truncates, or
+    /// a reset behind its back.
     pub truncated: Array1<bool>,
+    /// What else the environments tell.
+    pub info: I,
+}
+
+/// What a step of an [`Env`](crate::Env) tells besides.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Info {
+    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)); their sums are the rewards.
+    pub reward_terms: Array2<f64>,
     /// The episodes that ended, by environment.
     pub ended: Vec<Ended>,
 }
@@ -52,6 +61,9 @@ impl Ended {
 pub enum EndReason {
     /// A step could not be done: the environment stood in its last good state, and was revived.
     Diverged(String),
+    /// Somebody else reset the environment: a viewer, or the program by [`Env::sim_mut`](crate::Env::sim_mut). What is rewarded and
+    /// observed last is of the state after that.
+    Reset,
     /// A termination term, by name.
     Term(String),
     /// The limit of [`EnvCfg::episode_steps`](crate::EnvCfg::episode_steps).
@@ -64,6 +76,7 @@ impl fmt::Display for EndReason {
             Self::Diverged(why) => write!(f, "diverged: {why}"),
             Self::Term(name) => f.write_str(name),
             Self::TimeLimit => f.write_str("time limit"),
+            Self::Reset => f.write_str("reset by somebody else"),
         }
     }
 }

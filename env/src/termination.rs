@@ -1,6 +1,6 @@
 //! When episodes end.
 
-use crate::error::{EnvError, Result, TermKind, TermResult};
+use crate::error::{Result, TermKind, TermResult};
 use crate::now::Now;
 use ndarray::Array1;
 use std::fmt;
@@ -32,13 +32,7 @@ impl TerminationTerm {
 
     /// The environments that end.
     pub(crate) fn ends(&self, now: &Now<'_>) -> Result<Array1<bool>> {
-        let ends = (self.ends)(now).map_err(|e| EnvError::term(TermKind::Termination, &self.name, e))?;
-        if ends.len() == now.num_envs() {
-            return Ok(ends);
-        }
-        let (found, expected) = (vec![ends.len()], vec![now.num_envs()]);
-        let what = format!("what the termination term {:?} gives", self.name);
-        Err(EnvError::Shape { what, found, expected, meaning: "environments" })
+        now.for_each_env(TermKind::Termination, &self.name, (self.ends)(now))
     }
 }
 

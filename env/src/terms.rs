@@ -7,7 +7,7 @@ use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
 use ndarray::{Array1, Array2, Axis};
-use sim::{JointIndex, RobotId, SimulationManager};
+use sim::{JointIndex, Robot, RobotId, SimulationManager};
 
 /// Names and columns of the joints of a robot that match `patterns`.
 fn joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
@@ -33,11 +33,7 @@ pub fn joint_positions(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
-    let (names, joints) = joints(sim, robot, patterns)?;
-    Ok(ObservationTerm::new(name, names, move |now| {
-        let robot = now.sim().robot(robot);
-        Ok(columns(&(robot.get_qpos() - robot.get_default_qpos()), &joints))
-    }))
+    seen_of_joints(sim, name, robot, patterns, |robot| robot.get_qpos() - robot.get_default_qpos())
 }
 
 /// Velocities of joints \[rad/s or m/s\], as [`joint_positions`].
@@ -53,8 +49,19 @@ pub fn joint_velocities(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
+    seen_of_joints(sim, name, robot, patterns, |robot| robot.get_qvel())
+}
+
+/// What `read` gives of the joints of a robot that match `patterns`.
+fn seen_of_joints(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+    read: impl Fn(&Robot<'_>) -> Array2<f64> + Send + 'static,
+) -> Result<ObservationTerm> {
     let (names, joints) = joints(sim, robot, patterns)?;
-    Ok(ObservationTerm::new(name, names, move |now| Ok(columns(&now.sim().robot(robot).get_qvel(), &joints))))
+    Ok(ObservationTerm::new(name, names, move |now| Ok(columns(&read(&now.sim().robot(robot)), &joints))))
 }
 
 /// The last actions, one column for each of `names`, the columns of the action space.

@@ -76,6 +76,10 @@ pub(crate) struct Launcher {
     /// Replace the file of --record, and what a recording that was killed has left
     #[arg(long, requires = "record")]
     pub(crate) overwrite: bool,
+    /// What records: made when somebody first asks.
+    #[cfg(all(feature = "record", feature = "view"))]
+    #[arg(skip)]
+    files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
 }
 
 /// Where physics runs.

@@ -6,16 +6,13 @@ use kinetoscope::prelude::*;
 #[cfg(all(feature = "record", feature = "view"))]
 mod recorded {
     use super::*;
-    use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-
-    /// What the record button of window and browser does, and `--record`.
-    static FILES: OnceLock<Arc<Mutex<FileRecording>>> = OnceLock::new();
+    use std::sync::{Arc, Mutex, PoisonError};
 
     impl Launcher {
-        /// What records to the file of `--record`, or, where the record button is pressed without it, to `recording.mcap` in
-        /// the folder of `--out`.
-        pub(in super::super) fn files(&self) -> &'static Arc<Mutex<FileRecording>> {
-            FILES.get_or_init(|| {
+        /// What `--record` and the record button of window and browser do: they record to the file of `--record`, or, where the
+        /// button is pressed without it, to `recording.mcap` in the folder of `--out`.
+        pub(in super::super) fn files(&self) -> &Arc<Mutex<FileRecording>> {
+            self.files.get_or_init(|| {
                 let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
                 let path = self.record.clone().unwrap_or_else(folder);
                 let cfg = RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) };
@@ -33,14 +30,14 @@ mod recorded {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
                 begun.map_err(|error| format!("--record {error}"))?;
             }
-            Ok(Recording { files })
+            Ok(Recording { files: Arc::clone(files) })
         }
     }
 
     /// What `--record` or the record button has begun, if anything.
     #[derive(Debug)]
     pub(crate) struct Recording {
-        files: &'static Mutex<FileRecording>,
+        files: Arc<Mutex<FileRecording>>,
     }
 
     impl Recording {

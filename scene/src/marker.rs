@@ -45,6 +45,8 @@ pub enum MarkerKind {
 impl Marker {
     /// What the mask channel says of markers, where they are drawn.
     pub const MASK_ID: i32 = -1;
+    /// A geom group for markers among other things, where they are to be told apart: MuJoCo's groups are 0 to 5.
+    pub const GROUP: u8 = 31;
 
     /// A ball.
     pub fn sphere(center: [f64; 3], radius: f32, rgba: [f32; 4]) -> Self {

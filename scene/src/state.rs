@@ -6,7 +6,7 @@
 //! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
 //! and velocities are those of t_(k+1). Both times are given.
 
-use crate::{Light, PoseF32, PoseF64, RenderScene};
+use crate::{Light, Marker, PoseF32, PoseF64, RenderScene};
 use ndarray::{Array, Array2, Array3, Axis, RemoveAxis};
 use std::sync::Arc;
 
@@ -68,6 +68,8 @@ pub struct SceneState {
     /// What can be seen where sizes or colours are the environment's own, shape \[num_envs\]; empty where all environments
     /// look alike.
     pub own_scenes: Vec<OwnScene>,
+    /// What sensors show people of their measurements, shape \[num_envs\]: for cameras that draw it.
+    pub markers: Option<Vec<Vec<Marker>>>,
 }
 
 /// What can be seen in one environment instead of the scene of all: the same instances in the same order and of the same
@@ -171,6 +173,11 @@ impl SceneState {
         if let (Some(to), Some(from)) = (&mut self.contacts, &other.contacts) {
             to.take_over(from, chosen);
         }
+        if let (Some(to), Some(from)) = (&mut self.markers, &other.markers) {
+            for env in envs() {
+                to[env].clone_from(&from[env]);
+            }
+        }
         let sees = self.visible.is_some() || self.instance_poses.is_some();
         if sees && !(self.own_scenes.is_empty() && other.own_scenes.is_empty()) {
             self.own_scenes.resize(chosen.len(), OwnScene::default());
@@ -195,8 +202,13 @@ impl SceneState {
             (Some(_), None) => false,
             (Some(a), Some(b)) => a.first.len() == n + 1 && b.first.len() == n + 1,
         };
+        let markers = match (&self.markers, &other.markers) {
+            (None, _) => true,
+            (Some(a), b) => a.len() == n && b.as_ref().is_some_and(|b| b.len() == n),
+        };
         same_envs
             && visible
+            && markers
             && contacts
             && self.per_body().into_iter().zip(other.per_body()).all(|(a, b)| same_shape(a, b))
             && self.per_env().into_iter().zip(other.per_env()).all(|(a, b)| same_shape(a, b))
@@ -355,6 +367,7 @@ mod tests {
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
             own_scenes: Vec::new(),
+            markers: Some((0..3).map(|env| vec![Marker::sphere([who, f64::from(env), 0.0], 0.1, [1.0; 4])]).collect()),
         }
     }
 
@@ -369,7 +382,8 @@ mod tests {
             let numbers: Vec<f64> = s.per_env().into_iter().flatten().flat_map(|a| a.row(env).to_owned()).collect();
             let seen = s.visible.as_ref().map(|v| (v.instance_poses.row(env).to_owned(), v.lights.row(env).to_owned()));
             let contacts = s.contacts.as_ref().map(|c| c.of(env).to_vec());
-            (s.step[env], s.time[env], s.force_time[env], rows, numbers, seen, contacts)
+            let markers = s.markers.as_ref().map(|m| m[env].clone());
+            (s.step[env], s.time[env], s.force_time[env], rows, numbers, (seen, markers), contacts)
         };
         for (env, from) in
             [state(100.0, [1, 0, 2]), state(200.0, [0, 3, 5]), state(100.0, [1, 0, 2])].iter().enumerate()

@@ -242,12 +242,14 @@ impl Requires {
     pub const INSTANCES: Self = Self(1 << 9);
     /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
     pub const ACTUATORS: Self = Self(1 << 10);
+    /// [`SceneState::markers`], of all other sensors.
+    pub const MARKERS: Self = Self(1 << 11);
 
     /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
     /// know before the step that somebody wants it.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    const NAMES: [(Self, &str); 11] = [
+    const NAMES: [(Self, &str); 12] = [
         (Self::POSES, "poses"),
         (Self::VELOCITIES, "velocities"),
         (Self::ACCELERATIONS, "accelerations"),
@@ -259,6 +261,7 @@ impl Requires {
         (Self::JOINT_WRENCHES, "joint_wrenches"),
         (Self::INSTANCES, "instances"),
         (Self::ACTUATORS, "actuators"),
+        (Self::MARKERS, "markers"),
     ];
 
     /// Whether all of `other` is in this set.
@@ -293,6 +296,7 @@ impl Requires {
             visible: part(has(Self::VISIBLE), &state.visible),
             instance_poses: part(has(Self::INSTANCES), &state.instance_poses),
             own_scenes: if has(Self::VISIBLE) || has(Self::INSTANCES) { state.own_scenes.clone() } else { Vec::new() },
+            markers: part(has(Self::MARKERS), &state.markers),
         }
     }
 
@@ -338,6 +342,7 @@ impl Requires {
                     && state.actuator_activations.is_some(),
                 Self::ACTUATORS,
             )
+            | has(state.markers.is_some(), Self::MARKERS)
     }
 
     /// The names of the fields in the set.

@@ -152,10 +152,13 @@ impl SensorList {
         let mut state = gather::allocate(simulation, all);
         solve(simulation, all, &envs);
         gather::gather(simulation, self.substeps, all, &mut state);
+        if requires.contains(Requires::MARKERS) {
+            state.markers = Some(self.markers_beside(simulation, None));
+        }
         let mut slot = SensorSlot::new(sensor, requires, lazy, context.num_envs);
         slot.reset(&envs, &state);
         slot.sensor().map_err(|error| wrong(error.clone()))?;
-        self.state = state;
+        self.state = SceneState { markers: None, ..state };
         self.entries.push(Entry { uid, requires, debug_vis, lazy, build, slot: Ok(slot) });
         Ok(SensorId { manager: self.manager, index: self.entries.len() - 1, sensor: PhantomData })
     }
@@ -169,12 +172,33 @@ impl SensorList {
         gather::gather(simulation, self.substeps, all, &mut self.state);
         for entry in &mut self.entries {
             let context = SensorContext { name: entry.uid.as_str().into(), rebuilt: true, ..context.clone() };
-            entry.slot = (entry.build)(&context).map(|sensor| {
-                let mut slot = SensorSlot::new(sensor, entry.requires, entry.lazy, context.num_envs);
-                slot.reset(&envs, &self.state);
-                slot
-            });
+            let sensor = (entry.build)(&context);
+            entry.slot = sensor.map(|sensor| SensorSlot::new(sensor, entry.requires, entry.lazy, context.num_envs));
         }
+        self.tell(simulation, |_| true, |slot, state| slot.reset(&envs, state));
+    }
+
+    /// Tells those sensors that are `chosen` of the state: first those that measure, then those that draw what these show.
+    fn tell(
+        &mut self,
+        simulation: &Simulation,
+        chosen: impl Fn(usize) -> bool,
+        mut act: impl FnMut(&mut SensorSlot, &SceneState),
+    ) {
+        let draws = |entry: &Entry| entry.requires.contains(Requires::MARKERS);
+        let Self { entries, state, .. } = self;
+        for (_, entry) in entries.iter_mut().enumerate().filter(|(index, entry)| chosen(*index) && !draws(entry)) {
+            entry.slot.iter_mut().for_each(|slot| act(slot, state));
+        }
+        for index in (0..self.entries.len()).filter(|&index| chosen(index)) {
+            if draws(&self.entries[index]) {
+                self.state.markers = Some(self.markers_beside(simulation, Some(index)));
+                let Self { entries, state, .. } = self;
+                entries[index].slot.iter_mut().for_each(|slot| act(slot, state));
+            }
+        }
+        // Of the last one that asked for them.
+        self.state.markers = None;
     }
 
     /// Does as many of `steps` physics steps as until a sensor is due, at least 1; those that are due then measure. Gives
@@ -200,18 +224,16 @@ impl SensorList {
         if self.due.contains(&true) {
             gather::gather(simulation, self.substeps, requires, &mut self.state);
         }
-        for (entry, _) in self.entries.iter_mut().zip(&self.due).filter(|(_, due)| **due) {
-            entry.slot.iter_mut().for_each(|slot| slot.update(&self.state));
-        }
+        let due = std::mem::take(&mut self.due);
+        self.tell(simulation, |index| due[index], SensorSlot::update);
+        self.due = due;
         block
     }
 
     /// After a reset of `env_ids`.
     pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         self.renew(simulation, env_ids);
-        for slot in self.entries.iter_mut().flat_map(|entry| &mut entry.slot) {
-            slot.reset(env_ids, &self.state);
-        }
+        self.tell(simulation, |_| true, |slot, state| slot.reset(env_ids, state));
     }
 
     /// After somebody wrote to the state of `env_ids`.
@@ -224,9 +246,7 @@ impl SensorList {
             return;
         }
         self.renew(simulation, &running);
-        for slot in self.entries.iter_mut().flat_map(|entry| &mut entry.slot) {
-            slot.refresh(&running, &self.state);
-        }
+        self.tell(simulation, |_| true, |slot, state| slot.refresh(&running, state));
     }
 
     /// Remembers that somebody wrote to the state of `env_ids`.
@@ -248,16 +268,24 @@ impl SensorList {
 
     /// What they show of their last measurements.
     pub(crate) fn markers(&self, simulation: &Simulation) -> Vec<(EnvId, Marker)> {
-        let shown = self.entries.iter().filter(|e| e.debug_vis).filter_map(|e| e.slot.as_ref().ok()?.sensor().ok());
-        let shown: Vec<&dyn Sensor> = shown.collect();
-        let mut markers = Vec::new();
+        let markers = self.markers_beside(simulation, None).into_iter().enumerate();
+        markers.flat_map(|(env, markers)| markers.into_iter().map(move |marker| (EnvId(env), marker))).collect()
+    }
+
+    /// The same by environment, without those of the sensor at a place in the list.
+    fn markers_beside(&self, simulation: &Simulation, own: Option<usize>) -> Vec<Vec<Marker>> {
+        let others = self.entries.iter().enumerate().filter(|(index, entry)| entry.debug_vis && Some(*index) != own);
+        let shown: Vec<&dyn Sensor> = others.filter_map(|(_, entry)| entry.slot.as_ref().ok()?.sensor().ok()).collect();
+        let mut markers = vec![Vec::new(); simulation.batch.num_envs()];
+        if shown.is_empty() {
+            return markers;
+        }
         simulation.batch.for_each(|i, env| {
             let pose = |body: usize| {
                 let place = simulation.plan.bodies().get(body);
                 place.map_or_else(Pose::identity, |place| link_pose(env.data(), place))
             };
-            let of_env = shown.iter().flat_map(|sensor| sensor.markers(i, &pose));
-            markers.extend(of_env.map(|marker| (EnvId(i), marker)));
+            markers[i].extend(shown.iter().flat_map(|sensor| sensor.markers(i, &pose)));
         });
         markers
     }

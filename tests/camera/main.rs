@@ -1,6 +1,7 @@
 //! Cameras in a simulation, held against MuJoCo's own rays and against where things are.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod markers;
 mod models;
 mod mujoco_renderer;
 mod npy;

@@ -19,11 +19,11 @@ fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
         let step = env.step(&policy(seen.view())).unwrap();
         put(&mut bits, &step.observations);
         put(&mut bits, &step.final_observations);
-        put(&mut bits, &step.reward_terms);
+        put(&mut bits, &step.info.reward_terms);
         for (e, bits) in bits.iter_mut().enumerate() {
             bits.extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
         }
-        for Ended { env, reason, steps, reward_sums } in step.ended {
+        for Ended { env, reason, steps, reward_sums } in step.info.ended {
             ends[env.0].push(format!("{reason} {steps} {reward_sums:?}"));
         }
         seen = step.observations;

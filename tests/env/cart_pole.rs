@@ -120,7 +120,7 @@ fn cart_and_pole_are_the_loop_that_is_written_by_hand() {
             let found = row(&step.observations, &step.final_observations, e, step.rewards[e], terminated, truncated);
             assert_eq!(found, expected, "step {k}, environment {e}");
         }
-        for ended in &step.ended {
+        for ended in &step.info.ended {
             match &ended.reason {
                 EndReason::Term(name) if name == "fell" => fell += 1,
                 EndReason::TimeLimit => in_time += 1,

@@ -27,12 +27,12 @@ fn a_pushed_cart_is_where_newton_says_and_rewards_sum_up() {
         for (e, sign) in [1.0, 0.0, -1.0].into_iter().enumerate() {
             assert!((step.final_observations[(e, 0)] - sign * place(k)).abs() < ROUNDING, "step {k}");
             assert!((step.rewards[e] + sign * place(k)).abs() < ROUNDING, "step {k}");
-            assert_eq!(step.rewards[e], step.reward_terms[(e, 0)]);
+            assert_eq!(step.rewards[e], step.info.reward_terms[(e, 0)]);
             sums[e] -= sign * place(k);
         }
         if k == 60 {
-            assert_eq!(step.ended.len(), 3);
-            for ended in &step.ended {
+            assert_eq!(step.info.ended.len(), 3);
+            for ended in &step.info.ended {
                 assert!((ended.total() - sums[ended.env.0]).abs() < 60.0 * ROUNDING, "{ended:?}");
                 assert_eq!((ended.steps, ended.reward_sums.len()), (60, 1));
             }

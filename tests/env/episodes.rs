@@ -22,7 +22,10 @@ fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_be
                 let last = k == limit;
                 assert_eq!(step.truncated, Array1::from_elem(2, last), "step {k} of {limit}");
                 assert_eq!(step.terminated, Array1::from_elem(2, false));
-                assert_eq!(step.ended.iter().map(|e| e.steps).collect::<Vec<_>>(), vec![limit; 2 * usize::from(last)]);
+                assert_eq!(
+                    step.info.ended.iter().map(|e| e.steps).collect::<Vec<_>>(),
+                    vec![limit; 2 * usize::from(last)]
+                );
                 // h² F k (k + 1) / 2.
                 let away = |f: f64| 1e-4 * f * (k * (k + 1) / 2) as f64;
                 for (e, f) in [1.0, 2.0].into_iter().enumerate() {
@@ -30,7 +33,7 @@ fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_be
                 }
                 let seen = if last { &start } else { &step.final_observations };
                 assert_eq!(bits(&step.observations), bits(seen));
-                assert!(step.ended.iter().all(|ended| ended.reason == EndReason::TimeLimit));
+                assert!(step.info.ended.iter().all(|ended| ended.reason == EndReason::TimeLimit));
             }
         }
     }
@@ -61,11 +64,12 @@ fn both_ends_in_one_step_are_both_said_and_the_first_reason_counts() {
     let step = env.step(&idle).unwrap();
     assert_eq!(step.truncated, array![false, true, true]);
     assert_eq!(step.terminated, array![false, false, true]);
-    let reasons: Vec<String> = step.ended.iter().map(|ended| format!("{} {}", ended.env.0, ended.reason)).collect();
+    let reasons: Vec<String> =
+        step.info.ended.iter().map(|ended| format!("{} {}", ended.env.0, ended.reason)).collect();
     assert_eq!(reasons, ["1 seen enough", "2 seen enough"]);
     let step = env.step(&idle).unwrap();
     assert_eq!(
-        (step.truncated.to_vec(), step.ended[0].reason.to_string()),
+        (step.truncated.to_vec(), step.info.ended[0].reason.to_string()),
         (vec![true, false, false], "time limit".into())
     );
 }
@@ -193,7 +197,7 @@ fn commands_stay_for_an_episode() {
     for _ in 0..120 {
         let step = env.step(&policy(seen.view())).unwrap();
         assert_eq!(step.final_observations.column(goal), of_episode, "the goal of the episode that ended");
-        for ended in &step.ended {
+        for ended in &step.info.ended {
             let EnvId(e) = ended.env;
             assert_ne!(step.observations[(e, goal)], of_episode[e]);
             of_episode[e] = step.observations[(e, goal)];

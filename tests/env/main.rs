@@ -8,4 +8,7 @@ mod episodes;
 mod mistakes;
 mod noise;
 mod quarantine;
+mod resets;
+mod sensors;
 mod tasks;
+mod vector_env;

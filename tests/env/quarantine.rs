@@ -41,7 +41,7 @@ fn a_diverged_environment_is_terminated_with_its_reason_and_revived() {
         assert_eq!(step.terminated.iter().filter(|t| **t).count(), usize::from(bad), "step {k}");
         assert!(!step.truncated.iter().any(|t| *t));
         if bad {
-            let [ended] = &step.ended[..] else { panic!("{:?}", step.ended) };
+            let [ended] = &step.info.ended[..] else { panic!("{:?}", step.info.ended) };
             assert_eq!((ended.env, ended.steps), (EnvId(5), 20));
             let EndReason::Diverged(why) = &ended.reason else { panic!("{}", ended.reason) };
             // Three physics steps in a step: 19 went well.
@@ -68,6 +68,6 @@ fn what_is_written_by_hand_can_diverge_too() {
     env.sim_mut().robot_mut(robot).write_qpos(&far, None, Some(&[EnvId(1)])).unwrap();
     let step = env.step(&Array2::zeros((2, 1))).unwrap();
     assert_eq!(step.terminated.to_vec(), [false, true]);
-    assert!(matches!(&step.ended[..], [ended] if matches!(ended.reason, EndReason::Diverged(_))));
-    assert!(env.step(&Array2::zeros((2, 1))).unwrap().ended.is_empty());
+    assert!(matches!(&step.info.ended[..], [ended] if matches!(ended.reason, EndReason::Diverged(_))));
+    assert!(env.step(&Array2::zeros((2, 1))).unwrap().info.ended.is_empty());
 }

@@ -4,7 +4,7 @@
 #[allow(dead_code, reason = "each test uses its part")]
 mod display;
 
-use display::{Display, LONG, SIZE, pixels, press, screenshot_of, simulation, until};
+use display::{Display, LONG, SIZE, cfg_on, pixels, press, screenshot_of, simulation, until};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::os::unix::net::UnixStream;
@@ -73,7 +73,7 @@ fn of_a_huge_window_a_small_picture_is_sent_and_the_server_enlarges_it() {
     let Some(display) = Display::start("5400x4200") else { return };
     let wire = Wire::to(&display);
     let mut sim = simulation();
-    let window = sim.open_window_with(WindowCfg { display: Some(wire.name.clone()), ..display.cfg() }).unwrap();
+    let window = sim.open_window_with(WindowCfg { display: Some(wire.name.clone()), ..cfg_on(&display) }).unwrap();
     let connection = display.connect();
     let last_pixel = |[x, y]: [usize; 2]| screenshot_of(&connection, [x - 1, y - 1], [1, 1])[0];
     // Nothing steps: a picture is sent when a key asks for another one, and only then.

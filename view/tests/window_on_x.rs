@@ -5,7 +5,7 @@
 #[allow(dead_code, reason = "each test uses its part")]
 mod display;
 
-use display::{Display, LONG, SIZE, pixels, press, screenshot, simulation, until};
+use display::{Display, LONG, SIZE, cfg_on, pixels, press, screenshot, simulation, until};
 use sim::SimulationManager;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -66,7 +66,7 @@ fn a_window_shows_obeys_and_goes() {
     let mut sim = simulation();
 
     // What is on the display is what was drawn.
-    let window = sim.open_window_with(display.cfg()).unwrap();
+    let window = sim.open_window_with(cfg_on(&display)).unwrap();
     let connection = display.connect();
     let viewer = sim.viewer(Wants::default());
     let mut expected = Canvas::default();
@@ -122,7 +122,7 @@ fn a_window_shows_obeys_and_goes() {
     drop(viewer);
     let before = threads();
     for _ in 0..20 {
-        let window = sim.open_window_with(display.cfg()).unwrap();
+        let window = sim.open_window_with(cfg_on(&display)).unwrap();
         sim.update(1);
         window.close();
         assert_eq!(ended(&window), Closed::ByUser);
@@ -131,12 +131,12 @@ fn a_window_shows_obeys_and_goes() {
 
     // The simulation ends the window.
     let mut short = simulation();
-    let window = short.open_window_with(display.cfg()).unwrap();
+    let window = short.open_window_with(cfg_on(&display)).unwrap();
     drop(short);
     assert_eq!(ended(&window), Closed::WithSimulation);
 
     // The display is lost while the window is open and the simulation is paused by it: it goes on.
-    let window = sim.open_window_with(display.cfg()).unwrap();
+    let window = sim.open_window_with(cfg_on(&display)).unwrap();
     let viewer = sim.viewer(Wants::default());
     press(&connection, window.number(), 0x20);
     let run = Running::start(sim);
@@ -149,7 +149,7 @@ fn a_window_shows_obeys_and_goes() {
     let mut sim = run.end();
 
     // And there is no display any more.
-    let error = sim.open_window_with(display.cfg()).unwrap_err();
+    let error = sim.open_window_with(cfg_on(&display)).unwrap_err();
     assert!(matches!(error, WindowError::NoDisplay { .. }));
     let text = error.to_string();
     for word in ["DISPLAY", "WAYLAND_DISPLAY", "--headless"] {

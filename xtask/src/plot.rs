@@ -134,6 +134,7 @@ pub(crate) fn svg(plot: &Plot) -> String {
         (top + bottom) / 2.0,
         escape(&plot.axes[1])
     );
+    let mut lines = Vec::new();
     for (k, series) in plot.series.iter().enumerate() {
         let color = COLORS[k % COLORS.len()];
         let places = series.points.iter().filter(shown).map(|p| [axes[0].place(p[0]), axes[1].place(p[1])]);
@@ -148,18 +149,76 @@ pub(crate) fn svg(plot: &Plot) -> String {
         for [x, y] in places.iter().filter(|_| places.len() <= 12) {
             let _ = writeln!(out, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>");
         }
-        let y = top + 16.0 + 16.0 * k as f64;
+        lines.push(places);
+    }
+    let size = legend_size(&plot.series);
+    let [x, y] = emptiest_corner(size, &lines);
+    // On a ground of its own: where no corner is empty, a curve goes behind it.
+    let _ = writeln!(
+        out,
+        "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"white\" stroke=\"#ddd\"/>",
+        size[0], size[1]
+    );
+    for (k, series) in plot.series.iter().enumerate() {
+        let (color, row) = (COLORS[k % COLORS.len()], y + ROW * (k as f64 + 0.5) + 2.0);
         let _ = writeln!(
             out,
-            "<path d=\"M{} {y}H{}\" stroke=\"{color}\" stroke-width=\"3\"/><text x=\"{}\" y=\"{}\">{}</text>",
-            left + 8.0,
-            left + 28.0,
-            left + 33.0,
-            y + 4.0,
+            "<path d=\"M{:.1} {row:.1}H{:.1}\" stroke=\"{color}\" stroke-width=\"3\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            x + 4.0,
+            x + 24.0,
+            x + 29.0,
+            row + 4.0,
             escape(&series.name)
         );
     }
     out + "</svg>\n"
+}
+
+/// Height of a row of the legend \[pixels\].
+const ROW: f64 = 16.0;
+/// Widest that a letter of most names is, of 12 pixels \[pixels\].
+const LETTER: f64 = 6.8;
+/// From the frame to the legend \[pixels\].
+const GAP: f64 = 6.0;
+
+/// Width and height of the legend.
+fn legend_size(series: &[Series]) -> [f64; 2] {
+    let letters = series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
+    [33.0 + LETTER * letters as f64, ROW * series.len() as f64 + 4.0]
+}
+
+/// Where in the frame something of this size hides least of the lines: the first of the corners where that is so, to 10 pixels of
+/// line, so that numbers which differ in their last digits have it in the same corner.
+fn emptiest_corner([width, height]: [f64; 2], lines: &[Vec<[f64; 2]>]) -> [f64; 2] {
+    let [left, top, right, bottom] = FRAME;
+    let [near, far] = [[left + GAP, top + GAP], [right - GAP - width, bottom - GAP - height]];
+    let corners = [near, [far[0], near[1]], [near[0], far[1]], far];
+    let hidden = |corner: [f64; 2]| {
+        // With half a stroke around it.
+        let inside =
+            |p: [f64; 2]| (0..2).all(|k| p[k] > corner[k] - 2.0 && p[k] < corner[k] + [width, height][k] + 2.0);
+        let mut pixels = 0.0;
+        for line in lines {
+            for pair in line.windows(2) {
+                let way = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+                let steps = way[0].hypot(way[1]).ceil().max(1.0);
+                let length = way[0].hypot(way[1]) / steps;
+                let at = |k: u32| [0, 1].map(|axis| pair[0][axis] + (f64::from(k) + 0.5) / steps * way[axis]);
+                pixels += length * (0..steps as u32).filter(|k| inside(at(*k))).count() as f64;
+            }
+            // Measurements count as much as a stroke of the size of their mark.
+            pixels += 6.0 * line.iter().filter(|p| line.len() <= 12 && inside(**p)).count() as f64;
+        }
+        (pixels / 10.0).ceil() as u64
+    };
+    let mut best = (hidden(near), near);
+    for corner in &corners[1..] {
+        let here = hidden(*corner);
+        if here < best.0 {
+            best = (here, *corner);
+        }
+    }
+    best.1
 }
 
 fn escape(text: &str) -> String {
@@ -227,6 +286,38 @@ mod tests {
             let text = svg(&plot(false, points));
             assert!(text.ends_with("</svg>\n") && !text.contains("NaN"), "{text}");
         }
+    }
+
+    /// Where the ground of the legend is: left, top, width, height.
+    fn legend(text: &str) -> [f64; 4] {
+        let ground = text.lines().rfind(|line| line.starts_with("<rect")).expect("a ground");
+        ["x", "y", "width", "height"].map(|name| {
+            let rest = ground.split(&format!(" {name}=\"")).nth(1).expect("an attribute");
+            rest.split('"').next().and_then(|n| n.parse().ok()).expect("a number")
+        })
+    }
+
+    #[test]
+    fn the_legend_is_where_no_curve_is() {
+        let [left, top, right, bottom] = FRAME;
+        // Through two opposite corners, or with an end in three of them: one is empty, and which one is known.
+        let free = [
+            (vec![[0.0, 0.0], [1.0, 1.0]], [true, true]),
+            (vec![[0.0, 1.0], [1.0, 0.0]], [false, true]),
+            (vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [false, false]),
+            (vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]], [true, false]),
+        ];
+        for (points, [at_left, at_top]) in free {
+            let [x, y, width, height] = legend(&svg(&plot(false, &points)));
+            assert_eq!([x - left == GAP, (right - GAP - width - x).abs() < 0.11], [at_left, !at_left], "{points:?}");
+            assert_eq!([y - top == GAP, (bottom - GAP - height - y).abs() < 0.11], [at_top, !at_top], "{points:?}");
+        }
+        // Curves are drawn before it, names after it.
+        let text = svg(&plot(false, &[[0.0, 0.0], [1.0, 1.0]]));
+        let place = |what: &str| text.rfind(what).expect("is there");
+        assert!(
+            place("<polyline") < place("fill=\"white\" stroke") && place("fill=\"white\" stroke") < place("a &lt; b")
+        );
     }
 
     #[test]

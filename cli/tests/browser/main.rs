@@ -8,10 +8,15 @@ mod chromium;
 mod running;
 
 use chromium::{Chromium, Tab};
+use kinetoscope::RecordedFilm;
+use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use running::{Running, wait_until};
+use kinetoscope::record::{Film, Recording};
+use kinetoscope::view::control::{Play, Speed};
+use running::{Running, scene, wait_until};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -31,7 +36,11 @@ fn browser() -> Option<Chromium> {
 
 /// The page of a simulation, when it is connected.
 fn page<'a>(browser: &'a Chromium, running: &Running) -> Tab<'a> {
-    let mut tab = browser.open(&running.url);
+    page_at(browser, &running.url)
+}
+
+fn page_at<'a>(browser: &'a Chromium, url: &str) -> Tab<'a> {
+    let mut tab = browser.open(url);
     tab.wait_until("connected", "document.getElementById('link').dataset.state === 'connected'");
     tab
 }
@@ -195,6 +204,90 @@ fn a_click_selects_its_force_is_plotted_and_a_drag_with_ctrl_pulls() {
     tab.wait_until("nothing is selected", "document.getElementById('selected-card').hidden");
     assert_eq!(tab.evaluate("document.getElementById('note').hidden"), true, "nothing was refused");
     assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+/// Ends the showing of a recording, however it ends.
+struct Ends<'a>(&'a AtomicBool);
+
+impl Drop for Ends<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+#[test]
+fn the_slider_of_time_seeks_in_a_recording() {
+    let Some(browser) = browser() else { return };
+    // The cube falls from 2 m for half a second, which is 1.2 m.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fall.mcap");
+    let mut sim = scene(1);
+    let cube = sim.rigid_object_id("cube").unwrap();
+    sim.rigid_object_mut(cube).write_pose(&array![[0.7, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(100);
+    sim.finish_recording(recorder).unwrap();
+    let (film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+    let served = sim.serve_with("127.0.0.1:0", ServeCfg { speed: Speed::REAL, ..ServeCfg::default() }).unwrap();
+    let (url, over) = (served.url().to_string(), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let _ends = Ends(&over);
+            let mut tab = page_at(&browser, &url);
+            let (slider, text) =
+                ("document.getElementById('timeline')", "document.querySelector('#timeline-row output')");
+            tab.wait_until("a time line", "!document.getElementById('timeline-row').hidden");
+            tab.wait_until("the end", "document.getElementById('pause').textContent === 'Play'");
+            tab.wait_until("its time", &format!("{text}.textContent === '0.50 of 0.50 s'"));
+            tab.wait_until("the cube is seen", &format!("{CUBE} !== null"));
+            let [x, y, width, _] = tab.rectangle(slider);
+            let mut last = x + width - 8.0;
+            let mut heights = Vec::new();
+            // The middle of the thumb, 16 pixels wide, goes from end to end of the line.
+            for share in [0.0, 0.5, 0.8] {
+                let to = x + 8.0 + share * (width - 16.0);
+                tab.drag([last, y], [to, y]);
+                last = to;
+                let expected = 0.5 * share;
+                // Steps are 5 ms apart, a pixel is about one; where the mouse takes the thumb is two pixels off at most.
+                let near = |what: &str| format!("Math.abs({what} - {expected}) < 0.006 + 2 * 0.5 / {width}");
+                tab.wait_until("the time that was asked for", &near(&format!("parseFloat({text}.textContent)")));
+                tab.wait_until("the slider shows it", &near(&format!("{slider}.valueAsNumber")));
+                tab.wait_until("the page's clock", &near("parseFloat(document.getElementById('time').textContent)"));
+                // Pictures come a moment later: two that are the same are of one time.
+                let mut height = f64::NAN;
+                loop {
+                    std::thread::sleep(Duration::from_millis(300));
+                    let now = tab.evaluate(CUBE)[1].as_f64().unwrap();
+                    if (now - height).abs() < 1e-3 {
+                        break;
+                    }
+                    height = now;
+                }
+                heights.push(height);
+                if share == 0.5 {
+                    screenshot(&mut tab, "replay_page.png");
+                }
+            }
+            // It falls by g t² / 2: 0, 0.31 and 0.78 m. In the picture the second way is longer than the first, both are seen.
+            let fallen = [heights[1] - heights[0], heights[2] - heights[1]];
+            assert!(fallen[0] > 0.01 && fallen[1] > 1.1 * fallen[0], "{heights:?}");
+            // From there it is played to the end.
+            tab.click("document.getElementById('pause')");
+            tab.wait_until("the end again", &format!("{text}.textContent === '0.50 of 0.50 s'"));
+            tab.wait_until("it holds", "document.getElementById('pause').textContent === 'Play'");
+            assert_eq!(tab.evaluate("document.getElementById('note').hidden"), true, "nothing was refused");
+            assert_eq!(tab.complaints(), Vec::<String>::new());
+        });
+        sim.play(&mut RecordedFilm(film), &mut || !over.load(Ordering::Acquire)).unwrap();
+    });
+    served.close(&mut sim).unwrap();
+    // The control: a simulation that runs has no time line.
+    let running = Running::start(1);
+    let mut tab = page(&browser, &running);
+    tab.wait_until("a picture", "document.getElementById('cover').hidden");
+    assert_eq!(tab.evaluate("document.getElementById('timeline-row').hidden"), true);
+    assert_eq!(tab.evaluate("document.getElementById('timeline-row').getBoundingClientRect().height"), 0);
 }
 
 #[test]

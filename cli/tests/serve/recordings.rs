@@ -2,26 +2,15 @@
 
 use super::running::scene;
 use super::visitor::Visitor;
+use kinetoscope::RecordedFilm;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording};
-use kinetoscope::view::control::{Film as Shows, Play, Speed};
+use kinetoscope::view::control::{Play, Speed};
 use serde_json::json;
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-struct Shown(Film);
-
-impl Shows for Shown {
-    fn times(&self) -> &[f64] {
-        self.0.times()
-    }
-
-    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> std::result::Result<(), String> {
-        self.0.show(sim, frame).map_err(|error| error.to_string())
-    }
-}
 
 /// Ends the showing, however it ends.
 struct Ends<'a>(&'a AtomicBool);
@@ -91,7 +80,7 @@ fn a_browser_seeks_in_a_recording_and_sees_where_things_were() {
             visitor.ask(json!({"do": "play"}));
             visitor.wait_state("the end", |state| state["timeline"]["now"] == 0.5 && state["paused"] == true);
         });
-        sim.play(&mut Shown(film), &mut || !over.load(Ordering::Acquire)).unwrap();
+        sim.play(&mut RecordedFilm(film), &mut || !over.load(Ordering::Acquire)).unwrap();
     });
     served.close(&mut sim).unwrap();
 }

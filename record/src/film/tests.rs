@@ -125,6 +125,38 @@ fn a_recording_alone_is_enough_to_show_where_everything_was() {
     }
 }
 
+/// From step 15 on nothing is known of environment 1, as of one that diverged: there it stays, whichever moment was shown before.
+#[test]
+fn what_diverged_is_shown_where_it_last_was_wherever_one_seeks_from() {
+    const LOST: usize = 15;
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.mcap", "run.npz"] {
+        let path = folder.path().join(name);
+        recorded(&path, true);
+        let (mut film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+        let mut at = |film: &mut Film, frame: usize| {
+            film.show(&mut sim, frame).unwrap();
+            let part = sim.mjcf_part(film.part);
+            (part.get_qpos(), part.body_pose("hand").unwrap())
+        };
+        let (whole, last) = (at(&mut film, STEPS), at(&mut film, LOST));
+        let lost_at = film.times[LOST];
+        for track in film.tracks.iter_mut().filter(|track| track.env == 1) {
+            let lost = track.samples.times.iter().position(|time| *time > lost_at + 1e-9).unwrap();
+            track.samples.values[lost..].fill(f64::NAN);
+        }
+        for from in [0, 5, LOST, STEPS - 1] {
+            at(&mut film, from);
+            let seen = at(&mut film, STEPS);
+            assert_eq!(seen.0.row(1), last.0.row(1), "{name}: from {from}");
+            assert_eq!(seen.1.row(1), last.1.row(1), "{name}: from {from}");
+            // The control: the other environment goes on.
+            assert_eq!(seen.0.row(0), whole.0.row(0), "{name}");
+            assert_ne!(seen.0.row(0), last.0.row(0), "{name}");
+        }
+    }
+}
+
 #[test]
 fn without_a_scene_one_is_asked_for_and_a_given_one_does() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 use super::opening::{Opening, parent_pose};
 use super::ticket::Ticket;
 use ndarray::{Array1, Array2, Axis};
-use scene::{Light, OwnScene, Pose, PoseF32, RenderScene, SceneState};
+use scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 
 /// What there was to see.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub(super) struct Captures {
     pub(super) world_from_parent: Vec<Option<Pose>>,
     pub(super) stamps: Array1<f64>,
     pub(super) tickets: Vec<Ticket>,
+    /// What other sensors showed, row by row; nothing for cameras that do not draw it.
+    pub(super) markers: Vec<Vec<Marker>>,
     /// Of cameras with a shutter that takes time.
     opened: Option<Opened>,
 }
@@ -45,6 +47,7 @@ impl Captures {
             world_from_parent: vec![None; rows],
             stamps: Array1::zeros(rows),
             tickets: vec![ticket; rows],
+            markers: vec![Vec::new(); rows],
         }
     }
 
@@ -64,6 +67,9 @@ impl Captures {
         self.world_from_parent[row] = Some(parent_pose(state, env, parent));
         self.stamps[row] = state.time[env];
         self.tickets[row] = ticket;
+        if let Some(markers) = &state.markers {
+            self.markers[row].clone_from(&markers[env]);
+        }
         if let Some(opened) = &mut self.opened {
             opened.parents[row] = None;
             if let Some((poses, parent)) = opening.and_then(|(opening, of)| opening.of(of)) {
@@ -81,6 +87,7 @@ impl Captures {
         self.world_from_parent[row] = other.world_from_parent[from];
         self.stamps[row] = other.stamps[from];
         self.tickets[row] = other.tickets[from];
+        self.markers[row].clone_from(&other.markers[from]);
         if let (Some(opened), Some(other)) = (&mut self.opened, &other.opened) {
             opened.poses.index_axis_mut(Axis(0), row).assign(&other.poses.index_axis(Axis(0), from));
             opened.parents[row] = other.parents[from];

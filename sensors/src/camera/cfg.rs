@@ -124,6 +124,12 @@ pub struct CameraCfg {
     /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
+    /// Draw what the other sensors show people into the channel `color`, which is otherwise as without: ray hits, forces of
+    /// contacts, frames, what cameras see ([`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis) says for each whether it shows
+    /// anything). All other channels stay what they are. Markers are those of the instant of the picture (of other
+    /// cameras that draw markers, of their picture before), things are in front of them and behind them, and they cast
+    /// shadows; every renderer draws them.
+    pub draw_markers: bool,
 }
 
 impl Default for CameraCfg {
@@ -155,6 +161,7 @@ impl Default for CameraCfg {
             noise: BTreeMap::new(),
             imperfections: Imperfections::default(),
             debug_vis: false,
+            draw_markers: false,
         }
     }
 }
@@ -164,7 +171,7 @@ impl SensorCfg for CameraCfg {
 
     /// What can be seen; the poses of bodies only where it hangs on one.
     fn requires(&self) -> Requires {
-        Camera::requires(self.extrinsics.parent.is_some())
+        Camera::requires(self.extrinsics.parent.is_some(), self.draw_markers)
     }
 
     fn debug_vis(&self) -> bool {

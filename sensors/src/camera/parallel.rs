@@ -30,6 +30,8 @@ pub(super) type Job<'a> = (Shot<'a>, FrameMut<'a>);
 #[derive(Clone, Debug)]
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
+    /// How many of them work.
+    working: usize,
     plans: Vec<Plan>,
     crew: Crew,
     progress: RenderProgress,
@@ -41,7 +43,8 @@ impl ParallelRasterizer {
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
         let rasterizer = Rasterizer::new(cfg);
         let progress = rasterizer.progress.clone();
-        Self { rasterizers: vec![rasterizer; threads.max(1)], plans: Vec::new(), crew: Crew::default(), progress }
+        let (working, rasterizers) = (threads.max(1), vec![rasterizer; threads.max(1)]);
+        Self { rasterizers, working, plans: Vec::new(), crew: Crew::default(), progress }
     }
 
     /// Draws on the threads of `crew`. With those of a simulation nothing is allocated after the first batches.
@@ -53,6 +56,11 @@ impl ParallelRasterizer {
     /// Number of threads, the calling one included.
     pub fn threads(&self) -> usize {
         self.rasterizers.len()
+    }
+
+    /// Draws with no more than so many of its threads from now on, and at least with one; all keep their memory.
+    pub fn use_threads(&mut self, most: usize) {
+        self.working = most.clamp(1, self.rasterizers.len());
     }
 
     /// How frames are drawn.
@@ -115,9 +123,9 @@ impl ParallelRasterizer {
     ///
     /// As [`render`](Self::render).
     pub fn render_takes(&mut self, jobs: &mut [Job<'_>], takes: &[Take<'_>]) -> Result<(), (usize, RenderError)> {
-        let Self { rasterizers, plans, crew, progress } = self;
+        let Self { rasterizers, working, plans, crew, progress } = self;
         let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
-        let threads = worth(cfg, renderer, jobs).min(rasterizers.len());
+        let threads = worth(cfg, renderer, jobs).min(*working);
         let rasterizers = &mut rasterizers[..threads];
         let failure = Failure::default();
         progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.paths(shot, frame))));

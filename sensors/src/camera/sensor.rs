@@ -17,6 +17,7 @@ use super::mounts::{Mount, Mounts, chosen_rows};
 use super::opening::Opening;
 use super::parallel::{Job, ParallelRasterizer};
 use super::progress::RenderProgress;
+use super::rasterizer::RasterCfg;
 use super::shutter::Take;
 use super::ticket::Ticket;
 use crate::error::SensorError;
@@ -58,6 +59,8 @@ pub struct Camera {
     pub(super) mounts: Mounts,
     rays: RaysOfRows,
     channels: Channels,
+    /// Whether the markers of other sensors are drawn into colours.
+    draws_markers: bool,
     depth_miss: DepthMiss,
     lazy: bool,
     phases: Phases,
@@ -218,8 +221,9 @@ impl Sensor for Camera {
 }
 
 impl Camera {
-    pub(super) fn requires(attached: bool) -> Requires {
-        if attached { Requires::VISIBLE | Requires::POSES } else { Requires::VISIBLE }
+    pub(super) fn requires(attached: bool, draws_markers: bool) -> Requires {
+        let part = |wanted: bool, field| if wanted { field } else { Requires::NONE };
+        Requires::VISIBLE | part(attached, Requires::POSES) | part(draws_markers, Requires::MARKERS)
     }
 
     #[allow(clippy::too_many_arguments, reason = "the parts that the configuration has checked, in one place")]
@@ -245,7 +249,9 @@ impl Camera {
         let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
         let captures = Captures::new(rows, &scene, tickets[0], opening.is_some());
         let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
-        let mut rasterizer = ParallelRasterizer::new(cfg.raster, context.threads).with_crew(context.crew.clone());
+        let marked = u32::from(cfg.draw_markers) << Marker::GROUP;
+        let raster = RasterCfg { groups: cfg.raster.groups | marked, ..cfg.raster };
+        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.set_light(cfg.aperture, cfg.shutter);
         let progress = rasterizer.progress().clone();
@@ -260,6 +266,7 @@ impl Camera {
             mounts: Mounts::new(mount, rows),
             rays,
             channels: cfg.channels,
+            draws_markers: cfg.draw_markers,
             depth_miss: cfg.depth_miss,
             lazy: cfg.lazy,
             phases: schedule.phases(rows),
@@ -592,7 +599,7 @@ impl Camera {
 
     /// Whether the state is of the scene that the camera was built for.
     fn check(&self, state: &SceneState) -> Result<(), SensorError> {
-        let missing = Self::requires(self.is_attached()).without(Requires::present_in(state));
+        let missing = Self::requires(self.is_attached(), self.draws_markers).without(Requires::present_in(state));
         let Some(VisibleState { instance_poses, lights }) = state.visible.as_ref().filter(|_| missing.is_empty())
         else {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
@@ -614,7 +621,10 @@ impl Camera {
                 ("numbers per body pose", 7, numbers),
             ]
         });
-        match counts.into_iter().chain(of_bodies.into_iter().flatten()).find(|(_, expected, found)| expected != found) {
+        let of_markers = state.markers.as_ref().filter(|_| self.draws_markers);
+        let of_markers = of_markers.map(|markers| ("environments with markers", envs, markers.len()));
+        let all = counts.into_iter().chain(of_bodies.into_iter().flatten()).chain(of_markers);
+        match all.into_iter().find(|(_, expected, found)| expected != found) {
             Some((what, expected, found)) => Err(SensorError::WrongShape { what, expected, found }),
             None => Ok(()),
         }

@@ -35,6 +35,9 @@ pub enum RenderError {
         /// Principal point, y \[pixels\].
         cy: f32,
     },
+    /// The scene with what sensors show in it.
+    #[error("what sensors show cannot be drawn into the picture: {0}")]
+    Markers(String),
     /// The range of depths is empty.
     #[error("near {near} m and far {far} m: both must be finite, with 0 < near < far")]
     Range {

@@ -21,6 +21,7 @@ pub(crate) const AVAILABLE: Requires = Requires::POSES
     .union(Requires::SENSORDATA)
     .union(Requires::VISIBLE)
     .union(Requires::INSTANCES)
+    .union(Requires::MARKERS)
     .union(Requires::SOLVED);
 
 /// A state with room for what `requires` names. The body axis has the links of all robots, then objects, then frames of

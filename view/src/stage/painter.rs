@@ -44,6 +44,11 @@ impl Painter {
         Self { rasterizer: ParallelRasterizer::new(cfg, threads), cfg, assembly: Assembly::default() }
     }
 
+    /// Draws with no more than so many of its threads from now on.
+    pub fn use_threads(&mut self, most: usize) {
+        self.rasterizer.use_threads(most);
+    }
+
     /// Samples per pixel, 1 or 4.
     pub fn set_samples(&mut self, samples: u8) {
         self.cfg.samples = samples;

@@ -1,5 +1,6 @@
 //! What a window does with mouse and keys, and what it draws: everything but the window.
 
+use super::desks::Desks;
 use super::keys::{Action, Key, action};
 use super::{hud, timeline};
 use crate::control::{Command, Speed, Wants};
@@ -92,6 +93,7 @@ pub struct App {
     commands: Vec<Command>,
     drawn: Vec<Instant>,
     flown: Instant,
+    desks: Desks,
 }
 
 /// Short: snapshots and pictures are long.
@@ -111,7 +113,8 @@ impl fmt::Debug for App {
 }
 
 impl App {
-    /// A window of `size` pixels, drawn on `threads` threads.
+    /// A window of `size` pixels, drawn on `threads` threads at most, and on half of them where physics takes all the time that
+    /// it can get: as fast as can be, and for some seconds after it fell behind the speed that it should have.
     pub fn new(size: [usize; 2], threads: usize) -> Self {
         Self {
             painter: Painter::new(threads),
@@ -135,6 +138,7 @@ impl App {
             commands: Vec::new(),
             drawn: Vec::new(),
             flown: Instant::now(),
+            desks: Desks { most: threads.max(1), behind: None },
         }
     }
 
@@ -451,6 +455,7 @@ impl App {
         let shown = if self.through.is_some() { Shown::One(self.env) } else { self.shown };
         let look =
             Look { shown, overlays: self.overlays, picked: self.picked.as_ref(), trails: Some(&self.trails), spring };
+        self.painter.use_threads(self.desks.now(&snapshot.run, now));
         // Views of windows are good ones; one that is not leaves the last picture.
         let _ = self.painter.draw(&snapshot, &view, &look, canvas);
         let through = self.through.and_then(|camera| snapshot.names.cameras.get(camera));

@@ -1,6 +1,7 @@
 //! A native window onto a simulation that runs.
 
 mod app;
+mod desks;
 mod enlarge;
 mod hud;
 mod keys;
@@ -31,7 +32,8 @@ pub struct WindowCfg {
     pub display: Option<String>,
     /// How fast simulated time passes once it is open; `None` leaves it as it is.
     pub speed: Option<Speed>,
-    /// Threads that draw; half of the machine's, at least one, where `None`. The others step.
+    /// Threads that draw, at most; as many as the machine has where `None`. Half of them, and at least one, draw where physics
+    /// takes all the time that it can get ([`App::new`]).
     pub threads: Option<usize>,
     /// The simulation's record button; where `None`, the one that another view has brought, if any.
     pub recording: Option<RecordButton>,
@@ -200,7 +202,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Shows snapshots until something ends it.
 fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared) -> Result<Closed, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or((cores / 2).max(1)));
+    let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or(cores));
     let mut canvas = Canvas::default();
     let (mut last, mut wants) = (0, Wants::default());
     let mut outdated = true;

@@ -1,9 +1,11 @@
 //! A real X server without a screen (Xvfb), and what is to be seen on it.
 
+mod x_server;
+
+pub(crate) use x_server::Display;
+
 use scene::Pose;
 use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use view::{Canvas, WindowCfg};
 use x11rb::connection::Connection;
@@ -14,42 +16,9 @@ use x11rb::rust_connection::RustConnection;
 pub(crate) const LONG: Duration = Duration::from_secs(30);
 pub(crate) const SIZE: [usize; 2] = [480, 270];
 
-/// An X server of its own.
-pub(crate) struct Display {
-    pub(crate) server: Child,
-    pub(crate) name: String,
-}
-
-impl Display {
-    /// `None` where there is no Xvfb; in CI that is a failure. `cargo xtask test` installs it.
-    pub(crate) fn start(screen: &str) -> Option<Self> {
-        let screen = format!("{screen}x24");
-        let command = ["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-noreset"];
-        let started = Command::new("Xvfb").args(command).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
-        let Ok(mut server) = started else {
-            assert!(std::env::var_os("CI").is_none(), "Xvfb is not there; cargo xtask test installs it");
-            eprintln!("note: without Xvfb no window is opened (cargo xtask test installs it)");
-            return None;
-        };
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        Some(Self { server, name: format!(":{}", number.trim()) })
-    }
-
-    pub(crate) fn cfg(&self) -> WindowCfg {
-        WindowCfg { size: SIZE, display: Some(self.name.clone()), threads: Some(1), ..WindowCfg::default() }
-    }
-
-    pub(crate) fn connect(&self) -> RustConnection {
-        x11rb::connect(Some(&self.name)).unwrap().0
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
+/// A small window on a display.
+pub(crate) fn cfg_on(display: &Display) -> WindowCfg {
+    WindowCfg { size: SIZE, display: Some(display.name.clone()), threads: Some(1), ..WindowCfg::default() }
 }
 
 pub(crate) fn simulation() -> SimulationManager {

@@ -13,7 +13,7 @@ use crate::camera::shutter::{Opened, Take};
 use crate::camera::ticket::Stream;
 use crate::visibility::RenderError;
 use ndarray::Array2;
-use scene::{Pose, PoseF32};
+use scene::{Instance, Marker, Pose, PoseF32, RenderScene};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 
@@ -63,6 +63,7 @@ impl Camera {
         tickets.clear();
         let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
         let mut takes: Vec<Take<'_>> = emptied(std::mem::take(kept_takes));
+        let mut marked: Vec<&[Marker]> = Vec::new();
         for (((row, place), frame), view) in places.zip(frames).zip(&*views) {
             let poses = row_of(&captures.poses, place);
             let lights = Some(row_of(&captures.lights, place));
@@ -70,6 +71,9 @@ impl Camera {
             let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
             jobs.push((Shot { scene, poses, view, lights, lens: look(place).1, before }, frame));
             tickets.push(captures.tickets[place]);
+            if self.draws_markers {
+                marked.push(&captures.markers[place]);
+            }
             let opened = captures.opened(place).and_then(|(poses, parent)| {
                 let camera = self.world_from(look(place).0, Some(parent))?;
                 let before = self.opening.as_ref()?.seconds();
@@ -77,7 +81,10 @@ impl Camera {
             });
             takes.push(Take { noise: captures.tickets[place].bits(Stream::PATHS), opened });
         }
-        let result = rasterizer.render_takes(&mut jobs, &takes);
+        let result = match self.draws_markers && self.channels.color {
+            true => render_marked(rasterizer, &mut jobs, &takes, &marked),
+            false => rasterizer.render_takes(&mut jobs, &takes),
+        };
         *kept_takes = emptied(takes);
         if let Some(faults) = faults {
             faults.spoil(&mut jobs, tickets);
@@ -106,6 +113,58 @@ impl Camera {
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
         act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
+    }
+}
+
+/// Draws jobs, and the markers of each into its colours and nothing else.
+fn render_marked(
+    rasterizer: &mut ParallelRasterizer,
+    jobs: &mut [Job<'_>],
+    takes: &[Take<'_>],
+    markers: &[&[Marker]],
+) -> Result<(), (usize, RenderError)> {
+    let mut stages = Vec::new();
+    for (index, ((shot, _), markers)) in jobs.iter().zip(markers).enumerate().filter(|(_, (_, m))| !m.is_empty()) {
+        stages.push((index, Stage::of(shot, &takes[index], markers).map_err(|error| (index, error))?));
+    }
+    // First everything without the colours that have markers in them, then these.
+    let mut colors: Vec<_> = stages.iter().map(|(index, _)| jobs[*index].1.color.take()).collect();
+    let mut result = rasterizer.render_takes(jobs, takes);
+    if result.is_ok() {
+        let frames = colors.iter_mut().map(|color| FrameMut { color: color.as_deref_mut(), ..FrameMut::default() });
+        let (mut marked, mut marked_takes) = (Vec::new(), Vec::new());
+        for ((index, Stage { scene, poses, opened }), frame) in stages.iter().zip(frames) {
+            let (shot, take) = (jobs[*index].0, takes[*index]);
+            marked.push((Shot { scene, poses, before: None, ..shot }, frame));
+            let opened = take.opened.zip(opened.as_deref()).map(|(opened, poses)| Opened { poses, ..opened });
+            marked_takes.push(Take { opened, ..take });
+        }
+        let drawn = rasterizer.render_takes(&mut marked, &marked_takes);
+        result = drawn.map_err(|(place, error)| (stages[place].0, error));
+    }
+    for ((index, _), color) in stages.iter().zip(colors) {
+        jobs[*index].1.color = color;
+    }
+    result
+}
+
+/// A scene with markers in it.
+struct Stage {
+    scene: RenderScene,
+    poses: Vec<PoseF32>,
+    /// Where everything was when the shutter opened: markers stand still.
+    opened: Option<Vec<PoseF32>>,
+}
+
+impl Stage {
+    fn of(shot: &Shot<'_>, take: &Take<'_>, markers: &[Marker]) -> Result<Self, RenderError> {
+        let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
+        let added = added.into_iter().map(|instance| Instance { group: Marker::GROUP, ..instance });
+        let instances = shot.scene.instances().iter().cloned().chain(added).collect();
+        // Each of them can be drawn; there may be too many triangles together.
+        let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
+        let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
+        Ok(Self { scene, poses: with(shot.poses), opened: take.opened.as_ref().map(|opened| with(opened.poses)) })
     }
 }
 

@@ -1,0 +1,30 @@
+//! Recordings as what viewers show.
+
+use record::Film;
+use sim::SimulationManager;
+
+/// A recording for the viewers of a simulation: what [`Play::play`](view::control::Play::play) takes.
+///
+/// ```no_run
+/// use kinetoscope::RecordedFilm;
+/// use kinetoscope::prelude::*;
+/// use kinetoscope::record::{Film, Recording};
+/// use kinetoscope::view::control::Play;
+///
+/// let (film, mut sim) = Film::of(&Recording::open("run.mcap")?, None)?;
+/// let window = sim.open_window()?;
+/// sim.play(&mut RecordedFilm(film), &mut || window.is_open())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct RecordedFilm(pub Film);
+
+impl view::control::Film for RecordedFilm {
+    fn times(&self) -> &[f64] {
+        self.0.times()
+    }
+
+    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String> {
+        self.0.show(sim, frame).map_err(|error| error.to_string())
+    }
+}
