@@ -220,3 +220,31 @@ fn linear_to_srgb8(x: f32) -> u8 {
     let y = if x <= 0.003_130_8 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
     (y * 255.0 + 0.5) as u8
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// IEC 61966-2-1: a tenth of the scale on the line and beyond it, the ends, and the well known middle, where byte 188 is
+    /// half of the light (0.5029).
+    #[test]
+    fn bytes_of_srgb_are_linear_light() {
+        let table = srgb_to_linear();
+        assert_eq!((table[0], table[255]), (0.0, 1.0));
+        assert!((table[188] - 0.5029).abs() < 5e-5, "{}", table[188]);
+        assert!((table[10] - 10.0 / 255.0 / 12.92).abs() < 1e-9, "on the line: {}", table[10]);
+        assert!((decode_srgb(0.5) - 0.214_041).abs() < 1e-6, "{}", decode_srgb(0.5));
+        assert_eq!((decode_srgb(-1.0), decode_srgb(7.0)), (0.0, 1.0), "held within the scale");
+        // There and back: every byte is itself.
+        assert!((0..=255).all(|byte: u8| linear_to_srgb8(table[byte as usize]) == byte));
+        assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "brighter is more");
+    }
+
+    #[test]
+    fn a_plain_colour_is_the_default_in_that_colour() {
+        let red = Material::from_rgba([0.9, 0.1, 0.2, 0.5]);
+        assert_eq!(red.rgba, [0.9, 0.1, 0.2, 0.5]);
+        assert_eq!(Material { rgba: Material::default().rgba, ..red.clone() }, Material::default());
+        assert_ne!(red, Material::default());
+    }
+}

@@ -317,4 +317,19 @@ mod tests {
         assert_eq!(closest("Base", ["bass", "BASE", "base", "other"])[..2], ["BASE", "base"]);
         assert_eq!(closest("base", ["bass", "BASE", "base"])[0], "base");
     }
+
+    #[test]
+    fn what_is_in_every_environment_is_named_without_saying_so() {
+        for (name, expected) in [
+            ("{ENV}/robot", "robot"),
+            ("{ENV_REGEX_NS}/robot/.*_FOOT", "robot/.*_FOOT"),
+            ("robot", "robot"),
+            ("{ENV}", "{ENV}"),
+            ("a/{ENV}/robot", "a/{ENV}/robot"),
+            // Once: what is left is a name.
+            ("{ENV}/{ENV}/robot", "{ENV}/robot"),
+        ] {
+            assert_eq!(in_every_env(name), expected);
+        }
+    }
 }

@@ -37,3 +37,27 @@ pub fn to_row(pose: &Pose) -> [f64; 7] {
 pub fn from_row(row: &[f64; 7]) -> Pose {
     Pose::from_parts(Translation3::new(row[0], row[1], row[2]), from_wxyz([row[3], row[4], row[5], row[6]]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quarter turn about z takes x to y: its quaternion is cos 45° and sin 45° about z.
+    #[test]
+    fn both_orders_of_a_quaternion_are_the_same_turn() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        // Of any length: they are normalised.
+        for scale in [1.0, 3.0] {
+            let turns =
+                [from_wxyz([scale * half, 0.0, 0.0, scale * half]), from_xyzw([0.0, 0.0, scale * half, scale * half])];
+            for turn in turns {
+                assert!((turn * Vector3::x() - Vector3::y()).norm() < 1e-15, "{turn}");
+                assert!((turn.norm() - 1.0).abs() < 1e-15);
+            }
+        }
+        // Four different numbers, each in its place; the control: the other order is another turn.
+        let [w, x, y, z] = [0.1, 0.5, 0.7, 0.5];
+        assert_eq!(to_wxyz(&from_xyzw([x, y, z, w])), to_wxyz(&from_wxyz([w, x, y, z])));
+        assert!(from_xyzw([w, x, y, z]).angle_to(&from_wxyz([w, x, y, z])) > 0.5);
+    }
+}

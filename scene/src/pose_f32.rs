@@ -89,3 +89,57 @@ impl PoseF32 {
             && near(dot(cross, r[2]), 1.)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::from_xyz_rpy;
+    use nalgebra::{Point3, Vector3};
+
+    /// The same maps in double precision judge; numbers of size 5 rounded to 6e-8 of themselves, a few times.
+    #[test]
+    fn it_maps_as_the_pose_does_and_back() {
+        let pose = from_xyz_rpy([2.0, -3.0, 0.5], [0.3, -1.1, 2.0]);
+        let own = PoseF32::from(&pose);
+        let v = [0.7_f32, -0.2, 1.5];
+        let vector = Vector3::from(v.map(f64::from));
+        let near = |found: [f32; 3], expected: Vector3<f64>| {
+            assert!((Vector3::from(found.map(f64::from)) - expected).norm() < 2e-6, "{found:?}, expected {expected}");
+        };
+        near(own.rotate(v), pose * vector);
+        near(own.rotate_inverse(v), pose.rotation.inverse() * vector);
+        near(own.apply(v), (pose * Point3::from(vector)).coords);
+        near(own.apply_inverse(v), pose.inverse_transform_point(&Point3::from(vector)).coords);
+        assert!((own.rotate(v)[0] - own.rotate_inverse(v)[0]).abs() > 0.1, "the control: the two differ");
+    }
+
+    /// Two poses 100 km out and 2 m apart: one number in f32 there is 8 mm wide, their difference is exact.
+    #[test]
+    fn poses_far_out_keep_what_is_between_them() {
+        let turn = from_xyz_rpy([0.0; 3], [0.4, 0.2, -0.9]);
+        let at = |x: f32| PoseF32 { translation: [x, 65_536.0, 0.0], ..PoseF32::from(&turn) };
+        let (a, b) = (at(131_072.0), at(131_074.0));
+        let between = a.inverse_times(&b);
+        let expected = turn.inverse() * Vector3::new(2.0, 0.0, 0.0);
+        assert!((Vector3::from(between.translation.map(f64::from)) - expected).norm() < 1e-6, "{between:?}");
+        for (i, row) in between.rotation.iter().enumerate() {
+            for (j, x) in row.iter().enumerate() {
+                assert!((x - if i == j { 1.0 } else { 0.0 }).abs() < 1e-6, "{between:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_rotation_is_not_rigid() {
+        let good = PoseF32::from(&from_xyz_rpy([1.0, 2.0, 3.0], [0.3, -1.1, 2.0]));
+        assert!(good.is_rigid() && PoseF32::IDENTITY.is_rigid());
+        let with = |rotation: [[f32; 3]; 3]| PoseF32 { rotation, ..PoseF32::IDENTITY };
+        let mirror = with([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]);
+        let scaled = with([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]);
+        let sheared = with([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let nowhere = PoseF32::from_translation([f32::NAN, 0.0, 0.0]);
+        for bad in [mirror, scaled, sheared, nowhere, with([[f32::NAN; 3]; 3])] {
+            assert!(!bad.is_rigid(), "{bad:?}");
+        }
+    }
+}

@@ -94,6 +94,35 @@ fn check(robot: &RobotDescription) {
     assert_eq!(again.robot.links.len(), robot.links.len());
 }
 
+/// File names are what the caller says, of each mesh and texture, and what is written reads back to them.
+#[test]
+fn files_are_called_as_the_writer_is_told() {
+    let files = Files::new();
+    let path = files.0.path().join("meshes.urdf");
+    let text = r#"<robot name="m"><link name="a"><visual><geometry><mesh filename="seen.obj"/></geometry>
+        <material name="wood"><texture filename="wood.png"/></material></visual>
+        <collision><geometry><mesh filename="deep/hit.stl" scale="2 2 2"/></geometry></collision></link></robot>"#;
+    std::fs::create_dir(files.0.path().join("deep")).unwrap();
+    for name in ["seen.obj", "wood.png", "deep/hit.stl"] {
+        std::fs::write(files.0.path().join(name), "").unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let robot = assemble(&UrdfCfg::single(&path)).unwrap().description;
+    let asked = std::cell::RefCell::new(Vec::new());
+    let written = sim::urdf::write_urdf_with(&robot, |file| {
+        let name = file.file_name().unwrap().to_string_lossy().into_owned();
+        asked.borrow_mut().push(name.clone());
+        format!("package://m/{name}")
+    });
+    assert_eq!(*asked.borrow(), ["seen.obj", "wood.png", "hit.stl"]);
+    for name in ["seen.obj", "wood.png", "hit.stl"] {
+        assert_eq!(written.matches(&format!("filename=\"package://m/{name}\"")).count(), 1, "{name} in {written}");
+    }
+    // The control: without being told, absolute paths.
+    let here = files.0.path().join("deep/hit.stl");
+    assert!(write_urdf(&robot).contains(&*here.to_string_lossy()) && !written.contains(&*here.to_string_lossy()));
+}
+
 #[test]
 fn one_file_stays_as_it_is() {
     let files = Files::new();

@@ -9,6 +9,7 @@ mod grip;
 mod law;
 mod limits;
 mod mimic;
+mod models_at_run_time;
 mod modes;
 mod native;
 mod resistance;

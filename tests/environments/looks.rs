@@ -429,7 +429,7 @@ fn sizes_and_colours_that_cannot_be_are_named() {
         let said = fault(Property::Color, "cube", &bad);
         assert!(said.contains("opacity"), "{said}");
     }
-    assert!(fault(Property::Size, "cone", &[0.1; 3]).contains("box, ball"));
+    assert!(fault(Property::Size, "cone", &[0.1; 3]).contains("it is a mesh"));
     assert!(fault(Property::Size, "cube", &[0.1; 2]).contains("3 numbers"));
     assert!(fault(Property::Color, "ground", &[0.1; 4]).contains("body or terrain"));
     assert!((0..3).all(|env| sim.property_bytes(EnvId(env)).unwrap() == 0), "nothing has changed");

@@ -7,5 +7,6 @@ mod observers;
 mod randomize;
 mod rollout;
 mod shard;
+mod sizes;
 mod snapshot;
 mod worlds;

@@ -78,6 +78,33 @@ fn are_called_at_their_steps_and_change_nothing() {
     }
 }
 
+/// By type, in the order of adding; one that was taken away is not there, and one of another simulation is no one here.
+#[test]
+fn are_found_by_type() {
+    struct Other;
+    impl Observer for Other {
+        fn due_in(&self, _: &SimulationManager) -> u64 {
+            1000
+        }
+
+        fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+    }
+    let (mut sim, ..) = scene();
+    let watches = [3, 7].map(|every| sim.add_observer(Watch::new(every, |_, _| {}).0));
+    let other = sim.add_observer(Other);
+    let same =
+        |found: Vec<ObserverId<Watch>>, expected: &[ObserverId<Watch>]| format!("{found:?}") == format!("{expected:?}");
+    assert!(same(sim.observer_ids(), &watches));
+    assert_eq!(format!("{:?}", sim.observer_ids::<Other>()), format!("{:?}", [other]));
+    assert_eq!(sim.observer(watches[1]).unwrap().every, 7);
+    let taken = sim.remove_observer(watches[0]).unwrap();
+    assert_eq!(taken.every, 3);
+    assert!(same(sim.observer_ids(), &watches[1..]));
+    assert_eq!([watches[0], watches[1]].map(|id| sim.has_observer(id)), [false, true]);
+    let (elsewhere, ..) = scene();
+    assert!(sim.has_observer(other) && !elsewhere.has_observer(other));
+}
+
 #[test]
 fn are_told_of_resets_and_of_what_was_written_before_the_next_step() {
     let (mut sim, object, _) = scene();

@@ -41,6 +41,10 @@ fn world_alike(settings: SimulationManagerCfg) -> (SimulationManager, Ids) {
 
 #[test]
 fn eight_environments_are_twice_four() {
+    for (rank, first) in [(0, 0), (1, 4)] {
+        let settings = SimulationManagerCfg { num_envs: 4, shard: Shard { rank, world: 2 }, ..Default::default() };
+        assert_eq!(settings.first_env(), first);
+    }
     let eight = run(8, Shard::default(), 0);
     let parts = [run(4, Shard { rank: 0, world: 2 }, 0), run(4, Shard { rank: 1, world: 2 }, 4)];
     for (env, (whole, part)) in eight.iter().zip(parts.iter().flatten()).enumerate() {

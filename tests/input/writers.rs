@@ -71,7 +71,7 @@ fn arrays_of_any_layout_mean_the_same() {
     let columns = rows.t().as_standard_layout().into_owned().reversed_axes();
     sim.robot_mut(id).write_qpos(&columns, None, None).unwrap();
     assert_eq!(sim.robot(id).get_qpos(), rows);
-    // Columns and rows in any order; the last of two writes to the same place stays.
+    // Columns and rows in any order, each once.
     sim.robot_mut(id)
         .write_qpos(&array![[0.7, 0.6], [0.5, 0.4]], Some(&[JointIndex(2), JointIndex(0)]), Some(&[EnvId(2), EnvId(0)]))
         .unwrap();

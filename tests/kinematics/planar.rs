@@ -37,6 +37,26 @@ fn closed_form(x: f64, y: f64, side: f64) -> [f64; 2] {
     [y.atan2(x) - (L2 * elbow.sin()).atan2(L1 + L2 * elbow.cos()), elbow]
 }
 
+/// A variable moves a frame exactly where the frame's Jacobian has a column for it that is not zero.
+#[test]
+fn joints_beyond_a_link_do_not_move_it() {
+    use kinetoscope::sim::kinematics::Chain;
+    let (_dir, sim, id) = two_links(WIDE);
+    let robot = sim.robot(id);
+    for (link, moved) in [("root", [false, false]), ("upper", [true, false]), ("lower", [true, true])] {
+        let chain = Chain::new(robot.description(), robot.link_id(link).unwrap(), &Pose::identity()).unwrap();
+        assert_eq!([0, 1].map(|variable| chain.is_moved_by(variable)), moved, "{link}");
+        assert!(!chain.is_moved_by(2), "there is no such variable");
+        let turned = [0, 1].map(|variable| {
+            let mut q = [0.3, 0.4];
+            let before = chain.pose(&q);
+            q[variable] += 0.1;
+            chain.pose(&q).rotation.angle_to(&before.rotation) > 0.09
+        });
+        assert_eq!(turned, moved, "{link}");
+    }
+}
+
 fn at(x: f64, y: f64) -> Array2<f64> {
     array![[x, y, 0.0, 1.0, 0.0, 0.0, 0.0]]
 }

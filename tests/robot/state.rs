@@ -252,6 +252,107 @@ fn accelerations_are_those_of_the_last_step() {
     assert_eq!((after.row(0), after.row(1).to_vec()), (last.row(0), vec![0.0; 2]));
 }
 
+/// A state that is taken over with its accelerations goes on to the last bit as the one that it was taken from: they are
+/// where the solver begins. Wherever it begins, it ends within its tolerance: Newton's method stops where the cost,
+/// (a - a*)' M (a - a*) / 2 near its end, falls by less than 1e-8 of nv times the mean inertia. The smallest inertia here,
+/// 0.001 kg m², is a thirteenth of the mean, so that a is within sqrt(2e-8 * 2 * 13) = 7.2e-4 rad/s², and the velocity of one
+/// step within 7.2e-6 rad/s.
+#[test]
+fn accelerations_that_are_written_are_told_and_move_nothing() {
+    let gravity = [0.0, 0.0, -9.81];
+    let targets = array![[1.0, 0.0], [-0.7, 0.0], [0.2, 0.0]];
+    let (mut sim, id) = sim_with(gravity, true);
+    sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    sim.update(7);
+    let view = sim.robot(id);
+    let (q, v, a) = (view.get_qpos(), view.get_qvel(), view.get_qacc());
+    // The same state, from three beginnings of the solver.
+    let beginnings = [Some(a.clone()), None, Some(Array2::from_elem((ENVS, 2), -1e6))];
+    let mut others = beginnings.map(|accelerations| {
+        let (mut other, here) = sim_with(gravity, true);
+        let mut robot = other.robot_mut(here);
+        robot.set_qpos(&targets, None, None).unwrap();
+        robot.write_qpos(&q, None, None).unwrap();
+        robot.write_qvel(&v, None, None).unwrap();
+        if let Some(a) = accelerations {
+            robot.write_qacc(&a, None, None).unwrap();
+            assert_eq!(robot.read().get_qacc(), a, "read back");
+            assert_eq!((robot.read().get_qpos(), robot.read().get_qvel()), (q.clone(), v.clone()));
+            other.batch().read(1, |env| {
+                let [hinge, follower] = [env.data().qacc()[0], env.data().qacc()[1]];
+                assert_eq!([hinge, follower], [a[(1, 0)], a[(1, 1)]], "MuJoCo's own, too");
+            });
+        }
+        (other, here)
+    });
+    sim.update(1);
+    let after = sim.robot(id).get_qvel();
+    for (k, (other, here)) in others.iter_mut().enumerate() {
+        other.update(1);
+        let off = (&other.robot(*here).get_qvel() - &after).iter().fold(0.0_f64, |off, x| off.max(x.abs()));
+        println!("beginning {k}: velocities after the step differ by {off:.1e}");
+        assert!(off < 7.2e-6, "beginning {k}: {off}");
+        // What was written is gone: the step found its own.
+        let found = (&other.robot(*here).get_qvel() - &v) / 0.01;
+        for (index, a) in other.robot(*here).get_qacc().indexed_iter() {
+            assert_near(&[*a], &[found[index]], 1e-10 * (1.0 + a.abs()), "accelerations of the step");
+        }
+    }
+    let [(same, here), ..] = &mut others;
+    for _ in 0..50 {
+        assert_eq!(same.robot(*here).get_qvel(), sim.robot(id).get_qvel());
+        assert_eq!(
+            (same.robot(*here).get_qpos(), same.robot(*here).get_qacc()),
+            (sim.robot(id).get_qpos(), sim.robot(id).get_qacc())
+        );
+        same.update(1);
+        sim.update(1);
+    }
+    // The control: an effort of the same size does move the joint.
+    let before = sim.robot(id).get_qvel();
+    sim.robot_mut(id).set_qf(&array![[50.0, 0.0]], None, Some(&[EnvId(0)])).unwrap();
+    sim.update(1);
+    let push = &sim.robot(id).get_qvel() - &before;
+    assert!(push[(0, 0)].abs() > 0.1 && push[(1, 0)].abs() < 0.1, "{push}");
+}
+
+/// Single joints of single environments; a snapshot keeps what was written, and a reset does not.
+#[test]
+fn accelerations_are_written_for_those_that_are_named() {
+    let (mut sim, id) = sim_with([0.0; 3], true);
+    let follower = [JointIndex(1)];
+    sim.robot_mut(id).write_qacc(&array![[3.0], [-4.0]], Some(&follower), Some(&[EnvId(2), EnvId(0)])).unwrap();
+    let written = array![[0.0, -4.0], [0.0, 0.0], [0.0, 3.0]];
+    assert_eq!(sim.robot(id).get_qacc(), written);
+    let snapshot = sim.snapshot(None).unwrap();
+    let mistakes: [(Array2<f64>, Option<&[JointIndex]>, Option<&[EnvId]>, &str); 9] = [
+        (array![[1.0]], None, None, "[1, 1]"),
+        (Array2::zeros((2, 2)), None, None, "[3, 2]"),
+        (array![[f64::NAN, 0.0]], None, None, "write_qacc[0, 0] (joint \"hinge\") is NaN"),
+        (array![[0.0, f64::INFINITY]], None, None, "finite"),
+        (array![[0.0, -1.1e10]], None, None, "-1e10 to 1e10"),
+        (array![[0.0]], Some(&[JointIndex(2)]), None, "joint 2 does not exist"),
+        (array![[0.0, 0.0]], Some(&[JointIndex(1); 2]), None, "write_qacc names joint \"follower\" twice"),
+        (array![[0.0, 0.0]], None, Some(&[EnvId(3)]), "environment 3 does not exist"),
+        (array![[0.0, 0.0]], None, Some(&[EnvId(1), EnvId(1)]), "write_qacc names environment 1 twice"),
+    ];
+    for (values, joints, envs, part) in mistakes {
+        let error = sim.robot_mut(id).write_qacc(&values, joints, envs).unwrap_err().to_string();
+        assert!(error.contains(part), "{part:?} is not in {error}");
+        assert_eq!(sim.robot(id).get_qacc(), written, "{error}");
+    }
+    // The largest that may be does no harm: with no force on it the joint stays where it is.
+    sim.robot_mut(id).write_qacc(&array![[1e10, -1e10]], None, None).unwrap();
+    sim.update(1);
+    assert!(sim.diverged().is_empty());
+    let off = sim.robot(id).get_qpos().iter().fold(0.0_f64, |off, x| off.max(x.abs()));
+    assert!(off < 1e-7, "{off}");
+    sim.restore(&snapshot, None).unwrap();
+    assert_eq!(sim.robot(id).get_qacc(), written);
+    sim.reset(None).unwrap();
+    assert_eq!(sim.robot(id).get_qacc(), Array2::<f64>::zeros((ENVS, 2)));
+}
+
 #[test]
 fn targets_and_defaults_are_told() {
     let (mut sim, id) = sim_with([0.0; 3], false);
@@ -287,6 +388,12 @@ fn joints_and_links_are_found_by_pattern() {
     assert_eq!(view.active_joint_ids(), [JointIndex(0)]);
     assert_eq!(view.get_active_joint_ids("all").unwrap(), [JointIndex(0)]);
     assert_eq!(view.get_joint_ids("all").unwrap().len(), 2);
+    // Without a part: of the whole robot, which is the columns of every table.
+    assert_eq!(view.get_joint_ids(None).unwrap(), [JointIndex(0), JointIndex(1)]);
+    assert_eq!(view.get_active_joint_ids(None).unwrap(), view.active_joint_ids());
+    assert_eq!((view.active_joint_names(), view.mimic_joint_ids()), (vec!["hinge"], vec![JointIndex(1)]));
+    assert_eq!(view.get_qpos().ncols(), view.dof());
+    assert_eq!(view.mimic_drivers(), [(JointIndex(0), 1.0, 0.0), (JointIndex(0), -1.0, 0.0)]);
     let errors = [
         (view.find_joints(&["Hinge"]).unwrap_err(), vec!["robot \"robot\"", "\"Hinge\"", "\"hinge\""]),
         (view.find_joints(&["hinge", ".*"]).unwrap_err(), vec!["matched by both"]),

@@ -299,6 +299,7 @@ data_arrays_mut! {
     mocap_pos_mut = mocap_pos_mut: f64;
     mocap_quat_mut = mocap_quat_mut: f64;
     ctrl_mut = ctrl_mut: f64;
+    qacc_mut = qacc_mut: f64;
     qacc_warmstart_mut = qacc_warmstart_mut: f64;
     qfrc_applied_mut = qfrc_applied_mut: f64;
     xfrc_applied_mut = xfrc_applied_mut: f64;

@@ -9,7 +9,7 @@ use crate::manager::EnvId;
 use crate::mj::{self, CompileError, LoadError, Model, words};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
 use crate::objects::robot::check_pose;
-use crate::objects::rows::{Rows, Table, check_distinct};
+use crate::objects::rows::{Rows, Table, check_distinct, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::source::Source;
@@ -504,7 +504,7 @@ impl<'a> MjcfPartMut<'a> {
     /// row is for all of them), columns for `actuators` (all where `None`). MuJoCo clamps them to the ranges of the file.
     ///
     /// # Errors
-    /// Wrong shape, unknown actuator or environment, an actuator that is named twice, a value that is not finite; then nothing
+    /// Wrong shape, unknown actuator or environment, or one that is named twice, a value that is not finite; then nothing
     /// is set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_ctrl<'t>(
@@ -525,6 +525,7 @@ impl<'a> MjcfPartMut<'a> {
         let places: Vec<usize> = chosen.iter().map(|&index| all[index]).collect();
         let of = |column: usize| format!("actuator {:?}", self.data.names.actuators[chosen[column]]);
         check_distinct("set_ctrl", &chosen, &of)?;
+        distinct_envs("set_ctrl", env_ids, self.simulation.batch.num_envs())?;
         let table = Table { argument: "set_ctrl", meaning: "environments, actuators", columns: chosen.len(), of: &of };
         let rows = Rows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
         for (env, row) in rows.iter() {
@@ -542,7 +543,8 @@ impl<'a> MjcfPartMut<'a> {
     /// so that everything that is read afterwards belongs to the new state.
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, a value that is not finite, a quaternion of length zero; then nothing is written.
+    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a quaternion of length zero;
+    /// then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qpos<'t>(&mut self, positions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].qpos.clone();
@@ -572,7 +574,7 @@ impl<'a> MjcfPartMut<'a> {
     /// in [`write_qpos`](Self::write_qpos).
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, a value that is not finite; then nothing is written.
+    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].dofs.clone();
@@ -594,8 +596,8 @@ impl<'a> MjcfPartMut<'a> {
     /// elsewhere or reset. Quaternions are normalised. A forward pass follows.
     ///
     /// # Errors
-    /// There is no such body, or it is not moved by hand (with those that are); wrong shape, unknown environment, a value that
-    /// is not finite, a quaternion of length zero; then nothing is written.
+    /// There is no such body, or it is not moved by hand (with those that are); wrong shape, unknown environment, or one that
+    /// is named twice, a value that is not finite, a quaternion of length zero; then nothing is written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_mocap_pose<'t>(
         &mut self,
@@ -618,6 +620,7 @@ impl<'a> MjcfPartMut<'a> {
         let of = |_| format!("body {body:?}");
         let table =
             Table { argument: "write_mocap_pose", meaning: "environments, x y z qw qx qy qz", columns: 7, of: &of };
+        distinct_envs(table.argument, env_ids, self.simulation.batch.num_envs())?;
         let rows = Rows::check(table, poses.into(), env_ids, self.simulation.batch.num_envs())?;
         let mut places: Vec<(usize, [f64; 7])> = rows.arrays::<7>().collect();
         places.iter_mut().try_for_each(|(_, pose)| normalise("write_mocap_pose", pose, 3))?;
@@ -657,6 +660,7 @@ impl<'a> MjcfPartMut<'a> {
     ) -> Result<Rows<'v>> {
         let of = |_| format!("part {:?}", self.data.uid());
         let table = Table { argument, meaning: "environments, numbers of the joints", columns: places.len(), of: &of };
+        distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
     }
 }

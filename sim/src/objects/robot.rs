@@ -365,11 +365,14 @@ impl<'a> Robot<'a> {
         self.data.parts.keys().map(String::as_str).collect()
     }
 
-    /// Columns of the joints of a control part, mimic joints included, in the order of its patterns.
+    /// Columns of the joints of a control part, mimic joints included, in the order of its patterns; of all joints where
+    /// `part` is `None`. Without the mimic joints: [`get_active_joint_ids`](Self::get_active_joint_ids).
     ///
     /// # Errors
     /// There is no such part; the error lists those there are.
-    pub fn get_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn get_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
+        let Some(part) = part.into() else { return Ok((0..self.dof()).map(JointIndex).collect()) };
         let members = self.data.parts.get(part).ok_or_else(|| unknown("control part", part, self.control_parts()))?;
         Ok(members.iter().map(|&i| JointIndex(i)).collect())
     }
@@ -505,8 +508,8 @@ impl<'a> Robot<'a> {
     }
 }
 
-/// A robot, to command and to write. Positions and velocities are its state; accelerations
-/// ([`get_qacc`](Robot::get_qacc)) follow from it and from forces, and cannot be written.
+/// A robot, to command and to write. Positions and velocities are its state; accelerations follow from it and from forces,
+/// and [writing](Self::write_qacc) them moves nothing.
 #[derive(Debug)]
 pub struct RobotMut<'a> {
     pub(super) data: &'a Arc<RobotData>,
@@ -535,7 +538,8 @@ impl<'a> RobotMut<'a> {
     /// ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qpos<'t>(
         &mut self,
@@ -555,7 +559,8 @@ impl<'a> RobotMut<'a> {
     /// and columns as in [`set_qpos`](Self::set_qpos); columns of joints without a drive are accepted and ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qvel<'t>(
         &mut self,
@@ -576,7 +581,8 @@ impl<'a> RobotMut<'a> {
     /// accepted and ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is set.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// set.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qf<'t>(
         &mut self,
@@ -619,7 +625,8 @@ impl<'a> RobotMut<'a> {
     /// is read afterwards belongs to the new state.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, a value that is not finite; then nothing is written.
+    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// written.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qpos<'t>(
         &mut self,
@@ -656,7 +663,7 @@ impl<'a> RobotMut<'a> {
         Ok(())
     }
 
-    fn addresses(&self, of: impl Fn(&JointIndexing) -> usize) -> Vec<usize> {
+    pub(super) fn addresses(&self, of: impl Fn(&JointIndexing) -> usize) -> Vec<usize> {
         self.simulation.robots[self.index].joints.iter().map(of).collect()
     }
 
@@ -692,7 +699,7 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Changes the state of each environment that `write` is for, joint by joint; one forward pass each.
-    fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
+    pub(super) fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| write.joints.iter().zip(row).for_each(|(&joint, &value)| change(data, joint, value)));

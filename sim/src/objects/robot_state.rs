@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::objects::free_body::body_pose;
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::objects::rows::Numbers;
 use crate::pattern::{self, PatternError};
 use ::scene::Pose;
 use ::scene::pose::to_row;
@@ -42,6 +43,17 @@ impl Robot<'_> {
         (0..self.dof()).map(JointIndex).filter(|&joint| !self.is_mimic(joint)).collect()
     }
 
+    /// Names of the joints that follow no other joint.
+    pub fn active_joint_names(&self) -> Vec<&str> {
+        self.active_joint_ids().into_iter().map(|joint| self.joint_names()[joint.0].as_str()).collect()
+    }
+
+    /// The joints that follow another one; [`mimic_drivers`](Self::mimic_drivers) says which, and how.
+    #[doc(alias = "mimic_ids")]
+    pub fn mimic_joint_ids(&self) -> Vec<JointIndex> {
+        (0..self.dof()).map(JointIndex).filter(|&joint| self.is_mimic(joint)).collect()
+    }
+
     /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic ones.
     pub fn active_dof(&self) -> usize {
         self.active_joint_ids().len()
@@ -52,13 +64,14 @@ impl Robot<'_> {
         self.data.plans().get(joint.0).is_some_and(|plan| plan.actuator.is_some())
     }
 
-    /// The joints of a control part that follow no other joint, in the order of its patterns: what elsewhere is asked for with
-    /// `remove_mimic`.
+    /// The joints of a control part that follow no other joint, in the order of its patterns; of all joints where `part` is
+    /// `None`. It is what EmbodiChain's `get_joint_ids` gives with `remove_mimic`.
     ///
     /// # Errors
     /// There is no such part; the error lists those there are.
     #[doc(alias = "remove_mimic")]
-    pub fn get_active_joint_ids(&self, part: &str) -> Result<Vec<JointIndex>> {
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn get_active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let mut joints = self.get_joint_ids(part)?;
         joints.retain(|&joint| !self.is_mimic(joint));
         Ok(joints)
@@ -72,8 +85,8 @@ impl Robot<'_> {
 /// Joints.
 impl Robot<'_> {
     /// Accelerations of the joints that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
-    /// before the first one. They are what the solver makes of positions, velocities and forces, and no state: there is nothing
-    /// to write them with, and a write to the state leaves them as they are until the next step.
+    /// before the first one. They are what the solver makes of positions, velocities and forces: a write to the state leaves
+    /// them as they are until the next step, or until [`write_qacc`](RobotMut::write_qacc).
     ///
     /// With integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the velocity in
     /// the step, (v' - v) / h. They are not where something acts on the velocity after the solver: the viscous damping of
@@ -220,6 +233,33 @@ fn centre_of_mass(env: &Env, robot: &RobotIndex) -> Vector3<f64> {
 }
 
 impl RobotMut<'_> {
+    /// Writes the accelerations that [`get_qacc`](Robot::get_qacc) tells \[rad/s² or m/s²\], from which MuJoCo's solver begins
+    /// its search in the next step (its warm start, and `qacc`). Rows and columns as in [`write_qpos`](Self::write_qpos).
+    ///
+    /// They are a result, not a state: each step finds its own from positions, velocities and forces, within the solver's
+    /// tolerance wherever it begins, and puts them in the place of these. To push a joint there is
+    /// [`set_qf`](Self::set_qf). Written together with the positions and velocities of another simulation's robot, they let
+    /// this one go on to the last bit as that one does.
+    ///
+    /// # Errors
+    /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo takes for a diverged one.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn write_qacc<'t>(
+        &mut self,
+        accelerations: impl AsArray<'t, f64, Ix2>,
+        joint_ids: Option<&[JointIndex]>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let (argument, numbers) = ("write_qacc", Numbers::Acceleration);
+        let write = self.checked_numbers(argument, numbers, accelerations.into(), joint_ids, env_ids)?;
+        let addresses = self.addresses(|joint| joint.dof);
+        self.write_joints(&write, |data, joint, value| {
+            data.qacc_mut()[addresses[joint]] = value;
+            data.qacc_warmstart_mut()[addresses[joint]] = value;
+        });
+        Ok(())
+    }
+
     /// Sets the velocity of the centre of mass of the root link and of what is fixed to it, and its angular velocity, in
     /// world axes: rows of 6 \[m/s, rad/s\], as in [`write_root_velocity`](Self::write_root_velocity), which takes that of
     /// the link's frame.

@@ -22,6 +22,8 @@ pub(super) struct Table<'a> {
 pub(super) enum Numbers {
     /// Finite ones.
     Finite,
+    /// Those that MuJoCo goes on with as accelerations: its `mjMAXVAL` bounds them.
+    Acceleration,
     /// Finite ones that are not negative.
     Gain,
     /// Numbers above or at 0, and infinity for no limit.
@@ -34,6 +36,7 @@ impl Numbers {
     fn allow(self, value: f64) -> bool {
         match self {
             Self::Finite => value.is_finite(),
+            Self::Acceleration => value.abs() <= 1e10,
             Self::Gain => value.is_finite() && value >= 0.0,
             Self::Limit => value >= 0.0,
             Self::End => !value.is_nan(),
@@ -43,6 +46,7 @@ impl Numbers {
     fn expected(self) -> &'static str {
         match self {
             Self::Finite => "finite",
+            Self::Acceleration => "from -1e10 to 1e10, beyond which an acceleration counts as diverged",
             Self::Gain => "a finite number >= 0",
             Self::Limit => "a number >= 0, or infinite for no limit",
             Self::End => "a number, or infinite for no limit",
@@ -116,7 +120,9 @@ impl<'v> Rows<'v> {
         if let Some(((row, column), &value)) = values.indexed_iter().find(|(_, v)| !numbers.allow(**v)) {
             let of = of(column);
             return Err(match numbers {
-                Numbers::Finite => Error::NotFinite { argument, row, column, of, value },
+                Numbers::Finite | Numbers::Acceleration if !value.is_finite() => {
+                    Error::NotFinite { argument, row, column, of, value }
+                }
                 _ => Error::OutOfRange { argument, row, column, of, value, expected: numbers.expected().into() },
             });
         }

@@ -4,7 +4,7 @@ use super::Property;
 use super::error::RandomizationError;
 use super::properties::{OwnValues, Properties};
 use super::tables::{FrictionPlace, dofs_of, friction_place};
-use crate::drive::table::DriveTable;
+use crate::drive::table::{DriveState, DriveTable, Gains};
 use crate::env::Env;
 use crate::error::Result;
 use crate::mj::{DiagonalInertia, Editor, Model};
@@ -41,6 +41,7 @@ impl Maker {
     pub(crate) fn make(&mut self, properties: &Properties, own: &OwnValues, index: usize, env: &Env) -> Result<Made> {
         let drives = env.drives.table();
         properties.check(index)?;
+        check_models(properties, &env.drives, index)?;
         let mut damping: Vec<f64> = drives.damped.iter().map(|(_, damping)| *damping).collect();
         let is_nominal = own.iter().all(Option::is_none);
         self.editor.load(&self.base);
@@ -146,6 +147,29 @@ impl Maker {
         }
         Ok(constants)
     }
+}
+
+/// What the explicit models of drives say of gains and limits that are drawn or set.
+fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Result<(), RandomizationError> {
+    let table = properties.tables.get(Property::MaxEffort);
+    for (element, (name, &drive)) in table.names.iter().zip(&table.places).enumerate() {
+        let asked = |of: Property| properties.is_asked(of, element).then(|| properties.values[of as usize][element]);
+        let [kp, kd, max_effort] = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort].map(asked);
+        let Some(explicit) = drives.table().model_of(drive) else { continue };
+        if kp.or(kd).or(max_effort).is_none() {
+            continue;
+        }
+        let now = if properties.nominal_gains { drives.table().drives[drive].initial } else { drives.gains[drive] };
+        let gains = Gains {
+            kp: kp.unwrap_or(now.kp),
+            kd: kd.unwrap_or(now.kd),
+            max_effort: max_effort.unwrap_or(now.max_effort),
+            max_velocity: now.max_velocity,
+        };
+        let fault = |expected| RandomizationError::Model { env, name: name.clone(), expected };
+        explicit.model.law().check(&gains).map_err(fault)?;
+    }
+    Ok(())
 }
 
 impl Made {

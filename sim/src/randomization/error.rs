@@ -42,6 +42,24 @@ pub enum RandomizationError {
         /// What would be right.
         expected: &'static str,
     },
+    /// Gains or limits of a drive with an explicit model are not right for the model.
+    #[error("environment {env}: what the drive of {name:?} would have is not right for its model: {expected}")]
+    Model {
+        /// The environment.
+        env: usize,
+        /// The joint.
+        name: String,
+        /// What is wrong, and what would be right.
+        expected: String,
+    },
+    /// The size of what is called so is no property: a mesh, a plane or a height field.
+    #[error("the size of {name:?} cannot differ between environments: {reason}")]
+    Unsized {
+        /// Whose.
+        name: String,
+        /// Why, and what to do.
+        reason: &'static str,
+    },
     /// Another number of numbers than the property has.
     #[error("{property} of {name:?} is {expected} numbers, not {found}")]
     Width {

@@ -86,6 +86,18 @@ impl Properties {
         names
     }
 
+    /// The first thing that a pattern matches and that cannot have the property, with the reason, where it matches nothing
+    /// that can.
+    pub(super) fn only_without(&self, property: Property, pattern: &str) -> Option<(String, &'static str)> {
+        let without = &self.tables.get(property).without;
+        let matched = |names: &[&str]| pattern::select(&[pattern], names, property.owner()).unwrap_or_default();
+        if !matched(&self.names_to_draw(property)).is_empty() {
+            return None;
+        }
+        let names: Vec<&str> = without.iter().map(|(name, _)| name.as_str()).collect();
+        matched(&names).first().map(|&first| without[first].clone())
+    }
+
     /// The value in this environment; of the first shape where a body has several.
     ///
     /// # Errors
@@ -105,10 +117,13 @@ impl Properties {
     fn value<'v>(&self, property: Property, name: &str, values: &'v [f64]) -> Result<&'v [f64]> {
         let table = self.tables.get(property);
         let element = table.names.iter().position(|known| known == name);
-        let element = element.ok_or_else(|| Error::UnknownName {
-            what: property.owner(),
-            name: name.into(),
-            candidates: pattern::closest(name, self.names(property)).into_iter().map(String::from).collect(),
+        let element = element.ok_or_else(|| match table.why_not(name) {
+            Some(reason) => RandomizationError::Unsized { name: name.into(), reason }.into(),
+            None => Error::UnknownName {
+                what: property.owner(),
+                name: name.into(),
+                candidates: pattern::closest(name, self.names(property)).into_iter().map(String::from).collect(),
+            },
         })?;
         Ok(&values[element * property.width()..(element + 1) * property.width()])
     }

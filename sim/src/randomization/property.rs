@@ -42,9 +42,14 @@ pub enum Property {
     MaxEffort,
     /// Sizes of a shape of a link or object \[m\], 3 numbers as MuJoCo has them: half lengths of a box, radii of an
     /// ellipsoid; radius, half length of a cylinder and of the straight part of a capsule; radius of a ball. Numbers that a
-    /// shape does not have are 0 and stay 0. Cameras, ray casters and contacts have them alike. Of bodies with such shapes:
-    /// meshes, planes and terrain stay as they are, whatever they are part of. A body with several shapes has them scaled by
-    /// one factor where that is drawn, each about its own middle, which stays.
+    /// shape does not have are 0 and stay 0. Cameras, ray casters and contacts have them alike. A body with several shapes has
+    /// them scaled by one factor where that is drawn, each about its own middle, which stays.
+    ///
+    /// Meshes, planes and height fields have no size of their own in an environment; where a body has other shapes, too,
+    /// they stay as they are. MuJoCo keeps the vertices of a mesh, and the heights of a field, once for all that is made of
+    /// them, with what its compiler derived from them; and a plane touches things everywhere, whatever its size. To ask for
+    /// the size of what has no other shape is
+    /// [`RandomizationError::Unsized`](super::RandomizationError::Unsized), which says what to do instead.
     ///
     /// Mass, centre of mass and moments stay: they are properties of their own. So do the sizes of sites: a touch sensor of an
     /// MJCF file feels contacts in its nominal volume. Frames of links and joints stay where they are, so that

@@ -14,6 +14,8 @@ pub(crate) struct Table {
     pub(super) places: Vec<usize>,
     /// Nominal values, element by element.
     pub(super) nominal: Vec<f64>,
+    /// What is called so and cannot have the property, with the reason.
+    pub(super) without: Vec<(String, &'static str)>,
 }
 
 /// What the model alone does not say.
@@ -59,6 +61,11 @@ impl Table {
     pub(super) fn changes<'v>(&self, width: usize, values: &'v [f64]) -> BTreeMap<usize, &'v [f64]> {
         let elements = values.chunks(width).zip(self.nominal.chunks(width)).zip(&self.places);
         elements.filter(|((value, nominal), _)| value != nominal).map(|((value, _), &place)| (place, value)).collect()
+    }
+
+    /// Why what is called so cannot have the property, where there is a reason.
+    pub(super) fn why_not(&self, name: &str) -> Option<&'static str> {
+        self.without.iter().find(|(of, _)| of == name).map(|(_, reason)| *reason)
     }
 
     fn push(&mut self, name: String, place: usize, values: &[f64]) {
@@ -112,10 +119,14 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
             for geom in (0..model.ngeom()).filter(|&geom| !beside.proxies[geom]) {
                 let (size, numbers) = (&model.geom_size()[3 * geom..3 * geom + 3], sizes(model.geom_type()[geom]));
                 let value = [0, 1, 2].map(|k| if k < numbers { size[k] } else { 0.0 });
-                if let Some(name) = geom_name(model, geom).filter(|_| numbers > 0) {
-                    table.push(name, geom, &value);
+                match (geom_name(model, geom), no_sizes(model.geom_type()[geom])) {
+                    (Some(name), None) if numbers > 0 => table.push(name, geom, &value),
+                    (Some(name), Some(reason)) => table.without.push((name, reason)),
+                    _ => {}
                 }
             }
+            let Table { names, without, .. } = &mut table;
+            without.retain(|(name, _)| !names.contains(name));
         }
         Property::Color => {
             for geom in 0..model.ngeom() {
@@ -138,6 +149,25 @@ fn sizes(kind: i32) -> usize {
         mj::mjGEOM_CAPSULE | mj::mjGEOM_CYLINDER => 2,
         mj::mjGEOM_ELLIPSOID | mj::mjGEOM_BOX => 3,
         _ => 0,
+    }
+}
+
+/// Why the size of a geom of a type is no property.
+fn no_sizes(kind: i32) -> Option<&'static str> {
+    match kind as u32 {
+        mj::mjGEOM_MESH => Some(
+            "it is a mesh, whose vertices MuJoCo keeps once for all that is made of it, with the hull, frame and boxes that \
+             follow from them; add the object (or the body) once for each scale and put aside those that an environment does \
+             not use, or give it boxes, balls, capsules, cylinders or ellipsoids to collide",
+        ),
+        mj::mjGEOM_HFIELD => Some(
+            "it is a height field, whose heights and extent MuJoCo keeps in one place for all environments; lay several \
+             terrains side by side and start environments on different ones",
+        ),
+        mj::mjGEOM_PLANE => Some(
+            "it is a plane, which touches things everywhere, whatever its size; let a box of the wanted size stand for it",
+        ),
+        _ => None,
     }
 }
 

@@ -94,6 +94,9 @@ impl Randomization {
             if entries.is_empty() {
                 continue;
             }
+            if let Some((name, reason)) = entries.iter().find_map(|(of, _)| properties.only_without(property, of)) {
+                return Err(RandomizationError::Unsized { name, reason });
+            }
             let names = properties.names_to_draw(property);
             let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.owner())
                 .map_err(|error| RandomizationError::Pattern { property: property.name(), error: Box::new(error) })?;

@@ -1,0 +1,105 @@
+//! Sizes that are no property of an environment: meshes, planes and height fields say why, and what to do.
+
+use super::worlds::{cfg, cube};
+use kinetoscope::ndarray::array;
+use kinetoscope::prelude::*;
+
+/// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.
+const PART: &str = r#"<mujoco><asset><mesh name="spike" vertex="0 0 0  0.2 0 0  0 0.2 0  0 0 0.2"/></asset><worldbody>
+    <geom name="shelf" type="plane" size="0.5 0.5 0.1" pos="0 0 1"/>
+    <body name="one" pos="-1 0 2"><freejoint/><geom type="mesh" mesh="spike"/></body>
+    <body name="two" pos="-2 0 2"><freejoint/><geom type="mesh" mesh="spike"/></body>
+    <body name="both" pos="-3 0 2"><freejoint/><geom type="box" size="0.1 0.1 0.1"/><geom type="mesh" mesh="spike"/></body>
+    <body name="ball" pos="7 0 1.2"><freejoint/><geom size="0.1"/></body>
+  </worldbody></mujoco>"#;
+
+fn world() -> SimulationManager {
+    let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+    sim.add_rigid_object(cube("cube", 1.0, [0.0, 3.0, 0.05])).unwrap();
+    let shape = ObjectShape::Cone { radius: 0.1, height: 0.2 };
+    let init_pose = Pose::translation(1.0, 3.0, 0.2);
+    sim.add_rigid_object(RigidObjectCfg { uid: "cone".into(), shape, init_pose, ..Default::default() }).unwrap();
+    let heights = array![[0.0, 0.1], [0.05, 0.0]];
+    let init_pose = Pose::translation(-9.0, 0.0, 0.0);
+    sim.add_terrain(TerrainCfg { uid: "hills".into(), heights, size: [2.0; 2], init_pose, ..Default::default() })
+        .unwrap();
+    sim.add_mjcf(MjcfCfg::text("part", PART)).unwrap();
+    sim
+}
+
+fn size_of(sim: &SimulationManager, env: usize, name: &str) -> [f64; 3] {
+    let properties = sim.properties(EnvId(env)).unwrap();
+    properties.get(Property::Size, name).unwrap().try_into().unwrap()
+}
+
+#[test]
+fn what_has_no_size_of_its_own_says_why_and_what_to_do() {
+    let mut sim = world();
+    let cases = [
+        ("cone", ["it is a mesh", "once for each scale"]),
+        ("part/one", ["it is a mesh", "keeps once for all"]),
+        ("hills", ["it is a height field", "side by side"]),
+        ("ground", ["it is a plane", "a box of the wanted size"]),
+        ("part/shelf", ["it is a plane", "whatever its size"]),
+    ];
+    for (name, parts) in cases {
+        let properties = sim.properties(EnvId(1)).unwrap();
+        let drawn = Randomization::new().with(Property::Size, name, Draw::Scale([0.9, 1.1]));
+        let errors = [
+            properties.get(Property::Size, name).unwrap_err(),
+            properties.nominal(Property::Size, name).unwrap_err(),
+            sim.randomize(&drawn, None).unwrap_err(),
+            sim.randomize_with(None, |_, _, all| all.set(Property::Size, name, &[0.1; 3])).unwrap_err(),
+        ];
+        for error in errors {
+            assert!(
+                matches!(&error, Error::Randomization(RandomizationError::Unsized { name: of, .. }) if of == name),
+                "{error:?}"
+            );
+            for part in parts {
+                assert!(error.to_string().contains(part), "{part:?} is not in {error}");
+            }
+        }
+    }
+    // Nothing of that name at all is another mistake.
+    let typo = Randomization::new().with(Property::Size, "cubes", Draw::Scale([0.9, 1.1]));
+    let error = sim.randomize(&typo, None).unwrap_err();
+    assert!(matches!(error, Error::Randomization(RandomizationError::Pattern { .. })), "{error:?}");
+    assert!(sim.properties(EnvId(0)).unwrap().get(Property::Size, "cubes").is_err());
+}
+
+/// A pattern that reaches things of both kinds draws those that have sizes, and of a body the shapes that have.
+#[test]
+fn patterns_draw_what_has_sizes() {
+    let mut sim = world();
+    let drawn = Randomization::new().with(Property::Size, "c.*|part/both", Draw::Scale([1.2, 1.2]));
+    sim.randomize(&drawn, Some(&[EnvId(1)])).unwrap();
+    // Half lengths of 0.05 and 0.1 m, times the factor.
+    for (name, half) in [("cube", 0.05), ("part/both", 0.1)] {
+        assert_eq!(size_of(&sim, 0, name), [half; 3], "{name}");
+        assert_eq!(size_of(&sim, 1, name), [1.2 * half; 3], "{name}");
+    }
+}
+
+/// The reasons are true. A ball that falls beside a plane of half a metre comes to rest at the plane's height: MuJoCo's
+/// contacts yield by less than a millimetre under 40 N. Two bodies of one mesh share its vertices.
+#[test]
+fn planes_have_no_end_and_meshes_are_shared() {
+    let mut sim = world();
+    sim.update(300);
+    sim.batch().read(0, |env| {
+        let (data, model) = (env.data(), env.data().model());
+        let body = |name: &str| model.id(kinetoscope::sim::mj::ObjectKind::Body, name).unwrap();
+        let height = data.xpos()[3 * body("part/ball") + 2];
+        assert!((height - 1.1).abs() < 1e-3, "{height}");
+        let mesh_of = |name: &str| {
+            let of = body(name) as i32;
+            (0..model.ngeom())
+                .find(|&geom| model.geom_bodyid()[geom] == of)
+                .map(|geom| model.geom_dataid()[geom])
+                .unwrap()
+        };
+        assert_eq!(mesh_of("part/one"), mesh_of("part/two"));
+        assert_ne!(mesh_of("part/one"), mesh_of("cone"), "the control");
+    });
+}
