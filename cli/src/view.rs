@@ -32,8 +32,8 @@ pub(crate) struct Args {
     /// End after so many steps
     #[arg(long)]
     steps: Option<u64>,
-    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .apng for the first camera, a folder
-    /// for PNG files of all cameras. Without it the record button begins a recording.mcap
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .mp4,
+    /// .gif, .webp or .apng for the first camera; a folder for PNG files of all cameras. Without it the record button begins a recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replace the file of --record, and what a recording that was killed has left

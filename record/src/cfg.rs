@@ -10,7 +10,8 @@ use std::path::PathBuf;
 pub struct RecorderCfg {
     /// The file, or for [`Format::Pictures`] the folder.
     pub path: PathBuf,
-    /// How it is written; `None` for what the end of the name says: `.mcap`, `.npz`, `.apng`, nothing for a folder of pictures.
+    /// How it is written; `None` for what the end of the name says: [`Format::all`] lists them, nothing is a folder of
+    /// pictures.
     pub format: Option<Format>,
     /// What is recorded.
     pub topics: Vec<Topic>,

@@ -1,6 +1,6 @@
 //! What can be wrong with a recording.
 
-use crate::format::Format;
+use crate::format::{Format, ends};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,7 +33,8 @@ pub enum RecordError {
     },
     /// The end of the name is of no format.
     #[error(
-        "{path}: nothing is recorded as .{end}; known are .mcap, .npz, .apng, and a name without end for a folder of PNG files"
+        "{path}: nothing is recorded as .{end}; known are {}, and a name without end for a folder of PNG files",
+        ends()
     )]
     Format {
         /// The file.
@@ -68,6 +69,20 @@ pub enum RecordError {
         path: PathBuf,
         /// What was chosen.
         found: String,
+    },
+    /// Pictures of a size that the format does not have.
+    #[error("{path}: {} has no pictures of {width} x {height} pixels: {fits}", .format.name())]
+    Size {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
+        /// Pixels per row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Which it has.
+        fits: String,
     },
     /// Something is not called so.
     #[error("there is no {what} {name:?}{}", known(.candidates))]

@@ -14,14 +14,51 @@ pub enum Format {
     Npz,
     /// A folder of PNG files: colour as 8-bit RGB, depth and distance as 16-bit millimetres, and `times.csv` with their times.
     Pictures,
-    /// An animated PNG of one camera's colour in one environment.
+    /// An animated PNG of one camera's colour in one environment, without loss.
     Apng,
+    /// An animated GIF of the same: 256 colours in a picture, times in hundredths of a second.
+    Gif,
+    /// An animated WebP of the same, without loss.
+    Webp,
+    /// An MP4 file of the same: H.264, which has colours at half the resolution. The sides must be even.
+    Mp4,
+}
+
+/// What is known of a format.
+struct Known {
+    format: Format,
+    /// The end of names that mean it; an empty one is a folder.
+    end: &'static str,
+    /// Its name in messages.
+    name: &'static str,
+    /// What it has a place for.
+    holds: fn(&Stream) -> bool,
+}
+
+/// All of them.
+const ALL: [Known; 7] = [
+    Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
+    Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
+    Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
+    Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
+    Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
+    Known { format: Format::Webp, end: "webp", name: "an animated WebP", holds: is_color },
+    Known { format: Format::Mp4, end: "mp4", name: "an MP4 file", holds: is_color },
+];
+
+fn is_color(stream: &Stream) -> bool {
+    matches!(&stream.kind, Kind::Picture { channel, .. } if channel == "color")
+}
+
+fn is_seen(stream: &Stream) -> bool {
+    matches!(&stream.kind, Kind::Picture { channel, .. } if matches!(&**channel, "color" | "depth" | "distance"))
 }
 
 impl Format {
-    /// All of them with the ends of names that mean them; an empty one is a folder.
-    const ENDS: [(&'static str, Self); 4] =
-        [("mcap", Self::Mcap), ("npz", Self::Npz), ("", Self::Pictures), ("apng", Self::Apng)];
+    /// All formats, with the ends of names that mean them: `mcap`, `npz`; an empty one is a folder.
+    pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
+        ALL.iter().map(|known| (known.format, known.end))
+    }
 
     /// The format that the end of a name means.
     ///
@@ -29,27 +66,53 @@ impl Format {
     /// No format is called so; the error lists those there are.
     pub fn of_path(path: &Path) -> Result<Self> {
         let end = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let found = Self::ENDS.iter().find(|(known, _)| *known == end);
-        found.map(|(_, format)| *format).ok_or_else(|| RecordError::Format { path: path.into(), end })
+        let found = ALL.iter().find(|known| known.end == end);
+        found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), end })
+    }
+
+    fn known(self) -> &'static Known {
+        // Each is in the list, which a test sees to.
+        ALL.iter().find(|known| known.format == self).unwrap_or(&ALL[0])
     }
 
     /// Its name in messages.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Mcap => "an MCAP file",
-            Self::Npz => "a NumPy archive",
-            Self::Pictures => "a folder of pictures",
-            Self::Apng => "an animated PNG",
-        }
+        self.known().name
     }
 
     /// Whether it has a place for a stream.
     pub(crate) fn holds(self, stream: &Stream) -> bool {
-        match (self, &stream.kind) {
-            (Self::Mcap | Self::Npz, _) => true,
-            (Self::Pictures, Kind::Picture { channel, .. }) => matches!(&**channel, "color" | "depth" | "distance"),
-            (Self::Apng, Kind::Picture { channel, .. }) => channel == "color",
-            (Self::Pictures | Self::Apng, _) => false,
+        (self.known().holds)(stream)
+    }
+
+    /// Whether it shows one camera in one environment.
+    pub fn is_animation(self) -> bool {
+        matches!(self, Self::Apng | Self::Gif | Self::Webp | Self::Mp4)
+    }
+}
+
+/// The ends of all names, for a message.
+pub(crate) fn ends() -> String {
+    let ends = ALL.iter().filter(|known| !known.end.is_empty()).map(|known| format!(".{}", known.end));
+    ends.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_format_is_in_the_list_once() {
+        use Format::{Apng, Gif, Mcap, Mp4, Npz, Pictures, Webp};
+        let wanted = [Mcap, Npz, Pictures, Apng, Gif, Webp, Mp4];
+        assert!(Format::all().map(|(format, _)| format).eq(wanted));
+        for (format, end) in Format::all() {
+            // One that is missing here does not compile.
+            match format {
+                Mcap | Npz | Pictures | Apng | Gif | Webp | Mp4 => {}
+            }
+            assert_eq!(format.known().end, end);
+            assert_eq!(Format::of_path(&Path::new("a.b/run").with_extension(end)).ok(), Some(format));
         }
     }
 }

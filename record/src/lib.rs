@@ -1,7 +1,7 @@
 //! Writes what happens in a simulation to files, without losing anything silently.
 //!
 //! ```text
-//! SimulationManager -> Recorder (an observer) -> pool of packets -> thread of the file -> mcap | npz | png | apng
+//! SimulationManager -> Recorder (an observer) -> pool of packets -> thread of the file -> mcap | npz | png | ...
 //!                      topic: what is read                          format: how it is written
 //! ```
 //!
@@ -21,12 +21,14 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod animation;
 mod archive;
 mod cfg;
 mod clock;
 mod error;
 mod file;
 mod film;
+mod folder;
 mod format;
 mod mcap_file;
 mod npy;

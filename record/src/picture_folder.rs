@@ -1,7 +1,7 @@
 //! Folders of pictures.
 
 use crate::error::{RecordError, Result};
-use crate::file::{lock_left, part_of, sync_folder};
+use crate::folder::PartFolder;
 use crate::packet::Packet;
 use crate::picture::Png;
 use crate::stream::{Kind, Stream};
@@ -18,11 +18,8 @@ const TIMES: &str = "times.csv";
 /// whole; in a folder that was left, all pictures but perhaps the last are whole.
 #[derive(Debug)]
 pub(crate) struct PictureFolder {
-    path: PathBuf,
-    part: PathBuf,
-    overwrite: bool,
+    folder: PartFolder,
     png: Png,
-    /// Locked as long as there is a recorder.
     times: BufWriter<File>,
     /// Pictures of every row of every stream.
     counts: Vec<Vec<usize>>,
@@ -32,53 +29,10 @@ pub(crate) struct PictureFolder {
 impl PictureFolder {
     /// Makes the folder, which must be new or empty, or may be replaced: only a folder of a recorder is.
     pub(crate) fn create(path: &Path, overwrite: bool) -> Result<Self> {
-        // Without a separator at the end.
-        let path: PathBuf = path.components().collect();
-        if path.file_name().is_none() {
-            let error = io::Error::new(io::ErrorKind::InvalidInput, "a folder of pictures needs a name of its own");
-            return Err(RecordError::file(&path, error));
-        }
-        if !is_free(&path, overwrite).map_err(|error| RecordError::file(&path, error))? {
-            return Err(RecordError::Exists { path });
-        }
-        let part = part_of(&path);
-        let failed = |error| RecordError::file(&part, error);
-        let left = lock_left(&part.join(TIMES)).map_err(|error| match error {
-            RecordError::Busy { .. } => RecordError::Busy { part: part.clone() },
-            other => other,
-        })?;
-        if !is_free(&part, overwrite).map_err(failed)? {
-            return Err(RecordError::Unfinished { part, recoverable: false });
-        }
-        // Its lock would keep the folder on some systems.
-        drop(left);
-        let begin = || {
-            take_away(&part)?;
-            fs::create_dir_all(&part)?;
-            let mut times = File::create_new(part.join(TIMES))?;
-            times.try_lock()?;
-            times.write_all(b"picture,step,time,recorded_time\n")?;
-            Ok(BufWriter::new(times))
-        };
-        let times = begin().map_err(failed)?;
-        Ok(Self { path, part, overwrite, png: Png::default(), times, counts: Vec::new(), bytes: 0 })
-    }
-}
-
-/// Whether a folder may be made at a place: nothing is there, or an empty folder, or one of a recorder that may be replaced.
-fn is_free(path: &Path, overwrite: bool) -> io::Result<bool> {
-    match fs::read_dir(path) {
-        Ok(mut entries) => Ok(entries.next().is_none() || (overwrite && path.join(TIMES).is_file())),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
-        Err(error) => Err(error),
-    }
-}
-
-/// Takes away a folder that [`is_free`].
-fn take_away(path: &Path) -> io::Result<()> {
-    match fs::remove_dir_all(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
+        let (folder, mut times) = PartFolder::create(path, overwrite, TIMES)?;
+        let head = times.write_all(b"picture,step,time,recorded_time\n");
+        head.map_err(|error| RecordError::file(folder.part(), error))?;
+        Ok(Self { folder, png: Png::default(), times: BufWriter::new(times), counts: Vec::new(), bytes: 0 })
     }
 }
 
@@ -95,7 +49,7 @@ impl Sink for PictureFolder {
                     None => self.png.rgb(block.values.bytes().get(range).unwrap_or(&[]), [width, height])?,
                 };
                 let name = format!("{}/env_{env}/{:06}.png", stream.name, counts[row]);
-                let path = self.part.join(&name);
+                let path = self.folder.part().join(&name);
                 if let Some(folder) = path.parent().filter(|_| counts[row] == 0) {
                     fs::create_dir_all(folder)?;
                 }
@@ -116,16 +70,11 @@ impl Sink for PictureFolder {
     fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
         self.times.flush()?;
         self.times.get_ref().sync_all()?;
-        if !is_free(&self.path, self.overwrite)? {
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name has appeared meanwhile"));
-        }
-        take_away(&self.path)?;
-        fs::rename(&self.part, &self.path)?;
-        sync_folder(&self.path);
+        self.folder.commit()?;
         Ok(self.bytes)
     }
 
     fn kept(&self) -> Option<PathBuf> {
-        Some(self.part.clone())
+        Some(self.folder.part().into())
     }
 }

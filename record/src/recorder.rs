@@ -1,5 +1,6 @@
 //! The observer that records.
 
+use crate::animation::{self, Animation};
 use crate::cfg::RecorderCfg;
 use crate::clock::Clock;
 use crate::error::{RecordError, Result};
@@ -8,7 +9,6 @@ use crate::format::Format;
 use crate::mcap_file::McapFile;
 use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
-use crate::picture::Animation;
 use crate::picture_folder::PictureFolder;
 use crate::scene_file;
 use crate::source::Source;
@@ -450,12 +450,16 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
         return Err(RecordError::Nothing { path: cfg.path.clone(), format });
     }
     let pictures: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
-    if format == Format::Apng && pictures != 1 {
+    if format.is_animation() && pictures != 1 {
         let names: Vec<String> = sources
             .iter()
             .map(|Source { stream, .. }| format!("{} in {} environments", stream.name, stream.env_ids.len()))
             .collect();
         return Err(RecordError::TooMany { path: cfg.path.clone(), found: names.join(", ") });
+    }
+    if let (true, Some(size)) = (format.is_animation(), sources.iter().find_map(|source| picture_size(&source.stream)))
+    {
+        animation::check(&cfg.path, format, size)?;
     }
     Ok((sources, left_out))
 }
@@ -489,7 +493,7 @@ fn everything(
         }
     }
     sources.retain(|source| format.holds(&source.stream) && source.stream.width() > 0);
-    if format == Format::Apng {
+    if format.is_animation() {
         // The first camera, in the first environment that it looks into.
         sources.truncate(1);
         sources.iter_mut().for_each(Source::keep_first);
@@ -529,18 +533,22 @@ fn open(
             let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, &sim.snapshot(None)?, scene);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
-        Format::Apng | Format::Pictures => {
-            let shape = streams.iter().find_map(|stream| match stream.kind {
-                Kind::Picture { height, width, .. } => Some([width, height]),
-                _ => None,
-            });
+        _ => {
+            let size = streams.iter().find_map(picture_size);
             // `resolve` has seen to it that there is a picture.
-            let shape = shape.ok_or_else(|| RecordError::Nothing { path: cfg.path.clone(), format })?;
-            let file = Animation::create(part, storage, shape);
-            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
+            let size = size.ok_or_else(|| RecordError::Nothing { path: cfg.path.clone(), format })?;
+            Ok(Box::new(Animation::create(part, storage, format, size)?))
         }
     };
     sink
+}
+
+/// Width and height of a stream of pictures.
+fn picture_size(stream: &Stream) -> Option<[usize; 2]> {
+    match stream.kind {
+        Kind::Picture { height, width, .. } => Some([width, height]),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Folders of pictures, and animations.
 
+use super::readers::{python, said};
 use super::support::{PICTURE_EVERY, World};
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
-use std::io::BufReader;
+use kinetoscope::record::Format;
 use std::path::Path;
 
 const STEPS: u32 = 4 * PICTURE_EVERY;
@@ -92,42 +93,104 @@ fn a_folder_is_whole_when_it_has_its_name_and_nothing_old_is_in_it() {
     assert!(mine.join("one").exists());
 }
 
+/// Formats that show one camera in one environment.
+fn animations() -> impl Iterator<Item = (Format, &'static str)> {
+    Format::all().filter(|(format, _)| format.is_animation())
+}
+
+/// What an animation is expected to be, beside its frames.
+fn check_animation(end: &str, frame: &serde_json::Value, color: &[u8]) {
+    let bytes = |plane: &str| -> Vec<u8> {
+        let hex = frame[plane].as_str().unwrap();
+        (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect()
+    };
+    let pixels = color.as_chunks::<3>().0;
+    match end {
+        "apng" | "webp" => assert_eq!(bytes("rgb"), color, "{end}: without loss"),
+        "gif" => {
+            let known: std::collections::BTreeSet<_> = pixels.iter().collect();
+            assert!(known.len() <= 256, "{} colours", known.len());
+            assert_eq!(bytes("rgb"), color, "so many are a palette");
+        }
+        "mp4" => {
+            // ITU-R BT.709, 8 bits, limited range: half of rounding, and what is left of constants in 65536ths.
+            let close = |found: u8, wanted: f64| assert!((f64::from(found) - wanted).abs() < 0.52, "{found} {wanted}");
+            let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
+            for (found, pixel) in bytes("y").into_iter().zip(pixels) {
+                close(found, 16.0 + 219.0 * luma(scaled(pixel)));
+            }
+            let width = usize::try_from(frame["size"][0].as_u64().unwrap()).unwrap();
+            for (k, (blue, red)) in bytes("u").into_iter().zip(bytes("v")).enumerate() {
+                let (x, y) = (2 * (k % (width / 2)), 2 * (k / (width / 2)));
+                let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dy, dx)| scaled(&pixels[(y + dy) * width + x + dx]));
+                let mean = [0, 1, 2].map(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0);
+                close(blue, 128.0 + 224.0 * (mean[2] - luma(mean)) / 1.8556);
+                close(red, 128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
+            }
+            assert_eq!(bytes("y").len(), pixels.len());
+            assert_eq!(bytes("u").len(), pixels.len() / 4);
+            assert_eq!(frame["colour"], serde_json::json!([1, 13, 1, "tv"]));
+        }
+        _ => panic!("{end}: say what its frames should be"),
+    }
+}
+
 #[test]
 fn an_animation_has_every_frame_at_its_time() {
-    use image::AnimationDecoder;
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.apng");
-    let cfg = RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) };
-    let (recorded, colors, _) = recorded(cfg);
-    assert_eq!(recorded.bytes, path.metadata().unwrap().len());
-    let decoder = image::codecs::png::PngDecoder::new(BufReader::new(std::fs::File::open(&path).unwrap())).unwrap();
-    let frames = decoder.apng().unwrap().into_frames().collect_frames().unwrap();
-    assert_eq!(frames.len(), colors.len());
-    for (frame, color) in frames.iter().zip(&colors) {
-        let (numerator, denominator) = frame.delay().numer_denom_ms();
-        // Five steps of 10 ms.
-        assert_eq!(numerator, 50 * denominator);
-        let shown: Vec<u8> = frame.buffer().pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        assert_eq!(&shown, color);
+    let Some(python) = python() else { return };
+    for (_, end) in animations() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("run.{end}"));
+        let cfg = RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) };
+        let (recorded, colors, _) = recorded(cfg);
+        assert_eq!(recorded.bytes, path.metadata().unwrap().len());
+        let found = said(&python, "read_animation.py", &path);
+        let frames = found["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), colors.len(), "{end}");
+        for (k, (frame, color)) in frames.iter().zip(&colors).enumerate() {
+            // Five steps of 10 ms.
+            assert_eq!((&frame["from"], &frame["until"]), (&(50 * k).into(), &(50 * (k + 1)).into()), "{end}: {k}");
+            check_animation(end, frame, color);
+        }
+        assert_ne!(colors[0], colors[3], "something moves");
     }
-    assert_ne!(colors[0], colors[3], "something moves");
 }
 
 #[test]
 fn an_animation_shows_one_camera_in_one_environment() {
+    for (format, end) in animations() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("run.{end}"));
+        let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
+        let error = World::new(2, 1).sim.record(cfg).unwrap_err();
+        assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
+        assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
+        // Without a topic, the first of each is taken.
+        let mut world = World::new(2, 1);
+        let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+        let streams: Vec<_> =
+            world.sim.observer(recorder).unwrap().streams().map(|s| (s.name.clone(), s.env_ids.clone())).collect();
+        assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
+        // A recording without a frame is no file.
+        let error = world.sim.finish_recording(recorder).unwrap_err().to_string();
+        assert!(error.contains("no frame"), "{}: {error}", format.name());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn pictures_that_a_format_does_not_have_are_said_at_the_start() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.apng");
-    let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
-    let error = World::new(2, 1).sim.record(cfg).unwrap_err();
-    assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
-    assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
-    // Without a topic, the first of each is taken.
-    let mut world = World::new(2, 1);
-    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
-    let streams: Vec<_> =
-        world.sim.observer(recorder).unwrap().streams().map(|s| (s.name.clone(), s.env_ids.clone())).collect();
-    assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
-    // A recording without a frame is no file.
-    assert!(world.sim.finish_recording(recorder).is_err());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let mut world = World::new(1, 1);
+    let odd = CameraCfg { width: 33, height: 24, ..CameraCfg::default() };
+    world.sim.add_sensor("odd", odd).unwrap();
+    let cfg = |end| RecorderCfg::new(folder.path().join(end)).with_topics([Topic::channel("odd", "color")]);
+    let error = world.sim.record(cfg("run.mp4")).unwrap_err();
+    assert!(matches!(error, RecordError::Size { width: 33, height: 24, .. }), "{error}");
+    assert!(error.to_string().contains("run.mp4") && error.to_string().contains("even numbers"), "{error}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was begun");
+    let recorder = world.sim.record(cfg("run.webp")).unwrap();
+    (0..PICTURE_EVERY).for_each(|step| world.step(step));
+    world.sim.finish_recording(recorder).unwrap();
 }

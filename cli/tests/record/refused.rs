@@ -2,6 +2,7 @@
 
 use super::support::World;
 use kinetoscope::prelude::*;
+use kinetoscope::record::Format;
 use std::fs;
 
 fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
@@ -10,14 +11,20 @@ fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
     (error, text)
 }
 
+/// A name for each format that is a file.
+fn files() -> impl Iterator<Item = String> {
+    let is_file = |format: &Format| *format != Format::Pictures;
+    Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
+}
+
 #[test]
 fn files_that_are_there_stay_as_they_are() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["run.mcap", "run.npz", "run.apng"] {
-        let path = folder.path().join(name);
+    for name in files() {
+        let path = folder.path().join(&name);
         fs::write(&path, "precious").unwrap();
         let (error, text) = refusal(RecorderCfg::new(&path));
-        assert!(matches!(error, RecordError::Exists { .. }) && text.contains(name), "{text}");
+        assert!(matches!(error, RecordError::Exists { .. }) && text.contains(&name), "{text}");
         assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
         // Replaced, if it may be, at the end.
         let mut world = World::new(1, 1);
@@ -27,10 +34,16 @@ fn files_that_are_there_stay_as_they_are() {
         world.sim.finish_recording(recorder).unwrap();
         assert_ne!(fs::read(&path).unwrap(), b"precious");
     }
-    let pictures = folder.path().join("pictures");
-    fs::create_dir(&pictures).unwrap();
-    fs::write(pictures.join("one"), "precious").unwrap();
-    assert!(matches!(refusal(RecorderCfg::new(&pictures)).0, RecordError::Exists { .. }));
+    for name in ["pictures"] {
+        let mine = folder.path().join(name);
+        fs::create_dir(&mine).unwrap();
+        fs::write(mine.join("one"), "precious").unwrap();
+        assert!(matches!(refusal(RecorderCfg::new(&mine)).0, RecordError::Exists { .. }));
+        // Whatever is allowed: it is no recorder's.
+        let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&mine) };
+        assert!(matches!(refusal(cfg).0, RecordError::Exists { .. }));
+        assert_eq!(fs::read_to_string(mine.join("one")).unwrap(), "precious");
+    }
 }
 
 #[test]
@@ -48,13 +61,13 @@ fn folders_where_nothing_can_be_written_are_an_error_at_the_start() {
     // Not even an administrator writes below a file.
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    for name in ["run.mcap", "run.npz", "run.apng", "pictures"] {
-        for place in [file.join(name), folder.path().join("missing").join(name)] {
-            if name == "pictures" && place.starts_with(folder.path().join("missing")) {
+    for name in files().chain(["pictures".into()]) {
+        for place in [file.join(&name), folder.path().join("missing").join(&name)] {
+            if !files().any(|file| file == name) && place.starts_with(folder.path().join("missing")) {
                 continue; // Folders of pictures are made.
             }
             let (error, text) = refusal(RecorderCfg::new(&place));
-            assert!(matches!(error, RecordError::File { .. }) && text.contains(name), "{text}");
+            assert!(matches!(error, RecordError::File { .. }) && text.contains(&name), "{text}");
         }
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was left");
@@ -77,7 +90,10 @@ fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
         (RecorderCfg { envs: Some(vec![EnvId(3)]), ..RecorderCfg::new(&path) }, vec!["environment 3"]),
         (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..RecorderCfg::new(&path) }, vec!["twice"]),
         (RecorderCfg { topics: vec![], ..RecorderCfg::new(&path) }, vec!["nothing to record"]),
-        (RecorderCfg::new(folder.path().join("run.mp4")), vec![".mp4", ".mcap", ".npz", ".apng"]),
+        (
+            RecorderCfg::new(folder.path().join("run.avi")),
+            vec![".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4"],
+        ),
         (
             RecorderCfg::new(folder.path().join("run.apng")).with_topics([Topic::JointStates("arm".into())]),
             vec!["no place", "JointStates"],

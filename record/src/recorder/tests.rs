@@ -89,8 +89,30 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
     let recorder = Recorder::start(sim, cfg, &mut |file| Box::new(FullDisk { file, left }))?;
     let recorder = sim.add_observer(recorder);
-    sim.update(3000);
+    sim.update(if sim.sensor_uids().is_empty() { 3000 } else { 60 });
     sim.finish_recording(recorder)
+}
+
+#[test]
+fn an_animation_on_a_full_disk_is_an_error_and_leaves_nothing() {
+    for (_, end) in Format::all().filter(|(format, _)| format.is_animation()) {
+        let seen = || {
+            let mut sim = falling(1);
+            let camera = CameraCfg { width: 64, height: 64, ..CameraCfg::default() };
+            sim.add_sensor("camera", CameraCfg { update_period: 0.05, ..camera }).unwrap();
+            sim
+        };
+        // What is buffered is written at the end at the latest.
+        for left in [0, 100, 900] {
+            let folder = tempfile::tempdir().unwrap();
+            let error =
+                record_to_a_full_disk(&mut seen(), &folder.path().join(format!("run.{end}")), left).unwrap_err();
+            assert!(error.to_string().contains("no space left"), "{end}: {error}");
+            assert!(matches!(error, RecordError::File { kept: None, .. }), "{end}: {error:?}");
+            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{end}");
+            record_to_a_full_disk(&mut seen(), &folder.path().join(format!("whole.{end}")), usize::MAX).unwrap();
+        }
+    }
 }
 
 #[test]

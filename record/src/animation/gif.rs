@@ -1,0 +1,82 @@
+//! Animated GIF: 256 colours in a frame, the best ones where there are more, and times in hundredths of a second.
+
+use super::{Encoder, Out, duration, rgb_of, sides};
+use gif::{Frame, Repeat};
+use std::io::{self, Write};
+
+struct Gif {
+    size: [u16; 2],
+    /// Writes into memory, which goes to the file after every frame.
+    encoder: Option<gif::Encoder<Vec<u8>>>,
+    rgb: Vec<u8>,
+}
+
+/// How coarsely the best colours are looked for where there are more than 256: 1 looks at all pixels, 30 at few. Faster than this
+/// is hardly faster, and shows.
+const COARSENESS: i32 = 10;
+
+pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
+    Ok(Box::new(Gif { size: sides(size, usize::from(u16::MAX))?, encoder: None, rgb: Vec::new() }))
+}
+
+impl Encoder for Gif {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+        let [width, height] = self.size;
+        if self.encoder.is_none() {
+            let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(io::Error::other)?;
+            encoder.set_repeat(Repeat::Infinite).map_err(io::Error::other)?;
+            self.encoder = Some(encoder);
+        }
+        let Some(encoder) = &mut self.encoder else { return Ok(()) };
+        rgb_of(rgba, &mut self.rgb);
+        let mut frame = Frame::from_rgb_speed(width, height, &self.rgb, COARSENESS);
+        frame.delay = u16::try_from(duration(shown, 100.0)).unwrap_or(u16::MAX);
+        encoder.write_frame(&frame).map_err(io::Error::other)?;
+        let written = encoder.get_mut();
+        out.write_all(written)?;
+        written.clear();
+        Ok(())
+    }
+
+    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
+        match self.encoder.take() {
+            Some(encoder) => out.write_all(&encoder.into_inner().map_err(io::Error::other)?),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use std::io::{BufWriter, Seek, SeekFrom};
+
+    #[test]
+    fn the_palette_of_many_colours_is_chosen_for_the_picture() {
+        let mut file = tempfile::tempfile().unwrap();
+        let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
+        let mut encoder = begin([64, 64]).unwrap();
+        // 4096 reds and greens, and nothing of what a palette for everything has room for beside them.
+        let rgba: Vec<u8> =
+            (0..64 * 64_u32).flat_map(|k| [(4 * (k % 64)) as u8, (4 * (k / 64)) as u8, 40, 255]).collect();
+        encoder.frame(&mut out, &rgba, [0.0, 0.25]).unwrap();
+        encoder.finish(&mut out).unwrap();
+        out.flush().unwrap();
+        file.seek(SeekFrom::Start(0)).unwrap();
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut decoder = options.read_info(&file).unwrap();
+        let frame = decoder.read_next_frame().unwrap().unwrap();
+        assert_eq!(frame.delay, 25);
+        let fixed = |x: u8, kept: u32| (u32::from(x >> (8 - kept)) * 255 / ((1 << kept) - 1)) as u8;
+        let of_all: Vec<u8> = rgba
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .flat_map(|p| [fixed(p[0], 3), fixed(p[1], 3), fixed(p[2], 2), 255])
+            .collect();
+        let error = |found: &[u8]| found.iter().zip(&rgba).map(|(a, b)| u64::from(a.abs_diff(*b))).sum::<u64>();
+        assert!(2 * error(&frame.buffer) < error(&of_all), "{} {}", error(&frame.buffer), error(&of_all));
+    }
+}

@@ -1,0 +1,458 @@
+//! Pictures as an H.264 stream (ITU-T H.264, constrained baseline), without loss but for the colour space: what has changed is
+//! sent as it is, what has not is not sent.
+//!
+//! A picture is made of squares of 16 x 16 pixels, each of them in one of three ways: as in the picture before (clause 7.3.4,
+//! skipped), as the last row above it or the last column beside it goes on (8.3.3, Intra_16x16 without a residual), or number by
+//! number (I_PCM). What a simulation shows mostly stands still, so that few are of the third kind.
+
+/// Side of a square \[pixels\].
+const SIDE: usize = 16;
+
+/// Pictures from one that stands alone to the next: where a player can begin.
+const GROUP: u32 = 120;
+
+/// Units of the stream (7.3.1), as MP4 files have them: without start codes.
+pub(super) struct Headers {
+    pub(super) sequence: Vec<u8>,
+    pub(super) picture: Vec<u8>,
+}
+
+/// One picture of the stream.
+pub(super) struct Coded<'c> {
+    /// The unit.
+    pub(super) unit: &'c [u8],
+    /// Whether it can be decoded without those before.
+    pub(super) alone: bool,
+}
+
+pub(super) struct Stream {
+    size: [usize; 2],
+    now: Planes,
+    before: Planes,
+    /// Pictures since the last one that stands alone.
+    since: u32,
+    /// How many stand alone.
+    groups: u32,
+    bits: Bits,
+    unit: Vec<u8>,
+    /// For the row of squares above and the one to the left: whether their numbers were sent one by one.
+    above: Vec<bool>,
+}
+
+/// A picture in Y'CbCr of BT.709 with limited range, the colours at half the resolution in the middle of four pixels.
+#[derive(Clone)]
+struct Planes {
+    /// Squares per row and rows of squares.
+    squares: [usize; 2],
+    /// Luma, then both kinds of chroma.
+    planes: [Vec<u8>; 3],
+}
+
+/// The largest pictures of level 5.1 and of level 6.2 (table A-1): squares, and squares of a side.
+const LEVELS: [(u8, usize, usize); 2] = [(51, 36_864, 543), (62, 139_264, 1_055)];
+
+/// The level that has pictures of this size; `None` where none has, or where a side is odd: four pixels share a colour.
+fn level(size: [usize; 2]) -> Option<u8> {
+    let squares = size.map(|side| side.div_ceil(SIDE));
+    let fits = |(_, all, side): &&(u8, usize, usize)| {
+        squares.iter().all(|count| count <= side) && squares[0] * squares[1] <= *all
+    };
+    let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
+    LEVELS.iter().find(fits).filter(|_| even).map(|(level, ..)| *level)
+}
+
+impl Stream {
+    /// For pictures of a width and height; what fits, where they do not.
+    pub(super) fn new(size: [usize; 2]) -> Result<(Self, Headers), String> {
+        let level = level(size).ok_or_else(|| {
+            let (_, all, side) = LEVELS[1];
+            let most = side * SIDE;
+            format!("even numbers would do for both, up to {most} pixels and {} in all", all * SIDE * SIDE)
+        })?;
+        let squares = size.map(|side| side.div_ceil(SIDE));
+        let planes = Planes::new(squares);
+        let stream = Self {
+            size,
+            before: planes.clone(),
+            now: planes,
+            since: 0,
+            groups: 0,
+            bits: Bits::default(),
+            unit: Vec::new(),
+            above: vec![false; squares[0]],
+        };
+        Ok((stream, Headers { sequence: sequence(size, level), picture: picture() }))
+    }
+
+    /// The next picture, of red, green, blue and opacity, which is left out.
+    pub(super) fn code(&mut self, rgba: &[u8]) -> Coded<'_> {
+        std::mem::swap(&mut self.now, &mut self.before);
+        self.now.fill(rgba, self.size);
+        let alone = self.since == 0;
+        self.slice(alone);
+        self.since = (self.since + 1) % GROUP;
+        Coded { unit: &self.unit, alone }
+    }
+
+    fn slice(&mut self, alone: bool) {
+        let Self { now, before, bits, above, .. } = self;
+        bits.clear();
+        bits.ue(0); // first_mb_in_slice
+        bits.ue(if alone { 7 } else { 5 }); // slice_type: all I, all P
+        bits.ue(0); // pic_parameter_set_id
+        bits.put(self.since % 16, 4); // frame_num
+        if alone {
+            bits.ue(self.groups % 2); // idr_pic_id: not that of the one before
+            self.groups += 1;
+            bits.put(0, 2); // no_output_of_prior_pics_flag, long_term_reference_flag
+        } else {
+            bits.put(0, 1); // num_ref_idx_active_override_flag
+            bits.put(0, 1); // ref_pic_list_modification_flag_l0
+            bits.put(0, 1); // adaptive_ref_pic_marking_mode_flag
+        }
+        bits.se(0); // slice_qp_delta
+        bits.ue(1); // disable_deblocking_filter_idc: what is sent is what is shown
+        // In P slices the types of intra squares come after five others (table 7-13).
+        let first_type = if alone { 0 } else { 5 };
+        let mut skipped = 0;
+        let [columns, rows] = now.squares;
+        above.fill(false);
+        for row in 0..rows {
+            let mut left = false;
+            for column in 0..columns {
+                let place = [column, row];
+                if !alone && now.same(before, place) {
+                    skipped += 1;
+                    (above[column], left) = (false, false);
+                    continue;
+                }
+                if !alone {
+                    bits.ue(skipped); // mb_skip_run
+                    skipped = 0;
+                }
+                let goes_on = [Way::Down, Way::Across].into_iter().find(|way| now.goes_on(*way, place));
+                if let Some(way) = goes_on {
+                    // Intra_16x16 without coefficients (table 7-11): the mode, then that of chroma (table 7-16).
+                    let (luma, chroma) = match way {
+                        Way::Down => (0, 2),
+                        Way::Across => (1, 1),
+                    };
+                    bits.ue(first_type + 1 + luma);
+                    bits.ue(chroma);
+                    bits.se(0); // mb_qp_delta
+                    // No coefficient, in the code that the neighbours call for (9.2.1): those of I_PCM count as 16.
+                    let known = [(column > 0).then_some(left), (row > 0).then_some(above[column])];
+                    let count = |sent: bool| if sent { 16 } else { 0 };
+                    let context = match known {
+                        [Some(left), Some(above)] => (count(left) + count(above) + 1) / 2,
+                        [one, other] => one.or(other).map_or(0, count),
+                    };
+                    match context {
+                        0 => bits.put(1, 1),
+                        // Of eight and more, six bits.
+                        _ => bits.put(0b000011, 6),
+                    }
+                } else {
+                    bits.ue(first_type + 25); // I_PCM
+                    bits.align();
+                    now.put(place, bits);
+                }
+                (above[column], left) = (goes_on.is_none(), goes_on.is_none());
+            }
+        }
+        if skipped > 0 {
+            bits.ue(skipped);
+        }
+        bits.end();
+        self.unit.clear();
+        // nal_ref_idc 3; a picture that stands alone, or one that does not.
+        self.unit.push(if alone { 0x65 } else { 0x61 });
+        escape(&self.bits.bytes, &mut self.unit);
+    }
+}
+
+/// From where a square is continued.
+#[derive(Clone, Copy)]
+enum Way {
+    /// From the row above.
+    Down,
+    /// From the column to the left.
+    Across,
+}
+
+impl Planes {
+    fn new(squares: [usize; 2]) -> Self {
+        let luma = squares[0] * squares[1] * SIDE * SIDE;
+        Self { squares, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
+    }
+
+    /// Side of a square in a plane, and length of its rows.
+    fn shape(&self, plane: usize) -> (usize, usize) {
+        let side = if plane == 0 { SIDE } else { SIDE / 2 };
+        (side, side * self.squares[0])
+    }
+
+    /// Takes a picture; beyond its edges, which nobody sees, its last pixels go on.
+    fn fill(&mut self, rgba: &[u8], [width, height]: [usize; 2]) {
+        let pixels = rgba.as_chunks::<4>().0;
+        let [columns, rows] = self.squares.map(|count| count * SIDE / 2);
+        let (stride, half) = (2 * columns, columns);
+        for row in 0..rows {
+            for column in 0..columns {
+                let mut sums = [0_i32; 3];
+                for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    let (y, x) = (2 * row + dy, 2 * column + dx);
+                    let at = y.min(height - 1) * width + x.min(width - 1);
+                    let rgb = pixels.get(at).map_or([0; 3], |p| [p[0], p[1], p[2]].map(i32::from));
+                    self.planes[0][y * stride + x] = luma(rgb);
+                    sums.iter_mut().zip(rgb).for_each(|(sum, one)| *sum += one);
+                }
+                let [blue, red] = chroma(sums);
+                self.planes[1][row * half + column] = blue;
+                self.planes[2][row * half + column] = red;
+            }
+        }
+    }
+
+    /// The rows of a square in a plane.
+    fn rows(&self, plane: usize, [column, row]: [usize; 2]) -> impl Iterator<Item = &[u8]> {
+        let (side, stride) = self.shape(plane);
+        (0..side).map(move |k| &self.planes[plane][(row * side + k) * stride + column * side..][..side])
+    }
+
+    fn same(&self, other: &Self, place: [usize; 2]) -> bool {
+        (0..3).all(|plane| self.rows(plane, place).eq(other.rows(plane, place)))
+    }
+
+    /// Whether a square is what its neighbour's edge continues to, in all planes.
+    fn goes_on(&self, way: Way, [column, row]: [usize; 2]) -> bool {
+        let place = [column, row];
+        (0..3).all(|plane| {
+            let (side, stride) = self.shape(plane);
+            let (x, y) = (column * side, row * side);
+            match way {
+                Way::Down => {
+                    y > 0 && {
+                        let edge = &self.planes[plane][(y - 1) * stride + x..][..side];
+                        self.rows(plane, place).all(|row| row == edge)
+                    }
+                }
+                Way::Across => {
+                    x > 0 && {
+                        let mut rows = self.rows(plane, place).enumerate();
+                        rows.all(|(k, row)| row.iter().all(|one| *one == self.planes[plane][(y + k) * stride + x - 1]))
+                    }
+                }
+            }
+        })
+    }
+
+    fn put(&self, place: [usize; 2], bits: &mut Bits) {
+        for plane in 0..3 {
+            self.rows(plane, place).for_each(|row| bits.bytes.extend_from_slice(row));
+        }
+    }
+}
+
+/// BT.709 (0.2126 R + 0.7152 G + 0.0722 B) from 16 to 235, in 65536ths.
+fn luma([red, green, blue]: [i32; 3]) -> u8 {
+    ((11_966 * red + 40_254 * green + 4_064 * blue + (16 << 16) + (1 << 15)) >> 16) as u8
+}
+
+/// The differences of blue and red to luma from 16 to 240, of sums of four pixels.
+fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {
+    let middle = (128 << 18) + (1 << 17);
+    let cb = -6_596 * red - 22_189 * green + 28_785 * blue + middle;
+    let cr = 28_784 * red - 26_145 * green - 2_639 * blue + middle;
+    [(cb >> 18) as u8, (cr >> 18) as u8]
+}
+
+/// The sequence parameter set (7.3.2.1.1).
+fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
+    let squares = [width, height].map(|side| side.div_ceil(SIDE) as u32);
+    let mut bits = Bits::default();
+    bits.put(66, 8); // profile_idc: baseline
+    bits.put(0b1100_0000, 8); // constrained: also main
+    bits.put(level.into(), 8);
+    bits.ue(0); // seq_parameter_set_id
+    bits.ue(0); // log2_max_frame_num_minus4
+    bits.ue(2); // pic_order_cnt_type: shown in the order of the stream
+    bits.ue(1); // max_num_ref_frames
+    bits.put(0, 1); // gaps_in_frame_num_value_allowed_flag
+    squares.iter().for_each(|count| bits.ue(count - 1));
+    bits.put(1, 1); // frame_mbs_only_flag
+    bits.put(1, 1); // direct_8x8_inference_flag
+    bits.put(1, 1); // frame_cropping_flag
+    // Left, right, top, bottom, in units of two pixels.
+    let beyond = |count: u32, side: usize| (count * SIDE as u32 - side as u32) / 2;
+    for cut in [0, beyond(squares[0], width), 0, beyond(squares[1], height)] {
+        bits.ue(cut);
+    }
+    bits.put(1, 1); // vui_parameters_present_flag (annex E)
+    bits.put(0, 2); // aspect_ratio_info_present_flag, overscan_info_present_flag
+    bits.put(1, 1); // video_signal_type_present_flag
+    bits.put(5, 3); // video_format: not specified
+    bits.put(0, 1); // video_full_range_flag
+    bits.put(1, 1); // colour_description_present_flag
+    // Primaries and matrix of BT.709; the curve of sRGB.
+    [1, 13, 1].into_iter().for_each(|code| bits.put(code, 8));
+    bits.put(1, 1); // chroma_loc_info_present_flag
+    bits.ue(1); // in the middle of four pixels
+    bits.ue(1);
+    bits.put(0, 4); // timing_info, nal_hrd, vcl_hrd, pic_struct: not there
+    bits.put(1, 1); // bitstream_restriction_flag
+    bits.put(1, 1); // motion_vectors_over_pic_boundaries_flag
+    // No limits of bytes and bits; vectors of 0; nothing is shown later than it comes; one picture is kept.
+    [0, 0, 0, 0, 0, 1].into_iter().for_each(|number| bits.ue(number));
+    bits.end();
+    unit(0x67, &bits)
+}
+
+/// The picture parameter set (7.3.2.2).
+fn picture() -> Vec<u8> {
+    let mut bits = Bits::default();
+    bits.ue(0); // pic_parameter_set_id
+    bits.ue(0); // seq_parameter_set_id
+    bits.put(0, 2); // entropy_coding_mode_flag: CAVLC; bottom_field_pic_order_in_frame_present_flag
+    [0, 0, 0].into_iter().for_each(|number| bits.ue(number)); // slice groups, reference indices
+    bits.put(0, 3); // weighted_pred_flag, weighted_bipred_idc
+    (0..3).for_each(|_| bits.se(0)); // quantizers
+    bits.put(0b100, 3); // deblocking_filter_control_present_flag; constrained_intra_pred, redundant_pic_cnt: not
+    bits.end();
+    unit(0x68, &bits)
+}
+
+fn unit(head: u8, bits: &Bits) -> Vec<u8> {
+    let mut unit = vec![head];
+    escape(&bits.bytes, &mut unit);
+    unit
+}
+
+/// Puts a 3 into what would look like the beginning of a unit (7.4.1).
+fn escape(bytes: &[u8], to: &mut Vec<u8>) {
+    let mut zeros = 0;
+    for &byte in bytes {
+        if zeros == 2 && byte <= 3 {
+            to.push(3);
+            zeros = 0;
+        }
+        to.push(byte);
+        zeros = if byte == 0 { zeros + 1 } else { 0 };
+    }
+}
+
+/// Bits, the highest of a byte first.
+#[derive(Default)]
+struct Bits {
+    bytes: Vec<u8>,
+    /// How many bits of the last byte are free.
+    free: u32,
+}
+
+impl Bits {
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.free = 0;
+    }
+
+    /// The lowest `count` bits of a number.
+    fn put(&mut self, number: u32, count: u32) {
+        for k in (0..count).rev() {
+            if self.free == 0 {
+                self.bytes.push(0);
+                self.free = 8;
+            }
+            self.free -= 1;
+            if let Some(last) = self.bytes.last_mut() {
+                *last |= ((number >> k & 1) as u8) << self.free;
+            }
+        }
+    }
+
+    /// A number as an Exp-Golomb code (9.1): as many zeros as it has bits behind its first, when one is added.
+    fn ue(&mut self, number: u32) {
+        let length = 32 - (number + 1).leading_zeros();
+        self.put(0, length - 1);
+        self.put(number + 1, length);
+    }
+
+    /// The same with a sign (9.1.1).
+    fn se(&mut self, number: i32) {
+        let twice = 2 * number.unsigned_abs();
+        self.ue(if number > 0 { twice - 1 } else { twice });
+    }
+
+    /// Zeros up to the next byte.
+    fn align(&mut self) {
+        self.free = 0;
+    }
+
+    /// A one, then zeros up to the next byte.
+    fn end(&mut self) {
+        self.put(1, 1);
+        self.align();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_codes_of_the_standard() {
+        // Table 9-2: 1, 010, 011, 00100, 00101, ...
+        let mut bits = Bits::default();
+        [0, 1, 2, 3, 4].into_iter().for_each(|number| bits.ue(number));
+        assert_eq!(bits.bytes, [0b1010_0110, 0b0100_0010, 0b1000_0000]);
+        // Table 9-3: 0, 1, -1 are the codes of 0, 1, 2.
+        let mut signed = Bits::default();
+        [0, 1, -1].into_iter().for_each(|number| signed.se(number));
+        assert_eq!(signed.bytes, [0b1010_0110]);
+    }
+
+    #[test]
+    fn nothing_in_a_unit_looks_like_its_beginning() {
+        let mut unit = Vec::new();
+        escape(&[0, 0, 1, 0, 0, 0, 0, 0, 4], &mut unit);
+        assert_eq!(unit, [0, 0, 3, 1, 0, 0, 3, 0, 0, 3, 0, 4]);
+    }
+
+    #[test]
+    fn grey_has_no_colour_and_black_and_white_are_the_ends() {
+        for grey in 0..=255 {
+            assert_eq!(chroma([4 * grey; 3]), [128, 128], "{grey}");
+        }
+        assert_eq!([luma([0; 3]), luma([255; 3])], [16, 235]);
+        // Pure blue and pure red are the ends of their differences.
+        assert_eq!([chroma([0, 0, 1020])[0], chroma([1020, 0, 0])[1]], [240, 240]);
+        assert_eq!([chroma([1020, 1020, 0])[0], chroma([0, 1020, 1020])[1]], [16, 16]);
+    }
+
+    #[test]
+    fn what_stands_still_is_not_sent() {
+        let size = [64, 48];
+        let (mut stream, _) = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let noise = |seed: u32| -> Vec<u8> {
+            (0..4 * 64 * 48_u32).map(|k| ((k ^ seed).wrapping_mul(2_654_435_761) >> 24) as u8).collect()
+        };
+        let first = stream.code(&noise(0)).unit.len();
+        assert!(first > 64 * 48 * 3 / 2, "everything is sent: {first}");
+        let again = stream.code(&noise(0));
+        assert!(!again.alone && again.unit.len() < 16, "{}", again.unit.len());
+        assert!(stream.code(&noise(1)).unit.len() > 64 * 48 * 3 / 2);
+        // A flat picture needs one square.
+        let (mut flat, _) = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let flat = flat.code(&[90; 4 * 64 * 48]).unit.len();
+        assert!((384..500).contains(&flat), "{flat}");
+    }
+
+    #[test]
+    fn sizes_that_no_stream_has_are_said() {
+        for size in [[33, 24], [0, 2], [2, 16_882], [16_880, 4_096]] {
+            assert!(Stream::new(size).is_err_and(|fits| fits.contains("even")), "{size:?}");
+        }
+        for size in [[2, 2], [640, 480], [16_880, 16], [4096, 4096]] {
+            assert!(Stream::new(size).is_ok(), "{size:?}");
+        }
+    }
+}

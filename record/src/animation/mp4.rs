@@ -1,0 +1,159 @@
+//! MP4 (ISO/IEC 14496-12, its video as in 14496-15): the pictures one after the other, then where each of them is and how long it
+//! is shown. Without that nobody can read it: it comes at the end.
+
+use super::h264::{Headers, Stream};
+use super::{Encoder, Out, duration};
+use std::io::{self, Seek, SeekFrom, Write};
+
+/// Units of time in a second: whole ones for a frame at 24, 25, 30, 50, 60, 100 per second.
+const PER_SECOND: u32 = 90_000;
+
+struct Mp4 {
+    size: [usize; 2],
+    stream: Stream,
+    headers: Headers,
+    frames: Vec<Sample>,
+    /// Where the length of the data is to be written.
+    length_at: u64,
+    /// Where the next picture comes.
+    at: u64,
+}
+
+struct Sample {
+    at: u64,
+    bytes: u32,
+    duration: u32,
+    alone: bool,
+}
+
+pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
+    let (stream, headers) = Stream::new(size)?;
+    Ok(Box::new(Mp4 { size, stream, headers, frames: Vec::new(), length_at: 0, at: 0 }))
+}
+
+/// What every box begins with: its length, with itself, and its kind.
+fn boxed(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
+    let length = 8 + parts.iter().map(|part| part.len()).sum::<usize>();
+    // The largest one has some bytes for each frame.
+    let mut all = u32::try_from(length).unwrap_or(u32::MAX).to_be_bytes().to_vec();
+    all.extend_from_slice(kind);
+    parts.iter().for_each(|part| all.extend_from_slice(part));
+    all
+}
+
+/// A box with a version and flags.
+fn full(kind: &[u8; 4], version: u8, flags: u32, parts: &[&[u8]]) -> Vec<u8> {
+    let mut head = flags.to_be_bytes();
+    head[0] = version;
+    boxed(kind, &[&[&head[..]], parts].concat())
+}
+
+/// Numbers one after the other, highest byte first.
+fn words<const B: usize>(numbers: impl IntoIterator<Item = [u8; B]>) -> Vec<u8> {
+    numbers.into_iter().flatten().collect()
+}
+
+fn u32s(numbers: &[u32]) -> Vec<u8> {
+    words(numbers.iter().map(|number| number.to_be_bytes()))
+}
+
+/// No rotation, no scale, in fixed point.
+const UPRIGHT: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
+
+impl Mp4 {
+    /// Everything about the pictures (8.2).
+    fn about(&self) -> Vec<u8> {
+        let length: u64 = self.frames.iter().map(|frame| u64::from(frame.duration)).sum();
+        let length = length.to_be_bytes();
+        // Made and changed at no time that is told: the same recording is the same file.
+        let never = [0; 16];
+        let scale = PER_SECOND.to_be_bytes();
+        let [upright, next] = [u32s(&UPRIGHT), u32s(&[2])];
+        let loudness = u32s(&[1 << 16, 1 << 24, 0, 0]);
+        let header = full(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
+        let sides = u32s(&self.size.map(|side| (side as u32) << 16));
+        // Enabled, in the film, in its preview; the first track.
+        let track = full(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
+        // The language is undetermined: `und` in five bits each.
+        let media = full(b"mdhd", 1, 0, &[&never, &scale, &length, &[0x55, 0xc4, 0, 0]]);
+        let handler = full(b"hdlr", 0, 0, &[&[0; 4], b"vide", &[0; 12], b"video\0"]);
+        let here = full(b"dref", 0, 0, &[&u32s(&[1]), &full(b"url ", 0, 1, &[])]);
+        let video = full(b"vmhd", 0, 1, &[&[0; 8]]);
+        let info = boxed(b"minf", &[&video, &boxed(b"dinf", &[&here]), &self.table()]);
+        let track = boxed(b"trak", &[&track, &boxed(b"mdia", &[&media, &handler, &info])]);
+        boxed(b"moov", &[&header, &track])
+    }
+
+    /// The table of samples (8.5).
+    fn table(&self) -> Vec<u8> {
+        let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX).to_be_bytes();
+        let mut shown: Vec<[u32; 2]> = Vec::new();
+        for frame in &self.frames {
+            match shown.last_mut() {
+                Some([frames, duration]) if *duration == frame.duration => *frames += 1,
+                _ => shown.push([1, frame.duration]),
+            }
+        }
+        let times = words(shown.iter().flatten().map(|number| number.to_be_bytes()));
+        let times = full(b"stts", 0, 0, &[&count(shown.len()), &times]);
+        let alone: Vec<u32> = (1..).zip(&self.frames).filter(|(_, frame)| frame.alone).map(|(k, _)| k).collect();
+        let alone = full(b"stss", 0, 0, &[&count(alone.len()), &u32s(&alone)]);
+        // Each picture is a chunk of its own.
+        let chunks = full(b"stsc", 0, 0, &[&u32s(&[1, 1, 1, 1])]);
+        let sizes = words(self.frames.iter().map(|frame| frame.bytes.to_be_bytes()));
+        let sizes = full(b"stsz", 0, 0, &[&[0; 4], &count(self.frames.len()), &sizes]);
+        let places = words(self.frames.iter().map(|frame| frame.at.to_be_bytes()));
+        let places = full(b"co64", 0, 0, &[&count(self.frames.len()), &places]);
+        let kinds = full(b"stsd", 0, 0, &[&u32s(&[1]), &self.kind()]);
+        boxed(b"stbl", &[&kinds, &times, &alone, &chunks, &sizes, &places])
+    }
+
+    /// What the pictures are.
+    fn kind(&self) -> Vec<u8> {
+        let Headers { sequence, picture } = &self.headers;
+        let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
+        // Lengths of units have four bytes; one unit of each kind. Profile and level are as the first says.
+        let profile = sequence.get(1..4).unwrap_or_default();
+        let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(picture), picture];
+        let avc = boxed(b"avcC", &avc);
+        // Primaries, curve and matrix as in the stream, limited range.
+        let color = boxed(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
+        let sides = words(self.size.map(|side| (side as u16).to_be_bytes()));
+        let inch = u32s(&[72 << 16, 72 << 16, 0]);
+        let head: [&[u8]; 8] = [&[0; 6], &[0, 1], &[0; 16], &sides, &inch, &[0, 1], &[0; 32], &[0, 24, 0xff, 0xff]];
+        boxed(b"avc1", &[&head[..], &[&avc, &color]].concat())
+    }
+}
+
+impl Encoder for Mp4 {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+        if self.frames.is_empty() {
+            let brands = boxed(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
+            out.write_all(&brands)?;
+            // With a length of eight bytes, which is not known yet.
+            out.write_all(&u32s(&[1]))?;
+            out.write_all(b"mdat\0\0\0\0\0\0\0\0")?;
+            self.length_at = brands.len() as u64 + 8;
+            self.at = self.length_at + 8;
+        }
+        let coded = self.stream.code(rgba);
+        let too_large = |_| io::Error::other("a picture is too large for MP4");
+        let length = u32::try_from(coded.unit.len()).map_err(too_large)?;
+        out.write_all(&length.to_be_bytes())?;
+        out.write_all(coded.unit)?;
+        let duration = duration(shown, PER_SECOND.into());
+        let too_long = |_| io::Error::other("a picture is shown for longer than 13 hours");
+        let duration = u32::try_from(duration).map_err(too_long)?;
+        let bytes = length.checked_add(4).ok_or_else(|| io::Error::other("a picture is too large for MP4"))?;
+        self.frames.push(Sample { at: self.at, bytes, duration, alone: coded.alone });
+        self.at += u64::from(bytes);
+        Ok(())
+    }
+
+    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
+        out.write_all(&self.about())?;
+        out.seek(SeekFrom::Start(self.length_at))?;
+        // With its head of sixteen bytes.
+        out.write_all(&(self.at - self.length_at + 8).to_be_bytes())
+    }
+}
