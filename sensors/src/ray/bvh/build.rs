@@ -1,179 +1,422 @@
-//! Builds the tree: the surface area heuristic over bins, two children at a time, then eight.
+//! Builds the tree. Boxes are sorted along a Morton curve; those that lie together on it become groups. Above groups the
+//! surface area heuristic chooses from planes between bins, two children at a time, within them from the places between
+//! neighbours on the curve. Eight such children are a node.
 //!
-//! Source: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007.
+//! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH construction
+//! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
-use std::ops::Range;
 
-const BINS: usize = 16;
+/// Bins along an axis, of some groups and of many: with few, clearing and summing up bins takes longer than filling them.
+const SOME_BINS: usize = 8;
+const MANY_BINS: usize = 16;
+const MANY: usize = 32;
+/// No more groups than these are cut between neighbours, as things are.
+const FEW: usize = 8;
+/// Things of a group, at most.
+const GROUP: usize = 16;
 /// Things of a leaf, at most.
 const LEAF: usize = 4;
 /// What passing a node costs, in tests of one thing. A wide node is shared by several binary ones.
 const NODE_COST: f32 = 0.6;
 /// Deeper than this, halves of equal number: things that are spread over many orders of magnitude.
 const MAX_DEPTH: u32 = 48;
+/// Bits of a coordinate on the curve.
+const BITS: u32 = 10;
+/// What is added to it, between 0 and 2^22, has its whole number in the last bits: no instruction is needed to round.
+const TO_BITS: f32 = 12_582_912.0;
 
-const NOTHING: Aabb = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+/// Three numbers in a register of four.
+type Quad = [f32; 4];
 
-/// A node with two children, or a leaf.
-struct Binary {
-    bounds: Aabb,
-    /// The second child; the first one follows its parent. `None` for a leaf.
-    second: Option<usize>,
-    items: Range<usize>,
+/// A box.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    lo: Quad,
+    hi: Quad,
 }
 
-struct Builder<'a> {
-    boxes: &'a [Aabb],
-    middles: Vec<[f32; 3]>,
-    order: Vec<u32>,
-    tree: Vec<Binary>,
+/// The box of a thing, or of a group: the last places hold which it is (as bits), and how many things it is.
+type Item = Bounds;
+
+const NOTHING: Bounds = Bounds { lo: [f32::INFINITY; 4], hi: [f32::NEG_INFINITY; 4] };
+
+#[inline(always)]
+fn quad(f: impl Fn(usize) -> f32) -> Quad {
+    std::array::from_fn(f)
+}
+
+impl Bounds {
+    fn item(lo: [f32; 3], hi: [f32; 3], number: u32, count: u32) -> Self {
+        Self { lo: [lo[0], lo[1], lo[2], f32::from_bits(number)], hi: [hi[0], hi[1], hi[2], count as f32] }
+    }
+
+    fn number(&self) -> u32 {
+        self.lo[3].to_bits()
+    }
+
+    /// The box around both. Plain comparisons: those of the library look for what is no number.
+    #[inline(always)]
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            lo: quad(|k| if self.lo[k] < other.lo[k] { self.lo[k] } else { other.lo[k] }),
+            hi: quad(|k| if self.hi[k] > other.hi[k] { self.hi[k] } else { other.hi[k] }),
+        }
+    }
+
+    fn around(all: &[Self]) -> Self {
+        all.iter().fold(NOTHING, |sum, one| sum.with(one))
+    }
+
+    #[inline(always)]
+    fn middle(&self) -> Quad {
+        quad(|k| 0.5 * self.lo[k] + 0.5 * self.hi[k])
+    }
+
+    /// Half the surface.
+    #[inline(always)]
+    fn area(&self) -> f32 {
+        let [x, y, z, _] = quad(|k| self.hi[k] - self.lo[k]);
+        x * y + y * z + z * x
+    }
+}
+
+/// What tells in which of `count` cells along each axis of a box a point is.
+#[derive(Clone, Copy, Debug)]
+struct Cells<const N: usize> {
+    base: Quad,
+    /// 0 where the box has no length that counts.
+    scale: Quad,
+}
+
+impl<const N: usize> Cells<N> {
+    fn of(within: &Bounds) -> Self {
+        // The last point of the box is in the last cell.
+        let scale = quad(|k| (N as f32 * (1.0 - 1e-6)) / (within.hi[k] - within.lo[k]));
+        Self { base: within.lo, scale: scale.map(|x| if x.is_finite() { x } else { 0.0 }) }
+    }
+
+    #[inline(always)]
+    fn along(&self, axis: usize, x: f32) -> u32 {
+        ((x - self.base[axis]) * self.scale[axis] - 0.5 + TO_BITS).to_bits() & (N as u32 - 1)
+    }
+
+    #[inline(always)]
+    fn at(&self, point: Quad) -> [u32; 4] {
+        std::array::from_fn(|k| self.along(k, point[k]))
+    }
+}
+
+/// Some things that belong together.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    bounds: Bounds,
+    start: u32,
+    end: u32,
+    depth: u32,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// Groups: a range of those.
+    Groups,
+    /// Things: a range of the order.
+    Things,
+    /// Things that stay together.
+    Leaf,
+}
+
+impl Part {
+    /// Its first `count` and the rest.
+    #[inline(always)]
+    fn cut(&self, count: usize, [near, far]: [Bounds; 2]) -> [Self; 2] {
+        let (at, depth) = (self.start + count as u32, self.depth + 1);
+        [Self { bounds: near, end: at, depth, ..*self }, Self { bounds: far, start: at, depth, ..*self }]
+    }
+}
+
+struct Builder {
+    /// Along the curve.
+    things: Vec<Item>,
+    groups: Vec<Item>,
+    /// Where each group's things begin; and the end.
+    starts: Vec<u32>,
+    /// What a cut moves.
+    aside: Vec<Item>,
+    nodes: Vec<Node>,
+    pad: f32,
 }
 
 impl Bvh {
     /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
     pub(crate) fn build(boxes: &[Aabb]) -> (Self, Vec<u32>) {
-        let middle = |b: &Aabb| [0, 1, 2].map(|k| 0.5 * b[0][k] + 0.5 * b[1][k]);
-        let order = (0..u32::try_from(boxes.len()).unwrap_or(u32::MAX)).collect();
-        let mut builder = Builder { boxes, middles: boxes.iter().map(middle).collect(), order, tree: Vec::new() };
         if boxes.is_empty() {
             return (Self { nodes: Vec::new(), bounds: [[0.0; 3]; 2] }, Vec::new());
         }
-        builder.split(0..boxes.len(), 0);
-        let Builder { order, tree, .. } = builder;
-        let whole = tree[0].bounds;
-        let reach = whole.iter().flatten().fold(0.0f64, |m, &x| m.max(f64::from(x).abs()));
+        let unsorted: Vec<Item> = (0..).zip(boxes).map(|(k, [lo, hi])| Item::item(*lo, *hi, k, 1)).collect();
+        let bounds = Bounds::around(&unsorted);
+        let keys = curve(&unsorted, &bounds);
+        let things: Vec<Item> = keys.iter().map(|&key| unsorted[key as u32 as usize]).collect();
+        let mut starts = Vec::with_capacity(boxes.len() / 4 + 2);
+        group(&keys, 0, 31 + 3 * BITS, &mut starts);
+        starts.push(boxes.len() as u32);
+        let groups: Vec<Item> = (0..)
+            .zip(starts.windows(2))
+            .map(|(k, range)| {
+                let around = Bounds::around(&things[range[0] as usize..range[1] as usize]);
+                let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
+                Item::item([a, b, c], [d, e, f], k, range[1] - range[0])
+            })
+            .collect();
+        let [lo, hi] = [bounds.lo, bounds.hi].map(|q| [0, 1, 2].map(|k| f64::from(q[k])));
+        let reach = lo.iter().chain(&hi).fold(0.0f64, |m, x| m.max(x.abs()));
         let pad = reach * PAD;
-        let mut bvh = Self {
-            nodes: Vec::new(),
-            bounds: [whole[0].map(|x| f64::from(x) - pad), whole[1].map(|x| f64::from(x) + pad)],
-        };
-        bvh.widen(&tree, 0, pad);
-        (bvh, order)
+        let nodes = Vec::with_capacity(boxes.len() / 4 + 1);
+        let aside = groups.clone();
+        let all = Part { bounds, start: 0, end: groups.len() as u32, depth: 0, kind: Kind::Groups };
+        // Rounding a side takes up to u R off a pad of 16 u R.
+        let mut builder = Builder { things, groups, starts, aside, nodes, pad: (pad * (1.0 + 1.0 / 16.0)) as f32 };
+        builder.add([all; 2], 1);
+        let Builder { things, nodes, .. } = builder;
+        let order = things.iter().map(Item::number).collect();
+        (Self { nodes, bounds: [lo.map(|x| x - pad), hi.map(|x| x + pad)] }, order)
     }
+}
 
-    /// Adds the wide node of a binary one; returns its index.
-    fn widen(&mut self, tree: &[Binary], root: usize, pad: f64) -> u32 {
-        let mut children = vec![root];
-        // Opens the largest child until there are eight.
-        while children.len() < WIDE {
-            let largest = (0..children.len())
-                .filter(|&k| tree[children[k]].second.is_some())
-                .max_by(|&a, &b| area(&tree[children[a]].bounds).total_cmp(&area(&tree[children[b]].bounds)));
-            let Some(k) = largest else { break };
-            let open = children[k];
-            children[k] = open + 1;
-            children.extend(tree[open].second);
+/// The items by their middles' places on the Morton curve: places in the upper half of each number, indices in the lower.
+fn curve(items: &[Item], bounds: &Bounds) -> Vec<u64> {
+    let cells = Cells::<{ 1 << BITS }>::of(bounds);
+    let spread = |x: u32| {
+        let x = (x | x << 16) & 0x0300_00ff;
+        let x = (x | x << 8) & 0x0300_f00f;
+        let x = (x | x << 4) & 0x030c_30c3;
+        (x | x << 2) & 0x0924_9249
+    };
+    let key = |(index, item): (u64, &Item)| {
+        let [x, y, z, _] = cells.at(item.middle());
+        u64::from(spread(x) | spread(y) << 1 | spread(z) << 2) << 32 | index
+    };
+    let mut keys: Vec<u64> = (0..).zip(items).map(key).collect();
+    // Sorted digit by digit: a part of what comparing them takes.
+    const DIGITS: usize = 1 << BITS;
+    let digit = |key: u64, pass: u32| (key >> (32 + BITS * pass)) as usize % DIGITS;
+    let mut places = [[0u32; DIGITS]; 3];
+    for &key in &keys {
+        for (pass, places) in (0..).zip(&mut places) {
+            places[digit(key, pass)] += 1;
+        }
+    }
+    let mut sorted = vec![0; keys.len()];
+    for (pass, places) in (0..).zip(&mut places) {
+        let mut sum = 0;
+        for place in places.iter_mut() {
+            (*place, sum) = (sum, sum + *place);
+        }
+        for &key in &keys {
+            let place = &mut places[digit(key, pass)];
+            sorted[*place as usize] = key;
+            *place += 1;
+        }
+        std::mem::swap(&mut keys, &mut sorted);
+    }
+    keys
+}
+
+/// Where the groups of sorted keys begin: the largest cells of the curve, in halves by one bit after the other, that hold no
+/// more than a group may.
+fn group(keys: &[u64], first: u32, bit: u32, starts: &mut Vec<u32>) {
+    if keys.len() <= GROUP {
+        if !keys.is_empty() {
+            starts.push(first);
+        }
+        return;
+    }
+    // All at one place: halves of equal number.
+    let at = if bit < 32 { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
+    let (low, high) = keys.split_at(at);
+    let next = bit.max(32) - 1;
+    group(low, first, next, starts);
+    group(high, first + at as u32, next, starts);
+}
+
+impl Builder {
+    /// Adds the wide node of the first `count` of two parts, and all below; returns its index.
+    fn add(&mut self, seed: [Part; 2], mut count: usize) -> u32 {
+        let mut parts = [seed[0]; WIDE];
+        parts[1] = seed[1];
+        // Less than any where there is nothing to open.
+        let mut areas = [-1.0f32; WIDE];
+        for (area, part) in areas.iter_mut().zip(&parts).take(count) {
+            *area = part.bounds.area();
+        }
+        // Opens the largest until there are eight.
+        while count < WIDE {
+            let (mut largest, mut area) = (0, areas[0]);
+            for (k, &other) in areas.iter().enumerate().skip(1) {
+                (largest, area) = if other > area { (k, other) } else { (largest, area) };
+            }
+            if area < 0.0 {
+                break;
+            }
+            match self.open(&mut parts[largest]) {
+                Some([first, second]) => {
+                    (areas[largest], areas[count]) = (first.bounds.area(), second.bounds.area());
+                    (parts[largest], parts[count]) = (first, second);
+                    count += 1;
+                }
+                None => areas[largest] = -1.0,
+            }
         }
         let index = self.nodes.len();
         let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
-        self.nodes.push(Node { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] });
-        for (k, &child) in children.iter().enumerate() {
-            let Binary { bounds, second, items } = &tree[child];
-            let (to, count) = match second {
-                Some(_) => (self.widen(tree, child, pad), 0),
-                None => (items.start as u32, items.len() as u32),
+        let mut node = Node { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] };
+        for (k, Part { bounds: Bounds { lo, hi }, .. }) in parts.iter().enumerate().take(count) {
+            for axis in 0..3 {
+                node.sides[axis][k] = lo[axis] - self.pad;
+                node.sides[axis + 3][k] = hi[axis] + self.pad;
+            }
+        }
+        self.nodes.push(node);
+        for (k, part) in parts.iter_mut().enumerate().take(count) {
+            let small = part.kind == Kind::Things && part.end - part.start <= LEAF as u32
+                || part.kind == Kind::Groups && part.end - part.start == 1;
+            let halves = if part.kind != Kind::Leaf && small { self.open(part) } else { None };
+            let (child, count) = match (part.kind, halves) {
+                (Kind::Leaf, _) => (part.start, part.end - part.start),
+                (_, Some(halves)) => (self.add(halves, 2), 0),
+                (_, None) => (self.add([*part; 2], 1), 0),
             };
             let node = &mut self.nodes[index];
-            (node.child[k], node.count[k]) = (to, count);
-            for (axis, (&lo, &hi)) in bounds[0].iter().zip(&bounds[1]).enumerate() {
-                node.sides[axis][k] = ((f64::from(lo) - pad) as f32).next_down();
-                node.sides[axis + 3][k] = ((f64::from(hi) + pad) as f32).next_up();
-            }
+            (node.child[k], node.count[k]) = (child, count);
         }
         index as u32
     }
-}
 
-impl Builder<'_> {
-    /// Adds the binary node of a range of the order, and all below.
-    fn split(&mut self, items: Range<usize>, depth: u32) {
-        let of = |builder: &Self, f: &dyn Fn(usize) -> Aabb| {
-            builder.order[items.clone()].iter().fold(NOTHING, |all, &i| union(all, f(i as usize)))
-        };
-        let bounds = of(self, &|i| self.boxes[i]);
-        let middles = of(self, &|i| [self.middles[i]; 2]);
-        let index = self.tree.len();
-        self.tree.push(Binary { bounds, second: None, items: items.clone() });
-        let Some(at) = self.cut(&items, &bounds, &middles, depth) else { return };
-        self.split(items.start..at, depth + 1);
-        let second = self.tree.len();
-        self.split(at..items.end, depth + 1);
-        self.tree[index].second = Some(second);
-    }
-
-    /// Sorts a range in two parts and says where the second one begins; `None` where it is better left alone.
-    fn cut(&mut self, items: &Range<usize>, bounds: &Aabb, middles: &Aabb, depth: u32) -> Option<usize> {
-        let count = items.len();
-        if count < 2 {
+    /// The halves of a part; `None` where it is better left alone, and a leaf from now on.
+    #[inline(always)]
+    fn open(&mut self, part: &mut Part) -> Option<[Part; 2]> {
+        if part.kind == Kind::Groups {
+            let groups = &mut self.groups[part.start as usize..part.end as usize];
+            if let [group] = groups {
+                let k = group.number() as usize;
+                (part.start, part.end, part.kind) = (self.starts[k], self.starts[k + 1], Kind::Things);
+            } else {
+                let best = if groups.len() <= FEW {
+                    // Cuts have kept the order along the curve.
+                    let (_, at, near, far) = between::<FEW>(groups);
+                    Some((at, near, far))
+                } else if part.depth >= MAX_DEPTH {
+                    None
+                } else if groups.len() <= MANY {
+                    halve::<SOME_BINS>(groups, &mut self.aside)
+                } else {
+                    halve::<MANY_BINS>(groups, &mut self.aside)
+                };
+                // All at one place.
+                let (at, near, far) = best.unwrap_or_else(|| {
+                    let at = groups.len() / 2;
+                    (at, Bounds::around(&groups[..at]), Bounds::around(&groups[at..]))
+                });
+                return Some(part.cut(at, [near, far]));
+            }
+        }
+        let things = &self.things[part.start as usize..part.end as usize];
+        if things.len() < 2 {
+            part.kind = Kind::Leaf;
             return None;
         }
-        let best = if depth < MAX_DEPTH { self.best_plane(items, middles) } else { None };
-        let alone = count as f32 * area(bounds);
-        match best {
-            Some((cost, ..)) if count <= LEAF && cost + NODE_COST * area(bounds) >= alone => None,
-            Some((_, axis, plane)) => {
-                let order = &mut self.order[items.clone()];
-                let bin = |i: u32| bin(self.middles[i as usize][axis], middles, axis);
-                // Stable: the same tree whatever the sorting library does.
-                order.sort_by_key(|&i| bin(i) > plane);
-                let first = order.iter().filter(|&&i| bin(i) <= plane).count();
-                Some(items.start + first)
-            }
-            // All at one place.
-            None if count <= LEAF => None,
-            None => Some(items.start + count / 2),
+        let (cost, at, near, far) =
+            if things.len() <= LEAF { between::<LEAF>(things) } else { between::<GROUP>(things) };
+        let area = part.bounds.area();
+        // Sizes beyond the range have costs that are no numbers: those stay together.
+        let pays = cost + NODE_COST * area < things.len() as f32 * area;
+        if things.len() <= LEAF && !pays {
+            part.kind = Kind::Leaf;
+            return None;
+        }
+        Some(part.cut(at, [near, far]))
+    }
+}
+
+/// The best place to cut up to N things or groups along the curve: the cost, how many come before, and the boxes of both sides.
+fn between<const N: usize>(things: &[Item]) -> (f32, usize, Bounds, Bounds) {
+    let n = things.len().min(N);
+    let (mut first, mut rest) = ([NOTHING; N], [NOTHING; N]);
+    let mut costs = [0.0f32; N];
+    let mut sum = NOTHING;
+    let mut after = 0.0;
+    for k in (1..n).rev() {
+        sum = sum.with(&things[k]);
+        rest[k] = sum;
+        after += things[k].hi[3];
+        costs[k] = after * sum.area();
+    }
+    let mut sum = NOTHING;
+    let (mut best, mut cost, mut before) = (1, f32::INFINITY, 0.0);
+    for k in 1..n {
+        sum = sum.with(&things[k - 1]);
+        first[k] = sum;
+        before += things[k - 1].hi[3];
+        let sum = before * sum.area() + costs[k];
+        if sum < cost {
+            (best, cost) = (k, sum);
         }
     }
+    (cost, best, first[best % N], rest[best % N])
+}
 
-    /// Cost, axis and bin of the best plane to cut at; `None` if none has something on both sides.
-    fn best_plane(&self, items: &Range<usize>, middles: &Aabb) -> Option<(f32, usize, usize)> {
-        let mut best: Option<(f32, usize, usize)> = None;
-        for axis in 0..3 {
-            if middles[1][axis] <= middles[0][axis] {
+/// Sorts groups by the best plane between bins: how many come before, and the boxes of both sides; `None` if no plane has
+/// something on both.
+fn halve<const N: usize>(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, Bounds, Bounds)> {
+    let middles = groups.iter().fold(NOTHING, |all, group| {
+        let middle = group.middle();
+        all.with(&Bounds { lo: middle, hi: middle })
+    });
+    let cells = Cells::<N>::of(&middles);
+    let mut bins = [[(NOTHING, 0.0f32); N]; 3];
+    for group in &*groups {
+        let at = cells.at(group.middle());
+        for (bins, at) in bins.iter_mut().zip(at) {
+            let (bounds, count) = &mut bins[at as usize % N];
+            *bounds = bounds.with(group);
+            *count += group.hi[3];
+        }
+    }
+    let total: f32 = groups.iter().map(|group| group.hi[3]).sum();
+    let mut best: Option<(f32, usize, usize, Bounds, Bounds)> = None;
+    for (axis, bins) in bins.iter().enumerate().filter(|&(axis, _)| cells.scale[axis] > 0.0) {
+        let mut after = [NOTHING; N];
+        let mut sum = NOTHING;
+        for k in (1..N).rev() {
+            sum = sum.with(&bins[k].0);
+            after[k] = sum;
+        }
+        let (mut before, mut count) = (NOTHING, 0.0);
+        for k in 0..N - 1 {
+            before = before.with(&bins[k].0);
+            count += bins[k].1;
+            if count == 0.0 || count == total {
                 continue;
             }
-            let mut bins = [(0usize, NOTHING); BINS];
-            for &i in &self.order[items.clone()] {
-                let (n, b) = &mut bins[bin(self.middles[i as usize][axis], middles, axis)];
-                (*n, *b) = (*n + 1, union(*b, self.boxes[i as usize]));
-            }
-            let mut above = [(0usize, NOTHING); BINS];
-            let mut sum = (0, NOTHING);
-            for k in (0..BINS).rev() {
-                sum = (sum.0 + bins[k].0, union(sum.1, bins[k].1));
-                above[k] = sum;
-            }
-            let mut below = (0, NOTHING);
-            for k in 0..BINS - 1 {
-                below = (below.0 + bins[k].0, union(below.1, bins[k].1));
-                let (n, b) = above[k + 1];
-                if below.0 == 0 || n == 0 {
-                    continue;
-                }
-                let cost = below.0 as f32 * area(&below.1) + n as f32 * area(&b);
-                // A cost that is no number comes from sizes beyond the range: any plane will do.
-                if best.is_none_or(|(c, ..)| cost < c) {
-                    best = Some((cost, axis, k));
-                }
+            let cost = count * before.area() + (total - count) * after[k + 1].area();
+            // A cost that is no number comes from sizes beyond the range: any plane will do.
+            if best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, k, before, after[k + 1]));
             }
         }
-        best
     }
-}
-
-/// Which of the bins along an axis a middle belongs to.
-fn bin(middle: f32, middles: &Aabb, axis: usize) -> usize {
-    let (lo, hi) = (f64::from(middles[0][axis]), f64::from(middles[1][axis]));
-    (((f64::from(middle) - lo) / (hi - lo) * BINS as f64) as usize).min(BINS - 1)
-}
-
-fn union(a: Aabb, b: Aabb) -> Aabb {
-    [[0, 1, 2].map(|k| a[0][k].min(b[0][k])), [0, 1, 2].map(|k| a[1][k].max(b[1][k]))]
-}
-
-/// Half the surface.
-fn area(b: &Aabb) -> f32 {
-    let [x, y, z] = [0, 1, 2].map(|k| (b[1][k] - b[0][k]).max(0.0));
-    x * y + y * z + z * x
+    let (_, axis, last, before, after) = best?;
+    let (mut near, mut far) = (0, 0);
+    let aside = &mut aside[..groups.len()];
+    for k in 0..groups.len() {
+        let group = groups[k];
+        let first = cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize <= last;
+        // To both places, without a branch: one of them is written over.
+        (groups[near], aside[far]) = (group, group);
+        near += usize::from(first);
+        far += usize::from(!first);
+    }
+    groups[near..].copy_from_slice(&aside[..far]);
+    Some((near, before, after))
 }
