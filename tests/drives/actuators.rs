@@ -7,9 +7,11 @@
 use crate::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::drive::plan::PlanError;
+use kinetoscope::sim::drive::actuator::{Scheme, stable_timestep_of, warn_if_unstable};
+use kinetoscope::sim::drive::plan::{PlanError, effective_inertias, plan};
 use kinetoscope::sim::env::Env;
 use kinetoscope::sim::mj::Buffers;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 const EXACT: f64 = 1e-9;
@@ -388,6 +390,30 @@ fn explicit_models_warn_where_they_are_not_stable() {
     };
     // h² kp + 2 h kd = 4 M: kp = (0.8 - 0.02) / 1e-4 = 7800.
     assert!(!warned(7700.0) && warned(7900.0));
+}
+
+/// h² kp + 2 h kd = 4 I with the inertia I of a wheel and, times the square of its ratio, of the one that follows it.
+#[test]
+fn the_largest_stable_step_is_the_root_of_its_law() {
+    let (kp, kd, ratio) = (200.0, 4.0, -2.0);
+    let [leader, follower] = [0.3, 0.05];
+    let joints = [Joint::wheel("a", leader), Joint { mimic: Some(("a".into(), ratio)), ..Joint::wheel("b", follower) }];
+    let world = world(&joints, gains(kp, kd), weightless());
+    let description = world.view().description();
+    let (plans, _) = plan(description, &gains(kp, kd), &BTreeMap::new(), &[], false).unwrap();
+    // The two do not feel each other but through the coupling, which is not in the mass matrix.
+    let felt = effective_inertias(description, &plans, false).unwrap();
+    assert_close(felt[0], leader, 1e-12, "inertia of a");
+    assert_close(felt[1], follower, 1e-12, "inertia of b");
+    let of = |inertia: f64| ((kd * kd + 4.0 * inertia * kp).sqrt() - kd) / kp;
+    let (expected, alone) = (of(leader + ratio * ratio * follower), of(leader));
+    let found = stable_timestep_of(Scheme::Explicit, description, &plans, false).unwrap();
+    // Bisected to 1e-9 of it.
+    assert_close(found / expected, 1.0, 2e-9, "largest step");
+    assert!((found / alone - 1.0).abs() > 0.1, "the control: the follower matters");
+    assert!(warn_if_unstable(description, &plans, false, 0.99 * expected).is_none());
+    let warning = warn_if_unstable(description, &plans, false, 1.01 * expected).unwrap().to_string();
+    assert!(warning.contains(&format!("{found:.3e} s")) && warning.contains("substeps"), "{warning}");
 }
 
 #[test]

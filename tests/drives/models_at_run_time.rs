@@ -125,12 +125,12 @@ fn every_model_follows_what_single_drives_are_told_while_they_run() {
                 let (q, v, effort) = (world.view().get_qpos(), world.view().get_qvel(), world.view().get_qf());
                 let others = untold.view().get_qpos();
                 for env in 0..ENVS {
-                    for joint in 0..2 {
+                    for (joint, &moment) in M.iter().enumerate().take(2) {
                         let [aim, v_aim, ff] = if n < delay { [0.0; 3] } else { wobble(n - delay, joint) };
                         let at = (env, joint);
                         let unit = match told.kind[at] {
                             DriveType::Force => 1.0,
-                            DriveType::Acceleration => M[joint],
+                            DriveType::Acceleration => moment,
                             DriveType::None => 0.0,
                         };
                         let (kp, kd, limit) = (unit * told.stiffness[at], unit * told.damping[at], told.limit[at]);
@@ -141,7 +141,7 @@ fn every_model_follows_what_single_drives_are_told_while_they_run() {
                         } else {
                             saturated += 1
                         }
-                        u[at] += H * tau / M[joint];
+                        u[at] += H * tau / moment;
                         x[at] += H * u[at];
                         let what = format!("{name}, round {round}, step {n}, environment {env}, joint {joint}");
                         assert_close(effort[at], tau, EXACT, &format!("effort, {what}"));

@@ -4,6 +4,7 @@
 
 mod accepted;
 mod configuration;
+mod every_writer;
 mod located;
 mod names;
 mod refused;

@@ -316,6 +316,9 @@ fn accelerations_that_are_written_are_told_and_move_nothing() {
     assert!(push[(0, 0)].abs() > 0.1 && push[(1, 0)].abs() < 0.1, "{push}");
 }
 
+/// Numbers, joints and environments that do not go together, and what the message says.
+type Mistake<'a> = (Array2<f64>, Option<&'a [JointIndex]>, Option<&'a [EnvId]>, &'a str);
+
 /// Single joints of single environments; a snapshot keeps what was written, and a reset does not.
 #[test]
 fn accelerations_are_written_for_those_that_are_named() {
@@ -325,7 +328,7 @@ fn accelerations_are_written_for_those_that_are_named() {
     let written = array![[0.0, -4.0], [0.0, 0.0], [0.0, 3.0]];
     assert_eq!(sim.robot(id).get_qacc(), written);
     let snapshot = sim.snapshot(None).unwrap();
-    let mistakes: [(Array2<f64>, Option<&[JointIndex]>, Option<&[EnvId]>, &str); 9] = [
+    let mistakes: [Mistake<'_>; 9] = [
         (array![[1.0]], None, None, "[1, 1]"),
         (Array2::zeros((2, 2)), None, None, "[3, 2]"),
         (array![[f64::NAN, 0.0]], None, None, "write_qacc[0, 0] (joint \"hinge\") is NaN"),

@@ -304,4 +304,14 @@ fn a_sensor_of_ones_own_is_an_entity_of_files() {
     let error = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
     assert!(error.contains("height") && error.contains("with_sensor"), "{error}");
     assert!(SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).is_err());
+    // From a file the same; without the type it says which there are.
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("own.toml");
+    std::fs::write(&path, text).unwrap();
+    let read = SceneCfg::from_file_with(&path, &types).unwrap();
+    assert_eq!(read.to_toml(&types).unwrap(), written);
+    let error = SceneCfg::from_file(&path).unwrap_err().to_string();
+    assert!(error.contains("own.toml:6") && error.contains("\"height\"") && error.contains("rigid_object"), "{error}");
+    let error = SceneCfg::from_file_with(files.path().join("none.toml"), &types).unwrap_err();
+    assert!(matches!(&error, Error::File { path, .. } if path.ends_with("none.toml")), "{error:?}");
 }

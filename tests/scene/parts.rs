@@ -68,6 +68,8 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     let mut scene = InteractiveScene::new(cfg).unwrap();
     assert_eq!(scene.keys().collect::<Vec<_>>(), ["nail", "touch", "block", "ball", "cubes"]);
     assert_eq!(scene.weld("nail").unwrap().is_attached().to_vec(), [false, false]);
+    assert_eq!(scene.sim().weld(scene.weld_id("nail").unwrap()).cfg().uid, "nail");
+    assert!(scene.weld_id("ball").unwrap_err().to_string().contains("is a rigid object, not a weld"));
     scene.weld_mut("nail").unwrap().attach(Some(&[EnvId(1)])).unwrap();
     scene.update_for(1.0).unwrap();
     let height = |name: &str| scene.rigid_object(name).unwrap().get_pose()[(1, 2)];

@@ -1,0 +1,230 @@
+//! Every writer of robots, objects and MJCF parts, with every kind of mistake that its arrays and indices can have: a typed
+//! error that names it, and nothing is written. Each is called rightly, too, and then something changes.
+
+use super::support::{INERTIAL, bits, cfg, robot};
+use kinetoscope::ndarray::{Array2, Axis};
+use kinetoscope::prelude::*;
+use kinetoscope::sim::RobotMut;
+
+const ENVS: usize = 3;
+const POSE: &[f64] = &[0.1, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8];
+const HALF: &[f64] = &[0.5; 6];
+
+#[derive(Clone, Copy)]
+struct Ids {
+    robot: RobotId,
+    object: ObjectId,
+    part: MjcfId,
+}
+
+const PART: &str = r#"<mujoco><worldbody><body name="hand" mocap="true"><geom size="0.05" contype="0" conaffinity="0"/></body>
+    <body name="arm" pos="5 0 2"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></worldbody>
+    <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>"#;
+
+fn world() -> (SimulationManager, Ids) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut urdf = format!("<robot name=\"r\"><link name=\"l0\">{INERTIAL}</link>");
+    for i in 1..4 {
+        urdf += &format!(
+            "<link name=\"l{i}\">{INERTIAL}</link><joint name=\"j{i}\" type=\"revolute\"><parent link=\"l{}\"/>\
+             <child link=\"l{i}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\" effort=\"9\" velocity=\"1\"/>\
+             <dynamics damping=\"0.1\" friction=\"0.1\"/></joint>",
+            i - 1
+        );
+    }
+    let mut sim = SimulationManager::new(cfg(ENVS)).unwrap();
+    let init_pose = Pose::translation(0.0, 0.0, 3.0);
+    let base = RobotCfg { fix_base: false, init_pose, ..robot(dir.path(), "r", &(urdf + "</robot>")) };
+    let cube = RigidObjectCfg { uid: "o".into(), shape: ObjectShape::cube(0.1), ..Default::default() };
+    let ids = Ids {
+        robot: sim.add_robot(base).unwrap(),
+        object: sim.add_rigid_object(cube).unwrap(),
+        part: sim.add_mjcf(MjcfCfg::text("m", PART)).unwrap(),
+    };
+    (sim, ids)
+}
+
+/// Everything that a writer here may change.
+fn told(sim: &SimulationManager, ids: Ids) -> String {
+    let view = sim.robot(ids.robot);
+    let drives = [view.get_stiffness(), view.get_damping(), view.qf_limits(), view.qvel_limits()];
+    let joints = [view.get_friction(), view.get_joint_damping(), view.get_armature()];
+    let targets = [view.get_target_qpos(), view.get_target_qvel(), view.get_target_qf()];
+    let mut told = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
+    for env in 0..ENVS {
+        let properties = sim.properties(EnvId(env)).unwrap();
+        for property in [Property::Mass, Property::Inertia, Property::CenterOfMass, Property::Friction] {
+            told += &format!("{:?}", properties.get(property, "o").unwrap());
+        }
+        sim.batch().read(env, |env| {
+            let data = env.data();
+            told += &format!("{:?} {:?} {:?}", data.ctrl(), data.xfrc_applied(), [data.mocap_pos(), data.mocap_quat()]);
+        });
+    }
+    told
+}
+
+type Values<'a> = &'a Array2<f64>;
+type Envs<'a> = Option<&'a [EnvId]>;
+type Joints<'a> = Option<&'a [JointIndex]>;
+
+/// A writer of numbers of joints: its name, whether infinity is a number for it, and its call.
+type OfJoints = (&'static str, bool, fn(&mut RobotMut<'_>, Values<'_>, Joints<'_>, Envs<'_>) -> Result<()>);
+
+const OF_JOINTS: &[OfJoints] = &[
+    ("set_qpos", false, |r, v, j, e| r.set_qpos(v, j, e)),
+    ("set_qvel", false, |r, v, j, e| r.set_qvel(v, j, e)),
+    ("set_qf", false, |r, v, j, e| r.set_qf(v, j, e)),
+    ("write_qpos", false, |r, v, j, e| r.write_qpos(v, j, e)),
+    ("write_qvel", false, |r, v, j, e| r.write_qvel(v, j, e)),
+    ("write_qacc", false, |r, v, j, e| r.write_qacc(v, j, e)),
+    ("set_stiffness", false, |r, v, j, e| r.set_stiffness(v, j, e)),
+    ("set_damping", false, |r, v, j, e| r.set_damping(v, j, e)),
+    ("set_friction", false, |r, v, j, e| r.set_friction(v, j, e)),
+    ("set_joint_damping", false, |r, v, j, e| r.set_joint_damping(v, j, e)),
+    ("set_armature", false, |r, v, j, e| r.set_armature(v, j, e)),
+    ("set_qf_limits", true, |r, v, j, e| r.set_qf_limits(v, j, e)),
+    ("set_qvel_limits", true, |r, v, j, e| r.set_qvel_limits(v, j, e)),
+];
+
+/// A writer of rows: its name, a good row, and its call.
+type OfRows = (&'static str, &'static [f64], fn(&mut SimulationManager, Ids, Values<'_>, Envs<'_>) -> Result<()>);
+
+const OF_ROWS: &[OfRows] = &[
+    ("write_root_pose", POSE, |s, i, v, e| s.robot_mut(i.robot).write_root_pose(v, e)),
+    ("write_root_velocity", HALF, |s, i, v, e| s.robot_mut(i.robot).write_root_velocity(v, e)),
+    ("write_root_com_velocity", &[0.25; 6], |s, i, v, e| s.robot_mut(i.robot).write_root_com_velocity(v, e)),
+    ("write_pose", POSE, |s, i, v, e| s.rigid_object_mut(i.object).write_pose(v, e)),
+    ("write_velocity", HALF, |s, i, v, e| s.rigid_object_mut(i.object).write_velocity(v, e)),
+    ("set_mass", &[0.5], |s, i, v, e| s.rigid_object_mut(i.object).set_mass(v.index_axis(Axis(1), 0), e)),
+    ("set_friction", &[0.5; 3], |s, i, v, e| s.rigid_object_mut(i.object).set_friction(v, e)),
+    ("set_inertia", &[0.5; 3], |s, i, v, e| s.rigid_object_mut(i.object).set_inertia(v, e)),
+    ("set_external_wrench", &[0.5; 3], |s, i, v, e| {
+        s.rigid_object_mut(i.object).set_external_wrench(v, v, WrenchFrame::World, e)
+    }),
+    ("set_ctrl", &[0.5], |s, i, v, e| s.mjcf_part_mut(i.part).set_ctrl(v, None, e)),
+    ("write_qpos", &[0.5], |s, i, v, e| s.mjcf_part_mut(i.part).write_qpos(v, e)),
+    ("write_qvel", &[0.5], |s, i, v, e| s.mjcf_part_mut(i.part).write_qvel(v, e)),
+    ("write_mocap_pose", POSE, |s, i, v, e| s.mjcf_part_mut(i.part).write_mocap_pose("hand", v, e)),
+];
+
+/// What a mistake must be told as.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Shape,
+    Number,
+    Unknown(&'static str, usize),
+    Twice,
+}
+
+#[track_caller]
+fn assert_refused(result: Result<()>, name: &str, kind: Kind) {
+    let error = result.expect_err(name);
+    let right = match (&error, kind) {
+        (Error::Shape { argument, .. }, Kind::Shape)
+        | (Error::NotFinite { argument, .. } | Error::OutOfRange { argument, .. }, Kind::Number)
+        | (Error::Repeated { argument, .. }, Kind::Twice) => argument.starts_with(name),
+        (Error::UnknownIndex { what, index, .. }, Kind::Unknown(of, which)) => *what == of && *index == which,
+        _ => false,
+    };
+    assert!(right, "{name}: {kind:?} was told as {error:?}");
+}
+
+/// Tables of `rows` rows like the good one.
+fn table(good: &[f64], rows: usize) -> Array2<f64> {
+    Array2::from_shape_fn((rows, good.len()), |(_, k)| good[k])
+}
+
+fn with_last(mut values: Array2<f64>, value: f64) -> Array2<f64> {
+    let last = (values.nrows() - 1, values.ncols() - 1);
+    values[last] = value;
+    values
+}
+
+/// Tables and environments that are wrong for any writer of such rows.
+fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Vec<EnvId>>, Kind)> {
+    let mut wide = good.to_vec();
+    wide.push(0.5);
+    let some = |ids: &[usize]| Some(ids.iter().map(|&id| EnvId(id)).collect());
+    let mut mistakes = vec![
+        (table(good, 2), None, Kind::Shape),
+        (table(good, 4), None, Kind::Shape),
+        (table(good, 0), None, Kind::Shape),
+        (table(good, 3), some(&[0, 1]), Kind::Shape),
+        (with_last(table(good, 3), f64::NAN), None, Kind::Number),
+        (table(good, 1), some(&[ENVS]), Kind::Unknown("environment", ENVS)),
+        (table(good, 2), some(&[0, usize::MAX]), Kind::Unknown("environment", usize::MAX)),
+        (table(good, 3), some(&[1, 2, 1]), Kind::Twice),
+        (table(good, 1), some(&[1, 1]), Kind::Twice),
+    ];
+    if good.len() > 1 {
+        mistakes.push((table(&wide, 3), None, Kind::Shape));
+        mistakes.push((table(&good[1..], 3), None, Kind::Shape));
+    }
+    if !infinity_is_fine {
+        mistakes.push((with_last(table(good, 3), f64::INFINITY), None, Kind::Number));
+        mistakes.push((with_last(table(good, 1), f64::NEG_INFINITY), some(&[2]), Kind::Number));
+    }
+    mistakes
+}
+
+#[test]
+fn writers_of_joints_refuse_every_mistake() {
+    let (mut sim, ids) = world();
+    sim.update(3);
+    for (name, infinity_is_fine, call) in OF_JOINTS {
+        let before = told(&sim, ids);
+        let good: &[f64] = &HALF[..3];
+        for (values, envs, kind) in mistakes(good, *infinity_is_fine) {
+            assert_refused(call(&mut sim.robot_mut(ids.robot), &values, None, envs.as_deref()), name, kind);
+            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+        }
+        let twice = [JointIndex(2), JointIndex(0), JointIndex(2)];
+        let beyond = [JointIndex(0), JointIndex(3), JointIndex(1)];
+        let far = [JointIndex(usize::MAX)];
+        let joints: [(&[JointIndex], usize, Kind); 5] = [
+            (&twice, 3, Kind::Twice),
+            (&beyond, 3, Kind::Unknown("joint", 3)),
+            (&far, 1, Kind::Unknown("joint", usize::MAX)),
+            (&twice[..2], 3, Kind::Shape),
+            (&[], 3, Kind::Shape),
+        ];
+        for (joints, columns, kind) in joints {
+            let values = table(&HALF[..columns], ENVS);
+            assert_refused(call(&mut sim.robot_mut(ids.robot), &values, Some(joints), None), name, kind);
+            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+        }
+        // Nobody and nothing is no mistake.
+        let mut robot = sim.robot_mut(ids.robot);
+        call(&mut robot, &table(good, 0), None, Some(&[])).unwrap();
+        call(&mut robot, &Array2::zeros((ENVS, 0)), Some(&[]), None).unwrap();
+        assert_eq!(told(&sim, ids), before, "{name}: nothing is asked for");
+        call(&mut sim.robot_mut(ids.robot), &table(&good[..1], 1), Some(&[JointIndex(1)]), Some(&[EnvId(2)])).unwrap();
+        assert_ne!(told(&sim, ids), before, "{name}: the control");
+    }
+}
+
+#[test]
+fn writers_of_rows_refuse_every_mistake() {
+    let (mut sim, ids) = world();
+    sim.update(3);
+    for (name, good, call) in OF_ROWS {
+        let before = told(&sim, ids);
+        for (values, envs, kind) in mistakes(good, false) {
+            assert_refused(call(&mut sim, ids, &values, envs.as_deref()), name, kind);
+            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+        }
+        call(&mut sim, ids, &table(good, 0), Some(&[])).unwrap();
+        assert_eq!(told(&sim, ids), before, "{name}: nobody is asked");
+        call(&mut sim, ids, &table(good, 1), Some(&[EnvId(2)])).unwrap();
+        assert_ne!(told(&sim, ids), before, "{name}: the control");
+    }
+    // A quaternion of length zero has no direction.
+    let nowhere = table(&[0.0; 7], 1);
+    for (name, _, call) in OF_ROWS.iter().filter(|(name, ..)| name.ends_with("pose")) {
+        let before = told(&sim, ids);
+        let error = call(&mut sim, ids, &nowhere, None).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains("quaternion"), "{error}");
+        assert_eq!(told(&sim, ids), before);
+    }
+}
