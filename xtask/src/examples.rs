@@ -323,7 +323,7 @@ fn none_opened(report: &Value) -> Result<(), String> {
 /// As [`enough_succeeded`], and pushes were pushes: all robots lost the floor, and tilted.
 ///
 /// The third push lifts 9.6 kg by 120 N for 0.15 s: (120 - 9.6 x 9.81) / 9.6 = 2.69 m/s², so 0.40 m/s and 3 cm then, and the floor
-/// again after (0.40 + sqrt(0.40² + 2 x 9.81 x 0.03)) / 9.81 = 0.13 s: 0.28 s in all. A sixth of that is too long for a bump.
+/// again after (0.40 + sqrt(0.40² + 2 x 9.81 x 0.03)) / 9.81 = 0.13 s: 0.28 s in all, of which half is asked for.
 ///
 /// The weakest push is 20 N for 0.15 s, at 0.45 m from the floor, on an inertia of 1.43 kg m² (that of the example's `gains`): it
 /// leaves 0.94 rad/s at 0.07 rad, and wheels that accelerate at most by 6 m/s² take 0.06 s, 0.03 rad, to stop that. Of four pushes,
@@ -331,7 +331,7 @@ fn none_opened(report: &Value) -> Result<(), String> {
 fn balanced(report: &Value) -> Result<(), String> {
     enough_succeeded(report)?;
     for row in trials(report)? {
-        if number(row, "airborne")? < 0.05 || number(row, "largest_tilt")? < 0.1 {
+        if number(row, "airborne")? < 0.14 || number(row, "largest_tilt")? < 0.1 {
             return Err(format!("this robot was hardly pushed: {row}"));
         }
     }

@@ -42,6 +42,7 @@ pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, vie
     };
     let measured = run.measured_speed.map_or_else(String::new, |speed| format!(", {speed:.2}x"));
     let which = match shown {
+        Shown::All if snapshot.envs.len() == 1 => "1 environment".into(),
         Shown::All => format!("{} environments", snapshot.envs.len()),
         Shown::One(env) => format!("environment {env} of {}", snapshot.envs.len()),
     };
@@ -53,7 +54,8 @@ pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, vie
     let diverged = snapshot.envs.iter().filter(|env| env.look.diverged.is_some()).count();
     let mut below = 6 + 3 * 13 + 8;
     if diverged > 0 {
-        canvas.text(&format!("{diverged} environments diverged"), [8, below], FONT, YELLOW);
+        let which = if diverged == 1 { "environment" } else { "environments" };
+        canvas.text(&format!("{diverged} {which} diverged"), [8, below], FONT, YELLOW);
         below += 18;
     }
     if let Some(refused) = &run.refused {
