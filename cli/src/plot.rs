@@ -40,6 +40,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let recording = Recording::open(&args.file)?;
+    recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     if args.topic.is_empty() {
         if args.out.is_some() || !args.field.is_empty() {
             return Err("--topic: say of which topic; without --out and --field all of them are listed".into());

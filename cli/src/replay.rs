@@ -57,6 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         return Err(format!("--seconds {seconds}: give more than 0").into());
     }
     let recording = Recording::open(&args.file)?;
+    recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let envs = recording.env_ids().last().map_or(1, |last| last.saturating_add(1));
     let scene = args.scene.as_deref().map(|file| built(file, envs)).transpose()?;
     let (film, sim) = Film::of(&recording, scene.as_ref().map(InteractiveScene::sim))?;

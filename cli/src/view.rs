@@ -32,7 +32,7 @@ pub(crate) struct Args {
     /// End after so many steps
     #[arg(long)]
     steps: Option<u64>,
-    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .mp4,
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset; .mp4,
     /// .gif, .webp or .apng for the first camera; a folder for PNG files of all cameras. Without it the record button begins a recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,

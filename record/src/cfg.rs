@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Configuration of a recorder: plain data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecorderCfg {
-    /// The file, or for [`Format::Pictures`] the folder.
+    /// The file, or for [`Format::Pictures`] and [`Format::LeRobot`] the folder.
     pub path: PathBuf,
     /// How it is written; `None` for what the end of the name says: [`Format::all`] lists them, nothing is a folder of
     /// pictures.
@@ -25,6 +25,8 @@ pub struct RecorderCfg {
     /// Whether the scene is put into the file, as MJCF with its meshes, so that the file is enough to show the recording
     /// (`kinetoscope replay`). Of MCAP files and NumPy archives; it is taken once, when the recording begins.
     pub scene: bool,
+    /// What is being done, in words: the task of all episodes of a LeRobot dataset. Other formats do not say it.
+    pub task: String,
     /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
     /// has left. Of folders, only those of a recorder are replaced.
     pub overwrite: bool,
@@ -52,6 +54,7 @@ impl Default for RecorderCfg {
             every: 1,
             packets: 8,
             scene: true,
+            task: String::new(),
             overwrite: false,
         }
     }

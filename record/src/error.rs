@@ -84,6 +84,18 @@ pub enum RecordError {
         /// Which it has.
         fits: String,
     },
+    /// Rows of a rate that the format does not have.
+    #[error("{path}: with `every` {every} there are {found:.3} rows per second, which is no whole number; {}", whole(.near))]
+    Rate {
+        /// The file.
+        path: PathBuf,
+        /// [`RecorderCfg::every`](crate::RecorderCfg::every).
+        every: u64,
+        /// Rows in a second \[Hz\].
+        found: f64,
+        /// Values of `every` that would do, the nearest first.
+        near: Vec<u64>,
+    },
     /// Something is not called so.
     #[error("there is no {what} {name:?}{}", known(.candidates))]
     UnknownName {
@@ -225,4 +237,12 @@ fn unwritten(error: &Option<Arc<std::io::Error>>) -> String {
 
 fn left(kept: &Option<PathBuf>) -> String {
     kept.as_ref().map_or_else(String::new, |kept| format!("; what was recorded until then is in {}", kept.display()))
+}
+
+fn whole(near: &[u64]) -> String {
+    let near: Vec<String> = near.iter().map(u64::to_string).collect();
+    match near.is_empty() {
+        true => "choose another physics_dt".into(),
+        false => format!("{} would do", near.join(", ")),
+    }
 }

@@ -1,6 +1,7 @@
 //! The formats, and which one a name means.
 
 use crate::error::{RecordError, Result};
+use crate::lerobot;
 use crate::stream::{Kind, Stream};
 use std::path::Path;
 
@@ -14,6 +15,9 @@ pub enum Format {
     Npz,
     /// A folder of PNG files: colour as 8-bit RGB, depth and distance as 16-bit millimetres, and `times.csv` with their times.
     Pictures,
+    /// A LeRobot dataset, version 3.0: a folder of Parquet files. Each episode, from one reset of an environment to the next, is a
+    /// file; frames are the rows of the recording, from the first that has everything on, whose rate must be whole.
+    LeRobot,
     /// An animated PNG of one camera's colour in one environment, without loss.
     Apng,
     /// An animated GIF of the same: 256 colours in a picture, times in hundredths of a second.
@@ -36,10 +40,11 @@ struct Known {
 }
 
 /// All of them.
-const ALL: [Known; 7] = [
+const ALL: [Known; 8] = [
     Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
     Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
     Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
+    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds: lerobot::holds },
     Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
     Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
     Known { format: Format::Webp, end: "webp", name: "an animated WebP", holds: is_color },
@@ -103,13 +108,13 @@ mod tests {
 
     #[test]
     fn every_format_is_in_the_list_once() {
-        use Format::{Apng, Gif, Mcap, Mp4, Npz, Pictures, Webp};
-        let wanted = [Mcap, Npz, Pictures, Apng, Gif, Webp, Mp4];
+        use Format::{Apng, Gif, LeRobot, Mcap, Mp4, Npz, Pictures, Webp};
+        let wanted = [Mcap, Npz, Pictures, LeRobot, Apng, Gif, Webp, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
             // One that is missing here does not compile.
             match format {
-                Mcap | Npz | Pictures | Apng | Gif | Webp | Mp4 => {}
+                Mcap | Npz | Pictures | LeRobot | Apng | Gif | Webp | Mp4 => {}
             }
             assert_eq!(format.known().end, end);
             assert_eq!(Format::of_path(&Path::new("a.b/run").with_extension(end)).ok(), Some(format));

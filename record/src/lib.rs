@@ -30,6 +30,7 @@ mod file;
 mod film;
 mod folder;
 mod format;
+mod lerobot;
 mod mcap_file;
 mod npy;
 mod npz;

@@ -6,6 +6,7 @@ use crate::clock::Clock;
 use crate::error::{RecordError, Result};
 use crate::file::{PartFile, Storage, part_of};
 use crate::format::Format;
+use crate::lerobot::LeRobot;
 use crate::mcap_file::McapFile;
 use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
@@ -520,6 +521,9 @@ fn open(
 ) -> Result<Box<dyn Sink>> {
     if format == Format::Pictures {
         return Ok(Box::new(PictureFolder::create(&cfg.path, cfg.overwrite)?));
+    }
+    if format == Format::LeRobot {
+        return Ok(Box::new(LeRobot::create(cfg, streams, sim.cfg().physics_dt)?));
     }
     let (part, file) = PartFile::create(&cfg.path, cfg.overwrite, format == Format::Mcap)?;
     let storage = wrap(file);

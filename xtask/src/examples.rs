@@ -50,6 +50,7 @@ const TABLE: &[Run] = &[
     run_of("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
     run_of("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
+    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/create_robot.lerobot"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),

@@ -4,6 +4,7 @@
 mod button;
 mod contents;
 mod kill;
+mod lerobot;
 mod pictures;
 mod readers;
 mod refused;

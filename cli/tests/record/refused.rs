@@ -13,7 +13,7 @@ fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
 
 /// A name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
-    let is_file = |format: &Format| *format != Format::Pictures;
+    let is_file = |format: &Format| ![Format::Pictures, Format::LeRobot].contains(format);
     Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
 }
 
@@ -34,7 +34,7 @@ fn files_that_are_there_stay_as_they_are() {
         world.sim.finish_recording(recorder).unwrap();
         assert_ne!(fs::read(&path).unwrap(), b"precious");
     }
-    for name in ["pictures"] {
+    for name in ["pictures", "run.lerobot"] {
         let mine = folder.path().join(name);
         fs::create_dir(&mine).unwrap();
         fs::write(mine.join("one"), "precious").unwrap();
@@ -61,7 +61,7 @@ fn folders_where_nothing_can_be_written_are_an_error_at_the_start() {
     // Not even an administrator writes below a file.
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    for name in files().chain(["pictures".into()]) {
+    for name in files().chain(["pictures".into(), "run.lerobot".into()]) {
         for place in [file.join(&name), folder.path().join("missing").join(&name)] {
             if !files().any(|file| file == name) && place.starts_with(folder.path().join("missing")) {
                 continue; // Folders of pictures are made.
@@ -87,12 +87,20 @@ fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
         (with(Topic::channel("imu", "depth")), vec!["imu/depth"]),
         (RecorderCfg { every: 0, ..RecorderCfg::new(&path) }, vec!["every", "at least 1"]),
         (RecorderCfg { packets: 1, ..RecorderCfg::new(&path) }, vec!["packets", "at least 2"]),
+        (
+            RecorderCfg { every: 3, ..RecorderCfg::new(folder.path().join("run.lerobot")) },
+            vec!["run.lerobot", "33.333", "2, 4, 1 would do"],
+        ),
+        (
+            RecorderCfg::new(folder.path().join("run.lerobot")).with_topics([Topic::Sensor("imu".into())]),
+            vec!["no place", "sensors alone"],
+        ),
         (RecorderCfg { envs: Some(vec![EnvId(3)]), ..RecorderCfg::new(&path) }, vec!["environment 3"]),
         (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..RecorderCfg::new(&path) }, vec!["twice"]),
         (RecorderCfg { topics: vec![], ..RecorderCfg::new(&path) }, vec!["nothing to record"]),
         (
             RecorderCfg::new(folder.path().join("run.avi")),
-            vec![".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4"],
+            vec![".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"],
         ),
         (
             RecorderCfg::new(folder.path().join("run.apng")).with_topics([Topic::JointStates("arm".into())]),

@@ -89,8 +89,8 @@ fn unreadable(path: &Path, channel: &Channel) -> RecordError {
     RecordError::Malformed { path: path.into(), what: format!("a message of {topic} is no {kind}") }
 }
 
-/// What there is.
-pub(super) fn topics(path: &Path) -> Result<Vec<RecordedTopic>> {
+/// What there is, and what of it cannot be read.
+pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     /// A topic on its way; fields are kept in the order in which they were seen.
     #[derive(Default)]
     struct Found {
@@ -99,6 +99,8 @@ pub(super) fn topics(path: &Path) -> Result<Vec<RecordedTopic>> {
         fields: Vec<String>,
         known: BTreeSet<String>,
         varies: bool,
+        /// Which of its messages cannot be read.
+        unread: Option<u64>,
     }
     let mut all: BTreeMap<String, Found> = BTreeMap::new();
     walk(path, |told| {
@@ -108,11 +110,15 @@ pub(super) fn topics(path: &Path) -> Result<Vec<RecordedTopic>> {
         }
         let Some(found) = all.get_mut(&channel.topic) else { return Ok(()) };
         found.count += 1;
-        if found.count > 1 && !found.varies {
+        if found.unread.is_some() || (found.count > 1 && !found.varies) {
             return Ok(());
         }
         let Some(reads) = &channel.reads else { return Ok(()) };
-        let value = reads.read(data).ok_or_else(|| unreadable(path, channel))?;
+        let Some(value) = reads.read(data) else {
+            // The others can be read all the same.
+            found.unread = Some(found.count);
+            return Ok(());
+        };
         found.varies = value.varies();
         let mut fields = Vec::new();
         value.fields("", &mut fields);
@@ -120,8 +126,16 @@ pub(super) fn topics(path: &Path) -> Result<Vec<RecordedTopic>> {
         found.fields.extend(fields.into_iter().filter(|field| known.insert(field.clone())));
         Ok(())
     })?;
-    let topic = |(name, Found { kind, count, fields, .. })| RecordedTopic { name, kind, count, fields };
-    Ok(all.into_iter().map(topic).collect())
+    let mut warnings = Vec::new();
+    let mut topic = |(name, Found { kind, count, fields, unread, .. })| {
+        if let Some(number) = unread {
+            warnings.push(format!("{name} is left out: its message {number} of {count} is no {kind}"));
+        }
+        let fields = if unread.is_some() { Vec::new() } else { fields };
+        RecordedTopic { name, kind, count, fields }
+    };
+    let topics = all.into_iter().map(&mut topic).collect();
+    Ok((topics, warnings))
 }
 
 /// The numbers that are wanted.

@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 pub struct Recording {
     path: PathBuf,
     topics: Vec<RecordedTopic>,
+    warnings: Vec<String>,
     content: Content,
 }
 
@@ -80,12 +81,12 @@ impl Recording {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
-        let (content, topics) = match Format::of_path(path) {
+        let (content, (topics, warnings)) = match Format::of_path(path) {
             Ok(Format::Mcap) => (Content::Mcap, mcap::topics(path)?),
             Ok(Format::Npz) => {
                 let archive = Archive::read(path)?;
                 let topics = npz::topics(&archive)?;
-                (Content::Npz(Box::new(archive)), topics)
+                (Content::Npz(Box::new(archive)), (topics, Vec::new()))
             }
             _ if path.extension().is_some_and(|end| end == "part") => {
                 return Err(malformed(
@@ -94,7 +95,7 @@ impl Recording {
             }
             _ => return Err(malformed("recordings that can be read are called .mcap or .npz")),
         };
-        Ok(Self { path: path.into(), topics, content })
+        Ok(Self { path: path.into(), topics, warnings, content })
     }
 
     /// The file.
@@ -105,6 +106,11 @@ impl Recording {
     /// What was recorded, in the order of its names.
     pub fn topics(&self) -> &[RecordedTopic] {
         &self.topics
+    }
+
+    /// What of it cannot be read, and why: topics with a message that is not what its type says. They have no numbers.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The topic of a name, or of the end of one: `arm/joint_states` and `/joint_states` are `/env_0/arm/joint_states` where there

@@ -147,3 +147,37 @@ fn what_is_no_whole_recording_is_refused() {
         assert!(error.contains(words), "{error}");
     }
 }
+
+#[test]
+fn a_message_that_cannot_be_read_costs_its_topic_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("run.mcap"), folder.path().join("other.mcap"));
+    recorded(&path, None);
+    // As somebody else might write it: a topic whose second message is cut.
+    let bytes = std::fs::read(&path).unwrap();
+    let mut writer = ::mcap::Writer::new(std::fs::File::create(&other).unwrap()).unwrap();
+    let mut cut = 0;
+    for message in ::mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        writer.write(&message).unwrap();
+        if message.channel.topic == "/env_0/cart/tf" || message.channel.topic == "/env_0/tf" {
+            let channel = ::mcap::Channel { id: 99, topic: "/env_0/torn".into(), ..(*message.channel).clone() };
+            let keep = if cut == 1 { 10 } else { message.data.len() };
+            let data = message.data[..keep].to_vec().into();
+            writer.write(&::mcap::Message { channel: channel.into(), data, ..message.clone() }).unwrap();
+            cut += 1;
+        }
+    }
+    writer.finish().unwrap();
+    assert!(cut > 2, "{cut}");
+    assert!(Recording::open(&path).unwrap().warnings().is_empty());
+    let recording = Recording::open(&other).unwrap();
+    let [warning] = recording.warnings() else { panic!("{:?}", recording.warnings()) };
+    assert!(
+        warning.contains("/env_0/torn") && warning.contains("message 2") && warning.contains("TFMessage"),
+        "{warning}"
+    );
+    assert!(recording.topic("torn", None).unwrap().fields.is_empty());
+    let wanted = [Wanted::new("/env_0/cart/joint_states", "position[x]")];
+    assert_eq!(recording.samples(&wanted).unwrap(), Recording::open(&path).unwrap().samples(&wanted).unwrap());
+}

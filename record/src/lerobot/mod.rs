@@ -1,0 +1,457 @@
+//! LeRobot datasets, version 3.0: a folder with one Parquet file for each episode and what is known of all of them.
+//!
+//! An episode is what an environment does from one reset to the next. Its frames have one rate, that of the rows of the recording; a
+//! frame holds what was last measured, and the action that came next: the targets of the step that followed. So the last row of an
+//! episode, which no action followed, is no frame.
+
+mod features;
+mod parquet;
+mod statistics;
+
+use crate::cfg::RecorderCfg;
+use crate::error::{RecordError, Result};
+use crate::folder::PartFolder;
+use crate::packet::{EventKind, Packet, Values};
+use crate::picture::Png;
+use crate::stream::Stream;
+use crate::writer::Sink;
+use features::{Feature, Features};
+use parquet::{Kind, Table, put_bytes};
+use serde_json::{Value, json};
+use statistics::{OfPicture, Statistics};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub(crate) use features::holds;
+
+/// The file that says that a folder is a dataset.
+const INFO: &str = "meta/info.json";
+
+/// Files of a folder.
+const CHUNK: u64 = 1000;
+
+/// Rows are written when there are so many, or so many bytes of them.
+const ROWS: usize = 256;
+const BYTES: usize = 1 << 20;
+
+/// Columns that every dataset has behind its features.
+const COMMON: [(&str, &str); 5] = [
+    ("timestamp", "float32"),
+    ("frame_index", "int64"),
+    ("episode_index", "int64"),
+    ("index", "int64"),
+    ("task_index", "int64"),
+];
+
+/// A dataset on its way.
+pub(crate) struct LeRobot {
+    folder: PartFolder,
+    /// What its last file is written to; locked as long as there is a recorder.
+    info: File,
+    fps: u64,
+    /// Steps from one row to the next.
+    every: u64,
+    task: String,
+    features: Features,
+    envs: Vec<Env>,
+    /// Frames of each episode that was begun, and where its file has the numbers of its frames in the dataset.
+    episodes: Vec<Episode>,
+    statistics: Vec<Statistics>,
+    png: Png,
+}
+
+/// A picture that was measured.
+struct Picture {
+    file: Vec<u8>,
+    about: OfPicture,
+}
+
+/// What was measured last in an environment.
+struct Latest {
+    /// For each stream.
+    numbers: Vec<Option<Vec<f32>>>,
+    pictures: Vec<Option<Arc<Picture>>>,
+}
+
+struct Env {
+    env: usize,
+    latest: Latest,
+    /// The frame that waits for its action.
+    pending: Option<(Vec<Vec<f32>>, Vec<Arc<Picture>>)>,
+    running: Option<Running>,
+}
+
+/// An episode that goes on.
+struct Running {
+    episode: usize,
+    table: Table,
+    file: PathBuf,
+    rows: usize,
+    frames: u64,
+    values: Vec<Vec<u8>>,
+}
+
+#[derive(Default)]
+struct Episode {
+    frames: u64,
+    file: PathBuf,
+    /// Places and numbers of rows, as the table says.
+    index: Vec<(u64, u64)>,
+}
+
+/// Frames in a second, which are a whole number.
+///
+/// # Errors
+/// The rows of the recording have another rate.
+fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
+    let found = 1.0 / (dt * every as f64);
+    let whole = found.round();
+    // A thousandth of a frame in an hour of them.
+    if whole >= 1.0 && (found - whole).abs() < 1e-8 * whole {
+        return Ok(whole as u64);
+    }
+    let fits = |every: &u64| {
+        let rate = 1.0 / (dt * *every as f64);
+        rate >= 1.0 && (rate - rate.round()).abs() < 1e-8 * rate
+    };
+    let mut near: Vec<u64> = (1..=1000).filter(fits).collect();
+    near.sort_by_key(|other| other.abs_diff(every));
+    near.truncate(3);
+    Err(RecordError::Rate { path: path.into(), every, found, near })
+}
+
+impl LeRobot {
+    /// `dt` is the time of a step \[s\].
+    pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Self> {
+        let RecorderCfg { path, every, overwrite, task, .. } = cfg;
+        let fps = rate(path, dt, *every)?;
+        let features = Features::of(path, streams)?;
+        let (folder, info) = PartFolder::create(path, *overwrite, INFO)?;
+        let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
+        let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3))).collect();
+        let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
+        envs.sort_unstable();
+        envs.dedup();
+        let none = || Latest { numbers: vec![None; streams.len()], pictures: vec![None; streams.len()] };
+        let envs = envs.into_iter().map(|env| Env { env, latest: none(), pending: None, running: None }).collect();
+        let (every, task) = (*every, task.clone());
+        let (episodes, png) = (Vec::new(), Png::default());
+        Ok(Self { folder, info, fps, every, task, features, envs, episodes, statistics, png })
+    }
+
+    /// Whether the rows of a step are frames, whatever happened there.
+    fn is_due(&self, step: u64) -> bool {
+        step.is_multiple_of(self.every)
+    }
+
+    /// Takes what is new of an environment.
+    fn take(&mut self, k: usize, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+        let Env { env, latest, .. } = &mut self.envs[k];
+        for (s, (stream, block)) in streams.iter().zip(&packet.blocks).enumerate() {
+            let row = stream.env_ids.iter().position(|of| *of == *env);
+            let Some(row) = row.filter(|row| block.used && block.fresh[*row]) else { continue };
+            let range = row * stream.width()..(row + 1) * stream.width();
+            let Some(size) = self.features.size_of(s) else {
+                let numbers = match &block.values {
+                    Values::U8(values) => values[range].iter().map(|x| f32::from(*x)).collect(),
+                    Values::I32(values) => values[range].iter().map(|x| *x as f32).collect(),
+                    Values::F32(values) => values[range].to_vec(),
+                    Values::F64(values) => values[range].iter().map(|x| *x as f32).collect(),
+                };
+                latest.numbers[s] = Some(numbers);
+                continue;
+            };
+            let rgba = block.values.bytes().get(range).unwrap_or_default();
+            let (file, about) = (self.png.rgb(rgba, size)?.to_vec(), OfPicture::new(rgba));
+            latest.pictures[s] = Some(Arc::new(Picture { file, about }));
+        }
+        Ok(())
+    }
+
+    /// What there is now, if there is something of everything; actions are filled in later.
+    fn now(&self, k: usize) -> Option<(Vec<Vec<f32>>, Vec<Arc<Picture>>)> {
+        let latest = &self.envs[k].latest;
+        let numbers = self.features.numbers.iter().map(|feature| feature.values(&latest.numbers));
+        let pictures = self.features.pictures.iter().map(|(stream, ..)| latest.pictures.get(*stream)?.clone());
+        Some((numbers.collect::<Option<_>>()?, pictures.collect::<Option<_>>()?))
+    }
+
+    /// A row is due.
+    fn due(&mut self, k: usize, fresh: bool) -> io::Result<()> {
+        let pending = self.envs[k].pending.take();
+        if !fresh {
+            // It stands still: it has diverged.
+            return self.end(k);
+        }
+        if let Some((mut numbers, pictures)) = pending {
+            for (feature, values) in self.features.numbers.iter().zip(&mut numbers).filter(|(feature, _)| feature.later)
+            {
+                if let Some(action) = feature.values(&self.envs[k].latest.numbers) {
+                    *values = action;
+                }
+            }
+            self.add(k, &numbers, &pictures)?;
+        }
+        self.envs[k].pending = self.now(k);
+        Ok(())
+    }
+
+    /// Adds a frame to the episode of an environment, which begins with it if there is none.
+    fn add(&mut self, k: usize, numbers: &[Vec<f32>], pictures: &[Arc<Picture>]) -> io::Result<()> {
+        if self.envs[k].running.is_none() {
+            let episode = self.episodes.len();
+            let file = self.folder.part().join(data_file(episode as u64));
+            let table = Table::new(self.features.columns());
+            let values = vec![Vec::new(); table.width()];
+            self.episodes.push(Episode { file: file.clone(), ..Episode::default() });
+            self.envs[k].running = Some(Running { episode, table, file, rows: 0, frames: 0, values });
+        }
+        let Some(running) = &mut self.envs[k].running else { return Ok(()) };
+        let mut leaves = running.values.iter_mut();
+        for values in numbers {
+            let Some(to) = leaves.next() else { break };
+            values.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
+        }
+        for picture in pictures {
+            let (Some(bytes), Some(path)) = (leaves.next(), leaves.next()) else { break };
+            put_bytes(&picture.file, bytes)?;
+            put_bytes(format!("frame-{:06}.png", running.frames).as_bytes(), path)?;
+        }
+        let time = (running.frames as f64 / self.fps as f64) as f32;
+        // The place in the dataset is known at the end.
+        let whole = [running.frames, running.episode as u64, 0, 0];
+        if let Some(to) = leaves.next() {
+            to.extend_from_slice(&time.to_le_bytes());
+        }
+        for (to, number) in leaves.zip(whole) {
+            to.extend_from_slice(&number.to_le_bytes());
+        }
+        running.rows += 1;
+        running.frames += 1;
+        let all = numbers.len();
+        self.statistics.iter_mut().zip(numbers).for_each(|(statistics, values)| statistics.add(values));
+        let of_pictures = self.statistics.iter_mut().skip(all).zip(pictures);
+        of_pictures.for_each(|(statistics, picture)| statistics.add_picture(&picture.about));
+        if running.rows >= ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= BYTES {
+            running.write()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the episode of an environment: its file is whole.
+    fn end(&mut self, k: usize) -> io::Result<()> {
+        let Some(mut running) = self.envs[k].running.take() else { return Ok(()) };
+        running.write()?;
+        let mut out = BufWriter::new(running.open()?);
+        running.table.finish(&mut out, &[])?;
+        out.into_inner()?.sync_all()?;
+        let index = running.table.places("index");
+        let episode = &mut self.episodes[running.episode];
+        (episode.frames, episode.index) = (running.frames, index);
+        Ok(())
+    }
+
+    fn file(&self, name: &str) -> io::Result<BufWriter<File>> {
+        let path = self.folder.part().join(name);
+        path.parent().map_or(Ok(()), fs::create_dir_all)?;
+        Ok(BufWriter::new(File::create(path)?))
+    }
+
+    /// The only task, which is the index of its table, as pandas has it.
+    fn write_tasks(&self) -> io::Result<()> {
+        let index = "__index_level_0__";
+        let column = |name: Option<&str>, field, pandas, numpy| json!({ "name": name, "field_name": field, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
+        let about = json!({
+            "index_columns": [index],
+            "column_indexes": [],
+            "columns": [
+                column(Some("task_index"), "task_index", "int64", "int64"),
+                column(None, index, "unicode", "object"),
+            ],
+            "pandas_version": "2.0.0",
+        });
+        let mut table = Table::new(vec![("task_index".into(), Kind::Int64), (index.into(), Kind::Text)]);
+        let mut task = Vec::new();
+        put_bytes(self.task.as_bytes(), &mut task)?;
+        let mut out = self.file("meta/tasks.parquet")?;
+        table.write(&mut out, 1, &[0_i64.to_le_bytes().to_vec(), task])?;
+        table.finish(&mut out, &[("pandas", &about.to_string())])?;
+        out.into_inner()?.sync_all()
+    }
+
+    fn write_episodes(&self) -> io::Result<()> {
+        let numbers = [
+            "episode_index",
+            "length",
+            "data/chunk_index",
+            "data/file_index",
+            "dataset_from_index",
+            "dataset_to_index",
+            "meta/episodes/chunk_index",
+            "meta/episodes/file_index",
+        ];
+        let mut columns: Vec<(String, Kind)> = numbers.iter().map(|name| (name.to_string(), Kind::Int64)).collect();
+        columns.push(("tasks".into(), Kind::Texts));
+        let mut table = Table::new(columns);
+        let mut values = vec![Vec::new(); table.width()];
+        let mut first = 0;
+        for (number, episode) in (0_u64..).zip(&self.episodes) {
+            let last = first + episode.frames;
+            let row = [number, episode.frames, number / CHUNK, number % CHUNK, first, last, 0, 0];
+            for (to, number) in values.iter_mut().zip(row) {
+                to.extend_from_slice(&number.to_le_bytes());
+            }
+            if let Some(tasks) = values.last_mut() {
+                put_bytes(self.task.as_bytes(), tasks)?;
+            }
+            first = last;
+        }
+        let mut out = self.file("meta/episodes/chunk-000/file-000.parquet")?;
+        table.write(&mut out, self.episodes.len(), &values)?;
+        table.finish(&mut out, &[])?;
+        out.into_inner()?.sync_all()
+    }
+
+    fn info(&self) -> Value {
+        let (episodes, frames) = (self.episodes.len(), self.episodes.iter().map(|episode| episode.frames).sum::<u64>());
+        let mut features = self.features.described();
+        for (name, kind) in COMMON {
+            features.insert(name.into(), json!({ "dtype": kind, "shape": [1], "names": null }));
+        }
+        json!({
+            "codebase_version": "v3.0",
+            "robot_type": null,
+            "total_episodes": episodes,
+            "total_frames": frames,
+            "total_tasks": 1,
+            "chunks_size": CHUNK,
+            "data_files_size_in_mb": 100,
+            "video_files_size_in_mb": 200,
+            "fps": self.fps,
+            "splits": { "train": format!("0:{episodes}") },
+            "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+            "video_path": null,
+            "features": features,
+        })
+    }
+
+    /// Numbers the frames of all episodes: how many there are before is known only now.
+    fn number_frames(&self) -> io::Result<()> {
+        let mut next = 0_u64;
+        for episode in &self.episodes {
+            let mut file = OpenOptions::new().write(true).open(&episode.file)?;
+            for (at, rows) in &episode.index {
+                file.seek(SeekFrom::Start(*at))?;
+                let numbers: Vec<u8> = (next..next + rows).flat_map(u64::to_le_bytes).collect();
+                file.write_all(&numbers)?;
+                next += rows;
+            }
+            file.sync_all()?;
+        }
+        Ok(())
+    }
+}
+
+fn data_file(episode: u64) -> String {
+    format!("data/chunk-{:03}/file-{:03}.parquet", episode / CHUNK, episode % CHUNK)
+}
+
+impl Running {
+    /// Files are open only while they are written: there may be thousands.
+    fn open(&self) -> io::Result<File> {
+        self.file.parent().map_or(Ok(()), fs::create_dir_all)?;
+        OpenOptions::new().create(true).append(true).open(&self.file)
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        if self.rows > 0 {
+            let mut out = BufWriter::new(self.open()?);
+            self.table.write(&mut out, self.rows, &self.values)?;
+            out.flush()?;
+            self.values.iter_mut().for_each(Vec::clear);
+            self.rows = 0;
+        }
+        Ok(())
+    }
+}
+
+impl Sink for LeRobot {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+        for k in 0..self.envs.len() {
+            let env = self.envs[k].env;
+            let happened = packet.event.as_ref().filter(|event| event.env_ids.contains(&env)).map(|event| event.kind);
+            if happened == Some(EventKind::Reset) {
+                self.envs[k].pending = None;
+                self.end(k)?;
+                let latest = &mut self.envs[k].latest;
+                latest.numbers.fill(None);
+                latest.pictures.fill(None);
+            }
+            self.take(k, streams, packet)?;
+            let base = self.features.base;
+            let Some(block) = packet.blocks.get(base).filter(|block| block.used) else { continue };
+            let row = streams[base].env_ids.iter().position(|of| *of == env);
+            match (&packet.event, happened) {
+                (None, _) => self.due(k, row.is_some_and(|row| block.fresh[row]))?,
+                // What somebody has written is where the next action begins, where a row was due at all.
+                (_, Some(EventKind::Written)) if self.envs[k].pending.is_some() && self.is_due(packet.step) => {
+                    self.envs[k].pending = self.now(k);
+                }
+                (_, Some(EventKind::Reset)) if self.is_due(packet.step) => self.envs[k].pending = self.now(k),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        // Nobody can read it before the end.
+        Ok(())
+    }
+
+    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
+        (0..self.envs.len()).try_for_each(|k| self.end(k))?;
+        if self.episodes.is_empty() {
+            return Err(io::Error::other(
+                "there is no frame: every one needs all that is measured, and the action after it",
+            ));
+        }
+        self.number_frames()?;
+        self.write_tasks()?;
+        self.write_episodes()?;
+        let mut out = self.file("meta/stats.json")?;
+        let of_all = self.features.names().zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
+        out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
+        out.into_inner()?.sync_all()?;
+        // The last one: a folder with it is a dataset.
+        let info = format!("{:#}\n", self.info());
+        self.info.write_all(info.as_bytes())?;
+        self.info.sync_all()?;
+        let bytes = size_of(self.folder.part())?;
+        self.folder.commit()?;
+        Ok(bytes)
+    }
+
+    fn kept(&self) -> Option<PathBuf> {
+        Some(self.folder.part().into())
+    }
+}
+
+/// All files of a folder \[bytes\].
+fn size_of(folder: &Path) -> io::Result<u64> {
+    let mut bytes = 0;
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        bytes += if entry.file_type()?.is_dir() { size_of(&entry.path())? } else { entry.metadata()?.len() };
+    }
+    Ok(bytes)
+}
+
+impl Feature {
+    /// What a column of it holds.
+    fn kind(&self) -> Kind {
+        Kind::Float32(self.names.len())
+    }
+}

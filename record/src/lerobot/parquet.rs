@@ -1,0 +1,325 @@
+//! Parquet files, as far as LeRobot datasets need them: flat columns, lists of one length, pictures; no compression, no missing
+//! values. The layout is that of the Apache Parquet format, its descriptions are in Thrift's compact protocol.
+
+use std::io::{self, Write};
+
+/// What a column holds in each row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Whole numbers.
+    Int64,
+    /// As many numbers; one alone is no list.
+    Float32(usize),
+    /// A text.
+    Text,
+    /// A list of one text.
+    Texts,
+    /// A file in a format for pictures, and its name.
+    Picture,
+}
+
+/// A column that holds values: those of pictures have two.
+struct Leaf {
+    path: Vec<String>,
+    /// The physical type: 2 INT64, 4 FLOAT, 6 BYTE_ARRAY.
+    physical: i64,
+    /// Values in each row, where they are a list.
+    list: Option<usize>,
+}
+
+/// A file on its way: row groups one after the other, then what is where.
+pub(crate) struct Table {
+    columns: Vec<(String, Kind)>,
+    leaves: Vec<Leaf>,
+    /// Bytes until now.
+    at: u64,
+    rows: u64,
+    groups: Vec<Group>,
+}
+
+struct Group {
+    rows: u64,
+    /// For each leaf: where its page begins, how long it is, where its values begin.
+    pages: Vec<(u64, u64, u64)>,
+}
+
+const MAGIC: &[u8; 4] = b"PAR1";
+
+impl Table {
+    pub(crate) fn new(columns: Vec<(String, Kind)>) -> Self {
+        let leaf = |(name, kind): &(String, Kind)| {
+            let one = |below: &[&str], physical, list| {
+                let path = std::iter::once(&**name).chain(below.iter().copied()).map(String::from).collect();
+                Leaf { path, physical, list }
+            };
+            let listed = |physical, width| one(&["list", "element"], physical, Some(width));
+            match *kind {
+                Kind::Int64 => vec![one(&[], 2, None)],
+                Kind::Float32(1) => vec![one(&[], 4, None)],
+                Kind::Float32(width) => vec![listed(4, width)],
+                Kind::Text => vec![one(&[], 6, None)],
+                Kind::Texts => vec![listed(6, 1)],
+                Kind::Picture => vec![one(&["bytes"], 6, None), one(&["path"], 6, None)],
+            }
+        };
+        let leaves = columns.iter().flat_map(leaf).collect();
+        Self { columns, leaves, at: 0, rows: 0, groups: Vec::new() }
+    }
+
+    /// How many columns with values there are.
+    pub(crate) fn width(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// Writes some rows: the values of each leaf, one after the other, lowest byte first, texts and files behind their lengths
+    /// ([`put_bytes`]).
+    pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> io::Result<()> {
+        if self.at == 0 {
+            out.write_all(MAGIC)?;
+            self.at = MAGIC.len() as u64;
+        }
+        let mut pages = Vec::new();
+        for (leaf, values) in self.leaves.iter().zip(values) {
+            let count = rows * leaf.list.unwrap_or(1);
+            let levels = leaf.list.map_or_else(Vec::new, |width| levels(rows, width));
+            let size = levels.len() + values.len();
+            let mut page = Thrift::default();
+            page.int(1, 5, 0); // a page of data
+            page.int(2, 5, number(size)?);
+            page.int(3, 5, number(size)?);
+            page.open(5);
+            page.int(1, 5, number(count)?);
+            page.int(2, 5, 0); // PLAIN
+            page.int(3, 5, 3); // levels: RLE
+            page.int(4, 5, 3);
+            page.close();
+            page.close();
+            [&page.bytes, &levels, values].into_iter().try_for_each(|bytes| out.write_all(bytes))?;
+            let (head, size) = (page.bytes.len() as u64, size as u64);
+            pages.push((self.at, head + size, self.at + head + levels.len() as u64));
+            self.at += head + size;
+        }
+        self.rows += rows as u64;
+        self.groups.push(Group { rows: rows as u64, pages });
+        Ok(())
+    }
+
+    /// Where the values of a column of whole numbers are: the place in the file and the number of rows of each group.
+    pub(crate) fn places(&self, name: &str) -> Vec<(u64, u64)> {
+        let leaf = self.leaves.iter().position(|leaf| leaf.path == [name]);
+        let place = |group: &Group| leaf.and_then(|leaf| group.pages.get(leaf)).map(|page| (page.2, group.rows));
+        self.groups.iter().filter_map(place).collect()
+    }
+
+    /// Writes what is where, which ends the file. `about` is told to readers that know the keys.
+    pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> io::Result<()> {
+        if self.at == 0 {
+            out.write_all(MAGIC)?;
+        }
+        let mut file = Thrift::default();
+        file.int(1, 5, 1);
+        self.schema(&mut file);
+        file.int(3, 6, number(self.rows)?);
+        file.list(4, 12, self.groups.len());
+        for group in &self.groups {
+            file.begin();
+            file.list(1, 12, self.leaves.len());
+            for (leaf, (at, bytes, _)) in self.leaves.iter().zip(&group.pages) {
+                file.begin();
+                file.int(2, 6, number(*at)?);
+                file.open(3);
+                file.int(1, 5, leaf.physical);
+                file.list(2, 5, 2); // PLAIN, RLE
+                [0, 3].into_iter().for_each(|encoding| file.zigzag(encoding));
+                file.list(3, 8, leaf.path.len());
+                leaf.path.iter().for_each(|part| file.binary(part.as_bytes()));
+                file.int(4, 5, 0); // not compressed
+                file.int(5, 6, number(group.rows * leaf.list.unwrap_or(1) as u64)?);
+                file.int(6, 6, number(*bytes)?);
+                file.int(7, 6, number(*bytes)?);
+                file.int(9, 6, number(*at)?);
+                file.close();
+                file.close();
+            }
+            file.int(2, 6, number(group.pages.iter().map(|page| page.1).sum::<u64>())?);
+            file.int(3, 6, number(group.rows)?);
+            file.close();
+        }
+        if !about.is_empty() {
+            file.list(5, 12, about.len());
+            for (key, value) in about {
+                file.begin();
+                file.text(1, key);
+                file.text(2, value);
+                file.close();
+            }
+        }
+        file.text(6, "kinetoscope");
+        file.close();
+        out.write_all(&file.bytes)?;
+        out.write_all(&u32::try_from(file.bytes.len()).map_err(io::Error::other)?.to_le_bytes())?;
+        out.write_all(MAGIC)
+    }
+
+    fn schema(&self, file: &mut Thrift) {
+        // Elements in depth first order: the type, repetition (0 required, 2 repeated), name, children, converted type.
+        type Element<'e> = (Option<i64>, Option<i64>, &'e str, Option<usize>, Option<i64>);
+        let mut elements: Vec<Element<'_>> = vec![(None, None, "schema", Some(self.columns.len()), None)];
+        const UTF8: Option<i64> = Some(0);
+        for (name, kind) in &self.columns {
+            let mut list = |physical, converted| {
+                elements.push((None, Some(0), name.as_str(), Some(1), Some(3)));
+                elements.push((None, Some(2), "list", Some(1), None));
+                elements.push((Some(physical), Some(0), "element", None, converted));
+            };
+            match kind {
+                Kind::Float32(width) if *width != 1 => list(4, None),
+                Kind::Texts => list(6, UTF8),
+                Kind::Float32(_) => elements.push((Some(4), Some(0), name.as_str(), None, None)),
+                Kind::Int64 => elements.push((Some(2), Some(0), name.as_str(), None, None)),
+                Kind::Text => elements.push((Some(6), Some(0), name.as_str(), None, UTF8)),
+                Kind::Picture => {
+                    elements.push((None, Some(0), name.as_str(), Some(2), None));
+                    elements.push((Some(6), Some(0), "bytes", None, None));
+                    elements.push((Some(6), Some(0), "path", None, UTF8));
+                }
+            }
+        }
+        file.list(2, 12, elements.len());
+        for (physical, repetition, name, children, converted) in elements {
+            file.begin();
+            let mut int = |field, value: Option<i64>| value.into_iter().for_each(|value| file.int(field, 5, value));
+            int(1, physical);
+            int(3, repetition);
+            file.text(4, name);
+            let mut int = |field, value: Option<i64>| value.into_iter().for_each(|value| file.int(field, 5, value));
+            int(5, children.map(|count| count as i64));
+            int(6, converted);
+            file.close();
+        }
+    }
+}
+
+/// A text or a file as a value.
+pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
+    to.extend_from_slice(&u32::try_from(bytes.len()).map_err(io::Error::other)?.to_le_bytes());
+    to.extend_from_slice(bytes);
+    Ok(())
+}
+
+fn number<N: TryInto<i64>>(number: N) -> io::Result<i64> {
+    // Sizes of pages have 31 bits; a page is some megabytes.
+    number.try_into().map_err(|_| io::Error::other("a number is too large for Parquet"))
+}
+
+/// Levels of lists that all have one length: where rows begin, and that nothing is missing; runs of one value each.
+fn levels(rows: usize, width: usize) -> Vec<u8> {
+    let run = |count: usize, value: u8, to: &mut Vec<u8>| {
+        varint((count as u64) << 1, to);
+        to.push(value);
+    };
+    let (mut repeated, mut defined) = (Vec::new(), Vec::new());
+    for _ in 0..rows {
+        run(1, 0, &mut repeated);
+        if width > 1 {
+            run(width - 1, 1, &mut repeated);
+        }
+    }
+    run(rows * width, 1, &mut defined);
+    let sized = |levels: Vec<u8>| [(levels.len() as u32).to_le_bytes().to_vec(), levels].concat();
+    [sized(repeated), sized(defined)].concat()
+}
+
+fn varint(mut number: u64, to: &mut Vec<u8>) {
+    while number >= 0x80 {
+        to.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    to.push(number as u8);
+}
+
+/// Thrift's compact protocol, inside a first structure.
+struct Thrift {
+    bytes: Vec<u8>,
+    /// The last field of each structure that is open.
+    last: Vec<u8>,
+}
+
+impl Default for Thrift {
+    fn default() -> Self {
+        Self { bytes: Vec::new(), last: vec![0] }
+    }
+}
+
+impl Thrift {
+    /// Fields come in the order of their numbers, with gaps below 16.
+    fn field(&mut self, field: u8, kind: u8) {
+        if let Some(last) = self.last.last_mut() {
+            self.bytes.push((field - *last) << 4 | kind);
+            *last = field;
+        }
+    }
+
+    fn zigzag(&mut self, number: i64) {
+        varint((number << 1 ^ number >> 63) as u64, &mut self.bytes);
+    }
+
+    /// A whole number; `kind` is 5 for 32 bits and 6 for 64.
+    fn int(&mut self, field: u8, kind: u8, number: i64) {
+        self.field(field, kind);
+        self.zigzag(number);
+    }
+
+    fn binary(&mut self, bytes: &[u8]) {
+        varint(bytes.len() as u64, &mut self.bytes);
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    fn text(&mut self, field: u8, text: &str) {
+        self.field(field, 8);
+        self.binary(text.as_bytes());
+    }
+
+    /// The beginning of a list, whose elements follow.
+    fn list(&mut self, field: u8, kind: u8, count: usize) {
+        self.field(field, 9);
+        if count < 15 {
+            self.bytes.push((count as u8) << 4 | kind);
+        } else {
+            self.bytes.push(0xf0 | kind);
+            varint(count as u64, &mut self.bytes);
+        }
+    }
+
+    /// The beginning of a structure in a list.
+    fn begin(&mut self) {
+        self.last.push(0);
+    }
+
+    /// The beginning of a structure in a field.
+    fn open(&mut self, field: u8) {
+        self.field(field, 12);
+        self.begin();
+    }
+
+    fn close(&mut self) {
+        self.bytes.push(0);
+        self.last.pop();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_as_thrift_has_them() {
+        // Of the compact protocol's description: 50 399 is 0xdf 0x89 0x03; -1 becomes 1, 1 becomes 2.
+        let mut bytes = Vec::new();
+        varint(50_399, &mut bytes);
+        assert_eq!(bytes, [0xdf, 0x89, 0x03]);
+        let mut thrift = Thrift::default();
+        [-1, 1].into_iter().for_each(|number| thrift.zigzag(number));
+        assert_eq!(thrift.bytes, [1, 2]);
+    }
+}
