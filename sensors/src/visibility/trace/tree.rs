@@ -26,17 +26,19 @@ struct Node {
     thing: u32,
 }
 
+/// A box, its middle (doubled), and the thing in it.
+type Boxed = ([V3; 2], V3, u32);
+
 /// A tree over boxes; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
-    /// Boxes, their middles (doubled) and things.
-    boxes: Vec<([V3; 2], V3, u32)>,
+    boxes: Vec<Boxed>,
     nodes: Vec<Node>,
 }
 
 impl Tree {
     pub(super) fn bytes(&self) -> usize {
-        self.boxes.capacity() * size_of::<([V3; 2], V3, u32)>() + self.nodes.capacity() * size_of::<Node>()
+        self.boxes.capacity() * size_of::<Boxed>() + self.nodes.capacity() * size_of::<Node>()
     }
 
     pub(super) fn clear(&mut self) {
@@ -125,19 +127,19 @@ fn union(all: [V3; 2], b: &[V3; 2]) -> [V3; 2] {
 }
 
 /// Sorts by the middles along an axis; of those that are at one place the first thing comes first.
-fn order(axis: usize) -> impl Fn(&([V3; 2], V3, u32), &([V3; 2], V3, u32)) -> std::cmp::Ordering {
-    move |a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
+fn order(axis: usize, a: &Boxed, b: &Boxed) -> std::cmp::Ordering {
+    a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
 }
 
 /// Sorts a few boxes so that the best place to cut them is where it says.
-fn best_cut(boxes: &mut [([V3; 2], V3, u32)]) -> usize {
+fn best_cut(boxes: &mut [Boxed]) -> usize {
     let area = |b: [V3; 2]| {
         let [x, y, z] = [0, 1, 2].map(|k| b[1][k] - b[0][k]);
         x * y + y * z + z * x
     };
     let mut best = (f64::INFINITY, 0, boxes.len() / 2);
     for axis in 0..3 {
-        boxes.sort_unstable_by(order(axis));
+        boxes.sort_unstable_by(|a, b| order(axis, a, b));
         let mut costs = [0.0f64; FEW];
         let mut sum = NOTHING;
         for (k, (b, ..)) in boxes.iter().enumerate().skip(1).rev() {
@@ -154,13 +156,13 @@ fn best_cut(boxes: &mut [([V3; 2], V3, u32)]) -> usize {
         }
     }
     if best.1 != 2 {
-        boxes.sort_unstable_by(order(best.1));
+        boxes.sort_unstable_by(|a, b| order(best.1, a, b));
     }
     best.2
 }
 
 /// Adds the node of some boxes, and all below.
-fn split(boxes: &mut [([V3; 2], V3, u32)], nodes: &mut Vec<Node>, depth: usize) {
+fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
     let around = boxes.iter().fold(NOTHING, |all, (b, ..)| union(all, b));
     let index = nodes.len();
     nodes.push(Node { bounds: around, second: 0, thing: boxes[0].2 });
@@ -175,7 +177,7 @@ fn split(boxes: &mut [([V3; 2], V3, u32)], nodes: &mut Vec<Node>, depth: usize) 
 }
 
 /// Cuts boxes in halves of equal number, along the longest side.
-fn halve(boxes: &mut [([V3; 2], V3, u32)]) -> usize {
+fn halve(boxes: &mut [Boxed]) -> usize {
     let spread = |axis: usize| {
         let ends = boxes
             .iter()
@@ -184,7 +186,7 @@ fn halve(boxes: &mut [([V3; 2], V3, u32)]) -> usize {
     };
     let axis = (1..3).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
     let half = boxes.len() / 2;
-    boxes.select_nth_unstable_by(half, order(axis));
+    boxes.select_nth_unstable_by(half, |a, b| order(axis, a, b));
     half
 }
 
