@@ -15,7 +15,7 @@ use crate::error::SensorError;
 use ndarray::{Array1, Array2, Array3};
 use scene::RenderScene;
 use scene::pose::to_row;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What arrived last, in each row. All memory but that of pictures that are not shown is taken at construction.
 #[derive(Debug)]
@@ -25,11 +25,14 @@ pub(super) struct Landed {
     looks: Vec<Option<(Mount, Option<Arc<LensRays>>)>>,
     /// The pictures, once somebody looked.
     drawn: OnceLock<Result<Pictures, CameraError>>,
+    /// Who draws: one reader at a time.
+    turn: Mutex<()>,
 }
 
 impl Landed {
     pub(super) fn new(rows: usize, scene: &RenderScene, ticket: Ticket, slow: bool) -> Self {
-        Self { captures: Captures::new(rows, scene, ticket, slow), looks: vec![None; rows], drawn: OnceLock::new() }
+        let captures = Captures::new(rows, scene, ticket, slow);
+        Self { captures, looks: vec![None; rows], drawn: OnceLock::new(), turn: Mutex::new(()) }
     }
 
     pub(super) fn remember(
@@ -113,7 +116,22 @@ impl Camera {
         }
         // Of what is shown only some rows may be wanted, and drawing it is what the reader would have done anyway.
         let shown = self.pictures()?;
-        match landed.drawn.get_or_init(|| self.draw_landed(landed, shown)) {
+        let drawn = match landed.drawn.get() {
+            Some(drawn) => drawn,
+            None => {
+                // One reader draws, the others wait.
+                let _turn = landed.turn.lock().unwrap_or_else(PoisonError::into_inner);
+                match landed.drawn.get() {
+                    Some(drawn) => drawn,
+                    None => match self.draw_landed(landed, shown) {
+                        // What was broken off is drawn again by the next reader.
+                        Err(error) if error.is_cancelled() => return Err(error.into()),
+                        new => landed.drawn.get_or_init(|| new),
+                    },
+                }
+            }
+        };
+        match drawn {
             Ok(pictures) => pictures.get::<C>().ok_or_else(|| off().into()),
             Err(error) => Err(error.clone().into()),
         }

@@ -9,7 +9,8 @@ pub enum CameraError {
     /// Size, intrinsics, depth range or number of samples are no good.
     #[error("the camera cannot see: {0}")]
     View(RenderError),
-    /// An environment could not be drawn; it is tried again when it was captured anew.
+    /// An environment could not be drawn; it is tried again when it was captured anew, and at the next reading where somebody
+    /// broke it off.
     #[error("environment {env} cannot be drawn: {error}")]
     Draw {
         /// The environment.
@@ -234,4 +235,11 @@ fn some(ids: &[usize]) -> String {
     let first: Vec<String> = ids.iter().take(8).map(usize::to_string).collect();
     let more = if ids.len() > 8 { format!(" and {} more", ids.len() - 8) } else { String::new() };
     first.join(", ") + &more
+}
+
+impl CameraError {
+    /// Whether somebody broke the drawing off: what is drawn again is another drawing.
+    pub(super) fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Draw { error: RenderError::Cancelled { .. }, .. })
+    }
 }

@@ -44,6 +44,8 @@ pub(super) struct Past {
     /// What arrived last, of a camera with latency.
     pub(super) landed: Option<Landed>,
     pub(super) drawn: OnceLock<Album>,
+    /// Who draws it: one reader at a time.
+    pub(super) turn: Mutex<()>,
     /// The album while it is not in `drawn`.
     pub(super) shelf: Mutex<Option<Album>>,
 }
@@ -98,6 +100,7 @@ impl Memory {
                     shown: vec![false; rows],
                     landed: (cfg.latency_steps > 0).then(|| Landed::new(rows, scene, ticket, slow)),
                     drawn: OnceLock::new(),
+                    turn: Mutex::new(()),
                     shelf: Mutex::new(Some(Album::new(cfg.channels, rows, cfg.history_length, cfg.width, cfg.height))),
                 },
             })

@@ -27,7 +27,7 @@ pub(super) type Job<'a> = (Shot<'a>, FrameMut<'a>);
 ///
 /// Where there are many shots, each is drawn by one thread. The last ones, that would leave threads without work, are
 /// drawn together: first what is drawn where, then their shadow maps in parts, then bands of the pictures.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
     /// How many of them work.
@@ -37,14 +37,37 @@ pub struct ParallelRasterizer {
     progress: RenderProgress,
 }
 
+/// Draws as the other does, and counts its own progress.
+impl Clone for ParallelRasterizer {
+    fn clone(&self) -> Self {
+        let mut clone = Self {
+            rasterizers: self.rasterizers.clone(),
+            working: self.working,
+            plans: self.plans.clone(),
+            crew: self.crew.clone(),
+            progress: RenderProgress::default(),
+        };
+        clone.share_progress();
+        clone
+    }
+}
+
 impl ParallelRasterizer {
     /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The others start with each
     /// batch and end with it: see [`with_crew`](Self::with_crew).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        let rasterizer = Rasterizer::new(cfg);
-        let progress = rasterizer.progress.clone();
-        let (working, rasterizers) = (threads.max(1), vec![rasterizer; threads.max(1)]);
-        Self { rasterizers, working, plans: Vec::new(), crew: Crew::default(), progress }
+        let (working, rasterizers) = (threads.max(1), vec![Rasterizer::new(cfg); threads.max(1)]);
+        let (crew, progress) = (Crew::default(), RenderProgress::default());
+        let mut all = Self { rasterizers, working, plans: Vec::new(), crew, progress };
+        all.share_progress();
+        all
+    }
+
+    /// All threads count together.
+    fn share_progress(&mut self) {
+        for rasterizer in &mut self.rasterizers {
+            rasterizer.progress = self.progress.clone();
+        }
     }
 
     /// Draws on the threads of `crew`. With those of a simulation nothing is allocated after the first batches.
@@ -132,7 +155,12 @@ impl ParallelRasterizer {
         if renderer.follows_paths() {
             for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
-                failure.note(index, expose(crew, rasterizers, (shot, &take), frame));
+                let (before, paths) = (progress.samples(), renderer.paths(shot, frame));
+                let result = expose(crew, rasterizers, (shot, &take), frame);
+                if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
+                    progress.refuse(paths.saturating_sub(progress.samples() - before));
+                }
+                failure.note(index, result);
             }
             return failure.first();
         }

@@ -57,7 +57,7 @@ impl Camera {
         let pictures = match self.past().filter(|past| past.length() > 0) {
             None => None,
             Some(past) => {
-                let album = past.drawn.get_or_init(|| self.draw_past(past));
+                let album = self.album(past)?;
                 if let Some(failure) = &album.failure {
                     return Err(failure.clone().into());
                 }
@@ -71,8 +71,28 @@ impl Camera {
     /// Draws the history, if there is one.
     pub(super) fn draw_history(&self) {
         if let Some(past) = self.past().filter(|past| past.length() > 0) {
-            past.drawn.get_or_init(|| self.draw_past(past));
+            // What is wrong is said to who reads.
+            let _ = self.album(past);
         }
+    }
+
+    /// The album with all that has arrived; what was broken off is not kept, the next reader draws it again.
+    fn album<'a>(&'a self, past: &'a Past) -> Result<&'a Album, CameraError> {
+        if let Some(album) = past.drawn.get() {
+            return Ok(album);
+        }
+        // One reader draws, the others wait.
+        let _turn = past.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(album) = past.drawn.get() {
+            return Ok(album);
+        }
+        let album = self.draw_past(past);
+        if let Some(failure) = album.failure.as_ref().filter(|failure| failure.is_cancelled()) {
+            let failure = failure.clone();
+            *past.shelf.lock().unwrap_or_else(PoisonError::into_inner) = Some(album);
+            return Err(failure);
+        }
+        Ok(past.drawn.get_or_init(|| album))
     }
 
     /// Draws what has arrived and nobody has looked at.

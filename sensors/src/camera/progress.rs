@@ -38,7 +38,7 @@ impl RenderProgress {
         self.0.samples.load(Ordering::Relaxed)
     }
 
-    /// Paths that there are to follow: pixels times samples.
+    /// Paths that there are to follow: pixels times samples, without those of pictures that turned out to be impossible.
     pub fn total(&self) -> u64 {
         self.0.total.load(Ordering::Relaxed)
     }
@@ -71,7 +71,7 @@ impl RenderProgress {
         self.0.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Pictures that are begun from now on are drawn again; one that was broken off stays so until the camera captures the next.
+    /// Pictures that are begun from now on are drawn again, those that were broken off too when somebody reads them.
     pub fn resume(&self) {
         self.0.cancelled.store(false, Ordering::Relaxed);
     }
@@ -87,6 +87,11 @@ impl RenderProgress {
         self.0.samples.store(0, Ordering::Relaxed);
         self.0.rays.store(0, Ordering::Relaxed);
         self.0.total.store(total, Ordering::Relaxed);
+    }
+
+    /// Some of it will never be done: a picture that cannot be drawn.
+    pub(crate) fn refuse(&self, samples: u64) {
+        self.0.total.fetch_sub(samples, Ordering::Relaxed);
     }
 
     /// Some of it is done.

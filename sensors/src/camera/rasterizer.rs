@@ -103,7 +103,7 @@ pub struct Before<'a> {
 /// Transparency: things with 0 < alpha < 1 are blended into the colour, back to front by the depth of their origins, each
 /// with its nearest surface only; they are not seen by things behind them twice. All other channels see the nearest
 /// surface with alpha of at least 0.5. Opacity of textures is not used.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Rasterizer {
     /// How frames are drawn.
     pub cfg: RasterCfg,
@@ -123,6 +123,26 @@ pub struct Rasterizer {
     pub(super) film: Film,
     /// Of pictures whose rows are of several instants.
     pub(super) roll: Roll,
+}
+
+/// Draws as the other does, and counts its own progress.
+impl Clone for Rasterizer {
+    fn clone(&self) -> Self {
+        let Self { cfg, renderer, aperture, shutter, progress: _, assets, level, plan, brush, film, roll } = self;
+        Self {
+            cfg: *cfg,
+            renderer: *renderer,
+            aperture: *aperture,
+            shutter: *shutter,
+            progress: RenderProgress::default(),
+            assets: assets.clone(),
+            level: *level,
+            plan: plan.clone(),
+            brush: brush.clone(),
+            film: film.clone(),
+            roll: roll.clone(),
+        }
+    }
 }
 
 impl Default for Rasterizer {

@@ -81,6 +81,8 @@ pub struct Camera {
     due: Vec<usize>,
     /// The pictures of what was captured, once somebody looked.
     drawn: OnceLock<Canvas>,
+    /// Who draws: one reader at a time.
+    turn: Mutex<()>,
     desk: Mutex<Desk>,
     draws: AtomicU64,
 }
@@ -280,6 +282,7 @@ impl Camera {
             frame_counts: Array1::zeros(rows),
             due: Vec::with_capacity(rows),
             drawn: OnceLock::new(),
+            turn: Mutex::new(()),
             desk: Mutex::new(Desk {
                 rasterizer,
                 canvas,
@@ -336,7 +339,7 @@ impl Camera {
     }
 
     /// How far the drawing of pictures by path tracing is, and a way to break it off from another thread. A reading that was
-    /// broken off is [`CameraError::Draw`] with [`RenderError::Cancelled`], until something was captured anew or set.
+    /// broken off is [`CameraError::Draw`] with [`RenderError::Cancelled`]; the next one draws again.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
@@ -363,10 +366,32 @@ impl Camera {
     /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Draw`].
     pub fn pictures(&self) -> Result<&Pictures, SensorError> {
         (0..self.env_ids.len()).try_for_each(|row| self.must_have_captured(row))?;
-        let canvas = self.drawn.get_or_init(|| self.draw());
+        let canvas = match self.drawn.get() {
+            Some(canvas) => canvas,
+            None => {
+                // One reader draws, the others wait.
+                let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+                match self.drawn.get() {
+                    Some(canvas) => canvas,
+                    None => self.keep_drawn(self.draw())?,
+                }
+            }
+        };
         match &canvas.failure {
             Some(failure) => Err(failure.clone().into()),
             None => Ok(&canvas.pictures),
+        }
+    }
+
+    /// Keeps what was drawn for the next readers, except what was broken off: they draw it again.
+    fn keep_drawn(&self, canvas: Canvas) -> Result<&Canvas, CameraError> {
+        match &canvas.failure {
+            Some(failure) if failure.is_cancelled() => {
+                let failure = failure.clone();
+                self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas = Some(canvas);
+                Err(failure)
+            }
+            _ => Ok(self.drawn.get_or_init(|| canvas)),
         }
     }
 

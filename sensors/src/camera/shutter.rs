@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// What moves meanwhile is sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras look at
 /// where things are at the physics step at which the shutter opens, or the one before, and at the stamp; between, things go
-/// straight and turn steadily. Lamps are where they are at the stamp. Needs
+/// straight and turn steadily. What somebody puts elsewhere meanwhile counts as having been there since the shutter opened: how
+/// it moves from then on is spread over the whole span. Lamps are where they are at the stamp. Needs
 /// [`Renderer::RayTraced`](super::Renderer::RayTraced). Colours are of the whole exposure; all other channels of its middle,
 /// row by row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -118,12 +118,11 @@ impl ShadowRays<'_> {
             for index in 0..u32::from(self.occlusion_rays) {
                 let direction = basis.to_world(cosine(sequence.sample(index).pair(0)));
                 let direction = scale(direction, 1.0 / dot(direction, direction).sqrt());
-                // Below the surface itself there is no light.
-                let passes = if dot(direction, flat) > 0.0 {
-                    self.tracer.passes(&Ray { origin, direction }, f64::INFINITY, NOW, &mut stack)
-                } else {
-                    0.0
-                };
+                // What the smooth normal means lies beyond the surface itself: below that, rays are asked where it mirrors
+                // them. So what is round and made of triangles does not shade itself, and what is enclosed is dark.
+                let over = dot(direction, flat);
+                let asked = along(direction, if over < 0.0 { -2.0 * over } else { 0.0 }, flat);
+                let passes = self.tracer.passes(&Ray { origin, direction: asked }, f64::INFINITY, NOW, &mut stack);
                 blocked[usize::from(direction[2] <= 0.0)] += 1.0 - passes;
             }
             for (out, blocked) in out.iter_mut().zip(blocked) {
@@ -146,6 +145,11 @@ mod tests {
 
     /// The parts from above and below that are blocked at a point of a floor that looks to `normal`.
     fn blocked(things: Vec<(Shape, PoseF32)>, at: [f32; 3], normal: [f32; 3]) -> [f64; 2] {
+        blocked_of(things, at, (normal, normal))
+    }
+
+    /// The same, where light sees another normal than the surface has.
+    fn blocked_of(things: Vec<(Shape, PoseF32)>, at: [f32; 3], normals: ([f32; 3], [f32; 3])) -> [f64; 2] {
         let floor = (Plane::INFINITE.into(), PoseF32::IDENTITY);
         let (shapes, poses): (Vec<Shape>, Vec<PoseF32>) = std::iter::once(floor).chain(things).unzip();
         let instances = shapes.into_iter().map(|shape| Instance::new(shape, Material::default(), 1)).collect();
@@ -157,9 +161,9 @@ mod tests {
         let stack = RefCell::new(&mut stack);
         let rays = ShadowRays { tracer: &tracer, stack: &stack, shadows: true, occlusion_rays: 1 << 12 };
         at_level!(Level::best(), s => {
-            let (at, normal) = (V3::splat(s, at), V3::splat(s, normal));
+            let [at, normal, smooth] = [at, normals.0, normals.1].map(|v| V3::splat(s, v));
             let lanes = splat(s, 0.0f32).simd_gt(splat(s, -1.0));
-            let parts = rays.blocked(s, (at, normal, normal, splat(s, 1.0)), lanes);
+            let parts = rays.blocked(s, (at, normal, smooth, splat(s, 1.0)), lanes);
             parts.map(|part| f64::from(part.array()[3]))
         })
     }
@@ -196,5 +200,18 @@ mod tests {
         assert!((above - 0.16).abs() < NOISE && below == 0.0, "{above}");
         let [above, below] = blocked(vec![], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
         assert!((below - 0.5).abs() < NOISE && above == 0.0, "{below}");
+    }
+
+    /// A facet of something round, whose smooth normal leans over by half a right angle: alone it is not shaded at all, by
+    /// itself neither. In a closed box nothing passes, whatever the normals.
+    #[test]
+    fn facets_do_not_shade_what_is_round() {
+        let (up, leaning) = ([0.0, 0.0, 1.0], [0.5f32.sqrt(), 0.0, 0.5f32.sqrt()]);
+        assert_eq!(blocked_of(vec![], [0.3, 0.2, 0.0], (up, leaning)), [0.0; 2]);
+        let room = vec![(Sphere { radius: 2.0 }.into(), PoseF32::IDENTITY)];
+        let [above, below] = blocked_of(room, [0.3, 0.2, 0.0], (up, leaning));
+        assert!((above + below - 1.0).abs() < 1e-6, "{above} {below}");
+        // Light from below the horizon is that part of it that a plane of this tilt sees: (1 - cos) / 2.
+        assert!((below - 0.5 * (1.0 - 0.5f64.sqrt())).abs() < NOISE, "{below}");
     }
 }

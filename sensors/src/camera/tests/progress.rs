@@ -1,9 +1,11 @@
 //! Long renderings tell how far they are, and end when they are told to.
 
-use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, RenderProgress, Renderer, Shot};
+use super::super::channel::Color;
+use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, RenderProgress, Renderer, Shot};
 use super::scenes::figure;
-use super::stage::{built, cfg, context};
+use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
+use crate::sensor::Sensor;
 use crate::visibility::{RenderError, View};
 use std::time::{Duration, Instant};
 
@@ -92,7 +94,84 @@ fn cameras_lend_their_progress() {
     let expected = CameraError::Draw { env: 0, error: RenderError::Cancelled { samples: 0, total } };
     assert_eq!(error, expected.into());
     progress.resume();
-    assert!(camera.color().is_err(), "until something is set or captured");
-    camera.restore(None).unwrap();
-    assert!(camera.color().is_ok() && progress.samples() == total);
+    // What was broken off is drawn by the next reader, and is what it would have been.
+    let fresh = built(&CameraCfg { renderer: paths(2), ..cfg() }, &context(1));
+    assert_eq!(camera.color().unwrap(), fresh.color().unwrap());
+    assert_eq!(progress.samples(), total);
+    // A control: what cannot be drawn stays so.
+    let draws = camera.draws();
+    let mut state = state(&[1]);
+    state.visible.as_mut().unwrap().instance_poses[(0, 1)].translation[0] = f32::NAN;
+    camera.update(&state).unwrap();
+    assert!(camera.color().is_err() && camera.color().is_err());
+    assert_eq!(camera.draws(), draws + 1, "tried once");
+}
+
+/// A late camera that shows something newer, and one that remembers: neither keeps what was broken off.
+#[test]
+fn late_and_past_pictures_that_were_broken_off_are_drawn_when_read_again() {
+    let cfg = CameraCfg { renderer: paths(2), latency_steps: 2, history_length: 2, ..cfg() };
+    let context = context(1);
+    let run = |breaks_off: bool| {
+        let mut camera = built(&cfg, &context);
+        for step in 1..=3 {
+            camera.update(&state(&[step])).unwrap();
+        }
+        // Somebody writes: what is shown is not what arrived.
+        camera.refresh(&[0], &state(&[3])).unwrap();
+        assert!(camera.color().is_ok() && camera.arrived_stamps() != camera.stamps());
+        if breaks_off {
+            camera.progress().cancel();
+            for _ in 0..2 {
+                assert!(camera.arrived::<Color>().unwrap_err().to_string().contains("broken off"));
+                assert!(camera.history::<Color>().unwrap_err().to_string().contains("broken off"));
+            }
+            camera.progress().resume();
+        }
+        let (arrived, past) = (camera.arrived::<Color>().unwrap().to_owned(), camera.history::<Color>().unwrap());
+        let drawn = camera.draws();
+        assert_eq!(camera.arrived::<Color>().unwrap(), arrived);
+        assert_eq!(camera.draws(), drawn, "what is drawn is kept");
+        (arrived, past.to_owned())
+    };
+    assert_eq!(run(true), run(false));
+}
+
+/// Two pictures, of which one has a pose that is none: the other is all there is to do.
+#[test]
+fn pictures_that_are_refused_do_not_count() {
+    let (scene, poses) = figure();
+    let mut broken = poses.clone();
+    broken[0].rotation = [[0.0; 3]; 3];
+    let view = View::look_at([33, 21], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
+    let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2);
+    rasterizer.set_renderer(paths(8));
+    let mut frames = [Frame::new(33, 21, Channels::ALL), Frame::new(33, 21, Channels::ALL)];
+    let shot = |poses| Shot { scene: &scene, poses, view: &view, lights: None, lens: None, before: None };
+    let [first, second] = &mut frames;
+    let result = rasterizer.render(&mut [(shot(&broken[..]), first.as_mut()), (shot(&poses[..]), second.as_mut())]);
+    assert!(matches!(result, Err((0, RenderError::InstancePose { .. }))));
+    let progress = rasterizer.progress();
+    assert_eq!((progress.samples(), progress.total()), (33 * 21 * 8, 33 * 21 * 8));
+    assert_eq!((progress.fraction(), progress.remaining()), (Some(1.0), Some(Duration::ZERO)));
+}
+
+/// A copy of a renderer counts for itself, and breaking one off does not break off the other.
+#[test]
+fn copies_have_their_own_progress() {
+    let (scene, poses) = figure();
+    let view = View::look_at([33, 21], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
+    let mut first = ParallelRasterizer::new(RasterCfg::default(), 2);
+    first.set_renderer(paths(4));
+    let mut second = first.clone();
+    first.progress().cancel();
+    let mut frame = Frame::new(33, 21, Channels::ALL);
+    let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+    second.render(&mut [(shot, frame.as_mut())]).unwrap();
+    assert_eq!((second.progress().samples(), first.progress().samples()), (33 * 21 * 4, 0));
+    assert!(first.render(&mut [(shot, frame.as_mut())]).is_err());
+    let single = Rasterizer { renderer: paths(4), ..Rasterizer::default() };
+    let copy = single.clone();
+    single.progress.cancel();
+    assert!(!copy.progress.is_cancelled() && copy.renderer == single.renderer);
 }

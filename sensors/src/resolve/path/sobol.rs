@@ -41,17 +41,15 @@ fn scramble(x: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// The second dimension; the first are the reversed bits.
-fn second(mut index: u32) -> u32 {
-    let (mut out, mut direction) = (0, 1u32 << 31);
-    while index != 0 {
-        if index & 1 == 1 {
-            out ^= direction;
-        }
-        index >>= 1;
-        direction ^= direction >> 1;
-    }
-    out
+/// The second dimension of the point whose first one has these bits: the product with Pascal's triangle modulo 2, whose
+/// halves are triangles again. Source: Ahmed, An implementation algorithm of 2D Sobol sequence fast, elegant, and compact, EGSR
+/// 2024.
+fn second(mut first: u32) -> u32 {
+    first ^= first << 16;
+    first ^= (first & 0x00ff_00ff) << 8;
+    first ^= (first & 0x0f0f_0f0f) << 4;
+    first ^= (first & 0x3333_3333) << 2;
+    first ^ (first & 0x5555_5555) << 1
 }
 
 impl Sequence {
@@ -70,18 +68,29 @@ impl Sample {
     /// not depend on each other.
     pub(in crate::resolve) fn pair(self, dimension: u32) -> [f64; 2] {
         let seed = combine(self.seed, dimension);
-        let index = scramble(self.index, seed);
+        let first = scramble(self.index, seed).reverse_bits();
         let unit = |x: u32| f64::from(x) / 4_294_967_296.0;
-        [
-            unit(scramble(index.reverse_bits(), mix(seed ^ 0x68bc_21eb))),
-            unit(scramble(second(index), mix(seed ^ 0x02e5_be93))),
-        ]
+        [unit(scramble(first, mix(seed ^ 0x68bc_21eb))), unit(scramble(second(first), mix(seed ^ 0x02e5_be93)))]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The textbook's sum: every bit of the index adds a direction number, of which each is the one before times 1 + x.
+    #[test]
+    fn the_second_dimension_is_sobols() {
+        for k in 0..100_000u32 {
+            let index = if k < 1000 { k } else { mix(k) };
+            let (mut rest, mut sum, mut direction) = (index, 0, 1u32 << 31);
+            while rest != 0 {
+                sum ^= if rest & 1 == 1 { direction } else { 0 };
+                (rest, direction) = (rest >> 1, direction ^ direction >> 1);
+            }
+            assert_eq!(second(index.reverse_bits()), sum, "{index}");
+        }
+    }
 
     /// A net: one sample in every box of the same area, however it is cut in halves.
     #[test]

@@ -25,7 +25,7 @@ use crate::ray::shape::mesh::MeshTree;
 use crate::ray::triangle::ShearPacket;
 use crate::ray::vector::{V3, along, dot, scale};
 use crate::ray::{Ray, RayAssets};
-use motion::{Motion, wide};
+use motion::{Motion, rigid, wide};
 use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
 use tree::Tree;
@@ -139,7 +139,7 @@ impl Tracer {
         tree.clear();
         for (k, body) in bodies.iter().enumerate() {
             let Some(body) = body else { continue };
-            let world_from_instance = wide(&poses[k]);
+            let world_from_instance = rigid(&poses[k]);
             let thing = things.len() as u32;
             let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
             let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));

@@ -1,4 +1,7 @@
-//! The tree over the things of a frame: halves of equal number, along the longest side.
+//! The tree over the things of a frame: parts that rays meet least often, by the surface area heuristic; of many things, and
+//! far down, halves of equal number along the longest side.
+//!
+//! Source: Goldsmith and Salmon, Automatic creation of object hierarchies for ray tracing, 1987.
 
 use super::motion::Motion;
 use crate::ray::Ray;
@@ -7,8 +10,12 @@ use scene::PoseF64;
 
 /// How much larger boxes are: more than the rounding of the test.
 const LARGER: f64 = 1.0 + 1e-6;
-/// Deeper than any tree: halves of equal number of less than 2^32 things.
-const DEPTH: usize = 40;
+/// Levels of parts that may be of any size.
+const UNEVEN: usize = 8;
+/// Deeper than any tree: below those, halves of equal number of less than 2^32 things.
+const DEPTH: usize = UNEVEN + 32;
+/// Of more things all places to cut are not looked at: that takes as long as some thousand rays.
+const FEW: usize = 64;
 
 /// A box with two boxes in it, or with a thing.
 #[derive(Clone, Copy, Debug)]
@@ -19,17 +26,19 @@ struct Node {
     thing: u32,
 }
 
+/// A box, its middle (doubled), and the thing in it.
+type Boxed = ([V3; 2], V3, u32);
+
 /// A tree over boxes; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
-    /// Boxes, their middles (doubled) and things.
-    boxes: Vec<([V3; 2], V3, u32)>,
+    boxes: Vec<Boxed>,
     nodes: Vec<Node>,
 }
 
 impl Tree {
     pub(super) fn bytes(&self) -> usize {
-        self.boxes.capacity() * size_of::<([V3; 2], V3, u32)>() + self.nodes.capacity() * size_of::<Node>()
+        self.boxes.capacity() * size_of::<Boxed>() + self.nodes.capacity() * size_of::<Node>()
     }
 
     pub(super) fn clear(&mut self) {
@@ -58,7 +67,7 @@ impl Tree {
         let Self { boxes, nodes } = self;
         if !boxes.is_empty() {
             nodes.reserve(2 * boxes.len() - 1);
-            split(boxes, nodes);
+            split(boxes, nodes, 0);
         }
     }
 
@@ -111,16 +120,64 @@ impl Tree {
     }
 }
 
+const NOTHING: [V3; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+fn union(all: [V3; 2], b: &[V3; 2]) -> [V3; 2] {
+    [[0, 1, 2].map(|k| all[0][k].min(b[0][k])), [0, 1, 2].map(|k| all[1][k].max(b[1][k]))]
+}
+
+/// Sorts by the middles along an axis; of those that are at one place the first thing comes first.
+fn order(axis: usize, a: &Boxed, b: &Boxed) -> std::cmp::Ordering {
+    a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
+}
+
+/// Sorts a few boxes so that the best place to cut them is where it says.
+fn best_cut(boxes: &mut [Boxed]) -> usize {
+    let area = |b: [V3; 2]| {
+        let [x, y, z] = [0, 1, 2].map(|k| b[1][k] - b[0][k]);
+        x * y + y * z + z * x
+    };
+    let mut best = (f64::INFINITY, 0, boxes.len() / 2);
+    for axis in 0..3 {
+        boxes.sort_unstable_by(|a, b| order(axis, a, b));
+        let mut costs = [0.0f64; FEW];
+        let mut sum = NOTHING;
+        for (k, (b, ..)) in boxes.iter().enumerate().skip(1).rev() {
+            sum = union(sum, b);
+            costs[k] = (boxes.len() - k) as f64 * area(sum);
+        }
+        sum = NOTHING;
+        for (k, (b, ..)) in (1..).zip(&boxes[..boxes.len() - 1]) {
+            sum = union(sum, b);
+            let cost = k as f64 * area(sum) + costs[k];
+            if cost < best.0 {
+                best = (cost, axis, k);
+            }
+        }
+    }
+    if best.1 != 2 {
+        boxes.sort_unstable_by(|a, b| order(best.1, a, b));
+    }
+    best.2
+}
+
 /// Adds the node of some boxes, and all below.
-fn split(boxes: &mut [([V3; 2], V3, u32)], nodes: &mut Vec<Node>) {
-    let around = boxes.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |all, (b, ..)| {
-        [[0, 1, 2].map(|k| all[0][k].min(b[0][k])), [0, 1, 2].map(|k| all[1][k].max(b[1][k]))]
-    });
+fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
+    let around = boxes.iter().fold(NOTHING, |all, (b, ..)| union(all, b));
     let index = nodes.len();
     nodes.push(Node { bounds: around, second: 0, thing: boxes[0].2 });
     if boxes.len() == 1 {
         return;
     }
+    let at = if depth < UNEVEN && boxes.len() <= FEW { best_cut(boxes) } else { halve(boxes) };
+    let (low, high) = boxes.split_at_mut(at);
+    split(low, nodes, depth + 1);
+    nodes[index].second = nodes.len() as u32;
+    split(high, nodes, depth + 1);
+}
+
+/// Cuts boxes in halves of equal number, along the longest side.
+fn halve(boxes: &mut [Boxed]) -> usize {
     let spread = |axis: usize| {
         let ends = boxes
             .iter()
@@ -129,11 +186,8 @@ fn split(boxes: &mut [([V3; 2], V3, u32)], nodes: &mut Vec<Node>) {
     };
     let axis = (1..3).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
     let half = boxes.len() / 2;
-    boxes.select_nth_unstable_by(half, |a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2)));
-    let (low, high) = boxes.split_at_mut(half);
-    split(low, nodes);
-    nodes[index].second = nodes.len() as u32;
-    split(high, nodes);
+    boxes.select_nth_unstable_by(half, |a, b| order(axis, a, b));
+    half
 }
 
 #[cfg(test)]
@@ -147,7 +201,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
-        for count in [0usize, 1, 2, 3, 7, 100] {
+        for count in [0usize, 1, 2, 3, 7, 64, 65, 300] {
             let mut tree = Tree::default();
             let boxes: Vec<[V3; 2]> = (0..count)
                 .map(|_| {

@@ -134,9 +134,19 @@ fn what_is_not_opaque_glows_by_its_alpha() {
     glass.rgba[3] = 0.3;
     instances.push(Instance::new(Plane { half: [2.0; 2] }, glass, 3));
     let poses = [poses[0], poses[1], PoseF32::from_translation([0., 0., 0.5])];
-    // It is seen from above only, and lamps shine from above.
-    let veiled = seen(&dark(instances), &poses, &view, 256, 0);
+    // It is seen from above only, and lamps shine from above: rays of paths and shadow rays come from below.
+    let scene = dark(instances);
+    let veiled = seen(&scene, &poses, &view, 256, 0);
     assert!((veiled.0 - whole.0).abs() < 5.0 * veiled.1.hypot(whole.1), "backs are not seen: {veiled:?}, {whole:?}");
+    // Turned over, it takes its alpha once, of light that is looked for and of light that is met: 1 - 0.3, by each way alone.
+    let poses = [poses[0], poses[1], down([0., 0., 0.5])];
+    let part = 1.0 - f64::from(0.3f32);
+    for light in by_ways(&scene, &poses, &view, 0, 400) {
+        let off = 5.0 * light.1.hypot(part * whole.1);
+        assert!((light.0 - part * whole.0).abs() < off, "{light:?}, {part} of {whole:?}");
+        // Controls: light that is not taken, and light that is taken twice, would be found out.
+        assert!(off < 0.15 * whole.0 && part - part * part > 0.2, "{light:?}, {whole:?}");
+    }
 }
 
 /// Of several lamps, each is chosen as often as it is bright: the sum is that of each alone.
@@ -158,4 +168,93 @@ fn lamps_add_up() {
     assert!((together.0 - sum).abs() < 5.0 * (together.1.powi(2) + square).sqrt(), "{together:?}, not {sum}");
     // A control: without the faintest it is less.
     assert!((together.0 - (sum - alone[0].0)).abs() > 5.0 * (together.1.powi(2) + square).sqrt());
+}
+
+/// A panel of a mesh, 2 half sides wide, `aside` from where its instance is, that looks down (or up).
+fn panel(half: f32, aside: f32, up: bool) -> Shape {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let positions = corners.map(|[x, y]| [aside + half * x, half * y, 0.0f32]).to_vec();
+    let triangles = if up { vec![[0, 1, 2], [0, 2, 3]] } else { vec![[0, 2, 1], [0, 3, 2]] };
+    let mesh = scene::mesh::TriMesh::from_triangles(positions, triangles);
+    scene::shape::Mesh { mesh: std::sync::Arc::new(scene::RenderMesh::new(&mesh, 0.1)) }.into()
+}
+
+/// A lamp close above a floor, both turned anyhow and 40 m away from the frames of their meshes. A rotation in single
+/// precision is none: there and back is 1e-7 of 40 m aside, forty times what is left out of the way to a lamp 0.1 m away, so
+/// lamps would shade themselves, and floors too. The form factor does not turn.
+#[test]
+fn what_is_far_from_its_own_frame_does_not_shade_itself() {
+    let (aside, height) = (40.0f32, 0.1f32);
+    let factor = form_factor(3.0, 3.0);
+    let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
+    let glow = Material { emission: 2.0, ..matt(0.5) };
+    let instances =
+        vec![Instance::new(panel(4.0, aside, true), matt(0.7), 1), Instance::new(panel(0.3, aside, false), glow, 2)];
+    let mut scene = dark(instances);
+    for angles in [[0.3, -0.8, 2.1], [1.1, 0.4, -0.7], [-2.3, 1.2, 0.2], [0.7, 0.7, 0.7], [2.9, -0.2, 1.3]] {
+        let turned = PoseF32::from(&scene::pose::from_xyz_rpy([0.0; 3], angles));
+        let there = |local: [f32; 3]| turned.rotation.map(|r| r[0] * local[0] + r[1] * local[1] + r[2] * local[2]);
+        let place = |local: [f32; 3]| PoseF32 { translation: there(local), ..turned };
+        let poses = [place([-aside, 0.0, 0.0]), place([-aside, 0.0, height])];
+        let view = looking(there([0.9, 0.2, 0.05]), [0.0; 3]);
+        scene.lights.clear();
+        let studio = Studio::new(&scene, &poses, &view);
+        for ways in [Ways::Both, Ways::Looking] {
+            let light = studio.seen(&Paths { ways, ..studio.paths(256, 0, 0) }, 128);
+            // Translations of 40 m are rounded to 4e-6 m: 4e-5 of the height, as much of the form factor at most.
+            assert!(
+                (light.0 - expected).abs() < 5.0 * light.1 + 4e-5 * expected,
+                "{angles:?} {ways:?}: {light:?}, not {expected}"
+            );
+            assert!(light.1 < 0.01 * expected, "it can tell a twentieth: {light:?}");
+        }
+        // A lamp without a size lights the floor wherever the floor's frame is; the glowing panel is not between.
+        let normal = there([0.0, 0.0, 1.0]);
+        let shine = scale(to_f64(there([0.8, 0.0, 0.6])), -1.0);
+        scene.lights = vec![lamp(LightKind::Directional, [0.; 3], shine.map(|x| x as f32))];
+        let beside = there([2.0, 0.3, 0.0]);
+        let view = looking([0, 1, 2].map(|k| beside[k] + there([0.9, 0.2, 0.5])[k]), beside);
+        let studio = Studio::new(&scene, &poses, &view);
+        let lit = studio.seen(&Paths { ways: Ways::Looking, ..studio.paths(1, 0, 0) }, 1024).0;
+        let cosine = -dot(to_f64(normal), shine);
+        let sun = albedo(0.7) * f64::from(0.9f32) * cosine;
+        assert!(lit > sun * (1.0 - 1e-5), "{angles:?}: {lit}, at least {sun}");
+    }
+}
+
+/// Where light comes by a wall only, at later bounces: a lamp that looks away from what the camera sees, so that it is looked
+/// for and met at the wall and from there on. Judged by paths that only meet it, without any looking for it, over walls of
+/// every kind.
+#[test]
+fn both_ways_find_the_same_light_after_bounces() {
+    // Columns are the axes of a plane: the wall's normal is +x, the lamp's -x.
+    let wall = PoseF32 { rotation: [[0., 0., 1.], [1., 0., 0.], [0., 1., 0.]], translation: [-0.5, 0.0, 0.0] };
+    let lamp = PoseF32 { rotation: [[0., 0., -1.], [1., 0., 0.], [0., -1., 0.]], translation: [0.1, 0.0, 0.7] };
+    let sharp = Material { specular: 1.0, shininess: 0.6, ..matt(0.05) };
+    let mirror = Material { reflectance: 0.5, ..matt(0.5) };
+    let view = looking([1.5, 0.4, 0.9], [0.6, 0.0, 0.0]);
+    for material in [matt(0.8), shiny(), sharp, mirror] {
+        let instances = vec![
+            Instance::new(Plane::INFINITE, Material { specular: 0.5, shininess: 0.2, ..matt(0.7) }, 1),
+            Instance::new(Plane { half: [2.0; 2] }, material.clone(), 2),
+            Instance::new(Plane { half: [0.5; 2] }, Material { emission: 4.0, ..matt(0.5) }, 3),
+        ];
+        let (scene, poses) = (dark(instances), [PoseF32::IDENTITY, wall, lamp]);
+        // A control: the floor itself does not see the lamp.
+        let bare = by_ways(&scene, &poses, &view, 0, 4)[1].0;
+        assert_eq!(bare, 0.0);
+        let mut last = 0.0;
+        for bounces in [1, 3] {
+            let [both, looking, meeting] = by_ways(&scene, &poses, &view, bounces, 1200);
+            let what = format!("{material:?}, {bounces} bounces: {both:?} {looking:?} {meeting:?}");
+            for one in [both, looking] {
+                let off = 5.0 * meeting.1.hypot(one.1);
+                assert!((meeting.0 - one.0).abs() < off, "{what}");
+                // Controls: a light counted twice, or its share forgotten, would be found out.
+                assert!(off < 0.3 * meeting.0, "{what}");
+            }
+            assert!(both.0 > last, "{what}");
+            last = both.0;
+        }
+    }
 }
