@@ -75,11 +75,14 @@ struct Latest {
     pictures: Vec<Option<Arc<Picture>>>,
 }
 
+/// Numbers of each feature, and pictures.
+type Frame = (Vec<Vec<f32>>, Vec<Arc<Picture>>);
+
 struct Env {
     env: usize,
     latest: Latest,
     /// The frame that waits for its action.
-    pending: Option<(Vec<Vec<f32>>, Vec<Arc<Picture>>)>,
+    pending: Option<Frame>,
     running: Option<Running>,
 }
 
@@ -171,7 +174,7 @@ impl LeRobot {
     }
 
     /// What there is now, if there is something of everything; actions are filled in later.
-    fn now(&self, k: usize) -> Option<(Vec<Vec<f32>>, Vec<Arc<Picture>>)> {
+    fn now(&self, k: usize) -> Option<Frame> {
         let latest = &self.envs[k].latest;
         let numbers = self.features.numbers.iter().map(|feature| feature.values(&latest.numbers));
         let pictures = self.features.pictures.iter().map(|(stream, ..)| latest.pictures.get(*stream)?.clone());
