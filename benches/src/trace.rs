@@ -1,6 +1,8 @@
 //! Ray tracing on one thread: what is seen of the vendor's SR5 (the bundled one where it is not there) where it covers about
-//! 40 % of a picture, paths in a closed lit box around it, and how long its trees take to build. Against what we want.
+//! 40 % of a picture, paths in a closed lit box around it, and how long its trees take to build. Against what we want; whole
+//! pictures by rays also against MuJoCo Warp's ray caster, where it is on the machine.
 
+use crate::camera::by_rays;
 use crate::interleave::median;
 use crate::row::Row;
 use crate::startup::robots;
@@ -58,11 +60,14 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
         drop(targets);
     }
     let build = 1e9 * median(times) / scene.triangle_count() as f64;
+    // What a picture's rays take: the lamps' light, the sky, masks and normals, and writing all of it, come on top.
+    let pictures = by_rays(settings, COVERED)?;
     let at_least = |case: String, unit: &str, ours: f64, aim: f64| {
         Row::new("trace", case, unit, 1, ours).against("aim", aim, ours / aim).wanted(1.0)
     };
     Ok(vec![
         at_least(format!("{name}, what is seen, 640x480"), "rays/s", rays, RAYS),
+        pictures,
         at_least(format!("{name} in a lit box, 4 bounces"), "paths/s", paths, PATHS),
         // Where the time of a path goes: rays that go on and shadow rays.
         Row::new("trace", format!("{name} in a lit box, rays of a path"), "rays/path", 1, cast as f64 / pixels),

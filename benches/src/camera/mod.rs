@@ -11,14 +11,18 @@
 //! makes them by default, 4096 texels wide in MuJoCo and at most 1024 in ours, so there is also a row with MuJoCo's made as
 //! small as ours.
 
+mod by_rays;
 mod limit;
 mod scene;
 mod sides;
+
+pub(crate) use by_rays::by_rays;
 
 use crate::interleave::{Plan, Side, Times, measure};
 use crate::rival::{can_run, python};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::sensors::camera::Renderer as OurRenderer;
 use limit::{Compute, Copying};
 use scene::{Scene, Scenes};
 use sides::{Look, Ours, Renderer, Rival, Work};
@@ -96,7 +100,11 @@ struct Contest<'s> {
 
 impl<'s> Contest<'s> {
     fn ours(&mut self, scene: &'s Scene, work: &Work, threads: usize) -> Outcome<usize> {
-        let ours = Ours::new(scene, work, threads)?;
+        self.ours_by(scene, work, threads, OurRenderer::Raster)
+    }
+
+    fn ours_by(&mut self, scene: &'s Scene, work: &Work, threads: usize, by: OurRenderer) -> Outcome<usize> {
+        let ours = Ours::new(scene, work, threads, by)?;
         self.sides.push((work.envs as f64, Box::new(ours)));
         Ok(self.sides.len() - 1)
     }
@@ -104,7 +112,7 @@ impl<'s> Contest<'s> {
     /// The rival, where it is on the machine; it must see what ours sees.
     fn rival(&mut self, rivals: &Rivals, renderer: Renderer, scene: &'s Scene, work: &Work) -> Outcome<Option<usize>> {
         let Some(mut rival) = rivals.start(renderer, scene, work)? else { return Ok(None) };
-        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1)?;
+        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, OurRenderer::Raster)?;
         rival.must_see(&ours.depth()?, work.size)?;
         let (ours, theirs) = (scene.triangles(), rival.triangles()?);
         if ours != theirs {

@@ -5,9 +5,10 @@ use crate::Outcome;
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
 use crate::startup::robots;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Shape;
+use kinetoscope::scene::{PoseF32, Shape};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
 use kinetoscope::sensors::visibility::View;
-use kinetoscope::sim::mj::{self, Model, TARGET, Target};
+use kinetoscope::sim::mj::{self, Data, Model, TARGET, Target};
 use kinetoscope::sim::visible::Visible;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,8 @@ pub(super) struct Scene {
     states: Vec<Vec<f64>>,
     eye: [f32; 3],
     target: [f32; 3],
+    /// The MJCF without the camera.
+    mjcf: String,
     /// Where the file is.
     _folder: tempfile::TempDir,
 }
@@ -80,7 +83,7 @@ impl Scene {
         for left_out in visible.left_out() {
             eprintln!("  {name}: {left_out}");
         }
-        Ok(Self { name, file, model, visible, states, eye, target, _folder: folder })
+        Ok(Self { name, file, model, visible, states, eye, target, mjcf: mjcf.into(), _folder: folder })
     }
 
     /// A robot as it is exported for other programs, its arm bent, a little differently in every state.
@@ -98,6 +101,35 @@ impl Scene {
             (0..nq).map(|k| bent.get(k).map_or(0.0, |q| q + sway(k))).collect()
         };
         Self::new(name, &mjcf, folder, (0..STATES).map(state).collect(), [1.5, -1.1, 1.1], [0.1, 0.0, 0.5])
+    }
+
+    /// The same seen from so near, or so far, that things cover this part of a picture.
+    pub(super) fn covering(mut self, share: f64) -> Outcome<Self> {
+        let size = [320, 240];
+        let mut data = Data::new(&self.model)?;
+        data.qpos_mut().copy_from_slice(self.state(0));
+        data.step1()?;
+        let seen = self.visible.scene();
+        let mut poses = vec![PoseF32::IDENTITY; seen.instances().len()];
+        let mut lights = seen.lights.clone();
+        self.visible.read(&data, &mut poses, &mut lights);
+        let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
+        let mut rasterizer = ParallelRasterizer::new(RasterCfg { groups, ..RasterCfg::default() }, 1);
+        let (far, target) = (self.eye, self.target);
+        let (mut nearest, mut farthest) = (0.1f32, 4.0f32);
+        while farthest - nearest > 1e-3 {
+            let part = 0.5 * (nearest + farthest);
+            self.eye = [0, 1, 2].map(|k| target[k] + part * (far[k] - target[k]));
+            let mut frame = Frame::new(size[0], size[1], Channels { depth: true, ..Channels::default() });
+            let view = self.view(size)?;
+            let shot = Shot { scene: seen, poses: &poses, view: &view, lights: None, lens: None, before: None };
+            rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
+            let hits = frame.depth.iter().flatten().filter(|depth| depth.is_finite()).count();
+            let covered = hits as f64 / (size[0] * size[1]) as f64;
+            if covered > share { nearest = part } else { farthest = part }
+        }
+        std::fs::write(&self.file, with_camera(&self.mjcf, &self.view([1, 1])?)?)?;
+        Ok(self)
     }
 
     /// The joint positions of environment `index`.

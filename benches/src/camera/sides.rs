@@ -5,7 +5,7 @@ use crate::Outcome;
 use crate::interleave::Side;
 use crate::rival::Process;
 use kinetoscope::scene::{Light, PoseF32};
-use kinetoscope::sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
+use kinetoscope::sensors::camera::{self, Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
@@ -61,7 +61,7 @@ pub(super) struct Ours<'s> {
 }
 
 impl<'s> Ours<'s> {
-    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize) -> Outcome<Self> {
+    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize, by: camera::Renderer) -> Outcome<Self> {
         let full = work.look != Look::Plain;
         let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
         let cfg = RasterCfg { samples: if full { 4 } else { 1 }, shadows: full, groups, ..RasterCfg::default() };
@@ -78,6 +78,7 @@ impl<'s> Ours<'s> {
             lights: (0..work.envs).flat_map(|_| seen.lights.clone()).collect(),
             frames: vec![Frame::new(width, height, channels); work.envs],
         };
+        ours.rasterizer.set_renderer(by);
         ours.restart()?;
         Ok(ours)
     }

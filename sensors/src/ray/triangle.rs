@@ -194,6 +194,16 @@ pub(crate) fn normals<S: Simd>(s: S, corner: impl Fn(usize, usize) -> D<S>) -> (
 
 /// Unit normal, counter-clockwise corners seen from its tip; `None` for a triangle without an area.
 pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
+    unit(across(triangle))
+}
+
+/// Whether a triangle has an area, and so a [`normal`].
+pub(crate) fn has_area(triangle: &Triangle) -> bool {
+    let largest = across(triangle).iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    largest > 0.0 && largest.is_finite()
+}
+
+fn across(triangle: &Triangle) -> V3 {
     let [a, b, c] = triangle.map(to_f64);
-    unit(cross(sub(b, a), sub(c, a)))
+    cross(sub(b, a), sub(c, a))
 }

@@ -6,7 +6,7 @@ use super::{RayShape, Touch, Touches, touch_each};
 use crate::lanes::{D, Simd};
 use crate::ray::bvh::{Beam, Bvh, Stack, Walked};
 use crate::ray::packet::{Packet, WIDTH};
-use crate::ray::triangle::{Shear, ShearPacket, Triangle, normal};
+use crate::ray::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
 use crate::ray::vector::{V3, to_f64};
 use crate::ray::{Assets, Ray};
 use columns::Columns;
@@ -38,7 +38,7 @@ pub(crate) struct MeshTree {
 impl MeshTree {
     pub(crate) fn new(mesh: &RenderMesh) -> Self {
         let corners = |t: &[u32; 3]| t.map(|i| mesh.positions()[i as usize]);
-        let whole = |t: &Triangle| t.iter().flatten().all(|x| x.is_finite()) && normal(t).is_some();
+        let whole = |t: &Triangle| t.iter().flatten().all(|x| x.is_finite()) && has_area(t);
         Self::of_numbered((0..).zip(mesh.triangles().iter().map(corners)).filter(|(_, t)| whole(t)).unzip())
     }
 
