@@ -65,14 +65,14 @@ fn a_dataset_is_what_happened_and_each_action_is_the_one_that_followed() {
     // Rows of each environment, from one reset to the next.
     let mut runs: Vec<(usize, Vec<Row>)> = Vec::new();
     let mut were = [counts(&world, 0), counts(&world, 1)];
-    for env in 0..2 {
-        runs.push((env, vec![row(&world, env, &Row::default(), &mut were[env])]));
+    for (env, were) in were.iter_mut().enumerate() {
+        runs.push((env, vec![row(&world, env, &Row::default(), were)]));
     }
     for step in 0..30 {
         world.step(step);
-        for env in 0..2 {
+        for (env, were) in were.iter_mut().enumerate() {
             let (_, rows) = runs.iter_mut().rev().find(|(of, _)| *of == env).unwrap();
-            let next = row(&world, env, rows.last().unwrap(), &mut were[env]);
+            let next = row(&world, env, rows.last().unwrap(), were);
             rows.push(next);
         }
         if step == 12 {
