@@ -92,6 +92,7 @@ impl Drop for Worker {
 /// Draws every snapshot as a window does, and counts them.
 fn window(viewer: Viewer, drawn: Arc<AtomicU64>) -> Worker {
     let mut app = App::new(SIZE, cores());
+    app.keep_pace();
     viewer.set_wants(app.wants());
     let (mut canvas, mut last) = (Canvas::default(), 0);
     Worker::start(move || {

@@ -49,6 +49,11 @@ impl Painter {
         self.rasterizer.use_threads(most);
     }
 
+    /// Samples per pixel of its pictures.
+    pub(crate) fn samples(&self) -> u8 {
+        self.cfg.samples
+    }
+
     /// Samples per pixel, 1 or 4.
     pub fn set_samples(&mut self, samples: u8) {
         self.cfg.samples = samples;

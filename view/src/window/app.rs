@@ -1,11 +1,13 @@
 //! What a window does with mouse and keys, and what it draws: everything but the window.
 
 use super::desks::Desks;
+use super::fineness::Fineness;
 use super::keys::{Action, Key, action};
 use super::{hud, timeline};
 use crate::control::{Command, Speed, Wants};
 use crate::stage::{
-    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
+    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Timeline, Trails, contacts_wanted,
+    describe,
 };
 use nalgebra::Vector3;
 use sensors::visibility::View;
@@ -94,6 +96,10 @@ pub struct App {
     drawn: Vec<Instant>,
     flown: Instant,
     desks: Desks,
+    /// Where pictures may have fewer samples to keep pace.
+    fineness: Option<Fineness>,
+    /// What the last picture showed: steps, the moment of a recording, from where.
+    showed: Option<(u64, Option<Timeline>, View)>,
 }
 
 /// Short: snapshots and pictures are long.
@@ -139,6 +145,8 @@ impl App {
             drawn: Vec::new(),
             flown: Instant::now(),
             desks: Desks { most: threads.max(1), behind: None },
+            fineness: None,
+            showed: None,
         }
     }
 
@@ -188,9 +196,15 @@ impl App {
         std::mem::take(&mut self.commands)
     }
 
-    /// Whether the picture changes even where nothing happens: keys to fly are held.
-    pub fn moves(&self) -> bool {
-        !self.held.is_empty()
+    /// From now on what moves is drawn with one sample per pixel instead of four where those would make fewer than 30 pictures
+    /// per second. What rests for a quarter of a second has four.
+    pub fn keep_pace(&mut self) {
+        self.fineness = Some(Fineness::default());
+    }
+
+    /// Whether there is a picture to draw even where nothing happens: keys to fly are held, or what rests was drawn coarsely.
+    pub fn moves(&self, now: Instant) -> bool {
+        !self.held.is_empty() || self.fineness.is_some_and(|fineness| fineness.wants_better(now))
     }
 
     fn env_id(&self) -> Option<EnvId> {
@@ -456,8 +470,17 @@ impl App {
         let look =
             Look { shown, overlays: self.overlays, picked: self.picked.as_ref(), trails: Some(&self.trails), spring };
         self.painter.use_threads(self.desks.now(&snapshot.run, now));
+        let shows = (snapshot.run.steps, snapshot.run.timeline, view);
+        let changed = self.showed.replace(shows) != Some(shows);
+        if let Some(fineness) = &mut self.fineness {
+            self.painter.set_samples(fineness.samples(changed, now));
+        }
+        let start = Instant::now();
         // Views of windows are good ones; one that is not leaves the last picture.
         let _ = self.painter.draw(&snapshot, &view, &look, canvas);
+        if let Some(fineness) = &mut self.fineness {
+            fineness.drew(self.painter.samples(), start.elapsed());
+        }
         let through = self.through.and_then(|camera| snapshot.names.cameras.get(camera));
         let name =
             through.map_or_else(|| "free view".into(), |name| format!("camera {name}, environment {}", self.env));

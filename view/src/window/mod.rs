@@ -3,6 +3,7 @@
 mod app;
 mod desks;
 mod enlarge;
+mod fineness;
 mod hud;
 mod keys;
 #[cfg(test)]
@@ -203,6 +204,7 @@ const LOOK: Duration = Duration::from_millis(10);
 fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared) -> Result<Closed, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or(cores));
+    app.keep_pace();
     let mut canvas = Canvas::default();
     let (mut last, mut wants) = (0, Wants::default());
     let mut outdated = true;
@@ -238,7 +240,7 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
             app.show(snapshot);
             outdated = true;
         }
-        if outdated || app.moves() {
+        if outdated || app.moves(Instant::now()) {
             app.draw(&mut canvas, Instant::now());
             screen.present(&canvas)?;
             outdated = false;

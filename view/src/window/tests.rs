@@ -195,7 +195,7 @@ fn held_keys_fly_and_are_let_go() {
     let (_sample, _viewer, mut app) = app(1);
     let before = app.eye();
     app.handle(Input::Press(Key::Char('w')));
-    assert!(app.moves());
+    assert!(app.moves(Instant::now()));
     std::thread::sleep(Duration::from_millis(30));
     drawn(&mut app);
     let after = app.eye();
@@ -203,7 +203,7 @@ fn held_keys_fly_and_are_let_go() {
     let way: f64 = (0..3).map(|k| (after.target[k] - before.target[k]) * before.forward()[k]).sum();
     assert!(way >= 0.029 * before.distance && way <= 0.101 * before.distance, "{way}");
     app.handle(Input::FocusLost);
-    assert!(!app.moves());
+    assert!(!app.moves(Instant::now()));
 }
 
 /// A recording that is what it is set to.
