@@ -63,6 +63,7 @@ pub use objects::object_group::{GroupId, RigidObjectGroup, RigidObjectGroupCfg, 
 pub use objects::rigid_object::{BodyType, RigidObject, RigidObjectCfg, RigidObjectMut};
 pub use objects::robot::{JointIndex, Robot, RobotCfg, RobotMut};
 pub use objects::robot_file::MjcfFile;
+pub use objects::robot_part::RobotPartMut;
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
 pub use objects::weld::{Weld, WeldCfg, WeldId, WeldMut};

@@ -412,3 +412,41 @@ fn joints_and_links_are_found_by_pattern() {
         }
     }
 }
+
+/// Targets by the name of a part: its joints in the order of its patterns, and no other joint.
+#[test]
+fn a_part_is_commanded_by_its_name() {
+    let cfg = SimulationManagerCfg { num_envs: 2, ground: None, ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let arm = sim
+        .add_robot(RobotCfg {
+            urdf: UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap()),
+            control_parts: vec![("wrist".into(), vec!["JOINT6".into(), "JOINT4".into()])],
+            ..Default::default()
+        })
+        .unwrap();
+    let names = sim.robot(arm).joint_names().iter().map(|name| (*name).to_string()).collect::<Vec<_>>();
+    let column = |name: &str| names.iter().position(|other| other == name).unwrap();
+    let before = sim.robot(arm).get_target_qpos();
+    let mut wrist = sim.robot_mut(arm).into_part("wrist").unwrap();
+    assert_eq!(wrist.joint_ids(), [JointIndex(column("JOINT6")), JointIndex(column("JOINT4"))]);
+    wrist.set_qpos(&array![[0.2, -0.3]], None).unwrap();
+    wrist.set_qvel(&array![[0.5, 0.25]], Some(&[EnvId(1)])).unwrap();
+    wrist.set_qf(&array![[1.0, 2.0], [3.0, 4.0]], Some(&[EnvId(1), EnvId(0)])).unwrap();
+    let error = wrist.set_qpos(&array![[0.2, -0.3, 0.1]], None).unwrap_err().to_string();
+    assert!(error.contains("[1, 3]"), "{error}");
+    let (mut positions, mut velocities, mut efforts) = (before.clone(), 0.0 * &before, 0.0 * &before);
+    for env in 0..2 {
+        positions[(env, column("JOINT6"))] = 0.2;
+        positions[(env, column("JOINT4"))] = -0.3;
+    }
+    (velocities[(1, column("JOINT6"))], velocities[(1, column("JOINT4"))]) = (0.5, 0.25);
+    (efforts[(1, column("JOINT6"))], efforts[(1, column("JOINT4"))]) = (1.0, 2.0);
+    (efforts[(0, column("JOINT6"))], efforts[(0, column("JOINT4"))]) = (3.0, 4.0);
+    let robot = sim.robot(arm);
+    assert_eq!(robot.get_target_qpos(), positions);
+    assert_eq!(robot.get_target_qvel(), velocities);
+    assert_eq!(robot.get_target_qf(), efforts);
+    let error = sim.robot_mut(arm).into_part("wrst").unwrap_err().to_string();
+    assert!(error.contains("wrst") && error.contains("wrist"), "{error}");
+}

@@ -1,0 +1,60 @@
+//! A control part of a robot, to command by its name.
+
+use super::robot::{JointIndex, RobotMut};
+use crate::error::Result;
+use crate::manager::EnvId;
+use ndarray::{AsArray, Ix2};
+
+/// A control part of a robot, to command: as [`RobotMut`] with `joint_ids` of the part. The columns of all values are the
+/// part's joints, mimic joints included, in the order of [`joint_ids`](Self::joint_ids).
+#[derive(Debug)]
+pub struct RobotPartMut<'a> {
+    robot: RobotMut<'a>,
+    joints: Vec<JointIndex>,
+}
+
+impl<'a> RobotMut<'a> {
+    /// The control part `name`.
+    ///
+    /// # Errors
+    /// There is no such part; the error lists those there are.
+    pub fn into_part(self, name: &str) -> Result<RobotPartMut<'a>> {
+        let joints = self.read().get_joint_ids(name)?;
+        Ok(RobotPartMut { robot: self, joints })
+    }
+}
+
+#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+impl RobotPartMut<'_> {
+    /// Columns of the part's joints among those of the robot.
+    pub fn joint_ids(&self) -> &[JointIndex] {
+        &self.joints
+    }
+
+    /// Sets position targets \[rad or m\], clamped to the limits: rows for `env_ids` (all where `None`; a single row is for
+    /// all of them), a column for each joint of the part; those of mimic joints are accepted and ignored.
+    ///
+    /// # Errors
+    /// As [`RobotMut::set_qpos`]; then nothing is set.
+    pub fn set_qpos<'t>(&mut self, targets: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qpos(targets, Some(&self.joints), env_ids)
+    }
+
+    /// Sets velocity targets \[rad/s or m/s\], which stay until changed or reset; rows and columns as in
+    /// [`set_qpos`](Self::set_qpos).
+    ///
+    /// # Errors
+    /// As [`RobotMut::set_qvel`]; then nothing is set.
+    pub fn set_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qvel(velocities, Some(&self.joints), env_ids)
+    }
+
+    /// Sets efforts \[N m or N\], which stay until changed or reset, beside what drives give; rows and columns as in
+    /// [`set_qpos`](Self::set_qpos).
+    ///
+    /// # Errors
+    /// As [`RobotMut::set_qf`]; then nothing is set.
+    pub fn set_qf<'t>(&mut self, efforts: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qf(efforts, Some(&self.joints), env_ids)
+    }
+}
