@@ -34,7 +34,8 @@ use ndarray::{Array2, ArrayView2};
 /// - spaces and the number of environments, N, never change;
 /// - [`reset`](Self::reset) comes before the first [`step`](Self::step);
 /// - an environment whose episode ends begins the next one in the same step (Gymnasium's `AutoresetMode.SAME_STEP`), with the last
-///   observation of the old one in [`Step::final_observations`];
+///   observation of the old one in [`Step::final_observations`]; one that somebody else has reset is truncated, and that
+///   observation is of the state after the reset ([`EndReason::Reset`](crate::EndReason::Reset) where there are reasons);
 /// - what is observed is finite; actions beyond their bounds become the bounds;
 /// - environments do not know of each other, and the same seed and actions give the same bits.
 ///

@@ -58,13 +58,13 @@ const CACHE: usize = 8 << 20;
 const SPINS_BEFORE_YIELD: u32 = 1_000;
 
 /// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, while what paces its steps leaves its
-/// core to others, to a window that draws for one. Whoever spun in vain spins half as long the next time, and an eighth longer
-/// where that was enough: gaps that are short all the time are met awake, a pause in each step is slept through.
+/// core to others, to a window that draws for one. Whoever spun in vain spins half as long the next time, and a 64th longer
+/// where that was enough: gaps that are short all the time are met awake, a pause after every few steps is slept through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Patience(u32);
 
 impl Patience {
-    /// About a millisecond.
+    /// A millisecond where a pause of the processor takes 140 cycles, less on others.
     const LONGEST: Self = Self(20_000);
     /// The gaps between the jobs of one step.
     const SHORTEST: Self = Self(500);
@@ -74,7 +74,7 @@ impl Patience {
     }
 
     fn after(self, in_vain: bool) -> Self {
-        let next = if in_vain { self.0 / 2 } else { self.0 + self.0 / 8 };
+        let next = if in_vain { self.0 / 2 } else { self.0 + self.0 / 64 + 1 };
         Self(next.clamp(Self::SHORTEST.0, Self::LONGEST.0))
     }
 }
@@ -497,11 +497,13 @@ mod tests {
     fn a_worker_spins_where_gaps_are_short_and_sleeps_where_steps_are_paced() {
         let after = |gaps: &[bool]| gaps.iter().fold(Patience::LONGEST, |patience, &in_vain| patience.after(in_vain));
         assert_eq!(after(&[false; 100]), Patience::LONGEST);
-        // A few jobs of a step, then a pause, again and again.
-        let paced = [false, false, false, true].repeat(20);
-        assert_eq!(after(&paced), Patience::SHORTEST);
-        // Back at full speed.
-        assert_eq!(after(&[paced, vec![false; 40]].concat()), Patience::LONGEST);
+        for jobs in [0, 1, 3, 8, 32] {
+            // Some jobs, then a pause, again and again.
+            let paced = [vec![false; jobs], vec![true]].concat().repeat(100);
+            assert!(after(&paced).spins() < 2 * Patience::SHORTEST.spins(), "{jobs}: {:?}", after(&paced));
+            // Back at full speed.
+            assert_eq!(after(&[paced, vec![false; 300]].concat()), Patience::LONGEST);
+        }
     }
 
     #[test]

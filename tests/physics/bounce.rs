@@ -3,8 +3,8 @@
 //! `RigidObjectCfg::restitution` is a spring k and a damper b between the surfaces: while they overlap by x < 0 and push,
 //! `x'' = -b x' - k x`, with `k = ω²`, ω = π/(10 h) and `b = 2 ζ ω`. The integrator takes the acceleration before the step,
 //! then the velocity, then the place (semi-implicit Euler). Ten steps are few: where in a step the surfaces meet changes
-//! what comes out. [`off`] is the worst over all such places, by the recursion of these steps; [`apex`] the same of a
-//! fall.
+//! what comes out. [`apex`] is what comes out of a fall from a height, by the recursion of these steps; [`off`] and
+//! [`apex_off`] are the worst over all such places.
 
 use std::f64::consts::PI;
 
@@ -56,20 +56,29 @@ pub(crate) fn off(e: f64) -> f64 {
     worst.fold(0.0, f64::max) + IMPEDANCE
 }
 
-/// The furthest that the height \[m\] after a fall from `height` \[m\], in steps of `h` \[s\] under `g` \[m/s²\], may come out
-/// from e² `height`.
-pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
-    // In steps: lengths in metres, velocities in metres per step.
+/// The height \[m\] that is reached after a fall from `height` \[m\], in steps of `h` \[s\] under `g` \[m/s²\].
+pub(crate) fn apex(e: f64, height: f64, h: f64, g: f64) -> f64 {
+    // In steps: velocities are in metres per step.
     let g = g * h * h;
-    let way = (2.0 * g * height).sqrt();
+    let [x, v] = steps(e, g, height, 0.0, |x, v| x < 0.0 && v < 0.0);
+    let [x, v] = steps(e, g, x, v, |x, v| x >= 0.0 && v > 0.0);
+    let [top, _] = steps(e, g, x, v, |_, v| v <= 0.0);
+    top
+}
+
+/// What [`apex`] may be off by, for the impedance that MuJoCo gives a contact.
+pub(crate) fn apex_rest(e: f64, height: f64) -> f64 {
+    2.0 * e * e * IMPEDANCE * height
+}
+
+/// The furthest that the height \[m\] after a fall may come out from e² `height`, wherever in a step the surfaces meet.
+pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
+    let way = (2.0 * g * height).sqrt() * h;
     let worst = (0..PLACES).map(|place| {
         let height = height + way * place as f64 / PLACES as f64;
-        let [x, v] = steps(e, g, height, 0.0, |x, v| x < 0.0 && v < 0.0);
-        let [x, v] = steps(e, g, x, v, |x, v| x >= 0.0 && v > 0.0);
-        let [top, _] = steps(e, g, x, v, |_, v| v <= 0.0);
-        (top - e * e * height).abs()
+        (apex(e, height, h, g) - e * e * height).abs()
     });
-    worst.fold(0.0, f64::max) + 2.0 * e * e * IMPEDANCE * height
+    worst.fold(0.0, f64::max) + apex_rest(e, height)
 }
 
 #[test]

@@ -126,8 +126,8 @@ pub struct CameraCfg {
     pub debug_vis: bool,
     /// Draw what the other sensors show people into the channel `color`, which is otherwise as without: ray hits, forces of
     /// contacts, frames, what cameras see ([`SensorCfg::debug_vis`] says for each whether it shows
-    /// anything). All other channels stay what they are. Markers are those of the instant of the picture (of other
-    /// cameras that draw markers, of their picture before), things are in front of them and behind them, and they cast
+    /// anything). All other channels stay what they are. Markers are what each sensor had measured last at
+    /// the instant of the picture (of cameras that draw markers and were added later, at the instant before), things are in front of them and behind them, and they cast
     /// shadows; every renderer draws them.
     pub draw_markers: bool,
 }

@@ -14,6 +14,7 @@ use crate::resolve::plan::Plan;
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::trace::motion::Motion;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Rows of pixels that a thread takes at once: a row of blocks.
@@ -76,10 +77,14 @@ fn draw_colors(
     let seed = seed ^ take.noise;
     let (scene, moving) = (shot.scene, moving.as_ref());
     let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
+    // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
+    let broken_off = AtomicBool::new(false);
     crew.share(rasterizers, rows, |rasterizer, mut rows| {
-        rows.expose(&paths, denoise, rasterizer.brush.stack(), &progress);
+        if !rows.expose(&paths, denoise, rasterizer.brush.stack(), &progress) {
+            broken_off.store(true, Ordering::Relaxed);
+        }
     });
-    if progress.is_cancelled() {
+    if broken_off.into_inner() {
         return Err(RenderError::Cancelled { samples: progress.samples(), total: progress.total() });
     }
     let size = width * ROWS;

@@ -158,7 +158,7 @@ impl ParallelRasterizer {
                 let (before, paths) = (progress.samples(), renderer.paths(shot, frame));
                 let result = expose(crew, rasterizers, (shot, &take), frame);
                 if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
-                    progress.refuse(paths.saturating_sub(progress.samples() - before));
+                    progress.refuse(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
                 failure.note(index, result);
             }

@@ -91,7 +91,8 @@ impl RenderProgress {
 
     /// Some of it will never be done: a picture that cannot be drawn.
     pub(crate) fn refuse(&self, samples: u64) {
-        self.0.total.fetch_sub(samples, Ordering::Relaxed);
+        let less = |total: u64| Some(total.saturating_sub(samples));
+        let _ = self.0.total.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }
 
     /// Some of it is done.

@@ -225,9 +225,14 @@ impl Rasterizer {
         take: &Take<'_>,
         frame: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        self.progress.begin(self.renderer.paths(shot, frame));
+        let paths = self.renderer.paths(shot, frame);
+        self.progress.begin(paths);
         if self.renderer.follows_paths() {
-            return expose(&Crew::default(), std::slice::from_mut(self), (shot, take), frame);
+            let result = expose(&Crew::default(), std::slice::from_mut(self), (shot, take), frame);
+            if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
+                self.progress.refuse(paths.saturating_sub(self.progress.samples()));
+            }
+            return result;
         }
         let Self { cfg, renderer, aperture, shutter, assets, level, plan, brush, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);

@@ -36,8 +36,9 @@ pub struct ContactSensorCfg {
     /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
-    /// Show a red ball at every body that is touched, and an arrow of its net normal force, 1 m for 500 N
-    /// ([`Sensor::markers`](crate::Sensor::markers)): the forces of the last measurement, where the bodies are at present.
+    /// Show a red ball at every body that is touched and a green one at every other, and an arrow of the net normal force, 1 m
+    /// for 500 N ([`Sensor::markers`](crate::Sensor::markers)): the forces of the last measurement, where the bodies are at
+    /// present.
     pub debug_vis: bool,
 }
 

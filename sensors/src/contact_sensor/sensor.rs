@@ -69,16 +69,19 @@ impl Sensor for ContactSensor {
         Some(self)
     }
 
-    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N.
+    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N; a green ball at every other.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let forces = self.net_forces_w();
         let mut markers = Vec::new();
         for (k, &body) in self.pairs.bodies().iter().enumerate() {
             let force = [0, 1, 2].map(|axis| forces[(env, k, axis)]);
-            if force.iter().map(|f| f * f).sum::<f64>().sqrt() > self.force_threshold() {
-                let place = pose(body).translation.vector.into();
+            let place = pose(body).translation.vector.into();
+            let touched = force.iter().map(|f| f * f).sum::<f64>().sqrt() > self.force_threshold();
+            if touched {
                 markers.push(Marker::sphere(place, 0.05, [0.9, 0.05, 0.05, 1.0]));
                 markers.extend(Marker::arrow(place, force.map(|f| f / 500.0), [0.95, 0.6, 0.1, 1.0]));
+            } else {
+                markers.push(Marker::sphere(place, 0.05, [0.05, 0.7, 0.1, 1.0]));
             }
         }
         markers

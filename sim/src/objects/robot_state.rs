@@ -239,7 +239,8 @@ impl RobotMut<'_> {
     /// They are a result, not a state: each step finds its own from positions, velocities and forces, within the solver's
     /// tolerance wherever it begins, and puts them in the place of these. To push a joint there is
     /// [`set_qf`](Self::set_qf). Written together with the positions and velocities of another simulation's robot, they let
-    /// this one go on to the last bit as that one does.
+    /// this one go on to the last bit as that one does, where its base is fixed, it touches nothing else that moves, and targets
+    /// are the same; of everything else there is [`snapshot`](crate::SimulationManager::snapshot).
     ///
     /// # Errors
     /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo takes for a diverged one.

@@ -7,8 +7,10 @@ const FINE: u8 = 4;
 const COARSE: u8 = 1;
 /// Pictures take no longer than this where they can: 30 in a second.
 const BUDGET: Duration = Duration::from_millis(33);
-/// Part of the budget that fine pictures must fit in to be drawn again, so that it does not change to and fro.
-const ROOM: f64 = 0.8;
+/// Slow pictures in a row before fewer samples are taken: one may be slow for another reason.
+const SLOW: u32 = 3;
+/// After so long what moves is tried with all samples again.
+const RETRY: Duration = Duration::from_secs(5);
 /// What has not changed for so long rests.
 const REST: Duration = Duration::from_millis(250);
 
@@ -17,10 +19,10 @@ const REST: Duration = Duration::from_millis(250);
 pub(super) struct Fineness {
     /// When what is shown changed last.
     moved: Option<Instant>,
-    /// How long the last fine picture took.
-    fine: Option<Duration>,
-    /// How long the first coarse one after it took.
-    coarse: Option<Duration>,
+    /// Fine pictures in a row that took too long.
+    slow: u32,
+    /// When a fine picture was drawn last.
+    fine: Option<Instant>,
     /// Samples of the last picture.
     last: Option<u8>,
 }
@@ -32,25 +34,19 @@ impl Fineness {
             self.moved = Some(now);
         }
         let rests = self.moved.is_none_or(|then| now.saturating_duration_since(then) >= REST);
-        let slow = self.fine.is_some_and(|took| took > BUDGET);
-        if slow && !rests { COARSE } else { FINE }
+        let retries = self.fine.is_none_or(|then| now.saturating_duration_since(then) >= RETRY);
+        let samples = if self.slow < SLOW || rests || retries { FINE } else { COARSE };
+        if samples == FINE {
+            self.fine = Some(now);
+        }
+        samples
     }
 
     /// A picture was drawn.
     pub(super) fn drew(&mut self, samples: u8, took: Duration) {
         self.last = Some(samples);
         if samples == FINE {
-            (self.fine, self.coarse) = (Some(took), None);
-            return;
-        }
-        let (Some(fine), Some(coarse)) = (self.fine, self.coarse) else {
-            self.coarse = Some(took);
-            return;
-        };
-        // What made coarse pictures faster makes fine ones faster.
-        let expected = fine.mul_f64(took.as_secs_f64() / coarse.as_secs_f64().max(1e-6));
-        if expected < BUDGET.mul_f64(ROOM) {
-            (self.fine, self.coarse) = (None, None);
+            self.slow = if took > BUDGET { (self.slow + 1).min(SLOW) } else { 0 };
         }
     }
 
@@ -65,46 +61,49 @@ impl Fineness {
 mod tests {
     use super::*;
 
-    const SLOW: Duration = Duration::from_millis(50);
-    const FAST: Duration = Duration::from_millis(20);
+    const LATE: Duration = Duration::from_millis(50);
+    const QUICK: Duration = Duration::from_millis(20);
 
-    /// Pictures that took so long, 50 ms apart, and the samples of each.
-    fn samples(fineness: &mut Fineness, start: Instant, pictures: &[(bool, Duration)]) -> Vec<u8> {
+    /// Pictures of something that moves, 50 ms apart, that took so long with all samples, and the samples of each.
+    fn samples(fineness: &mut Fineness, start: Instant, fine: &[Duration]) -> Vec<u8> {
         let mut now = start;
-        let mut one = |&(changed, took): &(bool, Duration)| {
+        let mut one = |&took: &Duration| {
             now += Duration::from_millis(50);
-            let samples = fineness.samples(changed, now);
-            fineness.drew(samples, took);
+            let samples = fineness.samples(true, now);
+            fineness.drew(samples, if samples == FINE { took } else { took / 3 });
             samples
         };
-        pictures.iter().map(&mut one).collect()
+        fine.iter().map(&mut one).collect()
     }
 
     #[test]
     fn what_moves_slowly_is_coarse_and_what_rests_is_fine() {
         let start = Instant::now();
-        // Fast enough: fine all the time.
-        assert_eq!(samples(&mut Fineness::default(), start, &[(true, FAST); 20]), [4; 20]);
-        let mut slow = Fineness::default();
-        assert_eq!(samples(&mut slow, start, &[(true, SLOW), (true, FAST), (true, FAST)]), [4, 1, 1]);
-        // It stops at 150 ms; a quarter of a second later it is drawn again, once.
+        // Fast enough, but for two in a row: fine all the time.
+        let quick = [vec![QUICK; 5], vec![LATE; 2], vec![QUICK; 5]].concat();
+        assert_eq!(samples(&mut Fineness::default(), start, &quick), [4; 12]);
+        let mut late = Fineness::default();
+        assert_eq!(samples(&mut late, start, &[LATE; 6]), [4, 4, 4, 1, 1, 1]);
+        // It stops at 300 ms; a quarter of a second later it is drawn again, once.
         let at = |milliseconds| start + Duration::from_millis(milliseconds);
-        assert!(!slow.wants_better(at(390)) && slow.wants_better(at(400)));
-        assert_eq!(slow.samples(false, at(400)), 4);
-        slow.drew(4, SLOW);
-        assert!(!slow.wants_better(at(500)));
+        assert!(!late.wants_better(at(540)) && late.wants_better(at(550)));
+        assert_eq!(late.samples(false, at(550)), 4);
+        late.drew(4, LATE);
+        assert!(!late.wants_better(at(700)));
         // It moves again: how long fine pictures take is known.
-        assert_eq!(slow.samples(true, at(600)), 1);
+        assert_eq!(late.samples(true, at(800)), 1);
     }
 
     #[test]
-    fn fine_pictures_come_back_when_they_fit() {
+    fn all_samples_are_tried_again() {
         let (start, mut fineness) = (Instant::now(), Fineness::default());
-        // Coarse pictures become twice as fast: fine ones are expected to take 25 ms.
-        let pictures = [(true, SLOW), (true, FAST), (true, FAST / 2), (true, FAST)];
-        assert_eq!(samples(&mut fineness, start, &pictures), [4, 1, 1, 4]);
-        // A little faster is not enough: 40 ms.
-        let pictures = [(true, SLOW), (true, FAST), (true, FAST * 4 / 5), (true, FAST)];
-        assert_eq!(samples(&mut Fineness::default(), start, &pictures), [4, 1, 1, 1]);
+        // The third is at 150 ms, so that one at 5150 ms is tried, and the next one after as long.
+        let found = samples(&mut fineness, start, &[LATE; 210]);
+        let fine: Vec<usize> = (1..).zip(found).filter(|(_, samples)| *samples == FINE).map(|(k, _)| k).collect();
+        assert_eq!(fine, [1, 2, 3, 103, 203]);
+        // It has become faster: the next try is the last.
+        let later = start + Duration::from_millis(50 * 210);
+        let found = samples(&mut fineness, later, &[QUICK; 100]);
+        assert_eq!((found[91], found[92], found[99]), (1, 4, 4));
     }
 }

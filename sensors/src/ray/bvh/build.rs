@@ -23,7 +23,10 @@ const NODE_COST: f32 = 0.6;
 const MAX_DEPTH: u32 = 48;
 /// Bits of a coordinate on the curve.
 const BITS: u32 = 10;
-/// What is added to it, between 0 and 2^22, has its whole number in the last bits: no instruction is needed to round.
+/// Bits of a key from the first of its place on the curve to one below the last.
+const FIRST_BIT: u32 = 31 + 3 * BITS;
+const LAST_BIT: u32 = 31;
+/// What is added to a coordinate, between 0 and 2^22, has its whole number in the last bits: no instruction is needed to round.
 const TO_BITS: f32 = 12_582_912.0;
 
 /// Three numbers in a register of four.
@@ -156,11 +159,11 @@ impl Bvh {
         }
         let unsorted: Vec<Item> = (0..).zip(boxes).map(|(k, [lo, hi])| Item::item(*lo, *hi, k, 1)).collect();
         let bounds = Bounds::around(&unsorted);
-        let keys = curve(&unsorted, &bounds);
-        let things: Vec<Item> = keys.iter().map(|&key| unsorted[key as u32 as usize]).collect();
+        let mut keys = curve(&unsorted, 0..boxes.len() as u32, &bounds);
         let mut starts = Vec::with_capacity(boxes.len() / 4 + 2);
-        group(&keys, 0, 31 + 3 * BITS, &mut starts);
+        group(&unsorted, &mut keys, 0, FIRST_BIT, &mut starts);
         starts.push(boxes.len() as u32);
+        let things: Vec<Item> = keys.iter().map(|&key| unsorted[key as u32 as usize]).collect();
         let groups: Vec<Item> = (0..)
             .zip(starts.windows(2))
             .map(|(k, range)| {
@@ -176,7 +179,14 @@ impl Bvh {
         let aside = groups.clone();
         let all = Part { bounds, start: 0, end: groups.len() as u32, depth: 0, kind: Kind::Groups };
         // Rounding a side takes up to u R off a pad of 16 u R.
-        let mut builder = Builder { things, groups, starts, aside, nodes, pad: (pad * (1.0 + 1.0 / 16.0)) as f32 };
+        let mut builder = Builder {
+            things,
+            groups,
+            starts,
+            aside,
+            nodes,
+            pad: ((pad * (1.0 + 1.0 / 16.0)) as f32).max(f32::MIN_POSITIVE),
+        };
         builder.add([all; 2], 1);
         let Builder { things, nodes, .. } = builder;
         let order = things.iter().map(Item::number).collect();
@@ -184,20 +194,24 @@ impl Bvh {
     }
 }
 
-/// The items by their middles' places on the Morton curve: places in the upper half of each number, indices in the lower.
-fn curve(items: &[Item], bounds: &Bounds) -> Vec<u64> {
-    let cells = Cells::<{ 1 << BITS }>::of(bounds);
+/// Some of the items by their middles' places on the Morton curve through a box: places in the upper half of each number,
+/// indices in the lower.
+fn curve(items: &[Item], numbers: impl Iterator<Item = u32>, bounds: &Bounds) -> Vec<u64> {
+    let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
+    // Cells are cubes: what a flat thing has of thickness, rounding perhaps, is not cut as if it were as long as the rest.
+    let least = cells.scale.iter().take(3).filter(|&&scale| scale > 0.0).fold(f32::INFINITY, |least, &x| least.min(x));
+    cells.scale = [if least.is_finite() { least } else { 0.0 }; 4];
     let spread = |x: u32| {
         let x = (x | x << 16) & 0x0300_00ff;
         let x = (x | x << 8) & 0x0300_f00f;
         let x = (x | x << 4) & 0x030c_30c3;
         (x | x << 2) & 0x0924_9249
     };
-    let key = |(index, item): (u64, &Item)| {
-        let [x, y, z, _] = cells.at(item.middle());
-        u64::from(spread(x) | spread(y) << 1 | spread(z) << 2) << 32 | index
+    let key = |number: u32| {
+        let [x, y, z, _] = cells.at(items[number as usize].middle());
+        u64::from(spread(x) | spread(y) << 1 | spread(z) << 2) << 32 | u64::from(number)
     };
-    let mut keys: Vec<u64> = (0..).zip(items).map(key).collect();
+    let mut keys: Vec<u64> = numbers.map(key).collect();
     // Sorted digit by digit: a part of what comparing them takes.
     const DIGITS: usize = 1 << BITS;
     let digit = |key: u64, pass: u32| (key >> (32 + BITS * pass)) as usize % DIGITS;
@@ -224,20 +238,33 @@ fn curve(items: &[Item], bounds: &Bounds) -> Vec<u64> {
 }
 
 /// Where the groups of sorted keys begin: the largest cells of the curve, in halves by one bit after the other, that hold no
-/// more than a group may.
-fn group(keys: &[u64], first: u32, bit: u32, starts: &mut Vec<u32>) {
+/// more than a group may. What is more in one smallest cell is sorted along a curve of its own: details that lie close together,
+/// and something else far away.
+fn group(items: &[Item], keys: &mut [u64], first: u32, bit: u32, starts: &mut Vec<u32>) {
     if keys.len() <= GROUP {
         if !keys.is_empty() {
             starts.push(first);
         }
         return;
     }
+    if bit == LAST_BIT {
+        let numbers = || keys.iter().map(|&key| key as u32);
+        let within = numbers().fold(NOTHING, |sum, number| {
+            let middle = items[number as usize].middle();
+            sum.with(&Bounds { lo: middle, hi: middle })
+        });
+        let finer = curve(items, numbers(), &within);
+        if finer[0] >> 32 != finer[finer.len() - 1] >> 32 {
+            keys.copy_from_slice(&finer);
+            return group(items, keys, first, FIRST_BIT, starts);
+        }
+    }
     // All at one place: halves of equal number.
-    let at = if bit < 32 { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
-    let (low, high) = keys.split_at(at);
-    let next = bit.max(32) - 1;
-    group(low, first, next, starts);
-    group(high, first + at as u32, next, starts);
+    let at = if bit <= LAST_BIT { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
+    let (low, high) = keys.split_at_mut(at);
+    let next = if bit <= LAST_BIT { 0 } else { bit - 1 };
+    group(items, low, first, next, starts);
+    group(items, high, first + at as u32, next, starts);
 }
 
 impl Builder {
@@ -419,4 +446,61 @@ fn halve<const N: usize>(groups: &mut [Item], aside: &mut [Item]) -> Option<(usi
     }
     groups[near..].copy_from_slice(&aside[..far]);
     Some((near, before, after))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::ray::Ray;
+    use crate::ray::bvh::Stack;
+
+    /// Things that a ray down into the unit square tests, on average.
+    fn tested(boxes: &[Aabb]) -> f64 {
+        let (tree, order) = Bvh::build(boxes);
+        let mut seen = order.clone();
+        seen.sort_unstable();
+        assert!(seen.into_iter().eq(0..boxes.len() as u32), "each thing is in one leaf");
+        let (mut stack, mut count) = (Stack::default(), 0);
+        const RAYS: usize = 100;
+        for k in 0..RAYS {
+            let [x, y] = [0.05 + 0.009 * k as f64, (0.1 + 0.377 * k as f64).fract()];
+            let ray = Ray { origin: [x, y, 1.0], direction: [0.0, 0.0, -1.0] };
+            tree.walk(&ray, 10.0, &mut stack, |leaf, limit| {
+                count += leaf.len();
+                limit
+            });
+        }
+        count as f64 / RAYS as f64
+    }
+
+    /// A floor of 10 000 tiles without gaps, in an order that has nothing to do with their places, `thick` thick at random: a ray
+    /// meets one tile, or two.
+    fn floor(thick: f32) -> Vec<Aabb> {
+        let tile = |k: u32| {
+            let k = k * 7919 % 10_000;
+            let [x, y] = [(k % 100) as f32 / 100.0, (k / 100) as f32 / 100.0];
+            let z = thick * (k * 3571 % 1000) as f32 / 1000.0;
+            [[x, y, z], [x + 0.01, y + 0.01, z]]
+        };
+        (0..10_000).map(tile).collect()
+    }
+
+    /// Found by counting: a grid over all there is put everything into one cell, where the order of the file decided what
+    /// belongs together; and noise across a flat thing was cut as if it were as long as its sides.
+    #[test]
+    fn neither_something_far_away_nor_noise_spoils_a_tree() {
+        let plain = tested(&floor(0.0));
+        assert!(plain < 16.0, "{plain}");
+        let noisy = tested(&floor(1e-8));
+        assert!(noisy < 1.5 * plain, "{noisy}, not {plain}");
+        for far in [3e3, 3e6] {
+            let mut boxes = floor(0.0);
+            boxes.push([[far, far, 0.0], [far + 1.0, far + 1.0, 0.0]]);
+            let outlying = tested(&boxes);
+            assert!(outlying < 1.5 * plain, "{far}: {outlying}, not {plain}");
+        }
+        // All at one place: every thing is tested, and nothing recurs for ever.
+        assert_eq!(tested(&vec![[[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]; 1000]), 1000.0);
+    }
 }

@@ -63,12 +63,19 @@ impl Film {
 }
 
 impl Rows<'_> {
-    /// Follows the paths of all pixels, until it is broken off. With `smooth` the colour of surfaces is divided out.
-    pub(crate) fn expose(&mut self, paths: &Paths<'_>, smooth: bool, stack: &mut Stack, progress: &RenderProgress) {
+    /// Follows the paths of all pixels, until it is broken off; whether it was not. With `smooth` the colour of surfaces is
+    /// divided out.
+    pub(crate) fn expose(
+        &mut self,
+        paths: &Paths<'_>,
+        smooth: bool,
+        stack: &mut Stack,
+        progress: &RenderProgress,
+    ) -> bool {
         let width = paths.eye.projection.width;
         for (k, pixel) in self.pixels.iter_mut().enumerate() {
             if progress.is_cancelled() {
-                return;
+                return false;
             }
             let found @ Found { color, variance, albedo, rays, .. } =
                 paths.pixel([k % width, self.first + k / width], stack);
@@ -85,6 +92,7 @@ impl Rows<'_> {
             };
             debug_assert!(albedo.iter().all(|x| x.is_finite()));
         }
+        true
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn wide(pose: &PoseF32) -> PoseF64 {
 pub(crate) fn rigid(pose: &PoseF32) -> PoseF64 {
     let PoseF64 { mut rotation, translation } = wide(pose);
     // The nearest rotation, by Newton's iteration R (3 - R'R) / 2: an error of e becomes one of e². Source: Higham, Computing
-    // the polar decomposition, 1986. What is one already stays as it is, to the bit.
+    // the polar decomposition, 1986. Axes of the world stay what they are, to the bit.
     for _ in 0..3 {
         let r = rotation;
         let product = |i: usize, j: usize| (0..3).map(|k| r[k][i] * r[k][j]).sum::<f64>();
