@@ -96,6 +96,19 @@ pub enum RecordError {
         /// Values of `every` that would do, the nearest first.
         near: Vec<u64>,
     },
+    /// A dataset in which every row has everything, and something that is not measured in every environment.
+    #[error(
+        "{path}: every row of a dataset has everything, but {stream} is not in environment {env}; record environments and topics \
+         that go together"
+    )]
+    NotEverywhere {
+        /// The folder.
+        path: PathBuf,
+        /// What is missing, such as `camera/color`.
+        stream: String,
+        /// Where.
+        env: usize,
+    },
     /// Something is not called so.
     #[error("there is no {what} {name:?}{}", known(.candidates))]
     UnknownName {

@@ -144,3 +144,16 @@ fn a_dataset_that_is_not_whole_has_not_its_name() {
     let recorded = world.sim.finish_recording(recorder).unwrap();
     assert!(path.join("meta/info.json").is_file() && !part.exists() && recorded.bytes > 1000, "{recorded}");
 }
+
+/// Found by reading: every dataset has `meta/info.json`, so that somebody else's was taken for a recorder's and replaced.
+#[test]
+fn a_dataset_of_somebody_else_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("theirs.lerobot");
+    std::fs::create_dir_all(path.join("meta")).unwrap();
+    std::fs::write(path.join("meta/info.json"), "{}").unwrap();
+    let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) };
+    let error = World::new(1, 1).sim.record(cfg).unwrap_err();
+    assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+    assert_eq!(std::fs::read_to_string(path.join("meta/info.json")).unwrap(), "{}");
+}

@@ -72,7 +72,7 @@ impl Encoder for Apng {
         }
         self.data.clear();
         chunks(picture, b"IDAT").for_each(|data| self.data.extend_from_slice(data));
-        let milliseconds = u16::try_from(duration(shown, 1e3)).unwrap_or(u16::MAX);
+        let milliseconds = duration::<u16>(shown, 1e3, u16::MAX.into())?;
         let [width, height] = self.size.map(u32::to_be_bytes);
         let mut control = self.sequence.to_be_bytes().to_vec();
         for number in [width, height, [0; 4], [0; 4]] {

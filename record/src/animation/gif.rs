@@ -30,7 +30,7 @@ impl Encoder for Gif {
         let Some(encoder) = &mut self.encoder else { return Ok(()) };
         rgb_of(rgba, &mut self.rgb);
         let mut frame = Frame::from_rgb_speed(width, height, &self.rgb, COARSENESS);
-        frame.delay = u16::try_from(duration(shown, 100.0)).unwrap_or(u16::MAX);
+        frame.delay = duration(shown, 100.0, u16::MAX.into())?;
         encoder.write_frame(&frame).map_err(io::Error::other)?;
         let written = encoder.get_mut();
         out.write_all(written)?;

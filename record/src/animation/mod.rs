@@ -128,9 +128,17 @@ fn units(time: f64, per_second: f64) -> u64 {
     (time * per_second).round() as u64
 }
 
-/// How long a frame is shown, in such units: at least one.
-fn duration([from, until]: [f64; 2], per_second: f64) -> u64 {
-    units(until, per_second).saturating_sub(units(from, per_second)).max(1)
+/// How long a frame is shown, in such units: at least one, and `most` at most.
+///
+/// # Errors
+/// It was shown for longer than the format can say.
+fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> io::Result<N> {
+    let found = units(until, per_second).saturating_sub(units(from, per_second)).max(1);
+    let fits = N::try_from(found).ok().filter(|_| found <= most);
+    let longest = most as f64 / per_second;
+    fits.ok_or_else(|| {
+        io::Error::other(format!("a frame of this format is shown for {longest} s at most: record more often"))
+    })
 }
 
 /// Pixels without their opacity.
@@ -158,8 +166,11 @@ mod tests {
     fn what_is_rounded_does_not_add_up() {
         // 30 frames a second in hundredths of a second: 3, 4, 3, 3, 4, ...
         let shown = |k: u32| [f64::from(k) / 30.0, f64::from(k + 1) / 30.0];
-        let all: Vec<u64> = (0..30).map(|k| duration(shown(k), 100.0)).collect();
+        let all: Vec<u64> = (0..30).map(|k| duration(shown(k), 100.0, 9).unwrap()).collect();
         assert_eq!((all[..3].to_vec(), all.iter().sum::<u64>()), (vec![3, 4, 3], 100));
-        assert_eq!(duration([1.0, 1.0], 100.0), 1, "there is no frame that is not shown");
+        assert_eq!(duration::<u16>([1.0, 1.0], 100.0, 9).unwrap(), 1, "there is no frame that is not shown");
+        assert_eq!(duration::<u16>([1.0, 656.35], 100.0, 65_535).unwrap(), 65_535);
+        let error = duration::<u16>([1.0, 656.36], 100.0, 65_535).unwrap_err().to_string();
+        assert!(error.contains("655.35 s at most"), "{error}");
     }
 }

@@ -141,9 +141,7 @@ impl Encoder for Mp4 {
         let length = u32::try_from(coded.unit.len()).map_err(too_large)?;
         out.write_all(&length.to_be_bytes())?;
         out.write_all(coded.unit)?;
-        let duration = duration(shown, PER_SECOND.into());
-        let too_long = |_| io::Error::other("a picture is shown for longer than 13 hours");
-        let duration = u32::try_from(duration).map_err(too_long)?;
+        let duration = duration(shown, PER_SECOND.into(), u32::MAX.into())?;
         let bytes = length.checked_add(4).ok_or_else(|| io::Error::other("a picture is too large for MP4"))?;
         self.frames.push(Sample { at: self.at, bytes, duration, alone: coded.alone });
         self.at += u64::from(bytes);

@@ -58,7 +58,7 @@ impl Encoder for Webp {
         self.still.clear();
         let encoder = WebPEncoder::new(&mut self.still);
         encoder.encode(&self.rgb, self.size[0], self.size[1], ColorType::Rgb8).map_err(io::Error::other)?;
-        let milliseconds = three(u32::try_from(duration(shown, 1e3).min((1 << 24) - 1)).unwrap_or(0));
+        let milliseconds = three(duration(shown, 1e3, (1 << 24) - 1)?);
         let place = [0; 6];
         let picture = self.still.get(CHUNKS..).unwrap_or_default();
         chunk(out, b"ANMF", &[&place, &width, &height, &milliseconds, &[REPLACES], picture])

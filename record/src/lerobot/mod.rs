@@ -26,8 +26,10 @@ use std::sync::Arc;
 
 pub(crate) use features::holds;
 
-/// The file that says that a folder is a dataset.
+/// The file that says that a folder is a dataset; the last one that is written.
 const INFO: &str = "meta/info.json";
+/// The file that says that a recorder of ours wrote it, so that it may be replaced. It is locked as long as there is one.
+const MARKER: &str = "meta/.kinetoscope";
 
 /// Files of a folder.
 const CHUNK: u64 = 1000;
@@ -48,8 +50,8 @@ const COMMON: [(&str, &str); 5] = [
 /// A dataset on its way.
 pub(crate) struct LeRobot {
     folder: PartFolder,
-    /// What its last file is written to; locked as long as there is a recorder.
-    info: File,
+    /// The marker, locked.
+    _lock: File,
     fps: u64,
     /// Steps from one row to the next.
     every: u64,
@@ -131,17 +133,22 @@ impl LeRobot {
         let RecorderCfg { path, every, overwrite, task, .. } = cfg;
         let fps = rate(path, dt, *every)?;
         let features = Features::of(path, streams)?;
-        let (folder, info) = PartFolder::create(path, *overwrite, INFO)?;
         let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
         let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3))).collect();
         let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
         envs.sort_unstable();
         envs.dedup();
+        for &env in &envs {
+            if let Some(stream) = streams.iter().find(|stream| !stream.env_ids.contains(&env)) {
+                return Err(RecordError::NotEverywhere { path: path.clone(), stream: stream.name.clone(), env });
+            }
+        }
+        let (folder, lock) = PartFolder::create(path, *overwrite, MARKER)?;
         let none = || Latest { numbers: vec![None; streams.len()], pictures: vec![None; streams.len()] };
         let envs = envs.into_iter().map(|env| Env { env, latest: none(), pending: None, running: None }).collect();
         let (every, task) = (*every, task.clone());
         let (episodes, png) = (Vec::new(), Png::default());
-        Ok(Self { folder, info, fps, every, task, features, envs, episodes, statistics, png })
+        Ok(Self { folder, _lock: lock, fps, every, task, features, envs, episodes, statistics, png })
     }
 
     /// Whether the rows of a step are frames, whatever happened there.
@@ -430,8 +437,9 @@ impl Sink for LeRobot {
         out.into_inner()?.sync_all()?;
         // The last one: a folder with it is a dataset.
         let info = format!("{:#}\n", self.info());
-        self.info.write_all(info.as_bytes())?;
-        self.info.sync_all()?;
+        let mut out = self.file(INFO)?;
+        out.write_all(info.as_bytes())?;
+        out.into_inner()?.sync_all()?;
         let bytes = size_of(self.folder.part())?;
         self.folder.commit()?;
         Ok(bytes)
