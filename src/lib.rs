@@ -32,6 +32,7 @@ pub mod prelude {
     pub use sensors::camera::{
         Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Placement,
         RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, StereoCamera, StereoCameraCfg, StereoOrigin,
+        ToneCurve,
     };
     pub use sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,

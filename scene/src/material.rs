@@ -22,6 +22,15 @@ pub struct Material {
     pub shininess: f32,
     /// How much of the sky the surface mirrors, in 0..=1.
     pub reflectance: f32,
+    /// How much of the surface is metal, in 0..=1: light does not get below it, and what it mirrors has its colour.
+    pub metallic: f32,
+    /// How rough it is, in 0..=1, instead of `shininess`: alpha of the GGX law is its square.
+    pub roughness: Option<f32>,
+    /// How much of the light goes through, bent as by glass, in 0..=1. Of closed shapes, and of paths only: other renderers
+    /// draw the surface. See-through without bending is the opacity of `rgba`.
+    pub transmission: f32,
+    /// Refractive index of what is inside, at least 1: 1.5 for glass, 1.33 for water.
+    pub refractive_index: f32,
 }
 
 impl Default for Material {
@@ -36,6 +45,10 @@ impl Default for Material {
             specular: 0.5,
             shininess: 0.5,
             reflectance: 0.0,
+            metallic: 0.0,
+            roughness: None,
+            transmission: 0.0,
+            refractive_index: 1.5,
         }
     }
 }
@@ -44,6 +57,16 @@ impl Material {
     /// A plain colour.
     pub fn from_rgba(rgba: [f32; 4]) -> Self {
         Self { rgba, ..Self::default() }
+    }
+
+    /// The exponent of its highlights in Blinn's and Phong's law, 1 to 128: 128 times `shininess`, or that of a roughness,
+    /// 2 / alpha² - 2. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
+    pub fn exponent(&self) -> f32 {
+        let exponent = match self.roughness {
+            Some(roughness) => 2.0 / roughness.clamp(0.0, 1.0).powi(4) - 2.0,
+            None => 128.0 * self.shininess,
+        };
+        exponent.clamp(1.0, 128.0)
     }
 }
 

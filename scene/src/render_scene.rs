@@ -240,7 +240,10 @@ impl Instance {
         }
         let m = &self.material;
         let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
-        if m.rgba.iter().chain(&numbers).any(|x| !x.is_finite()) {
+        let numbers = numbers.into_iter().chain([m.metallic, m.roughness.unwrap_or_default(), m.transmission]);
+        // The largest of all that is known is 4, of germanium.
+        let bends = (1.0..=10.0).contains(&m.refractive_index);
+        if !bends || m.rgba.into_iter().chain(numbers).any(|x| !x.is_finite()) {
             return Err(RenderSceneError::Material { instance });
         }
         Ok(())

@@ -113,3 +113,30 @@ fn contacts_belong_to_bodies_of_the_part() {
         assert!((force[(0, 0, 2)] - 2.0 * 9.81).abs() < 1e-3, "{force}");
     }
 }
+
+/// MuJoCo 4 knows metals; they are drawn, and stay what they are when the part is written into the scene.
+#[test]
+fn metals_of_models_are_metals() {
+    let text = |more: &str| {
+        format!(
+            r#"<mujoco><asset><material name="steel" rgba="0.6 0.6 0.6 1" {more}/></asset><worldbody>
+               <body name="ball"><freejoint/><geom size="0.1" material="steel"/></body></worldbody></mujoco>"#
+        )
+    };
+    let looks = |text: String| {
+        let mut sim = empty(1);
+        sim.add_mjcf(MjcfCfg::text("ball", text)).map(|_| {
+            let material = sim.visible().scene().instances()[0].material.clone();
+            (material.metallic, material.roughness)
+        })
+    };
+    assert_eq!(looks(text("")).unwrap(), (0.0, None));
+    match looks(text(r#"metallic="0.75" roughness="0.25""#)) {
+        Ok(metal) => assert_eq!(metal, (0.75, Some(0.25))),
+        // 2.2.2 does not.
+        Err(error) => {
+            assert!(kinetoscope::sim::mj::version_string().starts_with("2."), "{error}");
+            assert!(error.to_string().contains("metallic"), "{error}");
+        }
+    }
+}

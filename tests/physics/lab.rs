@@ -25,6 +25,9 @@ pub(crate) fn weightless() -> SimulationManagerCfg {
     SimulationManagerCfg { gravity: Vector3::zeros(), ..earth() }
 }
 
+/// How much harder than to sink in it is to creep on a [`slope`].
+pub(crate) const IMPRATIO: f64 = 100.0;
+
 /// As [`earth`], on a ground plane that gravity is tilted against: a slope of `angle` \[rad\] down along x. Elliptic cones,
 /// and friction that creeps a hundred times less than MuJoCo's default.
 pub(crate) fn slope(angle: f64, friction: f64) -> SimulationManagerCfg {
@@ -32,7 +35,7 @@ pub(crate) fn slope(angle: f64, friction: f64) -> SimulationManagerCfg {
         gravity: G * Vector3::new(angle.sin(), 0.0, -angle.cos()),
         ground: Some(GroundCfg::default()),
         cone: Cone::Elliptic,
-        impratio: 100.0,
+        impratio: IMPRATIO,
         friction: [friction, 0.0, 0.0],
         ..earth()
     }

@@ -182,9 +182,15 @@ fn machine() -> String {
 }
 
 fn heading(machine: &str) -> String {
+    let rivals: Vec<&str> = CAMERAS.iter().flat_map(|module| module.packages).copied().collect();
     format!(
-        "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}.\n\nOurs and the rival ran in \
-         one run, one after the other. `ratio > 1`: ours is faster. `-`: the rival was not on the machine.\n"
+        "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` measures \
+         everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the rival ran in one run, \
+         in turns. Numbers are medians of the turns; so is the ratio, which is taken turn by turn and need not be that of the \
+         medians. `ratio > 1`: ours is faster. `-`: there is no rival, it was not on the machine, or it has another MuJoCo. \
+         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves.\n\nRivals in Python: {}, and \
+         the `mujoco` of the row.\n",
+        rivals.join(", ")
     )
 }
 

@@ -68,7 +68,8 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         };
         println!("{line}");
         table.push_str(&format!("{line}\n"));
-        if !matches!(verdict, Verdict::Caught(..)) {
+        // A law that is said to notice must.
+        if !matches!(&verdict, Verdict::Caught(_, not_by) if not_by.is_empty()) {
             findings.push(line);
         }
     }

@@ -259,4 +259,40 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
         ["force.iter().chain(torque)", "torque.iter().chain(force)"],
         &["tilted_inertia", "centre_of_percussion", "parallel_axis"],
     ),
+    physics(
+        "limits of joints twice as wide",
+        "sim/src/mjcf/write.rs",
+        [".numbers(\"range\", &range)", ".numbers(\"range\", &range.map(|x| 2.0 * x))"],
+        &["joint_limit"],
+    ),
+    physics(
+        "limits of motors twice as large",
+        "sim/src/mjcf/write.rs",
+        ["\"forcerange\", &[-limit, limit]", "\"forcerange\", &[-2.0 * limit, 2.0 * limit]"],
+        &["force_limit"],
+    ),
+    physics(
+        "armature forgotten",
+        "sim/src/mjcf/robot.rs",
+        ["armature: plan.armature,", "armature: 0.0 * plan.armature,"],
+        &["armature"],
+    ),
+    physics(
+        "dry friction forgotten",
+        "sim/src/mjcf/robot.rs",
+        ["frictionloss: if tendon { 0.0 } else { plan.friction },", "frictionloss: if tendon { 0.0 } else { 0.0 * plan.friction },"],
+        &["dry_friction"],
+    ),
+    physics(
+        "IMU at rest feels nothing",
+        "sensors/src/imu.rs",
+        ["acceleration + self.gravity_bias, spin_up", "acceleration, spin_up"],
+        &["imu_turntable", "imu_pendulum"],
+    ),
+    physics(
+        "pixels half a percent too wide",
+        "sensors/src/visibility/projection.rs",
+        ["inverse_f: [1.0 / self.fx, 1.0 / self.fy],", "inverse_f: [1.005 / self.fx, 1.0 / self.fy],"],
+        &["sphere_depth"],
+    ),
 ];

@@ -34,6 +34,8 @@ pub(crate) struct Row {
     pub(crate) pass: bool,
     /// Why the lines of MuJoCo differ, where the law says so.
     pub(crate) lines_differ: Option<String>,
+    /// Whether it says so of this row alone: then they do.
+    pub(crate) must_differ: bool,
 }
 
 /// What one run measured.
@@ -90,6 +92,7 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
             mujoco: mujoco.clone(),
             pass: row["pass"].as_bool()?,
             lines_differ: text(&row["lines_differ"]).or_else(|| text(&measured["lines_differ"])),
+            must_differ: row["lines_differ"].is_string(),
         });
     }
     for control in measured["controls"].as_array()? {
@@ -177,8 +180,8 @@ pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
         format!("**{} of {controls} controls hold as well and show nothing**: {}.", idle.len(), idle.join("; "))
     };
     let mut out = format!(
-        "# Laws of physics\n\nWritten by `cargo xtask physics-report`; do not edit. {} laws, each with a closed form or a \
-         conservation law, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls}\n\nThe derivation of a law, and where its \
+        "# Laws of physics\n\nWritten by `cargo xtask physics-report`; do not edit. {} laws, each with a closed form, a \
+         conservation law, a symmetry or a promise of sameness, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls}\n\nThe derivation of a law, and where its \
          tolerance comes from, stand at the head of its file. A number is as true on another machine if it differs by less than a \
          tenth of its tolerance; that is what CI asks of this page.\n",
         laws.len(),
@@ -258,7 +261,7 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
         "\n## Where {first} and {second} differ\n\nAll other numbers of both agree within a tenth of their tolerances.\n\n\
          | test | quantity | {first} | {second} | why |\n|---|---|--:|--:|---|\n"
     );
-    let (mut unexplained, mut some) = (Vec::new(), false);
+    let (mut unexplained, mut needless, mut some) = (Vec::new(), Vec::new(), false);
     for row in rows.iter().filter(|row| row.mujoco == **first) {
         let Some(other) = rows.iter().find(|other| other.mujoco == **second && is_same(other, row)) else {
             some = true;
@@ -268,6 +271,9 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
         };
         let most = row.tolerance.min(other.tolerance) * SAME;
         if (row.measured - other.measured).abs() <= most {
+            if row.must_differ {
+                needless.push(format!("{} ({})", row.law, row.quantity));
+            }
             continue;
         }
         some = true;
@@ -298,6 +304,10 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
         "numbers differ between the lines of MuJoCo by more than a tenth of the tolerance, and the law does not say why \
          (`lines_differ`)",
         &unexplained,
+    )?;
+    crate::run::no_findings(
+        "laws say why the lines of MuJoCo differ in a number (`lines_differ_in`) in which they agree",
+        &needless,
     )?;
     Ok(if some { out } else { String::new() })
 }
@@ -406,6 +416,7 @@ mod tests {
             mujoco: mujoco.into(),
             pass: true,
             lines_differ: None,
+            must_differ: false,
         }
     }
 
@@ -442,6 +453,20 @@ mod tests {
         let mut other = run("2.2.2", 1.095);
         other.rows[0].statement = "z = 0".into();
         assert_eq!(untrue(&page, &[other]).len(), 1);
+    }
+
+    #[test]
+    fn a_reason_needs_a_difference() {
+        let mut runs = [run("2.2.2", 1.095), run("4.0.0", 1.095)];
+        for run in &mut runs {
+            run.rows[0].lines_differ = Some("it was mended".into());
+        }
+        assert!(page(&runs).is_ok(), "a reason for some of the numbers of a law");
+        for run in &mut runs {
+            run.rows[0].must_differ = true;
+        }
+        let failure = page(&runs).expect_err("a reason for one number, which is the same");
+        assert!(failure.message.contains("free_fall"), "{failure}");
     }
 
     #[test]

@@ -80,7 +80,8 @@ fn draw_colors(
     // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
     let broken_off = AtomicBool::new(false);
     crew.share(rasterizers, rows, |rasterizer, mut rows| {
-        if !rows.expose(&paths, denoise, rasterizer.brush.stack(), &progress) {
+        let level = rasterizer.level;
+        if !rows.expose(level, &paths, denoise, rasterizer.brush.stack(), &progress) {
             broken_off.store(true, Ordering::Relaxed);
         }
     });
@@ -151,6 +152,6 @@ fn show(crew: &Crew, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, f
     let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
     crew.share(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
         let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
-        develop(rasterizer.level, pixels, guides, out);
+        develop(rasterizer.level, rasterizer.cfg.tone, pixels, guides, out);
     });
 }

@@ -7,12 +7,14 @@ use super::picture_noise::PictureNoise;
 use super::ticket::Ticket;
 use crate::crew::Crew;
 use crate::error::SensorError;
+use crate::resolve::tone::ToneCurve;
 use crate::sensor::SensorContext;
 
 /// What happens to pictures after they were drawn. There is none of it for a perfect camera.
 #[derive(Clone, Debug)]
 pub(super) struct Faults {
     imperfections: Imperfections,
+    tone: ToneCurve,
     noise: Option<PictureNoise>,
     /// As many as threads.
     workers: Vec<()>,
@@ -27,6 +29,7 @@ impl Faults {
         let any = noise.is_some() || !cfg.imperfections.is_empty();
         Ok(any.then(|| Self {
             imperfections: cfg.imperfections.clone(),
+            tone: cfg.raster.tone,
             noise,
             workers: vec![(); context.threads.max(1)],
             crew: context.crew.clone(),
@@ -35,10 +38,10 @@ impl Faults {
 
     /// Spoils pictures in which misses are infinite; each is spoilt by one thread.
     pub(super) fn spoil(&mut self, jobs: &mut [Job<'_>], tickets: &[Ticket]) {
-        let Self { imperfections, noise, workers, crew } = self;
+        let Self { imperfections, tone, noise, workers, crew } = self;
         let noise = noise.as_ref();
         crew.share(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
-            imperfections.spoil(frame, shot.view, ticket);
+            imperfections.spoil(frame, *tone, shot.view, ticket);
             if let Some(noise) = noise {
                 noise.disturb(frame, ticket);
             }

@@ -51,6 +51,7 @@ pub use parallel::ParallelRasterizer;
 pub use past::HistoryView;
 pub use point_cloud::PointFrame;
 pub use progress::RenderProgress;
+pub use crate::resolve::tone::ToneCurve;
 pub use rasterizer::{Before, RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};

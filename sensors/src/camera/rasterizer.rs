@@ -14,6 +14,7 @@ use crate::ray::RayAssets;
 use crate::resolve::band::Brush;
 use crate::resolve::path::film::Film;
 use crate::resolve::plan::{Plan, Style};
+use crate::resolve::tone::ToneCurve;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::{RenderError, View};
 use scene::{Light, PoseF32, RenderScene};
@@ -34,6 +35,8 @@ pub struct RasterCfg {
     /// exact where nothing is in the way of flat surfaces (of a mesh with smooth normals, what lies below a facet is in the way),
     /// with the noise of so many rays elsewhere, which depends on the point and nothing else.
     pub occlusion_rays: u16,
+    /// How light becomes the bytes of the colour.
+    pub tone: ToneCurve,
     /// Geom groups that are drawn: bit k is group k.
     pub groups: u32,
     /// Draw dense meshes coarser where that is hardly seen (level of detail).
@@ -59,7 +62,15 @@ pub struct RasterCfg {
 
 impl Default for RasterCfg {
     fn default() -> Self {
-        Self { samples: 4, shadows: true, shadow_size: 0, occlusion_rays: 0, groups: u32::MAX, lod: true }
+        Self {
+            samples: 4,
+            shadows: true,
+            shadow_size: 0,
+            occlusion_rays: 0,
+            tone: ToneCurve::Soft,
+            groups: u32::MAX,
+            lod: true,
+        }
     }
 }
 

@@ -41,12 +41,15 @@ pub enum Renderer {
     ///   infinite planes light as much, with more noise: paths meet them by chance.
     /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
     ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
-    ///   1). The layer mirrors a lamp's `specular` colour and everything else's only colour. `reflectance` of the light is
-    ///   mirrored perfectly. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
+    ///   1), or its roughness to the fourth power. The layer mirrors a lamp's `specular` colour and everything else's only
+    ///   colour. Of a metal F0 is its colour, F90 is 1, and nothing is below. `reflectance` of the light is
+    ///   mirrored perfectly. Of what is left, `transmission` meets smooth glass: it is mirrored by Fresnel's equations or goes
+    ///   through by Snell's law, and takes the colour where it enters. Each surface of glass is a bounce; lamps cast its shadow,
+    ///   and are not seen through it. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
     ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface
     ///   itself.
     ///
-    /// The tone curve and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
+    /// The [tone curve](super::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
     /// any number of threads. Pictures of [`Camera`](super::Camera)s have noise of their own each, by the seed of the
     /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
     /// same in any batch.

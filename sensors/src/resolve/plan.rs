@@ -5,6 +5,7 @@ use super::moves::Moves;
 use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_rays::ShadowRays;
+use super::tone::ToneCurve;
 use crate::camera::channel::{FrameMut, Stage};
 use crate::camera::rasterizer::Shot;
 use crate::camera::{Aperture, LensRays, RasterCfg, Renderer, Shutter};
@@ -42,6 +43,7 @@ pub(crate) struct Plan {
     shadow_rays: bool,
     /// Rays for ambient occlusion.
     occlusion_rays: u16,
+    pub(crate) tone: ToneCurve,
     /// The only row of each block that is wanted, if not all.
     pub(crate) only: Option<usize>,
 }
@@ -124,6 +126,7 @@ impl Plan {
         let hybrid = wants_color && renderer == Renderer::Hybrid;
         self.shadow_rays = hybrid && cfg.shadows;
         self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
+        self.tone = cfg.tone;
         let casts_rays = self.shadow_rays || self.occlusion_rays > 0;
         if wants_color && !renderer.follows_paths() {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);

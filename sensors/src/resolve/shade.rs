@@ -151,7 +151,7 @@ struct Gloss {
 
 impl Gloss {
     fn of(material: &Material) -> Self {
-        let exponent = ((material.shininess * 128.0 + 0.5) as u32).clamp(1, 128);
+        let exponent = (material.exponent() + 0.5) as u32;
         Self { strength: material.specular, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
@@ -280,6 +280,17 @@ pub(crate) fn shade<S: Simd>(
     }
     let mut color =
         V3 { x: base.x * diffuse[0] + gloss[0], y: base.y * diffuse[1] + gloss[1], z: base.z * diffuse[2] + gloss[2] };
+    if material.metallic > 0.0 {
+        // What it mirrors, in its colour; of a scene without a mirror, the sky.
+        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)));
+        let metal = V3 {
+            x: base.x * (mirrored.x + gloss[0]),
+            y: base.y * (mirrored.y + gloss[1]),
+            z: base.z * (mirrored.z + gloss[2]),
+        };
+        let k = splat(s, material.metallic.min(1.0));
+        color = color.scale(1.0 - k).add(metal.scale(k));
+    }
     if material.reflectance > 0.0 {
         let mirrored = view.sub(n.scale(n.dot(view) * 2.0));
         let k = splat(s, material.reflectance.clamp(0.0, 1.0));

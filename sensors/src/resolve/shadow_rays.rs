@@ -90,7 +90,7 @@ impl ShadowRays<'_> {
             let length = dot(direction, direction).sqrt();
             if length > 0.0 {
                 let ray = Ray { origin, direction: scale(direction, 1.0 / length) };
-                out[k] = self.tracer.passes(&ray, limit, NOW, &mut stack) as f32;
+                out[k] = self.tracer.passes(s, &ray, limit, NOW, &mut stack) as f32;
             }
         }
         if out == [1.0; LANES] { splat(s, 1.0) } else { load(s, &out) }
@@ -122,7 +122,7 @@ impl ShadowRays<'_> {
                 // them. So what is round and made of triangles does not shade itself, and what is enclosed is dark.
                 let over = dot(direction, flat);
                 let asked = along(direction, if over < 0.0 { -2.0 * over } else { 0.0 }, flat);
-                let passes = self.tracer.passes(&Ray { origin, direction: asked }, f64::INFINITY, NOW, &mut stack);
+                let passes = self.tracer.passes(s, &Ray { origin, direction: asked }, f64::INFINITY, NOW, &mut stack);
                 blocked[usize::from(direction[2] <= 0.0)] += 1.0 - passes;
             }
             for (out, blocked) in out.iter_mut().zip(blocked) {

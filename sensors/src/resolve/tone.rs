@@ -1,27 +1,60 @@
-//! From linear light to the screen.
-//!
-//! Tone curve: light up to 0.7 is kept, above it bends smoothly towards 1: y = 0.7 + 0.3 k / (k + 0.3) with k = x - 0.7,
-//! so highlights on white things do not clip. Then the sRGB transfer function, as a polynomial of √x that is within 0.2 of
-//! 255 of the standard (square roots and products round the same on every machine; powers do not).
+//! From linear light to the screen: a tone curve, then the sRGB transfer function, as a polynomial of √x that is within 0.2
+//! of 255 of the standard (square roots and products round the same on every machine; powers do not).
 
 use crate::lanes::{F, Simd, max, min, select, splat};
+use serde::{Deserialize, Serialize};
 
-/// Where the curve begins to bend.
+/// How light becomes what a screen shows, which ends at 1, before the sRGB transfer function. x is linear light, 1 that of a
+/// white surface in full light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToneCurve {
+    /// x up to 0.7; above it bends smoothly towards 1, so that highlights on white things do not clip:
+    /// 0.7 + 0.3 k / (k + 0.3) with k = x - 0.7.
+    #[default]
+    Soft,
+    /// x up to 1, and 1 above: the measure of light where nothing is too bright.
+    Clip,
+    /// As film, with a foot and a shoulder: x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), 1 at most. Source: Narkowicz, ACES
+    /// filmic tone mapping curve, 2015.
+    Filmic,
+}
+
+/// Where the soft curve begins to bend.
 const KNEE: f32 = 0.7;
+/// Brighter than this is as bright: what comes after stays a number.
+const BRIGHTEST: f32 = 1e6;
+
+impl ToneCurve {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Soft, Self::Clip, Self::Filmic];
+
+    #[inline(always)]
+    fn apply<S: Simd>(self, s: S, x: F<S>) -> F<S> {
+        match self {
+            Self::Soft => {
+                let bright = x.simd_gt(splat(s, KNEE));
+                if bright.any_true() {
+                    let k = min(x, splat(s, BRIGHTEST)) - KNEE;
+                    let bent = k * (1.0 - KNEE) / (k + (1.0 - KNEE)) + KNEE;
+                    min(select(bright, bent, x), splat(s, 1.0))
+                } else {
+                    x
+                }
+            }
+            Self::Clip => min(x, splat(s, 1.0)),
+            Self::Filmic => {
+                let x = min(x, splat(s, BRIGHTEST));
+                min(x * (x * 2.51 + 0.03) / (x * (x * 2.43 + 0.59) + 0.14), splat(s, 1.0))
+            }
+        }
+    }
+}
 
 /// The byte for a linear intensity, as a number in 0..=255.
 #[inline(always)]
-pub(crate) fn encode<S: Simd>(s: S, x: F<S>) -> F<S> {
-    let x = max(x, splat(s, 0.0));
-    let bright = x.simd_gt(splat(s, KNEE));
-    let x = if bright.any_true() {
-        let k = x - KNEE;
-        let bent = k * (1.0 - KNEE) / (k + (1.0 - KNEE)) + KNEE;
-        min(select(bright, bent, x), splat(s, 1.0))
-    } else {
-        x
-    };
-    to_srgb(s, x)
+pub(crate) fn encode<S: Simd>(s: S, curve: ToneCurve, x: F<S>) -> F<S> {
+    to_srgb(s, curve.apply(s, max(x, splat(s, 0.0))))
 }
 
 /// The sRGB byte for a linear intensity in 0..=1, without the tone curve, as a number in 0..=255.
@@ -51,21 +84,32 @@ mod tests {
     use super::*;
     use crate::lanes::levels;
 
+    /// Against the curves as their documentation has them and the standard's transfer function, in double precision.
     #[test]
-    fn encoding_is_srgb_below_the_knee_and_monotonic() {
-        for level in levels() {
+    fn encoding_is_the_curve_and_srgb_and_never_falls() {
+        let shown = |curve, x: f64| match curve {
+            ToneCurve::Soft if x > 0.7 => 0.7 + 0.3 * (x - 0.7) / (x - 0.7 + 0.3),
+            ToneCurve::Soft => x,
+            ToneCurve::Clip => x.min(1.0),
+            ToneCurve::Filmic => (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0),
+        };
+        for (level, curve) in levels().into_iter().flat_map(|level| ToneCurve::ALL.map(|curve| (level, curve))) {
+            let encoded = |x: f32| crate::lanes::at_level!(level, s => encode(s, curve, splat(s, x)).array()[3]);
             let mut last = 0.0;
             for k in 0..4000 {
                 let x = k as f32 / 1000.0;
-                let y = crate::lanes::at_level!(level, s => encode(s, splat(s, x)).array()[3]);
-                assert!(y >= last, "{x}");
+                let y = encoded(x);
+                assert!(y >= last, "{curve:?} {x}");
                 last = y;
-                if x < KNEE && y < 256.0 {
-                    let standard = if x <= 0.0031308 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-                    assert!((y - 0.5 - standard * 255.0).abs() < 0.25, "{x}: {y} {standard}");
-                }
+                let light = shown(curve, f64::from(x));
+                let standard = if light <= 0.0031308 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+                let expected = (standard * 255.0 + 0.5).min(255.0);
+                assert!((f64::from(y) - expected).abs() < 0.25, "{curve:?} {x}: {y}, not {expected}");
             }
-            assert!(last < 256.0);
+            assert_eq!([1e9, f32::MAX, f32::INFINITY].map(|x| encoded(x) as u8), [255; 3], "{curve:?}");
         }
+        // The control: they are not all the same.
+        let middle = ToneCurve::ALL.map(|curve| encode(crate::lanes::Scalar, curve, splat(crate::lanes::Scalar, 0.9)).array()[0]);
+        assert!((0..3).all(|k| (middle[k] - middle[(k + 1) % 3]).abs() > 1.0), "{middle:?}");
     }
 }

@@ -80,6 +80,10 @@ pub struct MaterialValues {
     pub shininess: f32,
     /// Share that is mirrored, 0..=1.
     pub reflectance: f32,
+    /// Share that is metal, 0..=1 (4.x); `None` where the model does not say.
+    pub metallic: Option<f32>,
+    /// How rough it is, 0..=1 (4.x); `None` where the model does not say.
+    pub roughness: Option<f32>,
 }
 
 /// Kinds of lights that both lines know.
@@ -303,8 +307,14 @@ impl Model {
             let textures = &array!(self, mat_texid)[material * roles..(material + 1) * roles];
             [mj::mjTEXROLE_RGB as usize, mj::mjTEXROLE_RGBA as usize].into_iter().map(|r| textures[r]).max()
         };
+        #[cfg(mj4)]
+        let [metallic, roughness] = [array!(self, mat_metallic)[material], array!(self, mat_roughness)[material]];
         #[cfg(not(mj4))]
         let texture = Some(array!(self, mat_texid)[material]);
+        #[cfg(not(mj4))]
+        let [metallic, roughness] = [-1.0, -1.0];
+        // What is not said is -1.
+        let unless_negative = |x: f32| (x >= 0.0).then_some(x);
         MaterialValues {
             rgba: chunks(array!(self, mat_rgba))[material],
             texture: texture.and_then(|t| usize::try_from(t).ok()),
@@ -314,6 +324,8 @@ impl Model {
             specular: array!(self, mat_specular)[material],
             shininess: array!(self, mat_shininess)[material],
             reflectance: array!(self, mat_reflectance)[material],
+            metallic: unless_negative(metallic),
+            roughness: unless_negative(roughness),
         }
     }
 

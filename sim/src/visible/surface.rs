@@ -34,6 +34,9 @@ impl<'a> Surfaces<'a> {
                     specular: m.specular,
                     shininess: m.shininess,
                     reflectance: m.reflectance,
+                    metallic: m.metallic.unwrap_or(0.0),
+                    roughness: m.roughness,
+                    ..Material::default()
                 }
             })
             .collect();

@@ -39,7 +39,13 @@ fn holds() {
             let omega = SPIN + torque / MOMENT * (1.0 - 1e-3);
             let alpha = if torque > 0.0 { alpha } else { 0.0 };
             let found = read(earth(), [RADIUS, 0.0], SPIN, torque);
-            let other = read(weightless(), [1.01 * RADIUS, 0.05], -0.99 * SPIN, 0.9 * torque - 0.01);
+            // Each row without its own cause: one thing is different at a time.
+            let farther = ("1 % farther out", read(earth(), [1.01 * RADIUS, 0.0], SPIN, torque));
+            let beside = ("5 cm beside", read(earth(), [RADIUS, 0.05], SPIN, torque));
+            let falling = ("without weight", read(weightless(), [RADIUS, 0.0], SPIN, torque));
+            let slower = ("with 1 % less spin", read(earth(), [RADIUS, 0.0], 0.99 * SPIN, torque));
+            let weaker = ("with 0.01 N m less", read(earth(), [RADIUS, 0.0], SPIN, torque - 0.01));
+            let others = [&farther, &weaker, &falling, &slower, &weaker, &beside, &farther];
             let rows = [
                 ("inwards", "m/s²", -omega * omega * RADIUS),
                 ("along its way", "m/s²", alpha * RADIUS),
@@ -52,7 +58,8 @@ fn holds() {
             for (k, (quantity, unit, expected)) in rows.into_iter().enumerate() {
                 let quantity = format!("{quantity}, {name}");
                 m.row(&quantity, unit, expected, found[k], (1e-10, "rounding of 1000 sums"));
-                m.control(&quantity, "elsewhere on another turntable, without weight", other[k]);
+                let (without, other) = others[k];
+                m.control(&quantity, without, other[k]);
             }
         }
     });

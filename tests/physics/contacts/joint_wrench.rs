@@ -53,13 +53,19 @@ fn holds() {
                 effort,
             ];
             let found = carried(SKEW, spin, MASS, effort);
-            let skew = [0.5 * SKEW[0], 0.5 * SKEW[1]];
-            let other = carried(skew, 0.9 * spin + 0.5, 1.1 * MASS, 0.9 * effort + 0.1);
+            // Each row without its own cause: one thing is different at a time.
+            let slower = ("that turns by 0.5 rad/s less", carried(SKEW, spin - 0.5, MASS, effort));
+            let pushed = ("that is driven with 0.1 N m more", carried(SKEW, spin, MASS, effort + 0.1));
+            let heavier = ("that is 10 % heavier", carried(SKEW, spin, 1.1 * MASS, effort));
+            let straight = ("whose axis is principal", carried([0.0; 2], spin, MASS, effort));
+            let (about_x, about_y) = if spin == 0.0 { (&slower, &heavier) } else { (&straight, &straight) };
+            let others = [&slower, &pushed, &heavier, about_x, about_y, &pushed];
             for (k, axis) in names.into_iter().enumerate() {
                 let quantity = format!("{axis}, {name}");
                 let unit = if k < 3 { "N" } else { "N m" };
                 m.row(&quantity, unit, expected[k], found[k], (1e-9, "rounding of a velocity over 1 ms"));
-                m.control(&quantity, "of another load that turns and is driven otherwise", other[k]);
+                let (without, other) = others[k];
+                m.control(&quantity, &format!("of a load {without}"), other[k]);
             }
         }
     });

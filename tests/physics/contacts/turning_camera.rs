@@ -1,6 +1,7 @@
 //! A camera that looks inwards from the rim of a turntable, at r, sees a ball that stands at (X, 0, Z) on its way:
 //! turned by θ = ω t it is at x = X sin(-θ), z = r - X cos θ of the camera's frame, y = z_c - Z, and in the picture
-//! where [`ball_in_picture`](super::ball_in_picture) says.
+//! where [`ball_in_picture`](super::ball_in_picture) says. A camera that stands at the rim, and a ball that goes round on the
+//! turntable, see the same the other way round: x = X sin θ.
 //!
 //! Tolerance: ω is constant to rounding. The middle of 1000 pixels is good to 0.1 pixels, its area to 4 √(2 π r) pixels
 //! (law `sphere_depth`).
@@ -10,6 +11,7 @@ use crate::lab::*;
 use crate::law::law;
 use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::MaskId;
 use std::f64::consts::{PI, TAU};
 
 const RIM: f64 = 1.2;
@@ -18,45 +20,69 @@ const BALL: [f64; 2] = [0.35, 0.2];
 const RADIUS: f64 = 0.08;
 const SPIN: f64 = 2.0;
 
+/// What is on the turntable; the other one stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Turns {
+    Camera,
+    Ball,
+}
+
 /// What the camera shows after `seconds`.
-fn seen(spin: f64, seconds: f64) -> Seen {
+fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     let mut lab = Lab::new(earth());
-    let links = [base(), Link::new("table", 2.0, [0.1; 3]), Link::new("rim", 0.0, [0.0; 3])];
-    let rim = Joint::fixed("screw", ["table", "rim"]).at([RIM, 0.0, EYE]);
-    let robot = lab.mechanism(&urdf(&links, &[Joint::hinge("turn", ["base", "table"], [0.0, 0.0, 1.0]), rim]));
-    let ball = lab.object(RigidObjectCfg {
-        uid: "ball".into(),
-        shape: ObjectShape::Sphere { radius: RADIUS },
-        body_type: BodyType::Static,
-        init_pose: Pose::translation(BALL[0], 0.0, BALL[1]),
-        ..RigidObjectCfg::default()
-    });
+    let turn = Joint::hinge("turn", ["base", "table"], [0.0, 0.0, 1.0]);
+    let table = Link::new("table", 2.0, [0.1; 3]);
+    let (text, parent, eye) = match turns {
+        Turns::Camera => {
+            let rim = Joint::fixed("screw", ["table", "rim"]).at([RIM, 0.0, EYE]);
+            (urdf(&[base(), table, Link::new("rim", 0.0, [0.0; 3])], &[turn, rim]), Some("rim".into()), [0.0; 3])
+        }
+        Turns::Ball => {
+            let screw = Joint::fixed("screw", ["table", "ball"]).at([BALL[0], 0.0, BALL[1]]);
+            (urdf(&[base(), table, Link::ball("ball", 0.1, RADIUS)], &[turn, screw]), None, [RIM, 0.0, EYE])
+        }
+    };
+    let robot = lab.mechanism(&text);
+    if turns == Turns::Camera {
+        lab.object(RigidObjectCfg {
+            uid: "ball".into(),
+            shape: ObjectShape::Sphere { radius: RADIUS },
+            body_type: BodyType::Static,
+            init_pose: Pose::translation(BALL[0], 0.0, BALL[1]),
+            ..RigidObjectCfg::default()
+        });
+    }
     let [width, height] = SIZE;
-    let placement = Placement::LookAt { eye: [0.0; 3], target: [-1.0, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
+    let target = [eye[0] - 1.0, eye[1], eye[2]];
+    let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
     let camera = CameraCfg {
         width,
         height,
         intrinsics: Intrinsics::Pixels { fx: FOCAL, fy: FOCAL, cx: MIDDLE[0], cy: MIDDLE[1] },
-        extrinsics: Extrinsics { parent: Some("rim".into()), placement, ..Extrinsics::default() },
+        extrinsics: Extrinsics { parent, placement, ..Extrinsics::default() },
         channels: Channels { mask: true, ..Channels::default() },
         ..CameraCfg::default()
     };
     let camera = lab.sim.add_sensor("camera", camera).unwrap();
     lab.write_joints(robot, &[0.0], &[spin]);
     lab.run(seconds);
-    let id = lab.sim.rigid_object(ball).mask_id();
+    let is_ball = |id: &&MaskId| id.object == "ball" || id.link.as_deref() == Some("ball");
+    let id = lab.sim.mask_ids().iter().find(is_ball).unwrap().id;
     found(&lab.sim.sensor(camera).unwrap().mask().unwrap(), id)
 }
 
 #[test]
 fn holds() {
-    law(module_path!(), "x = -X sin ω t, z = r - X cos ω t", |m| {
-        let still = seen(0.0, 0.25);
-        for seconds in [0.25, 0.6, 1.1, 1.9, 2.7] {
+    law(module_path!(), "x = ∓X sin ω t, z = r - X cos ω t", |m| {
+        let cases = [(Turns::Camera, 1.0, "the camera turns"), (Turns::Ball, -1.0, "the ball goes round")];
+        for ((turns, way, name), seconds) in
+            cases.into_iter().flat_map(|case| [0.25, 0.6, 1.1, 1.9, 2.7].map(|seconds| (case, seconds)))
+        {
+            let still = seen(turns, 0.0, 0.25);
             let (sin, cos) = (SPIN * seconds).sin_cos();
-            let form = expected([-BALL[0] * sin, EYE - BALL[1], RIM - BALL[0] * cos], RADIUS);
-            let ball = seen(SPIN, seconds);
-            let of = |what: &str| format!("{what} after {seconds} s");
+            let form = expected([-way * BALL[0] * sin, EYE - BALL[1], RIM - BALL[0] * cos], RADIUS);
+            let ball = seen(turns, SPIN, seconds);
+            let of = |what: &str| format!("{what} after {seconds} s, {name}");
             let edge = 4.0 * (TAU * (form.area / PI).sqrt()).sqrt();
             m.row(
                 &of("u of the middle"),

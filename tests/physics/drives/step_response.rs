@@ -70,8 +70,16 @@ fn drive(mode: &str, stiffer: f64) -> DriveCfg {
         "acceleration" => DriveCfg { drive_type: DriveType::Acceleration, ..implicit(k, d) },
         "ideal_pd" => model(IdealPd {}.into()),
         "dc_motor" => model(DcMotor { saturation_effort: 1e4 }.into()),
-        _ => model(DelayedPd { delay: DELAY, max_delay: DELAY }.into()),
+        "delayed_pd" => model(DelayedPd { delay: DELAY, max_delay: DELAY }.into()),
+        "acceleration, actuator" => DriveCfg { drive_type: DriveType::Acceleration, ..explicit(k, d) },
+        _ => panic!("{mode}: no gains are known for it here"),
     }
+}
+
+/// Modes of drives, and all models of actuators that there are.
+fn modes() -> Vec<&'static str> {
+    let modes = ["implicit", "actuator", "acceleration", "acceleration, actuator"];
+    modes.into_iter().chain(ActuatorModel::examples().iter().map(|model| model.law().name())).collect()
 }
 
 fn response(drive: DriveCfg) -> Response {
@@ -105,7 +113,7 @@ fn holds() {
         let root = (1.0 - RATIO * RATIO).sqrt();
         let mut curves =
             vec![("closed form", (0..150).map(|k| 5e-3 * f64::from(k)).map(|t| [t, 1.0 - error(t)]).collect())];
-        for mode in ["implicit", "actuator", "acceleration", "ideal_pd", "dc_motor", "delayed_pd"] {
+        for mode in modes() {
             let delay = if mode == "delayed_pd" { f64::from(DELAY) * H } else { 0.0 };
             let (found, stiff) = (response(drive(mode, 1.0)), response(drive(mode, 2.0)));
             let rise = (PI - RATIO.acos()) / (OMEGA * root) + delay;

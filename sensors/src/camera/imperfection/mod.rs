@@ -14,9 +14,10 @@ use super::channel::{Channel, Channels, Color, Depth, FrameMut};
 use super::error::CameraError;
 use super::ticket::Ticket;
 use crate::error::SensorError;
+use crate::resolve::tone::ToneCurve;
 use crate::visibility::View;
 use serde::{Deserialize, Serialize};
-use tone::TONE;
+use tone::Tone;
 
 /// An imperfection of light.
 trait OfLight {
@@ -157,13 +158,13 @@ impl Imperfections {
     }
 
     /// Spoils a frame in which misses are infinite.
-    pub(crate) fn spoil(&self, frame: &mut FrameMut<'_>, view: &View, ticket: &Ticket) {
-        let picture = Picture { view, ticket };
+    pub(crate) fn spoil(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, view: &View, ticket: &Ticket) {
+        let (picture, tone) = (Picture { view, ticket }, Tone::of(curve));
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
             for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
-                let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| TONE.light(byte));
+                let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.light(byte));
                 self.spoil_light(&mut light, &Place { picture, pixel });
-                bytes[..3].copy_from_slice(&light.map(|light| TONE.byte(light)));
+                bytes[..3].copy_from_slice(&light.map(|light| tone.byte(light)));
             }
         }
         if !self.of_depth() {

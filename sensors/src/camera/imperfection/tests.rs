@@ -13,6 +13,10 @@ fn view(size: [usize; 2], f: f32) -> View {
     View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
 }
 
+fn tone() -> &'static Tone {
+    Tone::of(ToneCurve::Soft)
+}
+
 /// The picture of a number.
 fn ticket(number: u64) -> Ticket {
     let mut ticket = Ticket::first(11, 3, "eye");
@@ -24,7 +28,7 @@ fn ticket(number: u64) -> Ticket {
 fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<u8> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
-    imperfections.spoil(&mut frame.as_mut(), &view([SIDE; 2], 150.0), &ticket(picture));
+    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, &view([SIDE; 2], 150.0), &ticket(picture));
     frame.color.unwrap()
 }
 
@@ -32,11 +36,11 @@ fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<u8> {
 /// their square to the variance (Sheppard): that is taken off.
 fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
     let bytes = spoilt(imperfections, byte, u64::from(byte));
-    let lights: Vec<f64> = bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|byte| TONE.light(byte)).collect();
+    let lights: Vec<f64> = bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|byte| tone().light(byte)).collect();
     let n = lights.len() as f64;
     let mean = lights.iter().sum::<f64>() / n;
     let variance = lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / n;
-    let step = 0.5 * (TONE.light(byte + 1) - TONE.light(byte - 1));
+    let step = 0.5 * (tone().light(byte + 1) - tone().light(byte - 1));
     [mean, variance - step * step / 12.0, n]
 }
 
@@ -70,7 +74,7 @@ fn shot_noise_grows_with_the_signal_and_read_noise_does_not() {
     {
         let points = levels.map(|byte| photon_transfer(imperfections, byte));
         for (byte, [mean, variance, n]) in levels.into_iter().zip(points) {
-            let (light, bound) = (TONE.light(byte), 6.0 * (variance / n).sqrt());
+            let (light, bound) = (tone().light(byte), 6.0 * (variance / n).sqrt());
             // A byte's middle and the mean of its light differ by an eighth of the change of the step: below 1e-5 here.
             assert!((mean - light).abs() < bound + 1e-5, "{byte}: {mean} is not {light}");
         }
@@ -89,7 +93,7 @@ fn noise_is_of_each_picture_and_colour() {
     for imperfections in [shot, read] {
         let lights = |picture| -> Vec<f64> {
             let bytes = spoilt(&imperfections, 150, picture);
-            bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|b| TONE.light(b) - TONE.light(150)).collect()
+            bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().light(b) - tone().light(150)).collect()
         };
         let (a, b) = (lights(1), lights(2));
         assert_eq!(a, lights(1), "the same picture");
@@ -109,11 +113,11 @@ fn noise_is_of_each_picture_and_colour() {
 fn few_electrons_are_counted_one_by_one() {
     for electrons in [0.5, 3.0, 20.0] {
         let byte = 128;
-        let shot = ShotNoise { electrons: electrons / TONE.light(byte) };
+        let shot = ShotNoise { electrons: electrons / tone().light(byte) };
         let (view, n) = (view([SIDE; 2], 150.0), 40_000);
         let mut counts = Vec::new();
         for pixel in 0..n {
-            let mut light = [TONE.light(byte); 3];
+            let mut light = [tone().light(byte); 3];
             shot.spoil(&mut light, &Place { picture: Picture { view: &view, ticket: &ticket(1) }, pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
@@ -136,8 +140,8 @@ fn light_falls_with_the_fourth_power_of_the_cosine() {
         for (pixel, found) in bytes.chunks(4).enumerate() {
             let (u, v) = ((pixel % SIDE) as f64 + 0.5, (pixel / SIDE) as f64 + 0.5);
             let angle = ((u - 100.0).hypot(v - 100.0) / 150.0).atan();
-            let light = TONE.light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4)));
-            let expected = TONE.byte(light);
+            let light = tone().light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4)));
+            let expected = tone().byte(light);
             assert!(found[..3].iter().all(|byte| byte.abs_diff(expected) <= 1), "{pixel}: {found:?}, {expected}");
             assert_eq!(found[3], 255);
             off += usize::from(found[0] != expected);
@@ -148,7 +152,7 @@ fn light_falls_with_the_fourth_power_of_the_cosine() {
     // The control: at a corner, 43 degrees off the axis, 0.28 of the light is left.
     let vignetting = Some(Vignetting::default());
     let corner = spoilt(&Imperfections { vignetting, ..Imperfections::default() }, 200, 1)[0];
-    let left = TONE.light(corner) / TONE.light(200);
+    let left = tone().light(corner) / tone().light(200);
     assert!((left - 0.28).abs() < 0.01, "{left}");
 }
 
@@ -196,7 +200,7 @@ fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> 
     let channels = Channels { depth: true, distance: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
     (frame.depth, frame.distance) = (Some(depths.to_vec()), Some(along(depths)));
-    imperfections.spoil(&mut frame.as_mut(), view, picture.ticket);
+    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, view, picture.ticket);
     let (depths, distances) = (frame.depth.take().unwrap(), frame.distance.clone().unwrap());
     assert_eq!(distances, along(&depths), "distance follows depth");
     depths
@@ -217,7 +221,7 @@ fn distances_alone_are_spoilt_alike() {
     let mut frame = Frame::new(60, 40, Channels { distance: true, ..Channels::default() });
     let distances = depths.iter().enumerate().map(|(k, depth)| (f64::from(*depth) / picture.cosine(k)) as f32);
     frame.distance = Some(distances.collect());
-    all.spoil(&mut frame.as_mut(), &view, picture.ticket);
+    all.spoil(&mut frame.as_mut(), ToneCurve::Soft, &view, picture.ticket);
     for (pixel, (distance, depth)) in frame.distance.unwrap().iter().zip(&expected).enumerate() {
         let found = f64::from(*distance) * picture.cosine(pixel);
         assert!(found == f64::from(*depth) || (found / f64::from(*depth) - 1.0).abs() < 1e-6, "{found} {depth}");

@@ -1,11 +1,15 @@
 //! Bytes of the screen as linear light, and back: the inverse of the renderers' own curve.
 
 use crate::lanes::{Scalar, splat};
-use crate::resolve::tone::encode;
+use crate::resolve::tone::{ToneCurve, encode};
 use std::sync::LazyLock;
 
-/// The curve, read backwards once.
-pub(super) static TONE: LazyLock<Tone> = LazyLock::new(Tone::new);
+/// The curves, read backwards once.
+static TONES: [LazyLock<Tone>; ToneCurve::ALL.len()] = [
+    LazyLock::new(|| Tone::new(ToneCurve::ALL[0])),
+    LazyLock::new(|| Tone::new(ToneCurve::ALL[1])),
+    LazyLock::new(|| Tone::new(ToneCurve::ALL[2])),
+];
 
 /// The curve in both directions. A byte that becomes light becomes the same byte again.
 #[derive(Debug)]
@@ -17,10 +21,16 @@ pub(super) struct Tone {
 }
 
 impl Tone {
-    fn new() -> Self {
-        let least = std::array::from_fn(|k| reach(k as f32 + 1.0));
+    /// That of a curve.
+    pub(super) fn of(curve: ToneCurve) -> &'static Self {
+        let place = ToneCurve::ALL.iter().position(|one| *one == curve);
+        &TONES[place.unwrap_or_default()]
+    }
+
+    fn new(curve: ToneCurve) -> Self {
+        let least = std::array::from_fn(|k| reach(curve, k as f32 + 1.0));
         // The curve adds half a byte, which rounds.
-        let light = |byte: usize| if byte == 255 { least[254] } else { reach(byte as f32 + 0.5) };
+        let light = |byte: usize| if byte == 255 { least[254] } else { reach(curve, byte as f32 + 0.5) };
         Self { lights: std::array::from_fn(|byte| f64::from(light(byte))), least }
     }
 
@@ -35,15 +45,15 @@ impl Tone {
 }
 
 /// The least light whose byte, before it is cut off, is `value` at least.
-fn reach(value: f32) -> f32 {
+fn reach(curve: ToneCurve, value: f32) -> f32 {
     // Positive numbers are in the order of their bits; the curve never falls.
     let (mut below, mut above) = (0, 1000f32.to_bits());
-    if encode(Scalar, splat(Scalar, 0.0)).array()[0] >= value {
+    if encode(Scalar, curve, splat(Scalar, 0.0)).array()[0] >= value {
         return 0.0;
     }
     while above - below > 1 {
         let middle = below.midpoint(above);
-        let byte = encode(Scalar, splat(Scalar, f32::from_bits(middle))).array()[0];
+        let byte = encode(Scalar, curve, splat(Scalar, f32::from_bits(middle))).array()[0];
         *(if byte >= value { &mut above } else { &mut below }) = middle;
     }
     f32::from_bits(above)
@@ -55,26 +65,32 @@ mod tests {
 
     #[test]
     fn every_byte_comes_back() {
-        for byte in 0..=255 {
-            assert_eq!(TONE.byte(TONE.light(byte)), byte);
+        for curve in ToneCurve::ALL {
+            let tone = Tone::of(curve);
+            for byte in 0..=255 {
+                assert_eq!(tone.byte(tone.light(byte)), byte, "{curve:?}");
+            }
+            assert_eq!([-1.0, 0.0, 1e9, f64::INFINITY].map(|light| tone.byte(light)), [0, 0, 255, 255], "{curve:?}");
         }
-        assert_eq!([-1.0, 0.0, 1e9, f64::INFINITY].map(|light| TONE.byte(light)), [0, 0, 255, 255]);
+        let lights = ToneCurve::ALL.map(|curve| Tone::of(curve).light(230));
+        assert!(lights[0] != lights[1] && lights[1] != lights[2], "each has its own: {lights:?}");
     }
 
     /// Against the closed form of the curve: sRGB's own inverse, and above 0.7 that of y = 0.7 + 0.3 k / (k + 0.3). The
     /// renderers' polynomial is within 0.2 of 255 of the standard, and the middle of a byte is found to far less.
     #[test]
     fn bytes_are_the_light_of_the_curve() {
+        let tone = Tone::of(ToneCurve::Soft);
         let screen = |light: f64| {
             let k = light - 0.7;
             let bent = if k > 0.0 { 0.7 + 0.3 * k / (k + 0.3) } else { light };
             255.0 * if bent <= 0.0031308 { 12.92 * bent } else { 1.055 * bent.powf(1.0 / 2.4) - 0.055 }
         };
         for byte in 0..255 {
-            let found = screen(TONE.light(byte));
+            let found = screen(tone.light(byte));
             assert!((found - f64::from(byte)).abs() < 0.25, "{byte}: {found}");
         }
-        assert!((screen(TONE.light(255)) - 254.5).abs() < 0.25);
-        assert!((screen(TONE.light(100) * 1.02) - 100.0).abs() > 0.5, "the control: two percent would be seen");
+        assert!((screen(tone.light(255)) - 254.5).abs() < 0.25);
+        assert!((screen(tone.light(100) * 1.02) - 100.0).abs() > 0.5, "the control: two percent would be seen");
     }
 }

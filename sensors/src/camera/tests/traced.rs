@@ -1,6 +1,6 @@
 //! Pictures by rays against the rasterizer's.
 
-use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot};
+use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, ToneCurve};
 use super::determinism::bits;
 use super::scenes::{Random, figure, random};
 use crate::lanes::levels;
@@ -12,7 +12,15 @@ const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, de
 
 /// Every level of detail as it is, for all renderers.
 const EXACT: RasterCfg =
-    RasterCfg { samples: 4, shadows: true, shadow_size: 0, occlusion_rays: 0, groups: u32::MAX, lod: false };
+    RasterCfg {
+        samples: 4,
+        shadows: true,
+        shadow_size: 0,
+        occlusion_rays: 0,
+        tone: ToneCurve::Soft,
+        groups: u32::MAX,
+        lod: false,
+    };
 
 fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
     let mut rasterizer = Rasterizer::new(cfg);

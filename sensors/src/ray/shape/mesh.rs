@@ -115,11 +115,22 @@ impl MeshTree {
     pub(crate) fn blocks(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> bool {
         let shear = Shear::new(ray);
         let mut blocked = false;
-        self.bvh.walk(ray, limit, stack, |leaf, limit| {
-            blocked |= self.triangles[leaf].iter().any(|t| shear.distance(t).is_some_and(|t| t >= 0.0 && t <= limit));
-            // Nothing is nearer than this: the walk ends.
-            if blocked { -1.0 } else { limit }
-        });
+        self.bvh.walk(
+            ray,
+            limit,
+            stack,
+            #[inline(always)]
+            |leaf, limit| {
+                for triangle in &self.triangles[leaf] {
+                    blocked = shear.distance(triangle).is_some_and(|t| t >= 0.0 && t <= limit);
+                    if blocked {
+                        break;
+                    }
+                }
+                // Nothing is nearer than this: the walk ends.
+                if blocked { -1.0 } else { limit }
+            },
+        );
         blocked
     }
 
@@ -134,18 +145,24 @@ impl MeshTree {
     ) -> Option<(f64, usize)> {
         let shear = Shear::new(ray);
         let mut best = found;
-        self.bvh.walk(ray, limit, stack, |leaf, mut limit| {
-            let first = leaf.start;
-            for (k, triangle) in self.triangles[leaf].iter().enumerate() {
-                let Some(t) = shear.distance(triangle).filter(|&t| t >= 0.0 && t <= limit) else { continue };
-                // On an edge the first triangle counts, in whatever order they are met.
-                if best.is_none_or(|(s, index)| t < s || first + k < index) {
-                    best = Some((t, first + k));
-                    limit = t;
+        self.bvh.walk(
+            ray,
+            limit,
+            stack,
+            #[inline(always)]
+            |leaf, mut limit| {
+                let first = leaf.start;
+                for (k, triangle) in self.triangles[leaf].iter().enumerate() {
+                    let Some(t) = shear.distance(triangle).filter(|&t| t >= 0.0 && t <= limit) else { continue };
+                    // On an edge the first triangle counts, in whatever order they are met.
+                    if best.is_none_or(|(s, index)| t < s || first + k < index) {
+                        best = Some((t, first + k));
+                        limit = t;
+                    }
                 }
-            }
-            limit
-        });
+                limit
+            },
+        );
         best
     }
 

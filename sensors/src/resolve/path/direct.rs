@@ -3,6 +3,7 @@
 use super::lobe::Basis;
 use super::point::Point;
 use super::{Path, Paths, REACH, SCATTERED, above, times};
+use crate::lanes::Simd;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, along, dot, sub, unit};
 use crate::visibility::trace::Hit;
@@ -13,10 +14,11 @@ const GLOWING: u32 = 1 << 29;
 
 impl Paths<'_> {
     /// What a point sends to `o` of the lamps' light.
-    pub(super) fn lit(&self, point: &Point, o: V3, path: &mut Path<'_>, dims: u32) -> V3 {
+    #[inline(always)]
+    pub(super) fn lit<S: Simd>(&self, s: S, point: &Point, o: V3, path: &mut Path<'_>, dims: u32) -> V3 {
         let basis = Basis::of(point.normal);
         let local = basis.to_local(o);
-        let matt = 1.0 - point.lobe.mirror;
+        let matt = point.lobe.rest();
         let mut out = [0.0; 3];
         let mut origin = None;
         for (lamp, k) in self.lamps.lamps.iter().zip(4..) {
@@ -24,15 +26,15 @@ impl Paths<'_> {
             let Some(light) = lamp.at(point.position, choice) else { continue };
             out = along(out, light.strength * matt, times(point.lobe.albedo, lamp.ambient));
             let scatter = point.lobe.scatter(local, basis.to_local(light.direction));
-            let sent = [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer * lamp.specular[c]));
+            let sent = [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer[c] * lamp.specular[c]));
             if sent.iter().all(|&x| x <= 0.0) {
                 continue;
             }
             let passes = if lamp.cast_shadow {
-                let origin = *origin.get_or_insert_with(|| self.lifted(point, path));
+                let origin = *origin.get_or_insert_with(|| self.lifted(s, point, path));
                 let ray = Ray { origin, direction: light.direction };
                 path.rays += 1;
-                self.tracer.passes(&ray, light.distance * REACH, path.time, path.stack)
+                self.tracer.passes(s, &ray, light.distance * REACH, path.time, path.stack)
             } else {
                 1.0
             };
@@ -43,8 +45,20 @@ impl Paths<'_> {
 
     /// What a point sends to `o` of the light of one thing that glows, which is looked for: on average its share of the
     /// light of all of them. `width` is that of a pixel at the point.
-    pub(super) fn glow(&self, point: &Point, o: V3, path: &mut Path<'_>, bounce: u32, width: f64) -> V3 {
+    #[inline(always)]
+    pub(super) fn glow<S: Simd>(
+        &self,
+        s: S,
+        point: &Point,
+        o: V3,
+        path: &mut Path<'_>,
+        bounce: u32,
+        width: f64,
+    ) -> V3 {
         let none = [0.0; 3];
+        if point.lobe.rest() <= 0.0 {
+            return none;
+        }
         let pair = |k: u32| path.sample.pair(GLOWING + 2 * bounce + k);
         // Without any, no numbers are needed.
         let Some(emitter) = self.lamps.emitters.choose(0.0).and_then(|_| self.lamps.emitters.choose(pair(0)[0])) else {
@@ -63,7 +77,7 @@ impl Paths<'_> {
         }
         let ray = Ray { origin: from, direction };
         path.rays += 1;
-        let passes = self.tracer.passes(&ray, distance * REACH, path.time, path.stack);
+        let passes = self.tracer.passes(s, &ray, distance * REACH, path.time, path.stack);
         if passes <= 0.0 {
             return none;
         }
@@ -79,7 +93,7 @@ impl Paths<'_> {
         let share = self.ways.looking(likely, point.lobe.likely(local, i));
         let scatter = point.lobe.scatter(local, i);
         let by = share * passes * there.alpha * (1.0 - there.lobe.mirror) / likely;
-        [0, 1, 2].map(|c| by * there.emission[c] * (scatter.below[c] + scatter.layer))
+        [0, 1, 2].map(|c| by * there.emission[c] * (scatter.below[c] + scatter.layer[c]))
     }
 
     /// The share of the light of what a path met that is not found by looking for it. The path's direction was chosen at
@@ -93,12 +107,13 @@ impl Paths<'_> {
     }
 
     /// Where shadow rays of a point begin: where its smooth normals mean it to be, unless something is between.
-    fn lifted(&self, point: &Point, path: &mut Path<'_>) -> V3 {
+    #[inline(always)]
+    fn lifted<S: Simd>(&self, s: S, point: &Point, path: &mut Path<'_>) -> V3 {
         let (here, lifted) = (above(point, 1.0), above(&Point { position: point.lifted, ..*point }, 1.0));
         let way = sub(lifted, here);
         let (far, Some(direction)) = (dot(way, way).sqrt(), unit(way)) else { return lifted };
         path.rays += 1;
-        match self.tracer.nearest(&Ray { origin: here, direction }, far, path.time, path.stack) {
+        match self.tracer.nearest(s, &Ray { origin: here, direction }, far, path.time, path.stack) {
             Some(_) => here,
             None => lifted,
         }

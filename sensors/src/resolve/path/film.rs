@@ -5,7 +5,7 @@ use super::{Found, Lamps, Paths};
 use crate::camera::RenderProgress;
 use crate::lanes::{LANES, Level, Simd, at_level, load};
 use crate::ray::bvh::Stack;
-use crate::resolve::tone::encode;
+use crate::resolve::tone::{ToneCurve, encode};
 
 /// A picture in linear light; keeps its memory.
 #[derive(Clone, Debug, Default)]
@@ -67,6 +67,18 @@ impl Rows<'_> {
     /// divided out.
     pub(crate) fn expose(
         &mut self,
+        level: Level,
+        paths: &Paths<'_>,
+        smooth: bool,
+        stack: &mut Stack,
+        progress: &RenderProgress,
+    ) -> bool {
+        at_level!(level, s => self.expose_lanes(s, paths, smooth, stack, progress))
+    }
+
+    fn expose_lanes<S: Simd>(
+        &mut self,
+        s: S,
         paths: &Paths<'_>,
         smooth: bool,
         stack: &mut Stack,
@@ -77,8 +89,11 @@ impl Rows<'_> {
             if progress.is_cancelled() {
                 return false;
             }
-            let found @ Found { color, variance, albedo, rays, .. } =
-                paths.pixel([k % width, self.first + k / width], stack);
+            let at = [k % width, self.first + k / width];
+            let found @ Found { color, variance, albedo, rays, .. } = s.vectorize(
+                #[inline(always)]
+                || paths.pixel(s, at, stack),
+            );
             progress.add(paths.samples.into(), rays);
             let mut by = [1.0; 3];
             if let Some(guide) = self.guides.get_mut(k).filter(|_| smooth) {
@@ -97,11 +112,11 @@ impl Rows<'_> {
 }
 
 /// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
-pub(crate) fn develop(level: Level, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
-    at_level!(level, s => develop_lanes(s, pixels, guides, out));
+pub(crate) fn develop(level: Level, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+    at_level!(level, s => develop_lanes(s, curve, pixels, guides, out));
 }
 
-fn develop_lanes<S: Simd>(s: S, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+fn develop_lanes<S: Simd>(s: S, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
     for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
         for c in 0..3 {
             let mut linear = [0.0f32; LANES];
@@ -112,7 +127,7 @@ fn develop_lanes<S: Simd>(s: S, pixels: &[Pixel], guides: &[Guide], out: &mut [u
             // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.
             s.vectorize(
                 #[inline(always)]
-                || bytes = encode(s, load(s, &linear)).to_int().array(),
+                || bytes = encode(s, curve, load(s, &linear)).to_int().array(),
             );
             for (to, byte) in out.chunks_exact_mut(4).zip(bytes) {
                 (to[c], to[3]) = (byte as u8, 255);

@@ -11,16 +11,25 @@ use std::f64::consts::PI;
 /// How a point scatters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lobe {
-    /// What is scattered below the layer.
+    /// The colour of the surface.
     pub(super) albedo: V3,
+    /// What is scattered below the layer: nothing of a metal.
+    body: V3,
     /// What the layer reflects along the normal, and at grazing.
-    f0: f64,
+    f0: V3,
     f90: f64,
     /// Roughness alpha of the layer, squared.
     alpha2: f64,
     /// What is mirrored perfectly.
     pub(super) mirror: f64,
+    /// What meets a smooth surface of glass.
+    glass: f64,
+    /// Refractive index of the side that light comes from, over that of the other side.
+    ratio: f64,
 }
+
+/// The least alpha², of a roughness of 0: highlights of a twentieth of a degree.
+const SMOOTHEST: f64 = 1e-6;
 
 /// Axes at a point, the third is the normal.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +50,7 @@ pub(super) struct Scattered {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatter {
     pub(super) below: V3,
-    pub(super) layer: f64,
+    pub(super) layer: V3,
 }
 
 impl Basis {
@@ -89,18 +98,54 @@ pub(super) fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
 }
 
 impl Lobe {
-    pub(super) fn new(material: &Material, albedo: V3) -> Self {
-        let f0 = 0.08 * f64::from(material.specular.clamp(0.0, 1.0));
-        let exponent = (128.0 * f64::from(material.shininess)).clamp(1.0, 128.0);
-        let mirror = f64::from(material.reflectance.clamp(0.0, 1.0));
-        Self { albedo, f0, f90: (50.0 * f0).min(1.0), alpha2: 2.0 / (exponent + 2.0), mirror }
+    /// `front` is whether light comes from outside of the body.
+    pub(super) fn new(material: &Material, albedo: V3, front: bool) -> Self {
+        let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
+        let (layer, metal) = (0.08 * part(material.specular), part(material.metallic));
+        let f0 = albedo.map(|color| layer + metal * (color - layer));
+        let f90 = (50.0 * f0.iter().fold(0.0f64, |m, &x| m.max(x))).min(1.0);
+        let alpha2 = match material.roughness {
+            Some(roughness) => part(roughness).powi(4).max(SMOOTHEST),
+            None => 2.0 / (f64::from(material.exponent()) + 2.0),
+        };
+        let mirror = part(material.reflectance);
+        let glass = (1.0 - mirror) * part(material.transmission);
+        let index = f64::from(material.refractive_index);
+        let ratio = if front { 1.0 / index } else { index };
+        Self { albedo, body: scale(albedo, 1.0 - metal), f0, f90, alpha2, mirror, glass, ratio }
     }
 
-    /// What the layer reflects at an angle of this cosine.
-    fn fresnel(&self, cos: f64) -> f64 {
+    /// The part of the light that is scattered: neither mirrored nor let through.
+    pub(super) fn rest(&self) -> f64 {
+        1.0 - self.mirror - self.glass
+    }
+
+    /// Whether there is no layer.
+    fn is_matt(&self) -> bool {
+        self.f0 == [0.0; 3]
+    }
+
+    /// What the layer reflects at an angle of this cosine. Source: Schlick, 1994.
+    fn fresnel(&self, cos: f64) -> V3 {
         let k = (1.0 - cos).clamp(0.0, 1.0);
         let square = k * k;
-        self.f0 + (self.f90 - self.f0) * (square * square * k)
+        let grazing = square * square * k;
+        self.f0.map(|f0| f0 + (self.f90 - f0) * grazing)
+    }
+
+    /// Where light goes that is bent into what `o` (from outside, z up) looks at, and how much is mirrored instead: Snell's law
+    /// and Fresnel's equations of light without polarisation; `None` where all is mirrored. Source: Born and Wolf, Principles
+    /// of Optics, section 1.5.
+    fn bent(&self, o: V3) -> (f64, Option<V3>) {
+        let square = 1.0 - self.ratio * self.ratio * (1.0 - o[2] * o[2]);
+        if square <= 0.0 {
+            return (1.0, None);
+        }
+        let (here, there) = (o[2], square.sqrt());
+        let across = (self.ratio * here - there) / (self.ratio * here + there);
+        let along = (here - self.ratio * there) / (here + self.ratio * there);
+        let mirrored = 0.5 * (across * across + along * along);
+        (mirrored, Some([-self.ratio * o[0], -self.ratio * o[1], -there]))
     }
 
     /// Density of microfacets, by the cosine of their tilt.
@@ -117,29 +162,30 @@ impl Lobe {
     /// Light from `i` to `o`, both unit and in the frame of the point.
     pub(super) fn scatter(&self, o: V3, i: V3) -> Scatter {
         if o[2] <= 0.0 || i[2] <= 0.0 {
-            return Scatter { below: [0.0; 3], layer: 0.0 };
+            return Scatter { below: [0.0; 3], layer: [0.0; 3] };
         }
-        let rest = 1.0 - self.mirror;
-        let through = (1.0 - self.fresnel(o[2])) * (1.0 - self.fresnel(i[2]));
-        let below = scale(self.albedo, rest * through * i[2] / PI);
-        if self.f0 == 0.0 {
-            return Scatter { below, layer: 0.0 };
+        let rest = self.rest();
+        let (into, out) = (self.fresnel(o[2]), self.fresnel(i[2]));
+        let below = [0, 1, 2].map(|k| rest * self.body[k] * (1.0 - into[k]) * (1.0 - out[k]) * i[2] / PI);
+        if self.is_matt() {
+            return Scatter { below, layer: [0.0; 3] };
         }
         let half = [0, 1, 2].map(|k| o[k] + i[k]);
         let length = dot(half, half).sqrt();
         let (tilt, angle) = (half[2] / length, dot(half, o) / length);
         let root = |cos: f64| (self.alpha2 + (1.0 - self.alpha2) * cos * cos).sqrt();
         let seen_twice = 1.0 / (2.0 * (o[2] * root(i[2]) + i[2] * root(o[2])));
-        Scatter { below, layer: rest * self.density(tilt) * self.fresnel(angle) * seen_twice * i[2] }
+        Scatter { below, layer: scale(self.fresnel(angle), rest * self.density(tilt) * seen_twice * i[2]) }
     }
 
     /// The part of directions that are chosen by the layer.
     fn share(&self, o: V3) -> f64 {
-        if self.f0 == 0.0 {
+        if self.is_matt() {
             return 0.0;
         }
-        let most = self.albedo.iter().fold(0.0f64, |m, &x| m.max(x));
-        let (layer, below) = (self.fresnel(o[2]), most * (1.0 - self.fresnel(o[2])));
+        let most = |color: V3| color.iter().fold(0.0f64, |m, &x| m.max(x));
+        let layer = most(self.fresnel(o[2]));
+        let below = most(self.body) * (1.0 - layer);
         (layer / (layer + below).max(1e-12)).clamp(0.1, 1.0)
     }
 
@@ -152,8 +198,22 @@ impl Lobe {
         if lobe < self.mirror {
             return Some(Scattered { direction: [-o[0], -o[1], o[2]], weight: [1.0; 3], mirrored: true, likely: 0.0 });
         }
-        let rest = 1.0 - self.mirror;
-        let lobe = (lobe - self.mirror) / rest;
+        let lobe = lobe - self.mirror;
+        if lobe < self.glass {
+            let (mirrored, through) = self.bent(o);
+            // What goes in takes the colour.
+            let tint = if self.ratio < 1.0 { self.albedo } else { [1.0; 3] };
+            let (direction, weight) = match through {
+                Some(through) if lobe >= mirrored * self.glass => (through, tint),
+                _ => ([-o[0], -o[1], o[2]], [1.0; 3]),
+            };
+            return Some(Scattered { direction, weight, mirrored: true, likely: 0.0 });
+        }
+        let rest = self.rest();
+        if rest <= 0.0 {
+            return None;
+        }
+        let lobe = (lobe - self.glass) / rest;
         let share = self.share(o);
         let direction = if lobe < share { self.mirrored_by_facet(o, at)? } else { cosine(at) };
         if direction[2] <= 0.0 {
@@ -161,7 +221,7 @@ impl Lobe {
         }
         let likely = self.likely(o, direction);
         let Scatter { below, layer } = self.scatter(o, direction);
-        let weight = below.map(|x| (x + layer) / likely);
+        let weight = [0, 1, 2].map(|k| (below[k] + layer[k]) / likely);
         Some(Scattered { direction, weight, mirrored: false, likely })
     }
 
@@ -175,7 +235,7 @@ impl Lobe {
             let tilt = half[2] / dot(half, half).sqrt();
             likely += share * self.seen(o[2]) * self.density(tilt) / (4.0 * o[2]);
         }
-        likely * (1.0 - self.mirror)
+        likely * self.rest()
     }
 
     /// Mirrored by a microfacet that is seen from `o`.
@@ -206,7 +266,7 @@ mod tests {
     use super::*;
 
     fn lobe(specular: f32, shininess: f32, albedo: f64) -> Lobe {
-        Lobe::new(&Material { specular, shininess, ..Material::default() }, [albedo; 3])
+        Lobe::new(&Material { specular, shininess, ..Material::default() }, [albedo; 3], true)
     }
 
     fn toward(cos: f64) -> V3 {
@@ -240,7 +300,7 @@ mod tests {
                     let (z, part) = ((f64::from(k % n) + 0.5) / f64::from(n), (f64::from(k / n) + 0.5) / f64::from(n));
                     let (r, [c, s]) = ((1.0 - z * z).sqrt(), turn(part));
                     let Scatter { below, layer } = lobe.scatter(o, [r * c, r * s, z]);
-                    all += (below[0] + layer) * 2.0 * PI / f64::from(n * n);
+                    all += (below[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
                 }
                 let count = 1 << 14;
                 let chosen: f64 = (0..count)
@@ -258,7 +318,7 @@ mod tests {
                 }
                 // A control: without the layer taking from what is below, more would go out than comes in.
                 if albedo == 1.0 && specular == 1.0 {
-                    let layer = Lobe { albedo: [0.0; 3], ..lobe };
+                    let layer = Lobe { body: [0.0; 3], ..lobe };
                     let above: f64 = (0..count)
                         .map(|k| {
                             let sample = Sequence::new([1, 2], 3).sample(k);
@@ -272,6 +332,70 @@ mod tests {
         }
     }
 
+    /// Of light along the normal a smooth metal mirrors its colour, and nothing else; half a metal as the mean of both says.
+    #[test]
+    fn metals_mirror_their_colour() {
+        let gold = [1.0, 0.77, 0.34];
+        let returned = |metallic: f32| {
+            let material = Material { metallic, specular: 0.5, roughness: Some(0.2), ..Material::default() };
+            let lobe = Lobe::new(&material, gold, true);
+            let count = 1 << 14;
+            let mut sum = [0.0; 3];
+            for k in 0..count {
+                let sample = Sequence::new([4, 2], 1).sample(k);
+                let Some(next) = lobe.choose([0.0, 0.0, 1.0], sample.pair(0)[0], sample.pair(1)) else { continue };
+                sum = [0, 1, 2].map(|c| sum[c] + next.weight[c] / f64::from(count));
+            }
+            sum
+        };
+        let metal = returned(1.0);
+        for c in 0..3 {
+            // Facets of alpha 0.04 are tilted by some degrees: Schlick's term is below 1e-5 there, what they hide of each other
+            // below alpha²/2. The net is good to a thousandth.
+            assert!((metal[c] - gold[c]).abs() < 2e-3, "{metal:?}");
+        }
+        // The control: without metal, the layer reflects 0.04 of all colours, and of what is below 0.96 times what it lets out.
+        let plain = returned(0.0);
+        assert!((plain[2] - metal[2]).abs() < 0.1 && (plain[0] - metal[0]).abs() > 0.02, "{plain:?}");
+    }
+
+    /// Along the normal ((n - 1)/(n + 1))² is mirrored; at Brewster's angle, tan = n, half of what the electric field across the
+    /// plane gives, ((n² - 1)/(n² + 1))²; and from inside beyond the critical angle, sin = 1/n, everything. What goes through
+    /// obeys Snell's law.
+    #[test]
+    fn glass_mirrors_and_bends_by_fresnel_and_snell() {
+        let n = 1.5f64;
+        let glass = Material { transmission: 1.0, refractive_index: 1.5, ..Material::default() };
+        let [outside, inside] = [true, false].map(|front| Lobe::new(&glass, [0.8; 3], front));
+        let along = ((n - 1.0) / (n + 1.0)).powi(2);
+        let brewster = 0.5 * ((n * n - 1.0) / (n * n + 1.0)).powi(2);
+        let tilt = n.atan();
+        for (lobe, o, expected) in [
+            (&outside, [0.0, 0.0, 1.0], along),
+            (&inside, [0.0, 0.0, 1.0], along),
+            (&outside, [tilt.sin(), 0.0, tilt.cos()], brewster),
+            (&inside, [1.01 / n, 0.0, (1.0 - (1.01 / n).powi(2)).sqrt()], 1.0),
+        ] {
+            let count = 10_000;
+            let chosen = (0..count).map(|k| lobe.choose(o, (f64::from(k) + 0.5) / f64::from(count), [0.5; 2]).unwrap());
+            let chosen: Vec<_> = chosen.collect();
+            let up = chosen.iter().filter(|next| next.direction[2] > 0.0).count() as f64 / f64::from(count);
+            assert!((up - expected).abs() < 2e-4, "{o:?}: {up}, not {expected}");
+            for next in chosen.iter().filter(|next| next.direction[2] < 0.0) {
+                // sin of the two angles are as the indices.
+                let ratio = (next.direction[0] + lobe.ratio * o[0]).abs();
+                let length = dot(next.direction, next.direction);
+                assert!(ratio < 1e-15 && (length - 1.0).abs() < 1e-14, "{next:?}");
+                let tint = if lobe.ratio < 1.0 { 0.8 } else { 1.0 };
+                assert!(next.mirrored && next.weight == [tint; 3]);
+            }
+        }
+        // The control: an index of 1 is nothing at all.
+        let air = Lobe::new(&Material { refractive_index: 1.0, ..glass }, [1.0; 3], true);
+        let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
+        assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
+    }
+
     #[test]
     fn scattering_is_the_same_both_ways() {
         let lobe = lobe(0.7, 0.2, 0.6);
@@ -279,7 +403,7 @@ mod tests {
             let (o, i) = (toward(a), [0.0, (1.0f64 - b * b).sqrt(), b]);
             let (there, back) = (lobe.scatter(o, i), lobe.scatter(i, o));
             let close = |x: f64, y: f64| (x - y).abs() < 1e-12 * x.abs().max(1e-3);
-            assert!(close(there.layer / i[2], back.layer / o[2]));
+            assert!(close(there.layer[0] / i[2], back.layer[0] / o[2]));
             assert!(close(there.below[0] / i[2], back.below[0] / o[2]));
         }
     }
@@ -287,7 +411,7 @@ mod tests {
     #[test]
     fn along_the_surface_nothing_is_scattered() {
         for (specular, reflectance) in [(1.0, 0.0), (0.0, 0.0), (0.5, 0.5)] {
-            let lobe = Lobe::new(&Material { specular, reflectance, ..Material::default() }, [0.5; 3]);
+            let lobe = Lobe::new(&Material { specular, reflectance, ..Material::default() }, [0.5; 3], true);
             for chance in [0.0, 0.3, 0.6, 0.99] {
                 assert!(lobe.choose([1.0, 0.0, 0.0], chance, [0.3, 0.7]).is_none());
                 // A control: a little above, something is, and it is a number.
@@ -299,7 +423,7 @@ mod tests {
 
     #[test]
     fn mirrors_take_their_part() {
-        let lobe = Lobe::new(&Material { reflectance: 0.4, specular: 0.0, ..Material::default() }, [0.5; 3]);
+        let lobe = Lobe::new(&Material { reflectance: 0.4, specular: 0.0, ..Material::default() }, [0.5; 3], true);
         let o = toward(0.6);
         assert!(lobe.choose(o, 0.39, [0.5; 2]).unwrap().mirrored && !lobe.choose(o, 0.41, [0.5; 2]).unwrap().mirrored);
         assert_eq!(lobe.choose(o, 0.0, [0.5; 2]).unwrap().direction, [-o[0], 0.0, 0.6]);

@@ -21,6 +21,7 @@ mod texel;
 mod tests;
 
 use crate::camera::shutter::Clock;
+use crate::lanes::Simd;
 use crate::ray::Ray;
 use crate::ray::bvh::Stack;
 use crate::ray::vector::{V3, along, dot, scale, to_f64};
@@ -203,7 +204,8 @@ struct Path<'a> {
 
 impl Paths<'_> {
     /// Follows the paths of a pixel.
-    pub(crate) fn pixel(&self, at: [usize; 2], stack: &mut Stack) -> Found {
+    #[inline(always)]
+    pub(crate) fn pixel<S: Simd>(&self, s: S, at: [usize; 2], stack: &mut Stack) -> Found {
         let sequence = Sequence::new(at, self.seed);
         let n = f64::from(self.samples);
         let mut out = Found::default();
@@ -213,7 +215,7 @@ impl Paths<'_> {
             let time = self.moving.map_or(NOW, |moving| moving.clock.at(at[1], sample.pair(INSTANT)[0]));
             let [dx, dy] = sample.pair(IN_PIXEL);
             let mut path = Path { sample, time, rays: 0, stack: &mut *stack };
-            let (color, first) = self.radiance(&mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
+            let (color, first) = self.radiance(s, &mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
             out.rays += path.rays;
             // Lamps and skies may be anything; what is no number would spread over its neighbours.
             let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
@@ -238,7 +240,8 @@ impl Paths<'_> {
     }
 
     /// The light that comes to a point of the picture, and what is seen there.
-    fn radiance(&self, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
+    #[inline(always)]
+    fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
         let (sample, time) = (path.sample, path.time);
         let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
         let Some(eye::First { mut ray, travelled: near, mut limit, mut width, mut spread }) =
@@ -255,7 +258,7 @@ impl Paths<'_> {
         let mut chosen: Option<(V3, f64)> = None;
         loop {
             path.rays += 1;
-            let hit = self.tracer.nearest(&ray, limit, time, path.stack);
+            let hit = self.tracer.nearest(s, &ray, limit, time, path.stack);
             let met = hit.and_then(|hit| {
                 let footprint = width + spread * hit.distance;
                 Some((hit, Point::new(self.scene, &ray, &hit, footprint)?))
@@ -283,9 +286,9 @@ impl Paths<'_> {
             }
             let o = scale(ray.direction, -1.0);
             if bounce == 0 {
-                let matt = 1.0 - point.lobe.mirror;
+                let matt = point.lobe.rest();
                 first = First {
-                    albedo: point.lobe.albedo.map(|x| matt * x + point.lobe.mirror),
+                    albedo: point.lobe.albedo.map(|x| matt * x + (1.0 - matt)),
                     normal: point.normal,
                     distance: travelled,
                 };
@@ -302,14 +305,15 @@ impl Paths<'_> {
             if bounce > self.max_bounces {
                 break;
             }
-            light = add(light, times(kept, self.lit(&point, o, path, dims)));
-            light = add(light, times(kept, self.glow(&point, o, path, bounce, width)));
+            light = add(light, times(kept, self.lit(s, &point, o, path, dims)));
+            light = add(light, times(kept, self.glow(s, &point, o, path, bounce, width)));
             let basis = Basis::of(point.normal);
             let [lobe, chance] = sample.pair(dims + CHANCE);
             let Some(next) = point.lobe.choose(basis.to_local(o), lobe, sample.pair(dims + ONWARD)) else { break };
             let onward = basis.to_world(next.direction);
-            // Below the surface itself, though not below its smooth normal.
-            if dot(onward, point.flat) <= 0.0 {
+            // Below the surface itself, though not below its smooth normal; or above, though it goes through.
+            let through = next.direction[2] < 0.0;
+            if (dot(onward, point.flat) <= 0.0) != through {
                 break;
             }
             kept = times(kept, next.weight);
@@ -324,7 +328,7 @@ impl Paths<'_> {
                 (clear, spread) = (false, spread.max(SCATTERED));
             }
             bounce += 1;
-            ray = Ray { origin: above(&point, 1.0), direction: onward };
+            ray = Ray { origin: above(&point, if through { -1.0 } else { 1.0 }), direction: onward };
             chosen = (!next.mirrored).then_some((ray.origin, next.likely));
             limit = f64::INFINITY;
         }

@@ -66,7 +66,7 @@ impl Point {
         let lift = corner.map_or([0.0; 3], |c| rotation.map(|row| dot(row, c.lift)));
         let lifted = along(position, 1.0, lift);
         let normal = normal.unwrap_or(flat);
-        Some(Self { position, lifted, flat, normal, front, lobe: Lobe::new(material, albedo), emission, alpha })
+        Some(Self { position, lifted, flat, normal, front, lobe: Lobe::new(material, albedo, front), emission, alpha })
     }
 }
 

@@ -3,8 +3,10 @@
 
 mod aperture;
 mod emitters;
+mod glass;
 
 use super::*;
+use crate::lanes::Scalar;
 use crate::ray::RayAssets;
 use crate::ray::vector::sub;
 use crate::visibility::View;
@@ -67,7 +69,7 @@ impl<'a> Studio<'a> {
     fn seen(&self, paths: &Paths<'_>, count: u32) -> (f64, f64) {
         let mut stack = Stack::default();
         let all: Vec<f64> =
-            (0..count).map(|seed| Paths { seed, ..paths.clone() }.pixel([0, 0], &mut stack).color[1]).collect();
+            (0..count).map(|seed| Paths { seed, ..paths.clone() }.pixel(Scalar, [0, 0], &mut stack).color[1]).collect();
         let n = f64::from(count);
         let mean = all.iter().sum::<f64>() / n;
         let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);

@@ -159,56 +159,77 @@ impl Tracer {
         Some(self.things[thing].at(time))
     }
 
-    /// The nearest surface at a distance from 0 to `limit` \[m\], at a time.
-    pub(crate) fn nearest(&self, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
-        let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
-        let mut meet = |thing: u32, limit: f64| {
-            let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
-            // Of two that are as near, the first in the scene counts.
-            if best.is_none_or(|b| found.distance < b.distance || found.distance == b.distance && thing < b.thing) {
-                best = Some(found);
-            }
-            limit.min(found.distance)
-        };
-        for &thing in &self.endless {
-            limit = meet(thing, limit);
-        }
-        self.tree.visit(ray, limit, meet);
-        self.hit(best?, time)
+    /// The nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn nearest<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
+                let mut meet = {
+                    #[inline(always)]
+                    |thing: u32, limit: f64| {
+                        let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
+                        // Of two that are as near, the first in the scene counts.
+                        if best.is_none_or(|b| {
+                            found.distance < b.distance || found.distance == b.distance && thing < b.thing
+                        }) {
+                            best = Some(found);
+                        }
+                        limit.min(found.distance)
+                    }
+                };
+                for &thing in &self.endless {
+                    limit = meet(thing, limit);
+                }
+                self.tree.visit(ray, limit, meet);
+                self.hit(best?, time)
+            },
+        )
     }
 
     /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
-    /// and past the front of other things what they let through.
-    pub(crate) fn passes(&self, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
-        let mut left = 1.0;
-        let mut meet = |thing: u32, limit: f64| {
-            let placed @ Thing { instance, alpha, .. } = &self.things[thing as usize];
-            if *alpha < 1.0 {
-                left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
-                return limit;
-            }
-            let local = seen_from(ray, &placed.at(time));
-            let blocked = match &self.bodies[*instance as usize] {
-                Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
-                Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
-                None => false,
-            };
-            if !blocked {
-                return limit;
-            }
-            left = 0.0;
-            // Nothing is nearer than this: the visit ends.
-            -1.0
-        };
-        let mut limit = limit;
-        for &thing in &self.endless {
-            limit = meet(thing, limit);
-        }
-        self.tree.visit(ray, limit, meet);
-        left
+    /// and past the front of other things what they let through. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn passes<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let mut left = 1.0;
+                let mut meet = {
+                    #[inline(always)]
+                    |thing: u32, limit: f64| {
+                        let placed @ Thing { instance, alpha, .. } = &self.things[thing as usize];
+                        if *alpha < 1.0 {
+                            left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
+                            return limit;
+                        }
+                        let local = seen_from(ray, &placed.at(time));
+                        let blocked = match &self.bodies[*instance as usize] {
+                            Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
+                            Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
+                            None => false,
+                        };
+                        if !blocked {
+                            return limit;
+                        }
+                        left = 0.0;
+                        // Nothing is nearer than this: the visit ends.
+                        -1.0
+                    }
+                };
+                let mut limit = limit;
+                for &thing in &self.endless {
+                    limit = meet(thing, limit);
+                }
+                self.tree.visit(ray, limit, meet);
+                left
+            },
+        )
     }
 
     /// How many fronts of a thing a ray goes through, at most [`MAX_FRONTS`].
+    #[inline(never)]
     fn fronts(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> i32 {
         // Closed forms are convex: after the first surface there is only a back.
         let body = &self.bodies[self.things[thing as usize].instance as usize];

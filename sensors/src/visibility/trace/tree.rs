@@ -77,14 +77,20 @@ impl Tree {
     pub(super) fn visit(&self, ray: &Ray, mut limit: f64, mut act: impl FnMut(u32, f64) -> f64) {
         // A direction that is almost none would make an infinity, and no number of it and a zero.
         let inverse = ray.direction.map(|d| 1.0 / if d.abs() < 1e-200 { 1e-200f64.copysign(d) } else { d });
-        let enter = |node: u32, limit: f64| {
-            let [lo, hi] = &self.nodes[node as usize].bounds;
-            let (mut near, mut far) = (0.0f64, limit);
-            for k in 0..3 {
-                let (a, b) = ((lo[k] - ray.origin[k]) * inverse[k], (hi[k] - ray.origin[k]) * inverse[k]);
-                (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+        // Plain comparisons: those of the library look for what is no number.
+        let smaller = |a: f64, b: f64| if a < b { a } else { b };
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let enter = {
+            #[inline(always)]
+            |node: u32, limit: f64| {
+                let [lo, hi] = &self.nodes[node as usize].bounds;
+                let (mut near, mut far) = (0.0f64, limit);
+                for k in 0..3 {
+                    let (a, b) = ((lo[k] - ray.origin[k]) * inverse[k], (hi[k] - ray.origin[k]) * inverse[k]);
+                    (near, far) = (larger(near, smaller(a, b)), smaller(far, larger(a, b)));
+                }
+                (near <= far * LARGER).then_some(near)
             }
-            (near <= far * LARGER).then_some(near)
         };
         let mut waiting = [(0.0, 0u32); DEPTH];
         let mut count = 0usize;

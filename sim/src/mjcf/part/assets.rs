@@ -65,6 +65,8 @@ impl Writing<'_> {
             .attr("specular", values.specular)
             .attr("shininess", values.shininess)
             .attr("reflectance", values.reflectance)
+            .opt("metallic", values.metallic)
+            .opt("roughness", values.roughness)
             .attr("rgba", singles(&values.rgba))
             .leaf()
     }

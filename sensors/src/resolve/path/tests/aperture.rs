@@ -30,7 +30,7 @@ fn picture(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, 
     let mut paths = studio.paths(samples, 0, 1);
     paths.eye.pupil = aperture.and_then(Pupil::of);
     let mut stack = Stack::default();
-    (0..SIZE * SIZE).map(|k| paths.pixel([k % SIZE, k / SIZE], &mut stack).color[1]).collect()
+    (0..SIZE * SIZE).map(|k| paths.pixel(Scalar, [k % SIZE, k / SIZE], &mut stack).color[1]).collect()
 }
 
 /// Sum, means and variances along both axes.

@@ -1,0 +1,59 @@
+//! Glass against Snell's law and Fresnel's equations.
+
+use super::*;
+
+fn glass(refractive_index: f32) -> Material {
+    Material { transmission: 1.0, refractive_index, specular: 0.0, ..Material::from_rgba([1.0; 4]) }
+}
+
+/// All light that meets clear glass leaves it again, so that it cannot be seen where light is the same everywhere. (An ellipsoid
+/// keeps light for more bounces than there may be.)
+#[test]
+fn clear_glass_in_a_furnace_cannot_be_seen() {
+    let shapes: [Shape; 3] = [
+        Sphere { radius: 0.3 }.into(),
+        Box { half: [0.2, 0.3, 0.1] }.into(),
+        Cylinder { radius: 0.2, half_length: 0.25 }.into(),
+    ];
+    for shape in shapes {
+        let furnace = |material: Material| {
+            let mut scene = dark(vec![Instance::new(shape.clone(), material, 1)]);
+            scene.sky = Sky::uniform([1.0; 3]);
+            let view = looking([1.0, 0.7, 0.9], [0.02, 0.01, 0.03]);
+            seen(&scene, &[PoseF32::IDENTITY], &view, 64, 64).0
+        };
+        let clear = furnace(glass(1.5));
+        assert!((clear - 1.0).abs() < 1e-12, "{shape:?}: {clear}");
+        // The control: green glass takes a part of what goes in.
+        let green = furnace(Material { rgba: [0.5, 0.5, 0.5, 1.0], ..glass(1.5) });
+        assert!(green < 0.5, "{shape:?}: {green}");
+    }
+}
+
+/// A plate of thickness t, seen at an angle θ, shows what is behind it moved by t (tan θ - tan θ'), sin θ' = sin θ/n, and lets
+/// (1 - F)² of its light through at first; what is mirrored inside comes out 2 t tan θ' beside, where nothing is.
+#[test]
+fn a_plate_of_glass_moves_what_is_behind_it() {
+    let (angle, n, t) = (0.25 * PI, 1.5f64, 0.2f64);
+    let inside = (angle.sin() / n).asin();
+    let [across, along] =
+        [((angle - inside).sin() / (angle + inside).sin()).powi(2), ((angle - inside).tan() / (angle + inside).tan()).powi(2)];
+    let expected = (1.0 - 0.5 * (across + along)).powi(2);
+    // From where the ray meets the plate, at x = 0, to the height of the lamp, 0.9 below the plate.
+    let x = t * inside.tan() + 0.9 * angle.tan();
+    let lamp = Material { emission: 1.0, ..matt(1.0) };
+    let shapes = vec![
+        Instance::new(Box { half: [2.0, 2.0, 0.5 * t as f32] }, glass(n as f32), 1),
+        Instance::new(Sphere { radius: 0.02 }, lamp, 2),
+    ];
+    let poses = [PoseF32::from_translation([0.0, 0.0, -0.5 * t as f32]), PoseF32::from_translation([x as f32, 0.0, -1.1])];
+    let view = looking([-1.0, 0.0, 1.0], [0.0; 3]);
+    let scene = dark(shapes);
+    let through = seen(&scene, &poses, &view, 1024, 4);
+    assert!(agrees(through, expected), "{through:?}, not {expected}");
+    // Controls: as bright as without losses it is not, and with air instead of glass the ray goes past.
+    assert!(!agrees(through, 1.0), "{through:?}");
+    let mut air = scene.instances().to_vec();
+    air[0].material = glass(1.0);
+    assert_eq!(seen(&dark(air), &poses, &view, 64, 4).0, 0.0);
+}
