@@ -39,7 +39,9 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
         }
         Turns::Ball => {
             let screw = Joint::fixed("screw", ["table", "ball"]).at([BALL[0], 0.0, BALL[1]]);
-            (urdf(&[base(), table, Link::ball("ball", 0.1, RADIUS)], &[turn, screw]), None, [RIM, 0.0, EYE])
+            let text = urdf(&[base(), table, Link::ball("ball", 0.1, RADIUS)], &[turn, screw]);
+            // To be seen, not touched.
+            (text.replace("collision>", "visual>"), None, [RIM, 0.0, EYE])
         }
     };
     let robot = lab.mechanism(&text);

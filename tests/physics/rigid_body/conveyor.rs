@@ -6,14 +6,11 @@
 //!
 //! (SimBenchmark has 25 balls and an oblique pull. Source: leggedrobotics, SimBenchmark, "Rolling test".)
 //!
-//! What slides has friction μ N at every step, and N is weight but for the momentum upwards that soft contacts give and take
-//! (law `sliding_block`): with the mean accelerations c upwards, the ground takes μ₁ (M c + m Σ c) more, and a ball that slips
-//! gets μ₂ m c more. That is counted.
-//!
-//! Tolerance: the solver's. Where balls roll, the arm of their friction is shorter by half of the depth, as in
-//! `rolling_sphere`.
+//! Tolerance: what slides has friction μ N at every step, and N is weight but for the momentum upwards that soft contacts give
+//! and take (law `sliding_block`): with the mean accelerations c upwards, forces along are off by μ₁ (M c + m Σ c) under the
+//! box and by μ₂ m c under a ball that slips. Where balls roll, the arm of their friction is shorter by half of the depth, as
+//! in `rolling_sphere`.
 
-use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
 use crate::law::law;
@@ -31,6 +28,8 @@ const BALLS: usize = 4;
 /// When the means begin and end, after the pull has begun \[s\]: what hops as it begins to slide has settled.
 const FROM: f64 = 0.8;
 const UNTIL: f64 = 1.6;
+/// The solver ends where a step gains less than this \[m/s²\].
+const SOLVER: f64 = 1e-6;
 
 /// Mean accelerations between [`FROM`] and [`UNTIL`].
 struct Pulled {
@@ -89,28 +88,26 @@ fn holds() {
         let n = BALLS as f64;
         let drag = FRICTION[0] * (BOX + n * BALL) * G;
         let rolls = (PULL - drag) / (3.5 * BOX / BALL + n) / BALL;
-        let arm = (depth(G) / (2.0 * RADIUS) * rolls + SOLVER, "arm of the balls");
-        // What the ground took besides, of all that is pulled where balls roll.
-        let under = |p: &Pulled| FRICTION[0] * (BOX * p.board[1] + n * BALL * p.ball[1]);
-        let besides = |p: &Pulled| under(p) / (3.5 * BOX + n * BALL);
+        let why = "momentum of hops, arm of the balls";
+        let arm = depth(G) / (2.0 * RADIUS);
+        // What hops take from the pull, on all that it accelerates.
+        let under = |p: &Pulled| FRICTION[0] * (BOX * p.board[1] + n * BALL * p.ball[1]).abs();
+        let off = |p: &Pulled| under(p) / (3.5 * BOX + n * BALL) + arm * rolls + SOLVER;
         let rolling = pulled(FRICTION[1], BOX);
-        let [of_box, of_ball] = ["acceleration of the box, hops counted", "acceleration of a ball, hops counted"];
-        let board = |p: &Pulled| p.board[0] + 3.5 * besides(p);
-        let ball = |p: &Pulled| p.ball[0] + besides(p);
-        m.row(of_box, "m/s²", 3.5 * rolls, board(&rolling), (3.5 * arm.0, arm.1));
-        m.row(of_ball, "m/s²", rolls, ball(&rolling), arm);
+        let [on_board, on_ball] = [(3.5 * off(&rolling), why), (off(&rolling), why)];
+        m.row("acceleration of the box", "m/s²", 3.5 * rolls, rolling.board[0], on_board);
+        m.row("acceleration of a ball", "m/s²", rolls, rolling.ball[0], on_ball);
         let none = pulled(0.0, BOX);
-        m.control(of_box, "without friction of the balls", board(&none));
-        m.control(of_ball, "without friction of the balls", ball(&none));
+        m.control("acceleration of the box", "without friction of the balls", none.board[0]);
+        m.control("acceleration of a ball", "without friction of the balls", none.ball[0]);
         let slipping = pulled(SLIPPERY, BOX);
         let slips = (PULL - drag - n * SLIPPERY * BALL * G) / BOX;
-        let [of_box, of_ball] = ["acceleration of the box, balls slip", "acceleration of a ball that slips"];
-        let board = |p: &Pulled| p.board[0] + (under(p) + n * SLIPPERY * BALL * p.ball[1]) / BOX;
-        let ball = |p: &Pulled| p.ball[0] - SLIPPERY * p.ball[1];
-        let solver = "tolerance of the solver";
-        m.row(of_box, "m/s²", slips, board(&slipping), (SOLVER * (1.0 + n * BALL / BOX), solver));
-        m.row(of_ball, "m/s²", SLIPPERY * G, ball(&slipping), (SOLVER, solver));
-        m.control(of_box, "with balls that roll", board(&rolling));
-        m.control(of_ball, "with balls that roll", ball(&rolling));
+        let on_top = SLIPPERY * slipping.ball[1].abs() + SOLVER;
+        let on_board = ((under(&slipping) + n * BALL * on_top) / BOX + SOLVER, "momentum of hops");
+        m.row("acceleration of the box, balls slip", "m/s²", slips, slipping.board[0], on_board);
+        let ball_slips = SLIPPERY * G;
+        m.row("acceleration of a ball that slips", "m/s²", ball_slips, slipping.ball[0], (on_top, "momentum of hops"));
+        m.control("acceleration of the box, balls slip", "with balls that roll", rolling.board[0]);
+        m.control("acceleration of a ball that slips", "with balls that roll", rolling.ball[0]);
     });
 }
