@@ -26,8 +26,8 @@ fn the_exported_model_is_the_one_that_runs() {
 }
 
 /// Of everything that 4.x knows and 2.2.2 does not, one.
-const NEWER: &str = r#"<mujoco><worldbody>
-    <body name="arm" gravcomp="1"><joint name="hinge" axis="0 1 0" actuatorfrcrange="-3 3"/><geom size="0.1" pos="0.2 0 0"/>
+const NEWER: &str = r#"<mujoco><asset><material name="steel" metallic="0.5" roughness="0.25"/></asset><worldbody>
+    <body name="arm" gravcomp="1"><joint name="hinge" axis="0 1 0" actuatorfrcrange="-3 3"/><geom size="0.1" pos="0.2 0 0" material="steel"/>
       <site name="here" pos="0.2 0 0"/>
       <body name="hand" pos="0.4 0 0"><joint name="wrist" axis="0 1 0"/><geom size="0.05" pos="0.1 0 0"/></body></body>
     <body name="other" pos="0.2 0 0"><freejoint/><geom size="0.1" contype="0" conaffinity="0"/><site name="there"/></body>
@@ -54,6 +54,8 @@ fn what_2_2_2_does_not_know_is_left_out_of_its_file() {
     sim.add_mjcf(MjcfCfg::text("new", NEWER)).unwrap();
     let left_out = sim.dump(dir.path()).unwrap();
     let expected = [
+        "material \"steel\": metallic 0.5",
+        "material \"steel\": roughness 0.25",
         "body \"arm\": gravcomp 1",
         "joint \"hinge\": actuatorfrcrange [-3.0, 3.0]",
         "equality \"hold\": the whole weld, which is between sites",

@@ -280,7 +280,10 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
     physics(
         "dry friction forgotten",
         "sim/src/mjcf/robot.rs",
-        ["frictionloss: if tendon { 0.0 } else { plan.friction },", "frictionloss: if tendon { 0.0 } else { 0.0 * plan.friction },"],
+        [
+            "frictionloss: if tendon { 0.0 } else { plan.friction },",
+            "frictionloss: if tendon { 0.0 } else { 0.0 * plan.friction },",
+        ],
         &["dry_friction"],
     ),
     physics(

@@ -234,6 +234,7 @@ impl CameraCfg {
             ("the channel flow", self.channels.flow),
             ("vignetting", self.imperfections.vignetting.is_some()),
             ("holes of structured light", self.imperfections.holes.is_some()),
+            ("noise of measured depth", self.imperfections.depth_noise.is_some()),
         ];
         let wrong = what.into_iter().find(|(_, wanted)| *wanted && !self.lens.is_pinhole());
         wrong.map_or(Ok(()), |(what, _)| Err(CameraError::PinholeOnly { what, lens: self.lens.name() }))

@@ -37,6 +37,7 @@ pub(crate) mod ticket;
 #[cfg(test)]
 mod tests;
 
+pub use crate::resolve::tone::ToneCurve;
 pub use aperture::Aperture;
 pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
 pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
@@ -51,7 +52,6 @@ pub use parallel::ParallelRasterizer;
 pub use past::HistoryView;
 pub use point_cloud::PointFrame;
 pub use progress::RenderProgress;
-pub use crate::resolve::tone::ToneCurve;
 pub use rasterizer::{Before, RasterCfg, Rasterizer, Shot};
 pub use renderer::Renderer;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};

@@ -15,8 +15,8 @@ pub(crate) struct PictureNoise {
     distance: Option<NoiseCfg>,
     /// Square root of the time between pictures.
     sqrt_period: f64,
-    /// Depths that can be measured.
-    range: [f64; 2],
+    /// Depths and distances that can be measured.
+    ranges: [[f64; 2]; 2],
 }
 
 /// Bytes of a colour.
@@ -25,11 +25,15 @@ const BYTES: [f64; 2] = [0.0, 255.0];
 impl PictureNoise {
     /// The noise that `cfg` asks for, where pictures are `period` \[s\] apart; `None` where it asks for none.
     pub(crate) fn new(cfg: &CameraCfg, period: f64) -> Result<Option<Self>, SensorError> {
-        let range = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
+        let [near, far] = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
+        // Rays through corners are longer than their depth, by how much depends on the lens; where near and far are along the
+        // ray, what is beside the camera has no depth, and what is behind it less than none.
+        let depths = if cfg.lens.is_forward() { [near, far] } else { [-far, far] };
+        let ranges = [depths, [near, f64::from(f32::MAX)]];
         let candidates = [
             (cfg.channels.color, Channel::within(Color::NAME, 0, BYTES)),
-            (cfg.channels.depth, Channel::within(Depth::NAME, 0, range)),
-            (cfg.channels.distance, Channel::within(Distance::NAME, 0, far_along_rays(range))),
+            (cfg.channels.depth, Channel::within(Depth::NAME, 0, ranges[0])),
+            (cfg.channels.distance, Channel::within(Distance::NAME, 0, ranges[1])),
         ];
         let measured: Vec<Channel> = candidates.into_iter().filter(|(on, _)| *on).map(|(_, channel)| channel).collect();
         // By their own names, for those that have others.
@@ -50,7 +54,7 @@ impl PictureNoise {
             depth: of(Depth::NAME)?,
             distance: of(Distance::NAME)?,
             sqrt_period: period.sqrt(),
-            range,
+            ranges,
         }))
     }
 
@@ -68,9 +72,8 @@ impl PictureNoise {
                 }
             }
         }
-        let ranges = [self.range, far_along_rays(self.range)];
         let channels = [(&self.depth, frame.depth.as_deref_mut()), (&self.distance, frame.distance.as_deref_mut())];
-        for ((channel, (noise, numbers)), range) in (1..).zip(channels).zip(ranges) {
+        for ((channel, (noise, numbers)), range) in (1..).zip(channels).zip(self.ranges) {
             let (Some(noise), Some(numbers)) = (noise, numbers) else { continue };
             for (block, numbers) in (0..).zip(numbers.chunks_mut(4)) {
                 let errors = self.errors(noise, channel, ticket, block);
@@ -101,12 +104,39 @@ impl PictureNoise {
     }
 }
 
-/// Distances that can be measured: rays through corners are longer than their depth, by how much depends on the lens.
-fn far_along_rays([near, _]: [f64; 2]) -> [f64; 2] {
-    [near, f64::from(f32::MAX)]
-}
-
 /// The name of a channel that may be called otherwise; what is no channel stays as it is.
 fn own_name(name: &str) -> &str {
     Channels::from_names(&[name]).ok().and_then(|channels| channels.names().first().copied()).unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Frame, Lens, Renderer};
+
+    /// Root cause: depths were kept between near and far, which behind lenses that see backward are along the ray: whatever is
+    /// beside the camera was `near` away.
+    #[test]
+    fn depths_beside_and_behind_the_camera_stay_there() {
+        let disturbed = |lens: &str| {
+            let cfg = CameraCfg {
+                lens: Lens::from_name(lens).expect("a lens"),
+                renderer: Renderer::FastRayTraced,
+                channels: Channels { depth: true, ..Channels::default() },
+                noise: [("depth".to_string(), NoiseCfg { std: 1e-9, ..NoiseCfg::default() })].into(),
+                near: 0.1,
+                ..CameraCfg::default()
+            };
+            let noise = PictureNoise::new(&cfg, 0.1).expect("numbers").expect("some");
+            let mut frame = Frame::new(2, 2, cfg.channels);
+            frame.depth = Some(vec![-2.0, 0.0, 0.5, 3.0]);
+            noise.disturb(&mut frame.as_mut(), &Ticket::first(1, 0, "eye"));
+            frame.depth.expect("it is on")
+        };
+        for (found, was) in disturbed("equidistant").into_iter().zip([-2.0, 0.0, 0.5, 3.0]) {
+            assert!((found - was).abs() < 1e-6, "{found}, not {was}");
+        }
+        // The control: a pinhole measures nothing nearer than `near`.
+        assert_eq!(disturbed("pinhole")[..2], [0.1, 0.1]);
+    }
 }

@@ -109,7 +109,8 @@ mod tests {
             assert_eq!([1e9, f32::MAX, f32::INFINITY].map(|x| encoded(x) as u8), [255; 3], "{curve:?}");
         }
         // The control: they are not all the same.
-        let middle = ToneCurve::ALL.map(|curve| encode(crate::lanes::Scalar, curve, splat(crate::lanes::Scalar, 0.9)).array()[0]);
+        let middle = ToneCurve::ALL
+            .map(|curve| encode(crate::lanes::Scalar, curve, splat(crate::lanes::Scalar, 0.9)).array()[0]);
         assert!((0..3).all(|k| (middle[k] - middle[(k + 1) % 3]).abs() > 1.0), "{middle:?}");
     }
 }

@@ -75,9 +75,5 @@ fn holds() {
         );
         m.control("largest error of the place in 2 s", "with the loop open", loose);
         m.control("largest error of the velocity in 2 s", "with the loop open", loose_speed);
-        m.lines_differ_in(
-            "largest error of the velocity in 2 s",
-            "solvers of a loop that lags; why was not traced, both are below the derived bound",
-        );
     });
 }

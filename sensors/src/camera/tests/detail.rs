@@ -18,16 +18,15 @@ const PIXELS: f64 = 0.5 + 2.0 / 256.0;
 /// \[m\]; a little more for rounding.
 const METRES: f32 = 1e-3 + 1e-6;
 
-const OFF: RasterCfg =
-    RasterCfg {
-        samples: 4,
-        shadows: true,
-        shadow_size: 0,
-        occlusion_rays: 0,
-        tone: ToneCurve::Soft,
-        groups: u32::MAX,
-        lod: false,
-    };
+const OFF: RasterCfg = RasterCfg {
+    samples: 4,
+    shadows: true,
+    shadow_size: 0,
+    occlusion_rays: 0,
+    tone: ToneCurve::Soft,
+    groups: u32::MAX,
+    lod: false,
+};
 const ON: RasterCfg = RasterCfg { lod: true, ..OFF };
 
 fn draw(cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {

@@ -51,8 +51,12 @@ fn configurations_are_checked() {
     let bent = CameraCfg { channels: flow.channels, ..rays.clone() };
     assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "the channel flow", lens: "equidistant" }.into());
     let imperfections = Imperfections { vignetting: Some(Default::default()), ..Default::default() };
-    let bent = CameraCfg { imperfections, ..rays };
+    let bent = CameraCfg { imperfections, ..rays.clone() };
     assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "vignetting", lens: "equidistant" }.into());
+    let imperfections = Imperfections { depth_noise: Some(Default::default()), ..Default::default() };
+    let channels = Channels { depth: true, ..Channels::default() };
+    let error = refused(&CameraCfg { imperfections, channels, ..rays });
+    assert_eq!(error, CameraError::PinholeOnly { what: "noise of measured depth", lens: "equidistant" }.into());
 
     let place = |placement| CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..cfg() };
     let nan = Placement::Pose { pos: [0.0, f64::NAN, 0.0], rotation: UnitQuaternion::identity() };

@@ -11,16 +11,15 @@ use scene::{Hemisphere, Instance, Light, LightKind, Material, PoseF32, RenderSce
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
 /// Every level of detail as it is, for all renderers.
-const EXACT: RasterCfg =
-    RasterCfg {
-        samples: 4,
-        shadows: true,
-        shadow_size: 0,
-        occlusion_rays: 0,
-        tone: ToneCurve::Soft,
-        groups: u32::MAX,
-        lod: false,
-    };
+const EXACT: RasterCfg = RasterCfg {
+    samples: 4,
+    shadows: true,
+    shadow_size: 0,
+    occlusion_rays: 0,
+    tone: ToneCurve::Soft,
+    groups: u32::MAX,
+    lod: false,
+};
 
 fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
     let mut rasterizer = Rasterizer::new(cfg);

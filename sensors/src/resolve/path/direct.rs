@@ -24,9 +24,10 @@ impl Paths<'_> {
         for (lamp, k) in self.lamps.lamps.iter().zip(4..) {
             let choice = if lamp.has_size() { path.sample.pair(dims + k) } else { [0.0; 2] };
             let Some(light) = lamp.at(point.position, choice) else { continue };
-            out = along(out, light.strength * matt, times(point.lobe.albedo, lamp.ambient));
+            out = along(out, light.strength * matt, times(point.lobe.body, lamp.ambient));
             let scatter = point.lobe.scatter(local, basis.to_local(light.direction));
-            let sent = [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer[c] * lamp.specular[c]));
+            let sent =
+                [0, 1, 2].map(|c| PI * (scatter.below[c] * lamp.diffuse[c] + scatter.layer[c] * lamp.specular[c]));
             if sent.iter().all(|&x| x <= 0.0) {
                 continue;
             }
@@ -46,15 +47,7 @@ impl Paths<'_> {
     /// What a point sends to `o` of the light of one thing that glows, which is looked for: on average its share of the
     /// light of all of them. `width` is that of a pixel at the point.
     #[inline(always)]
-    pub(super) fn glow<S: Simd>(
-        &self,
-        s: S,
-        point: &Point,
-        o: V3,
-        path: &mut Path<'_>,
-        bounce: u32,
-        width: f64,
-    ) -> V3 {
+    pub(super) fn glow<S: Simd>(&self, s: S, point: &Point, o: V3, path: &mut Path<'_>, bounce: u32, width: f64) -> V3 {
         let none = [0.0; 3];
         if point.lobe.rest() <= 0.0 {
             return none;

@@ -14,7 +14,7 @@ pub(super) struct Lobe {
     /// The colour of the surface.
     pub(super) albedo: V3,
     /// What is scattered below the layer: nothing of a metal.
-    body: V3,
+    pub(super) body: V3,
     /// What the layer reflects along the normal, and at grazing.
     f0: V3,
     f90: f64,
@@ -26,6 +26,8 @@ pub(super) struct Lobe {
     glass: f64,
     /// Refractive index of the side that light comes from, over that of the other side.
     ratio: f64,
+    /// Whether light comes from outside of the body.
+    front: bool,
 }
 
 /// The least alpha², of a roughness of 0: highlights of a twentieth of a degree.
@@ -112,12 +114,17 @@ impl Lobe {
         let glass = (1.0 - mirror) * part(material.transmission);
         let index = f64::from(material.refractive_index);
         let ratio = if front { 1.0 / index } else { index };
-        Self { albedo, body: scale(albedo, 1.0 - metal), f0, f90, alpha2, mirror, glass, ratio }
+        Self { albedo, body: scale(albedo, 1.0 - metal), f0, f90, alpha2, mirror, glass, ratio, front }
     }
 
     /// The part of the light that is scattered: neither mirrored nor let through.
     pub(super) fn rest(&self) -> f64 {
         1.0 - self.mirror - self.glass
+    }
+
+    /// Whether light goes through, and is bent.
+    pub(super) fn is_glass(&self) -> bool {
+        self.glass > 0.0
     }
 
     /// Whether there is no layer.
@@ -202,7 +209,7 @@ impl Lobe {
         if lobe < self.glass {
             let (mirrored, through) = self.bent(o);
             // What goes in takes the colour.
-            let tint = if self.ratio < 1.0 { self.albedo } else { [1.0; 3] };
+            let tint = if self.front { self.albedo } else { [1.0; 3] };
             let (direction, weight) = match through {
                 Some(through) if lobe >= mirrored * self.glass => (through, tint),
                 _ => ([-o[0], -o[1], o[2]], [1.0; 3]),
@@ -386,7 +393,7 @@ mod tests {
                 let ratio = (next.direction[0] + lobe.ratio * o[0]).abs();
                 let length = dot(next.direction, next.direction);
                 assert!(ratio < 1e-15 && (length - 1.0).abs() < 1e-14, "{next:?}");
-                let tint = if lobe.ratio < 1.0 { 0.8 } else { 1.0 };
+                let tint = if lobe.front { 0.8 } else { 1.0 };
                 assert!(next.mirrored && next.weight == [tint; 3]);
             }
         }
@@ -394,6 +401,9 @@ mod tests {
         let air = Lobe::new(&Material { refractive_index: 1.0, ..glass }, [1.0; 3], true);
         let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
+        // But for its colour.
+        let coloured = Lobe::new(&Material { refractive_index: 1.0, ..glass }, [0.3; 3], true);
+        assert_eq!(coloured.choose([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
     }
 
     #[test]

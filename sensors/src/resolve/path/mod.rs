@@ -275,7 +275,7 @@ impl Paths<'_> {
             limit -= distance;
             if point.alpha < 1.0 {
                 let chance = sample.pair(dims + THROUGH + 1_000_000 * passes)[0];
-                if !point.front || chance >= point.alpha {
+                if !point.front && !point.lobe.is_glass() || chance >= point.alpha {
                     passes += 1;
                     if passes > MAX_PASSES {
                         break;

@@ -56,6 +56,10 @@ impl Writing<'_> {
     fn material(&self, material: usize) -> String {
         let values = self.model.material(material);
         let texture = values.texture.filter(|t| self.is_written(*t)).map(|t| self.full(&self.names.textures[t]));
+        let mut newer = |values: Option<f32>, what: &str| {
+            values.filter(|value| self.newer("material", material, &format!("{what} {value}")))
+        };
+        let (metallic, roughness) = (newer(values.metallic, "metallic"), newer(values.roughness, "roughness"));
         Element::new("material")
             .attr("name", self.full(&self.names.materials[material]))
             .opt("texture", texture)
@@ -65,8 +69,8 @@ impl Writing<'_> {
             .attr("specular", values.specular)
             .attr("shininess", values.shininess)
             .attr("reflectance", values.reflectance)
-            .opt("metallic", values.metallic)
-            .opt("roughness", values.roughness)
+            .opt("metallic", metallic)
+            .opt("roughness", roughness)
             .attr("rgba", singles(&values.rgba))
             .leaf()
     }

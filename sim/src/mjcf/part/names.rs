@@ -86,6 +86,7 @@ impl PartNames {
             "site" => &self.sites,
             "camera" => &self.cameras,
             "light" => &self.lights,
+            "material" => &self.materials,
             "mesh" => &self.meshes,
             "texture" => &self.textures,
             "equality" => &self.equalities,

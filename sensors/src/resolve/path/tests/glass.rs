@@ -36,8 +36,10 @@ fn clear_glass_in_a_furnace_cannot_be_seen() {
 fn a_plate_of_glass_moves_what_is_behind_it() {
     let (angle, n, t) = (0.25 * PI, 1.5f64, 0.2f64);
     let inside = (angle.sin() / n).asin();
-    let [across, along] =
-        [((angle - inside).sin() / (angle + inside).sin()).powi(2), ((angle - inside).tan() / (angle + inside).tan()).powi(2)];
+    let [across, along] = [
+        ((angle - inside).sin() / (angle + inside).sin()).powi(2),
+        ((angle - inside).tan() / (angle + inside).tan()).powi(2),
+    ];
     let expected = (1.0 - 0.5 * (across + along)).powi(2);
     // From where the ray meets the plate, at x = 0, to the height of the lamp, 0.9 below the plate.
     let x = t * inside.tan() + 0.9 * angle.tan();
@@ -46,7 +48,8 @@ fn a_plate_of_glass_moves_what_is_behind_it() {
         Instance::new(Box { half: [2.0, 2.0, 0.5 * t as f32] }, glass(n as f32), 1),
         Instance::new(Sphere { radius: 0.02 }, lamp, 2),
     ];
-    let poses = [PoseF32::from_translation([0.0, 0.0, -0.5 * t as f32]), PoseF32::from_translation([x as f32, 0.0, -1.1])];
+    let poses =
+        [PoseF32::from_translation([0.0, 0.0, -0.5 * t as f32]), PoseF32::from_translation([x as f32, 0.0, -1.1])];
     let view = looking([-1.0, 0.0, 1.0], [0.0; 3]);
     let scene = dark(shapes);
     let through = seen(&scene, &poses, &view, 1024, 4);
