@@ -25,6 +25,7 @@ mod animation;
 mod archive;
 mod cfg;
 mod clock;
+mod episodes;
 mod error;
 mod file;
 mod film;
@@ -40,6 +41,8 @@ mod picture_folder;
 mod read;
 mod recorder;
 pub mod replay;
+#[cfg(feature = "hdf5")]
+mod robomimic;
 mod ros;
 mod scene_file;
 mod source;

@@ -27,7 +27,7 @@ use crate::picture::Png;
 use crate::ros::{self, Cdr, Schema, Stamp};
 use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Stream};
-use crate::writer::Sink;
+use crate::writer::{Sink, Written};
 use mcap::records::{AttachmentHeader, MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -183,7 +183,7 @@ impl McapFile {
         Ok(())
     }
 
-    fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> io::Result<()> {
+    fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> Written {
         let writer = self.writer.as_mut().ok_or_else(finished)?;
         let env = stream.env_ids[row];
         let at = nanos(block.stamps[row]);
@@ -253,8 +253,20 @@ impl McapFile {
                 return Ok(());
             }
         }
-        self.channels.write(writer, channels[0], at, cdr.bytes())
+        Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?)
     }
+}
+
+/// A topic that streams would share whose messages are of different types: one of them would be read as the other.
+pub(crate) fn taken(streams: &[&Stream]) -> Option<String> {
+    let mut known: BTreeMap<String, Schema> = BTreeMap::new();
+    streams.iter().flat_map(|stream| topics(stream)).find_map(|(topic, schema)| match known.get(&topic) {
+        Some(other) => (*other != schema).then_some(topic),
+        None => {
+            known.insert(topic, schema);
+            None
+        }
+    })
 }
 
 /// What a row of a stream is written as: topics behind the environment, and types.
@@ -277,7 +289,7 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
 }
 
 impl Sink for McapFile {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         if let Some(event) = &packet.event {
             self.write_event(event)?;
         }
@@ -290,15 +302,15 @@ impl Sink for McapFile {
     }
 
     /// Ends the chunk: what a killed process leaves ends with a whole one.
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)
+    fn flush(&mut self) -> Written {
+        Ok(self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)?)
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         let mut writer = self.writer.take().ok_or_else(finished)?;
         writer.finish().map_err(io_error)?;
         writer.into_inner().flush()?;
-        self.part.commit()
+        Ok(self.part.commit()?)
     }
 
     fn kept(&self) -> Option<PathBuf> {

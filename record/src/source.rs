@@ -202,10 +202,17 @@ impl Source {
         self.counts.iter_mut().zip(rows).map(|(count, now)| std::mem::replace(count, now) != now).collect()
     }
 
-    /// Counts measurements again after something happened: what sensors show then is no measurement.
-    pub(crate) fn recount(&mut self, sim: &SimulationManager) -> Result<()> {
+    /// Counts measurements again after something happened to environments: what sensors show there is no measurement. In the
+    /// others, one that was not recorded yet still is.
+    pub(crate) fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) -> Result<()> {
         if let Some(uid) = self.sensor.clone() {
+            let were = self.counts.clone();
             self.count(sim.sensor_called(&uid)?);
+            for ((count, was), env) in self.counts.iter_mut().zip(were).zip(&self.stream.env_ids) {
+                if !envs.contains(env) {
+                    *count = was;
+                }
+            }
         }
         Ok(())
     }

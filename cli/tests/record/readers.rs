@@ -30,7 +30,7 @@ pub(crate) fn said(python: &Path, script: &str, file: &Path) -> serde_json::Valu
 }
 
 /// Numbers with a fraction as texts of their bits, as the scripts give them: nothing is lost between the programs.
-fn bits(value: serde_json::Value) -> serde_json::Value {
+pub(crate) fn bits(value: serde_json::Value) -> serde_json::Value {
     use serde_json::Value;
     match value {
         Value::Number(number) if number.is_f64() => number.as_f64().unwrap().to_bits().to_string().into(),
