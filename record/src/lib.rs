@@ -59,5 +59,5 @@ pub use mcap_file::{Recovered, recover};
 pub use packet::{Event, EventKind};
 pub use read::{RecordedTopic, Recording, Samples, Wanted};
 pub use recorder::{Record, Recorded, Recorder, RecorderId};
-pub use stream::{Element, Kind, Part, Stream};
+pub use stream::{Distortion, Element, Kind, Part, Stream};
 pub use topic::Topic;

@@ -6,7 +6,7 @@
 //! | poses of links and objects | `/env_0/tf` | `tf2_msgs/msg/TFMessage`, frames `env_0/arm/link` |
 //! | colour | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
 //! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32SC1`, `32FC3` |
-//! | lens and pose of a camera | `/env_0/camera/camera_info`, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
+//! | lens and pose of a camera | `/env_0/camera/camera_info`, where ROS has words for the lens, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
 //! | IMU | `/env_0/imu` | `sensor_msgs/msg/Imu` |
 //! | ray caster | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2` |
 //! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
@@ -214,13 +214,16 @@ impl McapFile {
                     ros::image(cdr, stamp, &format!("{kind}{components}"), shape, put);
                 }
             }
-            Kind::Lens { camera, height, width } => {
+            Kind::Lens { camera, height, width, distortion } => {
                 let (k, pose) = states.split_at(9.min(states.len()));
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), pose);
+                let Some(distortion) = distortion else {
+                    return Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?);
+                };
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(camera);
-                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k);
+                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k, distortion);
             }
             Kind::Imu => {
                 let part = |name: &str| {
@@ -278,6 +281,7 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
         Kind::Poses { .. } => vec![transforms()],
         Kind::Picture { .. } if stream.element == Element::U8 => vec![(name, Schema::CompressedImage)],
         Kind::Picture { .. } => vec![(name, Schema::Image)],
+        Kind::Lens { distortion: None, .. } => vec![transforms()],
         Kind::Lens { camera, .. } => vec![(format!("{camera}/camera_info"), Schema::CameraInfo), transforms()],
         Kind::Imu => vec![(name, Schema::Imu), transforms()],
         Kind::Points => vec![(format!("{name}/points"), Schema::PointCloud2)],

@@ -8,7 +8,7 @@
 //! | `joints/force_time` | (T, N) | that of efforts and forces, where a sensor measures them at another instant than the rest \[s\] |
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
 //! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written |
-//! | `recording.json` | | time step, environments, names of joints and frames |
+//! | `recording.json` | | time step, environments, names of joints and frames, how lenses distort |
 //! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
@@ -93,6 +93,11 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             Kind::Poses { frames } => Some(frames),
             _ => None,
         };
+        let distortion = match &stream.kind {
+            Kind::Lens { distortion, .. } => distortion.as_ref(),
+            _ => None,
+        };
+        let distortion = distortion.map(|lens| json!({ "model": lens.model, "coefficients": lens.coefficients }));
         let part = |part: &Part| json!({ "name": member(stream, &part.name), "shape": part.shape, "of_forces": part.of_forces });
         let parts = stream.parts.iter().map(part);
         json!({
@@ -100,6 +105,7 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             "env_ids": stream.env_ids,
             "arrays": parts.collect::<Vec<_>>(),
             "columns": names,
+            "distortion": distortion,
         })
     };
     json!({

@@ -462,6 +462,15 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
     {
         return Err(RecordError::SameName { path: cfg.path.clone(), name });
     }
+    if format == Format::Mcap {
+        let unspoken = sources.iter().filter_map(|source| match &source.stream.kind {
+            Kind::Lens { camera, distortion: None, .. } => {
+                Some(format!("{camera}/camera_info (ROS has no words for its lens)"))
+            }
+            _ => None,
+        });
+        left_out.extend(unspoken);
+    }
     if sources.is_empty() {
         return Err(RecordError::Nothing { path: cfg.path.clone(), format });
     }

@@ -1,6 +1,7 @@
 //! The messages, field by field.
 
 use super::cdr::Cdr;
+use crate::stream::Distortion;
 
 /// When and where something was measured.
 #[derive(Clone, Copy, Debug)]
@@ -79,13 +80,19 @@ pub(crate) fn image(
     to.blob_of(height * bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo` of a lens without distortion; `k` are the nine numbers of its matrix.
-pub(crate) fn camera_info(to: &mut Cdr, stamp: Stamp<'_>, (height, width): (usize, usize), k: &[f64]) {
+/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of its matrix.
+pub(crate) fn camera_info(
+    to: &mut Cdr,
+    stamp: Stamp<'_>,
+    (height, width): (usize, usize),
+    k: &[f64],
+    distortion: &Distortion,
+) {
     header(to, stamp);
     to.count(height);
     to.count(width);
-    to.text("plumb_bob");
-    to.list(&[0.0; 5]);
+    to.text(&distortion.model);
+    to.list(&distortion.coefficients);
     to.f64s(k);
     to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     for row in k.chunks_exact(3) {
