@@ -34,6 +34,8 @@ pub struct FileRecording {
     /// How many files were begun.
     begun: usize,
     done: Vec<Recorded>,
+    /// Why the first one was broken off that the button has ended, until [`end`](Self::end) says so.
+    failed: Option<RecordError>,
     /// What is said of the last one that ended.
     said: String,
 }
@@ -42,7 +44,7 @@ impl FileRecording {
     /// Records as `cfg` says. The button never writes over what is there, unless `cfg` lets it: the file of `cfg`, `run.mcap`
     /// say, is followed by `run-2.mcap`, and one that exists is passed over.
     pub fn new(cfg: RecorderCfg) -> Self {
-        Self { cfg, now: None, begun: 0, done: Vec::new(), said: String::new() }
+        Self { cfg, now: None, begun: 0, done: Vec::new(), failed: None, said: String::new() }
     }
 
     /// Begins to record to the very file of the configuration, as a program does that was told to record.
@@ -56,10 +58,10 @@ impl FileRecording {
     /// Ends what is being recorded, and gives all recordings that ended since this was asked last.
     ///
     /// # Errors
-    /// As [`Record::finish_recording`].
+    /// As [`Record::finish_recording`], also of one that the button has ended. Asked again, this gives those that are whole.
     pub fn end(&mut self, sim: &mut SimulationManager) -> record::Result<Vec<Recorded>> {
         self.finish(sim)?;
-        Ok(std::mem::take(&mut self.done))
+        self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.done)), Err)
     }
 
     fn begin_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> record::Result<()> {
@@ -117,7 +119,10 @@ impl Recording for FileRecording {
                 let path = self.next_path();
                 self.begin_at(sim, path).map_err(said)
             }
-            (false, true) => self.finish(sim).map_err(said),
+            (false, true) => self.finish(sim).map_err(|error| {
+                self.failed.get_or_insert_with(|| error.clone());
+                said(error)
+            }),
             _ => Ok(()),
         }
     }

@@ -68,9 +68,9 @@ pub(crate) struct Launcher {
     /// File for the report, as JSON
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
-    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset; .mp4, .gif,
-    /// .webp or .apng for the first camera; a folder for PNG files of all cameras; from the start, where without it the record button of window and browser begins a
-    /// recording.mcap
+    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset, .hdf5 for
+    /// robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera; a folder for PNG files of all
+    /// cameras; from the start, where without it the record button of window and browser begins a recording.mcap
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Replace the file of --record, and what a recording that was killed has left

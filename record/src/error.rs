@@ -42,6 +42,16 @@ pub enum RecordError {
         /// The end of its name.
         end: String,
     },
+    /// This build does not write the format.
+    #[error("{path}: this build does not write {}: build with the feature `{feature}` (`--features {feature}`)", .format.name())]
+    NotBuilt {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
+        /// What to build with.
+        feature: &'static str,
+    },
     /// The format has no place for something that was asked for by name.
     #[error("{path}: {} has no place for {topic}", .format.name())]
     NoPlace {
@@ -203,9 +213,31 @@ pub enum RecordError {
         /// Why.
         error: Box<RecordError>,
         /// Why the file could not be written either, if so.
-        also: Option<Arc<std::io::Error>>,
+        also: Option<String>,
         /// What was written until then, where it can be read.
         kept: Option<PathBuf>,
+    },
+    /// There is more of something than the format has a place for.
+    #[error("{path}: {what}")]
+    Limit {
+        /// The file or folder.
+        path: PathBuf,
+        /// Of what, how much there may be, and what would help.
+        what: String,
+    },
+    /// An animation or a dataset without a frame.
+    #[error("{path}: there is no frame: {why}")]
+    NoFrame {
+        /// The file or folder.
+        path: PathBuf,
+        /// What never came, and every frame needs.
+        why: &'static str,
+    },
+    /// The thread that writes has ended by a fault of the program.
+    #[error("{path}: the thread that writes has panicked")]
+    Panicked {
+        /// The file or folder.
+        path: PathBuf,
     },
     /// The simulation said no.
     #[error("{0}")]
@@ -244,7 +276,7 @@ fn advice(recoverable: &bool) -> &'static str {
     }
 }
 
-fn unwritten(error: &Option<Arc<std::io::Error>>) -> String {
+fn unwritten(error: &Option<String>) -> String {
     error.as_ref().map_or_else(String::new, |error| format!("; nor can the file be written: {error}"))
 }
 

@@ -46,6 +46,10 @@ impl PartFile {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });
         }
+        if path.is_dir() {
+            let error = io::Error::new(io::ErrorKind::IsADirectory, "this is a folder, and no file replaces it");
+            return Err(RecordError::file(path, error));
+        }
         let begin = || {
             let file = File::create_new(&part)?;
             file.try_lock()?;
@@ -77,6 +81,12 @@ impl PartFile {
     /// What the file is to be called.
     pub(crate) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What it is called until then.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn part(&self) -> &Path {
+        &self.part
     }
 
     /// What was written, where it stays.

@@ -1,10 +1,13 @@
 //! Folders that have their name when they are whole, not before.
 
 use crate::error::{RecordError, Result};
-use crate::file::{lock_left, part_of, sync_folder};
+use crate::file::{folder_of, lock_left, part_of, sync_folder};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+
+/// What a folder is called that is put aside.
+const REPLACED: &str = "replaced";
 
 /// A folder on its way: called `NAME.part` until it is whole.
 #[derive(Debug)]
@@ -64,8 +67,24 @@ impl PartFolder {
         if !self.is_free(&self.path)? {
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name has appeared meanwhile"));
         }
-        take_away(&self.path)?;
-        fs::rename(&self.part, &self.path)?;
+        // What is replaced is put aside until the new one has its name: whatever happens meanwhile, one of them is there.
+        let aside = match self.path.symlink_metadata() {
+            Ok(_) => {
+                let aside = tempfile::tempdir_in(folder_of(&self.path))?;
+                fs::rename(&self.path, aside.path().join(REPLACED))?;
+                Some(aside)
+            }
+            Err(_) => None,
+        };
+        if let Err(error) = fs::rename(&self.part, &self.path) {
+            if let Some(aside) = aside {
+                let aside = aside.keep();
+                // Where it cannot go back, it stays where it is.
+                fs::rename(aside.join(REPLACED), &self.path)?;
+                fs::remove_dir(aside)?;
+            }
+            return Err(error);
+        }
         sync_folder(&self.path);
         Ok(())
     }
@@ -85,5 +104,33 @@ fn take_away(path: &Path) -> io::Result<()> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    /// Root cause: what was to be replaced was deleted before the new one had its name.
+    #[test]
+    fn what_is_replaced_is_there_until_the_new_one_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let make = |what: &str| {
+            let (part, marker) = PartFolder::create(&path, true, "marker").unwrap();
+            fs::write(part.part().join("what"), what).unwrap();
+            drop(marker);
+            part
+        };
+        make("old").commit().unwrap();
+        let broken = make("new");
+        fs::remove_dir_all(broken.part()).unwrap();
+        assert_eq!(broken.commit().unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "old");
+        // The control: with a new one, it is replaced, and nothing else is left.
+        make("new").commit().unwrap();
+        assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -1,7 +1,7 @@
 //! The formats, and which one a name means.
 
+use crate::episodes;
 use crate::error::{RecordError, Result};
-use crate::lerobot;
 use crate::stream::{Kind, Stream};
 use std::path::Path;
 
@@ -18,6 +18,9 @@ pub enum Format {
     /// A LeRobot dataset, version 3.0: a folder of Parquet files. Each episode, from one reset of an environment to the next, is a
     /// file; frames are the rows of the recording, from the first that has everything on, whose rate must be whole.
     LeRobot,
+    /// An HDF5 file as robomimic reads them: the same episodes and frames, at any rate, as one file. Only in builds with the feature
+    /// `hdf5`.
+    Hdf5,
     /// An animated PNG of one camera's colour in one environment, without loss.
     Apng,
     /// An animated GIF of the same: 256 colours in a picture, times in hundredths of a second.
@@ -40,11 +43,12 @@ struct Known {
 }
 
 /// All of them.
-const ALL: [Known; 8] = [
+const ALL: [Known; 9] = [
     Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
     Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
     Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
-    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds: lerobot::holds },
+    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds: episodes::holds },
+    Known { format: Format::Hdf5, end: "hdf5", name: "an HDF5 file (robomimic)", holds: episodes::holds },
     Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
     Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
     Known { format: Format::Webp, end: "webp", name: "an animated WebP", holds: is_color },
@@ -85,6 +89,16 @@ impl Format {
         self.known().name
     }
 
+    /// Whether this build writes it: HDF5 takes a feature.
+    pub fn is_built(self) -> bool {
+        self.feature().is_none()
+    }
+
+    /// The feature that this build lacks for it.
+    pub(crate) fn feature(self) -> Option<&'static str> {
+        (self == Self::Hdf5 && !cfg!(feature = "hdf5")).then_some("hdf5")
+    }
+
     /// Whether it has a place for a stream.
     pub(crate) fn holds(self, stream: &Stream) -> bool {
         (self.known().holds)(stream)
@@ -108,13 +122,13 @@ mod tests {
 
     #[test]
     fn every_format_is_in_the_list_once() {
-        use Format::{Apng, Gif, LeRobot, Mcap, Mp4, Npz, Pictures, Webp};
-        let wanted = [Mcap, Npz, Pictures, LeRobot, Apng, Gif, Webp, Mp4];
+        use Format::{Apng, Gif, Hdf5, LeRobot, Mcap, Mp4, Npz, Pictures, Webp};
+        let wanted = [Mcap, Npz, Pictures, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
             // One that is missing here does not compile.
             match format {
-                Mcap | Npz | Pictures | LeRobot | Apng | Gif | Webp | Mp4 => {}
+                Mcap | Npz | Pictures | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
             }
             assert_eq!(format.known().end, end);
             assert_eq!(Format::of_path(&Path::new("a.b/run").with_extension(end)).ok(), Some(format));

@@ -6,7 +6,7 @@
 //! | poses of links and objects | `/env_0/tf` | `tf2_msgs/msg/TFMessage`, frames `env_0/arm/link` |
 //! | colour | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
 //! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32SC1`, `32FC3` |
-//! | lens and pose of a camera | `/env_0/camera/camera_info`, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
+//! | lens and pose of a camera | `/env_0/camera/camera_info`, where ROS has words for the lens, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
 //! | IMU | `/env_0/imu` | `sensor_msgs/msg/Imu` |
 //! | ray caster | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2` |
 //! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
@@ -27,7 +27,7 @@ use crate::picture::Png;
 use crate::ros::{self, Cdr, Schema, Stamp};
 use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Stream};
-use crate::writer::Sink;
+use crate::writer::{Sink, Written};
 use mcap::records::{AttachmentHeader, MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -183,7 +183,7 @@ impl McapFile {
         Ok(())
     }
 
-    fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> io::Result<()> {
+    fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> Written {
         let writer = self.writer.as_mut().ok_or_else(finished)?;
         let env = stream.env_ids[row];
         let at = nanos(block.stamps[row]);
@@ -214,13 +214,16 @@ impl McapFile {
                     ros::image(cdr, stamp, &format!("{kind}{components}"), shape, put);
                 }
             }
-            Kind::Lens { camera, height, width } => {
+            Kind::Lens { camera, height, width, distortion } => {
                 let (k, pose) = states.split_at(9.min(states.len()));
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), pose);
+                let Some(distortion) = distortion else {
+                    return Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?);
+                };
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(camera);
-                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k);
+                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k, distortion);
             }
             Kind::Imu => {
                 let part = |name: &str| {
@@ -253,8 +256,20 @@ impl McapFile {
                 return Ok(());
             }
         }
-        self.channels.write(writer, channels[0], at, cdr.bytes())
+        Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?)
     }
+}
+
+/// A topic that streams would share whose messages are of different types: one of them would be read as the other.
+pub(crate) fn taken(streams: &[&Stream]) -> Option<String> {
+    let mut known: BTreeMap<String, Schema> = BTreeMap::new();
+    streams.iter().flat_map(|stream| topics(stream)).find_map(|(topic, schema)| match known.get(&topic) {
+        Some(other) => (*other != schema).then_some(topic),
+        None => {
+            known.insert(topic, schema);
+            None
+        }
+    })
 }
 
 /// What a row of a stream is written as: topics behind the environment, and types.
@@ -266,6 +281,7 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
         Kind::Poses { .. } => vec![transforms()],
         Kind::Picture { .. } if stream.element == Element::U8 => vec![(name, Schema::CompressedImage)],
         Kind::Picture { .. } => vec![(name, Schema::Image)],
+        Kind::Lens { distortion: None, .. } => vec![transforms()],
         Kind::Lens { camera, .. } => vec![(format!("{camera}/camera_info"), Schema::CameraInfo), transforms()],
         Kind::Imu => vec![(name, Schema::Imu), transforms()],
         Kind::Points => vec![(format!("{name}/points"), Schema::PointCloud2)],
@@ -277,7 +293,7 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
 }
 
 impl Sink for McapFile {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         if let Some(event) = &packet.event {
             self.write_event(event)?;
         }
@@ -290,15 +306,15 @@ impl Sink for McapFile {
     }
 
     /// Ends the chunk: what a killed process leaves ends with a whole one.
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)
+    fn flush(&mut self) -> Written {
+        Ok(self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)?)
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         let mut writer = self.writer.take().ok_or_else(finished)?;
         writer.finish().map_err(io_error)?;
         writer.into_inner().flush()?;
-        self.part.commit()
+        Ok(self.part.commit()?)
     }
 
     fn kept(&self) -> Option<PathBuf> {

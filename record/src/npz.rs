@@ -8,7 +8,7 @@
 //! | `joints/force_time` | (T, N) | that of efforts and forces, where a sensor measures them at another instant than the rest \[s\] |
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
 //! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written |
-//! | `recording.json` | | time step, environments, names of joints and frames |
+//! | `recording.json` | | time step, environments, names of joints and frames, how lenses distort |
 //! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
@@ -23,7 +23,7 @@ use crate::npy;
 use crate::packet::{Block, Event, EventKind, Packet};
 use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Part, Stream};
-use crate::writer::Sink;
+use crate::writer::{Fault, Sink, Written};
 use crate::zip::Archive;
 use serde_json::{Value, json};
 use sim::Snapshot;
@@ -93,6 +93,11 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             Kind::Poses { frames } => Some(frames),
             _ => None,
         };
+        let distortion = match &stream.kind {
+            Kind::Lens { distortion, .. } => distortion.as_ref(),
+            _ => None,
+        };
+        let distortion = distortion.map(|lens| json!({ "model": lens.model, "coefficients": lens.coefficients }));
         let part = |part: &Part| json!({ "name": member(stream, &part.name), "shape": part.shape, "of_forces": part.of_forces });
         let parts = stream.parts.iter().map(part);
         json!({
@@ -100,6 +105,7 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             "env_ids": stream.env_ids,
             "arrays": parts.collect::<Vec<_>>(),
             "columns": names,
+            "distortion": distortion,
         })
     };
     json!({
@@ -208,7 +214,7 @@ impl Element {
 }
 
 impl Sink for NpzFile {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         if let Some(event) = &packet.event {
             self.events.write_event(event)?;
         }
@@ -220,16 +226,16 @@ impl Sink for NpzFile {
         Ok(())
     }
 
-    fn flush(&mut self) -> io::Result<()> {
+    fn flush(&mut self) -> Written {
         // Nobody can read it before the end.
         Ok(())
     }
 
-    fn finish(&mut self, streams: &[Stream]) -> io::Result<u64> {
+    fn finish(&mut self, streams: &[Stream]) -> Written<u64> {
         let storage = self.storage.take().ok_or_else(|| io::Error::other("finished twice"))?;
         let mut archive = Archive::new(BufWriter::with_capacity(1 << 16, storage));
         let header = |element, shape: &[usize]| {
-            npy::header(element, shape).ok_or_else(|| io::Error::other("more axes than the format has room for"))
+            npy::header(element, shape).ok_or_else(|| Fault::limit("an array has more axes than NumPy has room for"))
         };
         let about = format!("{:#}\n", self.about);
         archive.add(ABOUT, b"", &mut about.as_bytes())?;
@@ -248,9 +254,9 @@ impl Sink for NpzFile {
             // One time for each environment, or two.
             let times = 8 * envs * (1 + usize::from(stream.is_mixed()));
             let record = 8 + times + envs * stream.width() * one;
-            let mut add = |name: String, element, shape: &[usize], range: Range<usize>| {
+            let mut add = |name: String, element, shape: &[usize], range: Range<usize>| -> Written {
                 let head = header(element, shape)?;
-                archive.add(&format!("{name}.npy"), &head, &mut spool.column(range, record)?)
+                Ok(archive.add(&format!("{name}.npy"), &head, &mut spool.column(range, record)?)?)
             };
             add(format!("{}/step", stream.name), Element::F64, &[rows], 0..8)?;
             add(format!("{}/time", stream.name), Element::F64, &[rows, envs], 8..8 + 8 * envs)?;
@@ -266,7 +272,7 @@ impl Sink for NpzFile {
             }
         }
         archive.finish()?.flush()?;
-        self.part.commit()
+        Ok(self.part.commit()?)
     }
 
     fn kept(&self) -> Option<PathBuf> {

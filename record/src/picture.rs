@@ -1,5 +1,6 @@
 //! PNG files.
 
+use crate::writer::{Fault, Written};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::io;
@@ -16,7 +17,7 @@ pub(crate) struct Png {
 
 impl Png {
     /// Pixels of red, green, blue and opacity, which is left out.
-    pub(crate) fn rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> io::Result<&[u8]> {
+    pub(crate) fn rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<&[u8]> {
         self.pixels.clear();
         for pixel in rgba.as_chunks::<4>().0 {
             self.pixels.extend_from_slice(&pixel[..3]);
@@ -25,7 +26,7 @@ impl Png {
     }
 
     /// Depths \[m\] as 16-bit millimetres: 0 where nothing was hit, 65535 for 65.535 m and more.
-    pub(crate) fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> io::Result<&[u8]> {
+    pub(crate) fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> Written<&[u8]> {
         self.pixels.clear();
         for depth in depths {
             self.pixels.extend_from_slice(&millimetres(*depth).to_ne_bytes());
@@ -33,9 +34,11 @@ impl Png {
         self.encode(size, ExtendedColorType::L16)
     }
 
-    fn encode(&mut self, [width, height]: [usize; 2], color: ExtendedColorType) -> io::Result<&[u8]> {
+    fn encode(&mut self, [width, height]: [usize; 2], color: ExtendedColorType) -> Written<&[u8]> {
         self.file.clear();
-        let side = |side: usize| u32::try_from(side).map_err(|_| io::Error::other("a picture is too large for PNG"));
+        let side = |side: usize| {
+            u32::try_from(side).map_err(|_| Fault::limit("a side of a PNG file has less than 4294967296 pixels"))
+        };
         let encoder = PngEncoder::new(&mut self.file);
         encoder.write_image(&self.pixels, side(width)?, side(height)?, color).map_err(io::Error::other)?;
         Ok(&self.file)

@@ -5,9 +5,9 @@ use crate::folder::PartFolder;
 use crate::packet::Packet;
 use crate::picture::Png;
 use crate::stream::{Kind, Stream};
-use crate::writer::Sink;
+use crate::writer::{Sink, Written};
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// The file with the times of all pictures. A folder that has one is that of a recorder.
@@ -37,7 +37,7 @@ impl PictureFolder {
 }
 
 impl Sink for PictureFolder {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         self.counts.resize_with(streams.len(), Vec::new);
         for ((stream, block), counts) in streams.iter().zip(&packet.blocks).zip(&mut self.counts) {
             counts.resize(stream.env_ids.len(), 0);
@@ -63,11 +63,11 @@ impl Sink for PictureFolder {
         Ok(())
     }
 
-    fn flush(&mut self) -> io::Result<()> {
-        self.times.flush()
+    fn flush(&mut self) -> Written {
+        Ok(self.times.flush()?)
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         self.times.flush()?;
         self.times.get_ref().sync_all()?;
         self.folder.commit()?;

@@ -6,8 +6,8 @@ use crate::clock::Clock;
 use crate::error::{RecordError, Result};
 use crate::file::{PartFile, Storage, part_of};
 use crate::format::Format;
-use crate::lerobot::LeRobot;
-use crate::mcap_file::McapFile;
+use crate::lerobot;
+use crate::mcap_file::{self, McapFile};
 use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
 use crate::picture_folder::PictureFolder;
@@ -15,7 +15,7 @@ use crate::scene_file;
 use crate::source::Source;
 use crate::stream::{Kind, Stream};
 use crate::topic::Topic;
-use crate::writer::{self, Failure, Sink};
+use crate::writer::{self, Failure, Fault, Sink};
 use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager};
 use std::fmt;
 use std::fs::File;
@@ -131,6 +131,9 @@ pub(crate) type Wrap<'w> = &'w mut dyn FnMut(File) -> Box<dyn Storage>;
 impl Recorder {
     pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, wrap: Wrap<'_>) -> Result<Self> {
         let format = cfg.format.map_or_else(|| Format::of_path(&cfg.path), Ok)?;
+        if let Some(feature) = format.feature() {
+            return Err(RecordError::NotBuilt { path: cfg.path, format, feature });
+        }
         for (field, value, least) in [("every", cfg.every, 1), ("packets", cfg.packets as u64, 2)] {
             if value < least {
                 return Err(RecordError::OutOfRange { field, value, least });
@@ -230,12 +233,12 @@ impl Recorder {
     fn end(&mut self) -> Result<Recorded> {
         self.full = None;
         let Some(thread) = self.thread.take() else { return Ok(self.recorded.clone()) };
-        let path = &self.cfg.path;
+        let path = self.cfg.path.clone();
         let written = thread.join().unwrap_or_else(|_| {
-            let error = std::io::Error::other("the thread that writes has panicked");
+            self.failure.get_or_insert(RecordError::Panicked { path: path.clone() });
             // What it has left is where it was.
-            let part = part_of(path);
-            Err(Failure { error: Some(error), kept: part.exists().then_some(part) })
+            let part = part_of(&path);
+            Err(Failure { error: None, kept: part.exists().then_some(part) })
         });
         let (failure, Failure { error, kept }) = match (self.failure.take(), written) {
             (None, Ok(bytes)) => {
@@ -244,16 +247,20 @@ impl Recorder {
             }
             (Some(failure), Ok(_)) => (failure, Failure { error: None, kept: None }),
             (Some(failure), Err(written)) => (failure, written),
-            (None, Err(Failure { error, kept })) => {
-                let error = error.unwrap_or_else(|| std::io::Error::other("the recording was broken off"));
-                return Err(RecordError::File { path: path.clone(), error: Arc::new(error), kept });
-            }
+            (None, Err(Failure { error, kept })) => match error {
+                None => {
+                    let error = Arc::new(std::io::Error::other("the recording was broken off"));
+                    return Err(RecordError::File { path, error, kept });
+                }
+                Some(Fault::Io(error)) => return Err(RecordError::File { path, error: Arc::new(error), kept }),
+                Some(fault) => (fault.of_file(&path), Failure { error: None, kept }),
+            },
         };
         let failure = match failure {
             RecordError::Changed { stream, .. } => RecordError::Changed { path: path.clone(), stream },
             other => other,
         };
-        Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(Arc::new), kept })
+        Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(|error| error.to_string()), kept })
     }
 
     /// Records what is due, and everything that is there at any time in environments `renewed`.
@@ -324,7 +331,7 @@ impl Recorder {
         let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
         let (steps, times) = (sim.steps(), sim.time());
         self.clock.restarted(&envs, &times, steps);
-        self.recount(sim);
+        self.recount(sim, &envs);
         let of: Vec<usize> = match &self.cfg.envs {
             Some(wanted) => envs.into_iter().filter(|env| wanted.contains(&EnvId(*env))).collect(),
             None => envs,
@@ -337,9 +344,9 @@ impl Recorder {
         self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at }), &of);
     }
 
-    fn recount(&mut self, sim: &SimulationManager) {
+    fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) {
         for source in &mut self.sources {
-            if let Err(error) = source.recount(sim) {
+            if let Err(error) = source.recount(sim, envs) {
                 return self.fail(error);
             }
         }
@@ -364,7 +371,7 @@ impl Recorder {
             }
             Err(error) => return self.fail(error),
         }
-        self.recount(sim);
+        self.recount(sim, &(0..sim.num_envs()).collect::<Vec<_>>());
     }
 }
 
@@ -407,6 +414,9 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
         Some(envs) => envs.iter().map(|env| env.0).collect(),
         None => (0..count).collect(),
     };
+    if envs.is_empty() {
+        return Err(RecordError::OutOfRange { field: "the number of envs", value: 0, least: 1 });
+    }
     envs.sort_unstable();
     let twice = envs.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
     if let Some(env) = twice.or_else(|| envs.iter().copied().find(|env| *env >= count)) {
@@ -446,6 +456,20 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(RecordError::SameName { path: cfg.path.clone(), name: pair[0].clone() });
         }
+    }
+    if format == Format::Mcap
+        && let Some(name) = mcap_file::taken(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>())
+    {
+        return Err(RecordError::SameName { path: cfg.path.clone(), name });
+    }
+    if format == Format::Mcap {
+        let unspoken = sources.iter().filter_map(|source| match &source.stream.kind {
+            Kind::Lens { camera, distortion: None, .. } => {
+                Some(format!("{camera}/camera_info (ROS has no words for its lens)"))
+            }
+            _ => None,
+        });
+        left_out.extend(unspoken);
     }
     if sources.is_empty() {
         return Err(RecordError::Nothing { path: cfg.path.clone(), format });
@@ -523,7 +547,11 @@ fn open(
         return Ok(Box::new(PictureFolder::create(&cfg.path, cfg.overwrite)?));
     }
     if format == Format::LeRobot {
-        return Ok(Box::new(LeRobot::create(cfg, streams, sim.cfg().physics_dt)?));
+        return lerobot::create(cfg, streams, sim.cfg().physics_dt);
+    }
+    #[cfg(feature = "hdf5")]
+    if format == Format::Hdf5 {
+        return crate::robomimic::create(cfg, streams, sim.cfg().physics_dt);
     }
     let (part, file) = PartFile::create(&cfg.path, cfg.overwrite, format == Format::Mcap)?;
     let storage = wrap(file);

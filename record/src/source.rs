@@ -2,10 +2,10 @@
 
 use crate::error::{RecordError, Result};
 use crate::packet::{Block, Values};
-use crate::stream::{Element, Kind, Part, Stream};
+use crate::stream::{Distortion, Element, Kind, Part, Stream};
 use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
 use sensors::camera::channel::{Color, Depth, Distance, Mask, Normal, Position, ShadingNormal};
-use sensors::camera::{CameraConvention, Channel};
+use sensors::camera::{CameraConvention, Channel, DistortionModel};
 use sensors::{
     ActuatorState, Camera, ContactSensor, Imu, JointState, JointWrench, MujocoSensor, RayCaster, RayCasterCamera,
     Sampled, Sensor,
@@ -121,7 +121,7 @@ impl Source {
                 sources.push(Self::picture(sim, uid, channel, envs)?);
             }
             let shape = image_shape(any);
-            let kind = Kind::Lens { camera: uid.into(), height: shape.0, width: shape.1 };
+            let kind = Kind::Lens { camera: uid.into(), height: shape.0, width: shape.1, distortion: distortion(any) };
             let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
             let lens = Self::new(format!("{uid}/lens"), kind, Element::F64, parts, envs, What::Lens(uid.into()));
             sources.push(lens.of_sensor(uid, sensor)?);
@@ -202,10 +202,17 @@ impl Source {
         self.counts.iter_mut().zip(rows).map(|(count, now)| std::mem::replace(count, now) != now).collect()
     }
 
-    /// Counts measurements again after something happened: what sensors show then is no measurement.
-    pub(crate) fn recount(&mut self, sim: &SimulationManager) -> Result<()> {
+    /// Counts measurements again after something happened to environments: what sensors show there is no measurement. In the
+    /// others, one that was not recorded yet still is.
+    pub(crate) fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) -> Result<()> {
         if let Some(uid) = self.sensor.clone() {
+            let were = self.counts.clone();
             self.count(sim.sensor_called(&uid)?);
+            for ((count, was), env) in self.counts.iter_mut().zip(were).zip(&self.stream.env_ids) {
+                if !envs.contains(env) {
+                    *count = was;
+                }
+            }
         }
         Ok(())
     }
@@ -448,6 +455,16 @@ fn channels(sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
         None if sensor.is::<RayCasterCamera>() => RAY_CAMERA.to_vec(),
         None => Vec::new(),
     }
+}
+
+/// What the lens of a camera does to its pictures, which is the same in all environments.
+fn distortion(sensor: &dyn Any) -> Option<Distortion> {
+    let Some(camera) = sensor.downcast_ref::<Camera>() else {
+        // Ray casters that draw pictures are pinholes.
+        return Some(Distortion { model: DistortionModel::PlumbBob.name().into(), coefficients: vec![0.0; 5] });
+    };
+    let info = camera.camera_info("", *camera.env_ids().first()?).ok()?;
+    Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
 }
 
 /// Rows and pixels per row.

@@ -63,8 +63,17 @@ pub enum Element {
     F64,
 }
 
+/// How a lens distorts pictures, in ROS's words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distortion {
+    /// `plumb_bob`, `rational_polynomial` or `equidistant`.
+    pub model: String,
+    /// Its coefficients, in the order of the model.
+    pub coefficients: Vec<f64>,
+}
+
 /// What the numbers of a stream mean.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Kind {
     /// Positions, velocities and efforts, of joints or wanted of them.
@@ -96,6 +105,8 @@ pub enum Kind {
         height: usize,
         /// Pixels per row of its pictures.
         width: usize,
+        /// What its lens does to them; `None` for a lens that ROS has no words for.
+        distortion: Option<Distortion>,
     },
     /// An inertial measurement unit; the quantities are called as its channels.
     Imu,

@@ -1,9 +1,10 @@
 //! The thread that writes: packets in, a file out.
 
+use crate::error::RecordError;
 use crate::packet::Packet;
 use crate::stream::Stream;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
@@ -12,16 +13,49 @@ use std::time::{Duration, Instant};
 /// What is written may be read by others after this long at the latest.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
+/// What comes of writing.
+pub(crate) type Written<T = ()> = std::result::Result<T, Fault>;
+
+/// Why something was not written.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Fault {
+    /// The disk says no.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The format has no place for so much; what would be right.
+    #[error("{0}")]
+    Limit(String),
+    /// Of animations and datasets, where every frame needs something that never came; what.
+    #[error("there is no frame: {0}")]
+    NoFrame(&'static str),
+}
+
+impl Fault {
+    pub(crate) fn limit(what: impl Into<String>) -> Self {
+        Self::Limit(what.into())
+    }
+
+    /// The error of the recording of a file.
+    pub(crate) fn of_file(self, path: &Path) -> RecordError {
+        let path = path.into();
+        match self {
+            Self::Io(error) => RecordError::File { path, error: Arc::new(error), kept: None },
+            Self::Limit(what) => RecordError::Limit { path, what },
+            Self::NoFrame(why) => RecordError::NoFrame { path, why },
+        }
+    }
+}
+
 /// A file of some format on its way.
 pub(crate) trait Sink: Send {
     /// Writes what is in a packet.
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()>;
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written;
 
     /// Brings what was written to where a killed process leaves it.
-    fn flush(&mut self) -> io::Result<()>;
+    fn flush(&mut self) -> Written;
 
     /// Makes the file whole and gives it its name; returns its size \[bytes\].
-    fn finish(&mut self, streams: &[Stream]) -> io::Result<u64>;
+    fn finish(&mut self, streams: &[Stream]) -> Written<u64>;
 
     /// After an error: where what was written can be read. What nobody can read is taken away with the sink.
     fn kept(&self) -> Option<PathBuf>;
@@ -31,7 +65,7 @@ pub(crate) trait Sink: Send {
 #[derive(Debug)]
 pub(crate) struct Failure {
     /// `None` where the recorder broke it off.
-    pub(crate) error: Option<io::Error>,
+    pub(crate) error: Option<Fault>,
     pub(crate) kept: Option<PathBuf>,
 }
 

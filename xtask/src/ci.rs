@@ -166,16 +166,17 @@ fn fmt(context: &Context<'_>) -> Outcome {
 }
 
 fn clippy(ready: &Ready) -> Outcome {
-    ready.cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]).run()
+    let cargo = ready.cargo().args(["clippy", "--workspace", "--all-targets"]).args(test::features(None));
+    cargo.args(["--", "-D", "warnings"]).run()
 }
 
 fn unit_tests(context: &Context<'_>) -> Outcome {
-    context.debian()?.cargo().args(["test", "--workspace", "--lib", "--bins"]).run()
+    context.debian()?.cargo().args(["test", "--workspace", "--lib", "--bins"]).args(test::features(None)).run()
 }
 
 fn rustdoc(context: &Context<'_>) -> Outcome {
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
-    cargo.args(["doc", "--workspace", "--no-deps"]).run()
+    cargo.args(["doc", "--workspace", "--no-deps"]).args(test::features(None)).run()
 }
 
 fn demo(context: &Context<'_>) -> Outcome {

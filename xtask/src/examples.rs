@@ -52,6 +52,8 @@ const TABLE: &[Run] = &[
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/create_robot.lerobot"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
+    // Examples are built without the feature that writes it.
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.hdf5"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),

@@ -56,6 +56,7 @@ fn cargo_args(args: &TestArgs) -> Vec<String> {
         Some(package) => words.extend(["--package".to_string(), package.clone()]),
         None => words.push("--workspace".to_string()),
     }
+    words.extend(features(args.package.as_deref()));
     words.extend(args.filter.clone());
     if !args.test_args.is_empty() {
         words.push("--".to_string());
@@ -64,13 +65,34 @@ fn cargo_args(args: &TestArgs) -> Vec<String> {
     words
 }
 
+/// Crates that have the feature of recordings as HDF5, which is off by default.
+const WITH_HDF5: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
+
+/// What is off by default and is to be checked too, in the whole workspace or in a package.
+pub(crate) fn features(package: Option<&str>) -> Vec<String> {
+    let feature = match package {
+        None => "kinetoscope-cli/hdf5",
+        Some(package) if WITH_HDF5.contains(&package) => "hdf5",
+        Some(_) => return Vec::new(),
+    };
+    ["--features", feature].map(String::from).to_vec()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn without_arguments_everything_is_tested() {
-        assert_eq!(cargo_args(&TestArgs::default()), ["test", "--workspace"]);
+        assert_eq!(cargo_args(&TestArgs::default()), ["test", "--workspace", "--features", "kinetoscope-cli/hdf5"]);
+    }
+
+    #[test]
+    fn packages_are_tested_with_their_feature() {
+        for package in WITH_HDF5 {
+            assert_eq!(features(Some(package)), ["--features", "hdf5"]);
+        }
+        assert!(features(Some("kinetoscope-sim")).is_empty());
     }
 
     #[test]

@@ -150,3 +150,28 @@ fn what_cannot_be_recorded_is_said() {
     let run = watched.viewer.newest().unwrap().run.clone();
     assert!(run.refused.is_some_and(|reason| reason.contains("missing")) && !run.recording.unwrap().on);
 }
+
+/// Root cause: an error of a recording that the button had ended was told to the viewer only, and a program that asked at its end
+/// heard that all was well.
+#[test]
+fn a_recording_that_the_button_ended_badly_is_an_error_at_the_end() {
+    use kinetoscope::view::Recording as _;
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
+    let mut files = FileRecording::new(RecorderCfg::new(folder.path().join("run.npz")));
+    files.set(&mut world.sim, true).unwrap();
+    world.step(0);
+    // A second robot has joints, which the sensor of all joints now measures.
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
+    world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
+    world.step(1);
+    let said = files.set(&mut world.sim, false).unwrap_err();
+    // Another one, which is well.
+    files.set(&mut world.sim, true).unwrap();
+    world.step(2);
+    let error = files.end(&mut world.sim).unwrap_err();
+    assert!(matches!(error, RecordError::BrokenOff { .. }) && error.to_string() == said, "{error}");
+    let whole = files.end(&mut world.sim).unwrap();
+    assert_eq!(whole.len(), 1, "{whole:?}");
+    assert!(whole[0].path.is_file());
+}

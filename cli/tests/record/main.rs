@@ -3,6 +3,8 @@
 
 mod button;
 mod contents;
+mod episodes;
+mod hdf5;
 mod kill;
 mod lerobot;
 mod pictures;

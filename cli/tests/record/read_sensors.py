@@ -7,11 +7,13 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from told import tell, weighed
 
-last = {}
+last, frames = {}, set()
 with open(sys.argv[1], "rb") as file:
     reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
     for schema, channel, message, decoded in reader.iter_decoded_messages():
         last[channel.topic] = (schema.name, message, decoded)
+        if channel.topic == "/env_1/tf":
+            frames.update(transform.child_frame_id for transform in decoded.transforms)
     attached = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
 
 
@@ -35,7 +37,12 @@ assert (normal.encoding, normal.is_bigendian, normal.step) == ("32FC3", 0, 12 * 
 assert len(normal.data) == normal.step * normal.height and normal.header.frame_id == "env_1/sensors/eye"
 numbers = bytes(normal.data)
 
+_, fish = of("/env_1/fish/camera_info", "sensor_msgs/msg/CameraInfo")
+
 tell({
+    "fish": [fish.distortion_model, list(fish.d), list(fish.k)],
+    "infos": sorted(topic for topic in last if topic.endswith("camera_info")),
+    "round": "env_1/sensors/round" in frames,
     "points": list(points),
     "point_time": message.log_time,
     "forces": list(forces.data),

@@ -3,6 +3,8 @@
 use super::support::{PICTURE_EVERY, World};
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::Lens;
+use kinetoscope::sensors::camera::lens::{OpenCvFisheye, Panorama};
 use kinetoscope::sensors::ray::pattern::Grid;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -30,7 +32,7 @@ pub(crate) fn said(python: &Path, script: &str, file: &Path) -> serde_json::Valu
 }
 
 /// Numbers with a fraction as texts of their bits, as the scripts give them: nothing is lost between the programs.
-fn bits(value: serde_json::Value) -> serde_json::Value {
+pub(crate) fn bits(value: serde_json::Value) -> serde_json::Value {
     use serde_json::Value;
     match value {
         Value::Number(number) if number.is_f64() => number.as_f64().unwrap().to_bits().to_string().into(),
@@ -124,8 +126,18 @@ fn sensed(path: &Path) -> serde_json::Value {
         ..CameraCfg::default()
     };
     let eye = sim.add_sensor("eye", eye).unwrap();
+    // Lenses: one that ROS has words for, and one that it has none for.
+    let bent = OpenCvFisheye { k1: 0.02, k2: -0.003, k3: 0.0005, k4: -0.0001, max_angle: None };
+    let lenses: [(&str, Lens); 2] = [("fish", bent.into()), ("round", Panorama {}.into())];
+    let [fish, _] = lenses.map(|(uid, lens)| {
+        let (renderer, channels) = (Renderer::FastRayTraced, Channels { depth: true, ..Channels::NONE });
+        let cfg = CameraCfg { width: 16, height: 8, lens, renderer, channels, ..CameraCfg::default() };
+        sim.add_sensor(uid, cfg).unwrap()
+    });
     let recorder = sim.record(RecorderCfg::new(path)).unwrap();
     sim.update(100);
+    let fish = sim.sensor(fish).unwrap();
+    let matrix: Vec<f64> = fish.intrinsic_matrices().index_axis(Axis(0), 1).iter().copied().collect();
     let scanner = sim.sensor(scanner).unwrap();
     let hits = scanner.hits().index_axis(Axis(0), 1).to_owned();
     let points = hits.rows().into_iter().filter(|p| p.iter().all(|x| x.is_finite()));
@@ -145,9 +157,13 @@ fn sensed(path: &Path) -> serde_json::Value {
         "normal_sum": normal.iter().zip(1..).map(|(x, k)| u64::from(x.to_bits()) * k).sum::<u64>(),
         "upward": upward,
         "attached": ["scene.zip"],
+        "fish": ["equidistant", [0.02, -0.003, 0.0005, -0.0001], matrix],
+        "infos": ["/env_0/eye/camera_info", "/env_0/fish/camera_info", "/env_1/eye/camera_info", "/env_1/fish/camera_info"],
+        "round": true,
     });
     assert!(upward > 0 && upward < 24 * 16, "{upward}");
-    sim.finish_recording(recorder).unwrap();
+    let left_out = sim.finish_recording(recorder).unwrap().left_out;
+    assert!(left_out.iter().any(|what| what.starts_with("round/camera_info")), "{left_out:?}");
     bits(expected)
 }
 

@@ -13,7 +13,7 @@ fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
 
 /// A name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
-    let is_file = |format: &Format| ![Format::Pictures, Format::LeRobot].contains(format);
+    let is_file = |format: &Format| format.is_built() && ![Format::Pictures, Format::LeRobot].contains(format);
     Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
 }
 
@@ -98,6 +98,7 @@ fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
         (RecorderCfg { envs: Some(vec![EnvId(3)]), ..RecorderCfg::new(&path) }, vec!["environment 3"]),
         (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..RecorderCfg::new(&path) }, vec!["twice"]),
         (RecorderCfg { topics: vec![], ..RecorderCfg::new(&path) }, vec!["nothing to record"]),
+        (RecorderCfg { envs: Some(vec![]), ..RecorderCfg::new(&path) }, vec!["number of envs is 0", "at least 1"]),
         (
             RecorderCfg::new(folder.path().join("run.avi")),
             vec![".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"],
@@ -111,6 +112,35 @@ fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
         assert!(words.iter().all(|word| text.contains(word)), "{text}: {words:?}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
+}
+
+/// Root cause: whether a folder may be replaced by a file was asked when the recording ended.
+#[test]
+fn no_file_replaces_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in files() {
+        let path = folder.path().join(&name);
+        fs::create_dir(&path).unwrap();
+        let (error, text) = refusal(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) });
+        assert!(matches!(error, RecordError::File { .. }) && text.contains("this is a folder"), "{text}");
+        assert!(path.is_dir());
+        fs::remove_dir(&path).unwrap();
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
+}
+
+/// Root cause: a topic was looked for by its name alone, so that an IMU called `tf` was written as transforms.
+#[test]
+fn two_kinds_of_messages_do_not_share_a_topic() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
+    world.sim.add_sensor("tf", ImuCfg::on("cube")).unwrap();
+    let error = world.sim.record(RecorderCfg::new(folder.path().join("run.mcap"))).unwrap_err();
+    assert!(matches!(&error, RecordError::SameName { name, .. } if name == "tf"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
+    // The control: arrays of archives have names of their own.
+    let recorder = world.sim.record(RecorderCfg::new(folder.path().join("run.npz"))).unwrap();
+    world.sim.finish_recording(recorder).unwrap();
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use super::{Encoder, Out, duration, sides};
 use crate::picture::Png;
-use std::io::{self, Seek, SeekFrom, Write};
+use crate::writer::{Fault, Written};
+use std::io::{Seek, SeekFrom, Write};
 
 struct Apng {
     png: Png,
@@ -24,9 +25,10 @@ pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
     Ok(Box::new(Apng { png: Png::default(), size, frames: 0, sequence: 0, count_at: 0, data: Vec::new() }))
 }
 
-fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> io::Result<()> {
+fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> Written {
     let length: usize = data.iter().map(|part| part.len()).sum();
-    let length = u32::try_from(length).map_err(|_| io::Error::other("a frame is too large for PNG"))?;
+    let length = u32::try_from(length)
+        .map_err(|_| Fault::limit("a frame of a PNG file has at most 4 GiB; make pictures smaller"))?;
     to.write_all(&length.to_be_bytes())?;
     to.write_all(kind)?;
     let mut crc = crc32fast::Hasher::new();
@@ -35,7 +37,7 @@ fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> io::Result<()> 
         crc.update(part);
         to.write_all(part)?;
     }
-    to.write_all(&crc.finalize().to_be_bytes())
+    Ok(to.write_all(&crc.finalize().to_be_bytes())?)
 }
 
 /// The data of the chunks of one kind in a PNG file.
@@ -53,14 +55,14 @@ fn chunks<'f>(file: &'f [u8], kind: &'static [u8; 4]) -> impl Iterator<Item = &'
 }
 
 impl Apng {
-    fn write_count(out: &mut Out, frames: u32) -> io::Result<()> {
+    fn write_count(out: &mut Out, frames: u32) -> Written {
         // Played for ever.
         chunk(out, b"acTL", &[&frames.to_be_bytes(), &[0; 4]])
     }
 }
 
 impl Encoder for Apng {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
         let picture = self.png.rgb(rgba, self.size.map(|side| side as usize))?;
         if self.frames == 0 {
             out.write_all(SIGNATURE)?;
@@ -94,7 +96,7 @@ impl Encoder for Apng {
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
+    fn finish(&mut self, out: &mut Out) -> Written {
         chunk(out, b"IEND", &[])?;
         out.seek(SeekFrom::Start(self.count_at))?;
         Self::write_count(out, self.frames)

@@ -1,6 +1,7 @@
 //! Animated GIF: 256 colours in a frame, the best ones where there are more, and times in hundredths of a second.
 
 use super::{Encoder, Out, duration, rgb_of, sides};
+use crate::writer::Written;
 use gif::{Frame, Repeat};
 use std::io::{self, Write};
 
@@ -20,7 +21,7 @@ pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
 }
 
 impl Encoder for Gif {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
         let [width, height] = self.size;
         if self.encoder.is_none() {
             let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(io::Error::other)?;
@@ -38,11 +39,9 @@ impl Encoder for Gif {
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
-        match self.encoder.take() {
-            Some(encoder) => out.write_all(&encoder.into_inner().map_err(io::Error::other)?),
-            None => Ok(()),
-        }
+    fn finish(&mut self, out: &mut Out) -> Written {
+        let Some(encoder) = self.encoder.take() else { return Ok(()) };
+        Ok(out.write_all(&encoder.into_inner().map_err(io::Error::other)?)?)
     }
 }
 

@@ -5,13 +5,12 @@
 //! skipped), as the last row above it or the last column beside it goes on (8.3.3, Intra_16x16 without a residual), or number by
 //! number (I_PCM). What a simulation shows mostly stands still, so that few are of the third kind.
 
-/// Side of a square \[pixels\].
-const SIDE: usize = 16;
+use super::level::{HIGHEST, Level, SIDE};
 
 /// Pictures from one that stands alone to the next: where a player can begin.
 const GROUP: u32 = 120;
 
-/// Units of the stream (7.3.1), as MP4 files have them: without start codes.
+/// Units of the stream (7.3.1), as MP4 files have them: without start codes. What level it has is known at its end.
 pub(super) struct Headers {
     pub(super) sequence: Vec<u8>,
     pub(super) picture: Vec<u8>,
@@ -48,30 +47,18 @@ struct Planes {
     planes: [Vec<u8>; 3],
 }
 
-/// The largest pictures of level 5.1 and of level 6.2 (table A-1): squares, and squares of a side.
-const LEVELS: [(u8, usize, usize); 2] = [(51, 36_864, 543), (62, 139_264, 1_055)];
-
-/// The level that has pictures of this size; `None` where none has, or where a side is odd: four pixels share a colour.
-fn level(size: [usize; 2]) -> Option<u8> {
-    let squares = size.map(|side| side.div_ceil(SIDE));
-    let fits = |(_, all, side): &&(u8, usize, usize)| {
-        squares.iter().all(|count| count <= side) && squares[0] * squares[1] <= *all
-    };
-    let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
-    LEVELS.iter().find(fits).filter(|_| even).map(|(level, ..)| *level)
-}
-
 impl Stream {
     /// For pictures of a width and height; what fits, where they do not.
-    pub(super) fn new(size: [usize; 2]) -> Result<(Self, Headers), String> {
-        let level = level(size).ok_or_else(|| {
-            let (_, all, side) = LEVELS[1];
-            let most = side * SIDE;
-            format!("even numbers would do for both, up to {most} pixels and {} in all", all * SIDE * SIDE)
-        })?;
+    pub(super) fn new(size: [usize; 2]) -> Result<Self, String> {
         let squares = size.map(|side| side.div_ceil(SIDE));
+        // Four pixels share a colour.
+        let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
+        if !even || !HIGHEST.has(squares) {
+            let [most, all] = HIGHEST.largest();
+            return Err(format!("even numbers would do for both, up to {most} pixels and {all} in all"));
+        }
         let planes = Planes::new(squares);
-        let stream = Self {
+        Ok(Self {
             size,
             before: planes.clone(),
             now: planes,
@@ -80,8 +67,14 @@ impl Stream {
             bits: Bits::default(),
             unit: Vec::new(),
             above: vec![false; squares[0]],
-        };
-        Ok((stream, Headers { sequence: sequence(size, level), picture: picture() }))
+        })
+    }
+
+    /// The headers of the stream, when all of it is known: for how long each picture is shown, in units of which a second has
+    /// `per_second`, and its bytes.
+    pub(super) fn headers(&self, per_second: u32, frames: impl Iterator<Item = [u32; 2]> + Clone) -> Headers {
+        let level = Level::of(self.now.squares, per_second, frames);
+        Headers { sequence: sequence(self.size, level.code), picture: picture() }
     }
 
     /// The next picture, of red, green, blue and opacity, which is left out.
@@ -431,7 +424,7 @@ mod tests {
     #[test]
     fn what_stands_still_is_not_sent() {
         let size = [64, 48];
-        let (mut stream, _) = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let mut stream = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
         let noise = |seed: u32| -> Vec<u8> {
             (0..4 * 64 * 48_u32).map(|k| ((k ^ seed).wrapping_mul(2_654_435_761) >> 24) as u8).collect()
         };
@@ -441,7 +434,7 @@ mod tests {
         assert!(!again.alone && again.unit.len() < 16, "{}", again.unit.len());
         assert!(stream.code(&noise(1)).unit.len() > 64 * 48 * 3 / 2);
         // A flat picture needs one square.
-        let (mut flat, _) = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let mut flat = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
         let flat = flat.code(&[90; 4 * 64 * 48]).unit.len();
         assert!((384..500).contains(&flat), "{flat}");
     }

@@ -4,6 +4,7 @@
 mod apng;
 mod gif;
 mod h264;
+mod level;
 mod mp4;
 mod webp;
 
@@ -12,8 +13,8 @@ use crate::file::{PartFile, Storage};
 use crate::format::Format;
 use crate::packet::Packet;
 use crate::stream::Stream;
-use crate::writer::Sink;
-use std::io::{self, BufWriter, Write};
+use crate::writer::{Fault, Sink, Written};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// What frames are written to.
@@ -23,10 +24,10 @@ type Out = BufWriter<Box<dyn Storage>>;
 trait Encoder: Send {
     /// The next frame: its pixels, red, green, blue and opacity, and since when until when it is shown \[s\], from the first frame
     /// on.
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()>;
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written;
 
     /// What follows the last frame, and what of the beginning is known only then.
-    fn finish(&mut self, out: &mut Out) -> io::Result<()>;
+    fn finish(&mut self, out: &mut Out) -> Written;
 }
 
 /// How a format begins: pictures of some width and height; or what they would have to be.
@@ -79,7 +80,7 @@ impl Animation {
 
     /// Writes the frame that waits, which is shown until `next` \[s\]; where there is no next one, as long as the one before.
     /// Gives its memory.
-    fn show(&mut self, next: Option<f64>) -> io::Result<Vec<u8>> {
+    fn show(&mut self, next: Option<f64>) -> Written<Vec<u8>> {
         let (Some((rgba, time)), Some(out)) = (self.waiting.take(), &mut self.file) else { return Ok(Vec::new()) };
         self.last = next.map_or(self.last, |next| next - time);
         let first = *self.first.get_or_insert(time);
@@ -89,7 +90,7 @@ impl Animation {
 }
 
 impl Sink for Animation {
-    fn write(&mut self, _streams: &[Stream], packet: &Packet) -> io::Result<()> {
+    fn write(&mut self, _streams: &[Stream], packet: &Packet) -> Written {
         let Some(block) = packet.blocks.iter().find(|block| block.used) else { return Ok(()) };
         // On the clock of the recording, which goes on over resets.
         let time = block.stamps.first().copied().unwrap_or(0.0);
@@ -100,20 +101,19 @@ impl Sink for Animation {
         Ok(())
     }
 
-    fn flush(&mut self) -> io::Result<()> {
+    fn flush(&mut self) -> Written {
         // Nobody can read it before the end.
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         self.show(None)?;
-        let mut file = self.file.take().ok_or_else(|| io::Error::other("finished twice"))?;
-        if self.first.is_none() {
-            return Err(io::Error::other("the camera has measured nothing: there is no frame"));
-        }
+        let Some(mut file) = self.file.take().filter(|_| self.first.is_some()) else {
+            return Err(Fault::NoFrame("the camera has measured nothing"));
+        };
         self.encoder.finish(&mut file)?;
         file.flush()?;
-        self.part.commit()
+        Ok(self.part.commit()?)
     }
 
     fn kept(&self) -> Option<PathBuf> {
@@ -132,12 +132,12 @@ fn units(time: f64, per_second: f64) -> u64 {
 ///
 /// # Errors
 /// It was shown for longer than the format can say.
-fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> io::Result<N> {
+fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> Written<N> {
     let found = units(until, per_second).saturating_sub(units(from, per_second)).max(1);
     let fits = N::try_from(found).ok().filter(|_| found <= most);
     let longest = most as f64 / per_second;
     fits.ok_or_else(|| {
-        io::Error::other(format!("a frame of this format is shown for {longest} s at most: record more often"))
+        Fault::limit(format!("a frame of this format is shown for {longest} s at most: record more often"))
     })
 }
 

@@ -3,7 +3,8 @@
 
 use super::h264::{Headers, Stream};
 use super::{Encoder, Out, duration};
-use std::io::{self, Seek, SeekFrom, Write};
+use crate::writer::{Fault, Written};
+use std::io::{Seek, SeekFrom, Write};
 
 /// Units of time in a second: whole ones for a frame at 24, 25, 30, 50, 60, 100 per second.
 const PER_SECOND: u32 = 90_000;
@@ -11,7 +12,6 @@ const PER_SECOND: u32 = 90_000;
 struct Mp4 {
     size: [usize; 2],
     stream: Stream,
-    headers: Headers,
     frames: Vec<Sample>,
     /// Where the length of the data is to be written.
     length_at: u64,
@@ -27,8 +27,8 @@ struct Sample {
 }
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    let (stream, headers) = Stream::new(size)?;
-    Ok(Box::new(Mp4 { size, stream, headers, frames: Vec::new(), length_at: 0, at: 0 }))
+    let stream = Stream::new(size)?;
+    Ok(Box::new(Mp4 { size, stream, frames: Vec::new(), length_at: 0, at: 0 }))
 }
 
 /// What every box begins with: its length, with itself, and its kind.
@@ -110,7 +110,8 @@ impl Mp4 {
 
     /// What the pictures are.
     fn kind(&self) -> Vec<u8> {
-        let Headers { sequence, picture } = &self.headers;
+        let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
+        let Headers { sequence, picture } = &self.stream.headers(PER_SECOND, frames);
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
         // Lengths of units have four bytes; one unit of each kind. Profile and level are as the first says.
         let profile = sequence.get(1..4).unwrap_or_default();
@@ -126,7 +127,7 @@ impl Mp4 {
 }
 
 impl Encoder for Mp4 {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
         if self.frames.is_empty() {
             let brands = boxed(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
             out.write_all(&brands)?;
@@ -137,21 +138,21 @@ impl Encoder for Mp4 {
             self.at = self.length_at + 8;
         }
         let coded = self.stream.code(rgba);
-        let too_large = |_| io::Error::other("a picture is too large for MP4");
-        let length = u32::try_from(coded.unit.len()).map_err(too_large)?;
+        let too_large = || Fault::limit("a picture of an MP4 file has less than 4 GiB; make pictures smaller");
+        let length = u32::try_from(coded.unit.len()).map_err(|_| too_large())?;
         out.write_all(&length.to_be_bytes())?;
         out.write_all(coded.unit)?;
         let duration = duration(shown, PER_SECOND.into(), u32::MAX.into())?;
-        let bytes = length.checked_add(4).ok_or_else(|| io::Error::other("a picture is too large for MP4"))?;
+        let bytes = length.checked_add(4).ok_or_else(too_large)?;
         self.frames.push(Sample { at: self.at, bytes, duration, alone: coded.alone });
         self.at += u64::from(bytes);
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
+    fn finish(&mut self, out: &mut Out) -> Written {
         out.write_all(&self.about())?;
         out.seek(SeekFrom::Start(self.length_at))?;
         // With its head of sixteen bytes.
-        out.write_all(&(self.at - self.length_at + 8).to_be_bytes())
+        Ok(out.write_all(&(self.at - self.length_at + 8).to_be_bytes())?)
     }
 }

@@ -2,18 +2,23 @@
 //! 2.7, describes.
 
 use super::{Encoder, Out, duration, rgb_of, sides};
+use crate::writer::{Fault, Written};
 use image_webp::{ColorType, WebPEncoder};
 use std::io::{self, Seek, SeekFrom, Write};
 
 struct Webp {
     size: [u32; 2],
-    begun: bool,
+    /// What is in the file behind the length at its beginning \[bytes\].
+    length: u64,
     rgb: Vec<u8>,
     still: Vec<u8>,
 }
 
 /// The longest side of a stream without loss.
 const MOST: usize = 1 << 14;
+
+/// The largest length of a file (section 2.4) \[bytes\].
+const LONGEST: u64 = (1 << 32) - 10;
 
 /// Where the pictures begin in the file of a still one: behind `RIFF`, a length, and `WEBP`.
 const CHUNKS: usize = 12;
@@ -24,7 +29,7 @@ const REPLACES: u8 = 0b10;
 const ANIMATED: u8 = 0b10;
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    Ok(Box::new(Webp { size: sides(size, MOST)?, begun: false, rgb: Vec::new(), still: Vec::new() }))
+    Ok(Box::new(Webp { size: sides(size, MOST)?, length: 0, rgb: Vec::new(), still: Vec::new() }))
 }
 
 /// The lowest three bytes of a number.
@@ -33,26 +38,34 @@ fn three(number: u32) -> [u8; 3] {
     [a, b, c]
 }
 
-fn chunk(out: &mut Out, kind: &[u8; 4], parts: &[&[u8]]) -> io::Result<()> {
-    let length: usize = parts.iter().map(|part| part.len()).sum();
-    let known = u32::try_from(length).map_err(|_| io::Error::other("a frame is too large for WebP"))?;
-    out.write_all(kind)?;
-    out.write_all(&known.to_le_bytes())?;
-    parts.iter().try_for_each(|part| out.write_all(part))?;
-    // The next one begins at an even place.
-    out.write_all(&[0][..length % 2])
+impl Webp {
+    /// Writes a chunk, if the file has room for it.
+    fn chunk(&mut self, out: &mut Out, kind: &[u8; 4], parts: &[&[u8]]) -> Written {
+        let length: usize = parts.iter().map(|part| part.len()).sum();
+        // The next one begins at an even place.
+        let after = self.length + 8 + (length + length % 2) as u64;
+        let known = u32::try_from(length).ok().filter(|_| after <= LONGEST);
+        let known =
+            known.ok_or_else(|| Fault::limit("a WebP file has at most 4 GiB; record less, or as .apng or .mp4"))?;
+        out.write_all(kind)?;
+        out.write_all(&known.to_le_bytes())?;
+        parts.iter().try_for_each(|part| out.write_all(part))?;
+        out.write_all(&[0][..length % 2])?;
+        self.length = after;
+        Ok(())
+    }
 }
 
 impl Encoder for Webp {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> io::Result<()> {
+    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
         let [width, height] = self.size.map(|side| three(side - 1));
-        if !self.begun {
+        if self.length == 0 {
             // The length is not known yet.
             out.write_all(b"RIFF\0\0\0\0WEBP")?;
-            chunk(out, b"VP8X", &[&[ANIMATED, 0, 0, 0], &width, &height])?;
+            self.length = 4;
+            self.chunk(out, b"VP8X", &[&[ANIMATED, 0, 0, 0], &width, &height])?;
             // No background, played for ever.
-            chunk(out, b"ANIM", &[&[0; 4], &[0; 2]])?;
-            self.begun = true;
+            self.chunk(out, b"ANIM", &[&[0; 4], &[0; 2]])?;
         }
         rgb_of(rgba, &mut self.rgb);
         self.still.clear();
@@ -60,14 +73,49 @@ impl Encoder for Webp {
         encoder.encode(&self.rgb, self.size[0], self.size[1], ColorType::Rgb8).map_err(io::Error::other)?;
         let milliseconds = three(duration(shown, 1e3, (1 << 24) - 1)?);
         let place = [0; 6];
-        let picture = self.still.get(CHUNKS..).unwrap_or_default();
-        chunk(out, b"ANMF", &[&place, &width, &height, &milliseconds, &[REPLACES], picture])
+        let still = std::mem::take(&mut self.still);
+        let picture = still.get(CHUNKS..).unwrap_or_default();
+        let written = self.chunk(out, b"ANMF", &[&place, &width, &height, &milliseconds, &[REPLACES], picture]);
+        self.still = still;
+        written
     }
 
-    fn finish(&mut self, out: &mut Out) -> io::Result<()> {
-        let length = out.stream_position()?.saturating_sub(8);
-        let length = u32::try_from(length).map_err(|_| io::Error::other("a WebP file has at most 4 GiB"))?;
+    fn finish(&mut self, out: &mut Out) -> Written {
+        // Every chunk has seen to it that it fits.
+        let length = u32::try_from(self.length).unwrap_or(u32::MAX);
         out.seek(SeekFrom::Start(4))?;
-        out.write_all(&length.to_le_bytes())
+        Ok(out.write_all(&length.to_le_bytes())?)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use std::io::BufWriter;
+
+    /// Root cause: the length of a file was looked at when its last frame had been written, hours later.
+    #[test]
+    fn a_frame_that_does_not_fit_any_more_is_an_error_at_once() {
+        let rgba = [7; 4 * 16 * 16];
+        // One frame alone, and what it takes.
+        let frame_at = |length: u64| {
+            let file = tempfile::tempfile().unwrap();
+            let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
+            let mut webp = Webp { size: [16, 16], length, rgb: Vec::new(), still: Vec::new() };
+            let result = webp.frame(&mut out, &rgba, [0.0, 0.1]);
+            out.flush().unwrap();
+            (result, webp.length, file.metadata().unwrap().len())
+        };
+        let (result, after, size) = frame_at(4);
+        result.unwrap();
+        assert_eq!(after - 4, size, "a chunk is counted as it is written");
+        // The last one that fits, and the first that does not: nothing of it is written.
+        let (result, last, _) = frame_at(LONGEST - size);
+        result.unwrap();
+        assert_eq!(last, LONGEST);
+        let (result, still, written) = frame_at(LONGEST - size + 1);
+        assert!(matches!(result, Err(Fault::Limit(_))), "{result:?}");
+        assert_eq!((still, written), (LONGEST - size + 1, 0));
     }
 }

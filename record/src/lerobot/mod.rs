@@ -1,30 +1,23 @@
 //! LeRobot datasets, version 3.0: a folder with one Parquet file for each episode and what is known of all of them.
-//!
-//! An episode is what an environment does from one reset to the next. Its frames have one rate, that of the rows of the recording; a
-//! frame holds what was last measured, and the action that came next: the targets of the step that followed. So the last row of an
-//! episode, which no action followed, is no frame.
 
-mod features;
 mod parquet;
 mod statistics;
 
 use crate::cfg::RecorderCfg;
+use crate::episodes::{self, Dataset, Episodes, Features, Frame, Role};
 use crate::error::{RecordError, Result};
 use crate::folder::PartFolder;
-use crate::packet::{EventKind, Packet, Values};
+use crate::format::Format;
 use crate::picture::Png;
 use crate::stream::Stream;
-use crate::writer::Sink;
-use features::{Feature, Features};
+use crate::writer::{Fault, Sink, Written};
 use parquet::{Kind, Table, put_bytes};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use statistics::{OfPicture, Statistics};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-pub(crate) use features::holds;
 
 /// The file that says that a folder is a dataset; the last one that is written.
 const INFO: &str = "meta/info.json";
@@ -48,16 +41,15 @@ const COMMON: [(&str, &str); 5] = [
 ];
 
 /// A dataset on its way.
-pub(crate) struct LeRobot {
+struct LeRobot {
     folder: PartFolder,
     /// The marker, locked.
     _lock: File,
     fps: u64,
-    /// Steps from one row to the next.
-    every: u64,
     task: String,
-    features: Features,
-    envs: Vec<Env>,
+    features: Arc<Features>,
+    /// The episode that goes on in each environment.
+    running: Vec<Option<Running>>,
     /// Frames of each episode that was begun, and where its file has the numbers of its frames in the dataset.
     episodes: Vec<Episode>,
     statistics: Vec<Statistics>,
@@ -68,24 +60,6 @@ pub(crate) struct LeRobot {
 struct Picture {
     file: Vec<u8>,
     about: OfPicture,
-}
-
-/// What was measured last in an environment.
-struct Latest {
-    /// For each stream.
-    numbers: Vec<Option<Vec<f32>>>,
-    pictures: Vec<Option<Arc<Picture>>>,
-}
-
-/// Numbers of each feature, and pictures.
-type Frame = (Vec<Vec<f32>>, Vec<Arc<Picture>>);
-
-struct Env {
-    env: usize,
-    latest: Latest,
-    /// The frame that waits for its action.
-    pending: Option<Frame>,
-    running: Option<Running>,
 }
 
 /// An episode that goes on.
@@ -127,100 +101,88 @@ fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
     Err(RecordError::Rate { path: path.into(), every, found, near })
 }
 
-impl LeRobot {
-    /// `dt` is the time of a step \[s\].
-    pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Self> {
-        let RecorderCfg { path, every, overwrite, task, .. } = cfg;
-        let fps = rate(path, dt, *every)?;
-        let features = Features::of(path, streams)?;
-        let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
-        let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3))).collect();
-        let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
-        envs.sort_unstable();
-        envs.dedup();
-        for &env in &envs {
-            if let Some(stream) = streams.iter().find(|stream| !stream.env_ids.contains(&env)) {
-                return Err(RecordError::NotEverywhere { path: path.clone(), stream: stream.name.clone(), env });
-            }
-        }
-        let (folder, lock) = PartFolder::create(path, *overwrite, MARKER)?;
-        let none = || Latest { numbers: vec![None; streams.len()], pictures: vec![None; streams.len()] };
-        let envs = envs.into_iter().map(|env| Env { env, latest: none(), pending: None, running: None }).collect();
-        let (every, task) = (*every, task.clone());
-        let (episodes, png) = (Vec::new(), Png::default());
-        Ok(Self { folder, _lock: lock, fps, every, task, features, envs, episodes, statistics, png })
+/// What a role is called in a dataset. Names of features have no strokes.
+fn name_of(role: &Role) -> String {
+    let dotted = |name: &str| name.replace('/', ".");
+    match role {
+        Role::Positions => "observation.state".into(),
+        Role::Velocities => "observation.velocity".into(),
+        Role::Efforts => "observation.effort".into(),
+        Role::Action => "action".into(),
+        Role::TargetVelocities => "target.velocity".into(),
+        Role::TargetEfforts => "target.effort".into(),
+        Role::Objects => "observation.environment_state".into(),
+        Role::Sensor { stream, channel } => format!("sensors.{}.{}", dotted(stream), dotted(channel)),
+        Role::Picture(camera) => format!("observation.images.{}", dotted(camera)),
+    }
+}
+
+/// Begins a dataset; `dt` is the time of a step \[s\].
+pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Box<dyn Sink>> {
+    let RecorderCfg { path, every, overwrite, task, .. } = cfg;
+    let fps = rate(path, dt, *every)?;
+    let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
+    let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
+    let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3))).collect();
+    let envs = episodes::environments(path, streams)?;
+    let (folder, lock) = PartFolder::create(path, *overwrite, MARKER)?;
+    let dataset = LeRobot {
+        folder,
+        _lock: lock,
+        fps,
+        task: task.clone(),
+        features: Arc::clone(&features),
+        running: envs.iter().map(|_| None).collect(),
+        episodes: Vec::new(),
+        statistics,
+        png: Png::default(),
+    };
+    Ok(Box::new(Episodes::new(dataset, features, *every, &envs, streams)))
+}
+
+/// What a frame has, as columns.
+fn columns(features: &Features) -> Vec<(String, Kind)> {
+    let numbers = features.numbers.iter().map(|feature| (feature.name.clone(), Kind::Float32(feature.names.len())));
+    let pictures = features.pictures.iter().map(|picture| (picture.name.clone(), Kind::Picture));
+    let common = COMMON
+        .iter()
+        .map(|(name, kind)| (name.to_string(), if *kind == "int64" { Kind::Int64 } else { Kind::Float32(1) }));
+    numbers.chain(pictures).chain(common).collect()
+}
+
+/// The same, as `meta/info.json` has it.
+fn described(features: &Features) -> Map<String, Value> {
+    let numbers = features.numbers.iter().map(|feature| {
+        let names = &feature.names;
+        (feature.name.clone(), json!({ "dtype": "float32", "shape": [names.len()], "names": names }))
+    });
+    let pictures = features.pictures.iter().map(|picture| {
+        let (names, [width, height]) = (["height", "width", "channels"], picture.size);
+        (picture.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
+    });
+    numbers.chain(pictures).collect()
+}
+
+impl Dataset for LeRobot {
+    type Picture = Picture;
+
+    fn picture(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<Picture> {
+        Ok(Picture { file: self.png.rgb(rgba, size)?.to_vec(), about: OfPicture::new(rgba) })
     }
 
-    /// Whether the rows of a step are frames, whatever happened there.
-    fn is_due(&self, step: u64) -> bool {
-        step.is_multiple_of(self.every)
-    }
-
-    /// Takes what is new of an environment.
-    fn take(&mut self, k: usize, streams: &[Stream], packet: &Packet) -> io::Result<()> {
-        let Env { env, latest, .. } = &mut self.envs[k];
-        for (s, (stream, block)) in streams.iter().zip(&packet.blocks).enumerate() {
-            let row = stream.env_ids.iter().position(|of| *of == *env);
-            let Some(row) = row.filter(|row| block.used && block.fresh[*row]) else { continue };
-            let range = row * stream.width()..(row + 1) * stream.width();
-            let Some(size) = self.features.size_of(s) else {
-                let numbers = match &block.values {
-                    Values::U8(values) => values[range].iter().map(|x| f32::from(*x)).collect(),
-                    Values::I32(values) => values[range].iter().map(|x| *x as f32).collect(),
-                    Values::F32(values) => values[range].to_vec(),
-                    Values::F64(values) => values[range].iter().map(|x| *x as f32).collect(),
-                };
-                latest.numbers[s] = Some(numbers);
-                continue;
-            };
-            let rgba = block.values.bytes().get(range).unwrap_or_default();
-            let (file, about) = (self.png.rgb(rgba, size)?.to_vec(), OfPicture::new(rgba));
-            latest.pictures[s] = Some(Arc::new(Picture { file, about }));
-        }
-        Ok(())
-    }
-
-    /// What there is now, if there is something of everything; actions are filled in later.
-    fn now(&self, k: usize) -> Option<Frame> {
-        let latest = &self.envs[k].latest;
-        let numbers = self.features.numbers.iter().map(|feature| feature.values(&latest.numbers));
-        let pictures = self.features.pictures.iter().map(|(stream, ..)| latest.pictures.get(*stream)?.clone());
-        Some((numbers.collect::<Option<_>>()?, pictures.collect::<Option<_>>()?))
-    }
-
-    /// A row is due.
-    fn due(&mut self, k: usize, fresh: bool) -> io::Result<()> {
-        let pending = self.envs[k].pending.take();
-        if !fresh {
-            // It stands still: it has diverged.
-            return self.end(k);
-        }
-        if let Some((mut numbers, pictures)) = pending {
-            for (feature, values) in self.features.numbers.iter().zip(&mut numbers).filter(|(feature, _)| feature.later)
-            {
-                if let Some(action) = feature.values(&self.envs[k].latest.numbers) {
-                    *values = action;
-                }
-            }
-            self.add(k, &numbers, &pictures)?;
-        }
-        self.envs[k].pending = self.now(k);
-        Ok(())
-    }
-
-    /// Adds a frame to the episode of an environment, which begins with it if there is none.
-    fn add(&mut self, k: usize, numbers: &[Vec<f32>], pictures: &[Arc<Picture>]) -> io::Result<()> {
-        if self.envs[k].running.is_none() {
+    fn add(&mut self, env: usize, Frame { numbers, pictures }: &Frame<Picture>, _next: &Frame<Picture>) -> Written {
+        if self.running[env].is_none() {
             let episode = self.episodes.len();
             let file = self.folder.part().join(data_file(episode as u64));
-            let table = Table::new(self.features.columns());
+            let table = Table::new(columns(&self.features));
             let values = vec![Vec::new(); table.width()];
             self.episodes.push(Episode { file: file.clone(), ..Episode::default() });
-            self.envs[k].running = Some(Running { episode, table, file, rows: 0, frames: 0, values });
+            self.running[env] = Some(Running { episode, table, file, rows: 0, frames: 0, values });
         }
-        let Some(running) = &mut self.envs[k].running else { return Ok(()) };
+        let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
+        let Some(running) = &mut self.running[env] else { return Ok(()) };
         let mut leaves = running.values.iter_mut();
-        for values in numbers {
+        for values in &numbers {
             let Some(to) = leaves.next() else { break };
             values.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
         }
@@ -241,7 +203,7 @@ impl LeRobot {
         running.rows += 1;
         running.frames += 1;
         let all = numbers.len();
-        self.statistics.iter_mut().zip(numbers).for_each(|(statistics, values)| statistics.add(values));
+        self.statistics.iter_mut().zip(&numbers).for_each(|(statistics, values)| statistics.add(values));
         let of_pictures = self.statistics.iter_mut().skip(all).zip(pictures);
         of_pictures.for_each(|(statistics, picture)| statistics.add_picture(&picture.about));
         if running.rows >= ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= BYTES {
@@ -250,19 +212,46 @@ impl LeRobot {
         Ok(())
     }
 
-    /// Ends the episode of an environment: its file is whole.
-    fn end(&mut self, k: usize) -> io::Result<()> {
-        let Some(mut running) = self.envs[k].running.take() else { return Ok(()) };
+    /// The file of the episode is whole.
+    fn end(&mut self, env: usize) -> Written {
+        let Some(mut running) = self.running[env].take() else { return Ok(()) };
         running.write()?;
         let mut out = BufWriter::new(running.open()?);
         running.table.finish(&mut out, &[])?;
-        out.into_inner()?.sync_all()?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
         let index = running.table.places("index");
         let episode = &mut self.episodes[running.episode];
         (episode.frames, episode.index) = (running.frames, index);
         Ok(())
     }
 
+    fn finish(&mut self) -> Written<u64> {
+        if self.episodes.is_empty() {
+            return Err(Fault::NoFrame(episodes::NO_FRAME));
+        }
+        self.number_frames()?;
+        self.write_tasks()?;
+        self.write_episodes()?;
+        let mut out = self.file("meta/stats.json")?;
+        let of_all = self.features.names().zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
+        out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        // The last one: a folder with it is a dataset.
+        let info = format!("{:#}\n", self.info());
+        let mut out = self.file(INFO)?;
+        out.write_all(info.as_bytes())?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        let bytes = size_of(self.folder.part())?;
+        self.folder.commit()?;
+        Ok(bytes)
+    }
+
+    fn kept(&self) -> Option<PathBuf> {
+        Some(self.folder.part().into())
+    }
+}
+
+impl LeRobot {
     fn file(&self, name: &str) -> io::Result<BufWriter<File>> {
         let path = self.folder.part().join(name);
         path.parent().map_or(Ok(()), fs::create_dir_all)?;
@@ -270,7 +259,7 @@ impl LeRobot {
     }
 
     /// The only task, which is the index of its table, as pandas has it.
-    fn write_tasks(&self) -> io::Result<()> {
+    fn write_tasks(&self) -> Written {
         let index = "__index_level_0__";
         let column = |name: Option<&str>, field, pandas, numpy| json!({ "name": name, "field_name": field, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
         let about = json!({
@@ -288,10 +277,10 @@ impl LeRobot {
         let mut out = self.file("meta/tasks.parquet")?;
         table.write(&mut out, 1, &[0_i64.to_le_bytes().to_vec(), task])?;
         table.finish(&mut out, &[("pandas", &about.to_string())])?;
-        out.into_inner()?.sync_all()
+        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?)
     }
 
-    fn write_episodes(&self) -> io::Result<()> {
+    fn write_episodes(&self) -> Written {
         let numbers = [
             "episode_index",
             "length",
@@ -321,12 +310,12 @@ impl LeRobot {
         let mut out = self.file("meta/episodes/chunk-000/file-000.parquet")?;
         table.write(&mut out, self.episodes.len(), &values)?;
         table.finish(&mut out, &[])?;
-        out.into_inner()?.sync_all()
+        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?)
     }
 
     fn info(&self) -> Value {
         let (episodes, frames) = (self.episodes.len(), self.episodes.iter().map(|episode| episode.frames).sum::<u64>());
-        let mut features = self.features.described();
+        let mut features = described(&self.features);
         for (name, kind) in COMMON {
             features.insert(name.into(), json!({ "dtype": kind, "shape": [1], "names": null }));
         }
@@ -375,7 +364,7 @@ impl Running {
         OpenOptions::new().create(true).append(true).open(&self.file)
     }
 
-    fn write(&mut self) -> io::Result<()> {
+    fn write(&mut self) -> Written {
         if self.rows > 0 {
             let mut out = BufWriter::new(self.open()?);
             self.table.write(&mut out, self.rows, &self.values)?;
@@ -387,69 +376,6 @@ impl Running {
     }
 }
 
-impl Sink for LeRobot {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> io::Result<()> {
-        for k in 0..self.envs.len() {
-            let env = self.envs[k].env;
-            let happened = packet.event.as_ref().filter(|event| event.env_ids.contains(&env)).map(|event| event.kind);
-            if happened == Some(EventKind::Reset) {
-                self.envs[k].pending = None;
-                self.end(k)?;
-                let latest = &mut self.envs[k].latest;
-                latest.numbers.fill(None);
-                latest.pictures.fill(None);
-            }
-            self.take(k, streams, packet)?;
-            let base = self.features.base;
-            let Some(block) = packet.blocks.get(base).filter(|block| block.used) else { continue };
-            let row = streams[base].env_ids.iter().position(|of| *of == env);
-            match (&packet.event, happened) {
-                (None, _) => self.due(k, row.is_some_and(|row| block.fresh[row]))?,
-                // What somebody has written is where the next action begins, where a row was due at all.
-                (_, Some(EventKind::Written)) if self.envs[k].pending.is_some() && self.is_due(packet.step) => {
-                    self.envs[k].pending = self.now(k);
-                }
-                (_, Some(EventKind::Reset)) if self.is_due(packet.step) => self.envs[k].pending = self.now(k),
-                _ => {}
-            }
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        // Nobody can read it before the end.
-        Ok(())
-    }
-
-    fn finish(&mut self, _streams: &[Stream]) -> io::Result<u64> {
-        (0..self.envs.len()).try_for_each(|k| self.end(k))?;
-        if self.episodes.is_empty() {
-            return Err(io::Error::other(
-                "there is no frame: every one needs all that is measured, and the action after it",
-            ));
-        }
-        self.number_frames()?;
-        self.write_tasks()?;
-        self.write_episodes()?;
-        let mut out = self.file("meta/stats.json")?;
-        let of_all = self.features.names().zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
-        out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
-        out.into_inner()?.sync_all()?;
-        // The last one: a folder with it is a dataset.
-        let info = format!("{:#}\n", self.info());
-        let mut out = self.file(INFO)?;
-        out.write_all(info.as_bytes())?;
-        out.into_inner()?.sync_all()?;
-        let bytes = size_of(self.folder.part())?;
-        self.folder.commit()?;
-        Ok(bytes)
-    }
-
-    fn kept(&self) -> Option<PathBuf> {
-        Some(self.folder.part().into())
-    }
-}
-
 /// All files of a folder \[bytes\].
 fn size_of(folder: &Path) -> io::Result<u64> {
     let mut bytes = 0;
@@ -458,11 +384,4 @@ fn size_of(folder: &Path) -> io::Result<u64> {
         bytes += if entry.file_type()?.is_dir() { size_of(&entry.path())? } else { entry.metadata()?.len() };
     }
     Ok(bytes)
-}
-
-impl Feature {
-    /// What a column of it holds.
-    fn kind(&self) -> Kind {
-        Kind::Float32(self.names.len())
-    }
 }

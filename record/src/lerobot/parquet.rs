@@ -1,7 +1,8 @@
 //! Parquet files, as far as LeRobot datasets need them: flat columns, lists of one length, pictures; no compression, no missing
 //! values. The layout is that of the Apache Parquet format, its descriptions are in Thrift's compact protocol.
 
-use std::io::{self, Write};
+use crate::writer::{Fault, Written};
+use std::io::Write;
 
 /// What a column holds in each row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +74,7 @@ impl Table {
 
     /// Writes some rows: the values of each leaf, one after the other, lowest byte first, texts and files behind their lengths
     /// ([`put_bytes`]).
-    pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> io::Result<()> {
+    pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> Written {
         if self.at == 0 {
             out.write_all(MAGIC)?;
             self.at = MAGIC.len() as u64;
@@ -83,19 +84,9 @@ impl Table {
             let count = rows * leaf.list.unwrap_or(1);
             let levels = leaf.list.map_or_else(Vec::new, |width| levels(rows, width));
             let size = levels.len() + values.len();
-            let mut page = Thrift::default();
-            page.int(1, 5, 0); // a page of data
-            page.int(2, 5, number(size)?);
-            page.int(3, 5, number(size)?);
-            page.open(5);
-            page.int(1, 5, number(count)?);
-            page.int(2, 5, 0); // PLAIN
-            page.int(3, 5, 3); // levels: RLE
-            page.int(4, 5, 3);
-            page.close();
-            page.close();
-            [&page.bytes, &levels, values].into_iter().try_for_each(|bytes| out.write_all(bytes))?;
-            let (head, size) = (page.bytes.len() as u64, size as u64);
+            let page = page_head(size, count)?;
+            [&page, &levels, values].into_iter().try_for_each(|bytes| out.write_all(bytes))?;
+            let (head, size) = (page.len() as u64, size as u64);
             pages.push((self.at, head + size, self.at + head + levels.len() as u64));
             self.at += head + size;
         }
@@ -112,7 +103,7 @@ impl Table {
     }
 
     /// Writes what is where, which ends the file. `about` is told to readers that know the keys.
-    pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> io::Result<()> {
+    pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> Written {
         if self.at == 0 {
             out.write_all(MAGIC)?;
         }
@@ -157,8 +148,9 @@ impl Table {
         file.text(6, "kinetoscope");
         file.close();
         out.write_all(&file.bytes)?;
-        out.write_all(&u32::try_from(file.bytes.len()).map_err(io::Error::other)?.to_le_bytes())?;
-        out.write_all(MAGIC)
+        // Readers take it for a number with a sign.
+        out.write_all(&number::<i32>(file.bytes.len() as u64)?.to_le_bytes())?;
+        Ok(out.write_all(MAGIC)?)
     }
 
     fn schema(&self, file: &mut Thrift) {
@@ -201,15 +193,34 @@ impl Table {
 }
 
 /// A text or a file as a value.
-pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
-    to.extend_from_slice(&u32::try_from(bytes.len()).map_err(io::Error::other)?.to_le_bytes());
+pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> Written {
+    to.extend_from_slice(&number::<i32>(bytes.len() as u64)?.to_le_bytes());
     to.extend_from_slice(bytes);
     Ok(())
 }
 
-fn number<N: TryInto<i64>>(number: N) -> io::Result<i64> {
-    // Sizes of pages have 31 bits; a page is some megabytes.
-    number.try_into().map_err(|_| io::Error::other("a number is too large for Parquet"))
+/// A size or a count as the format has it: numbers with signs, of 32 bits in pages, of 64 elsewhere.
+fn number<N: TryFrom<u64>>(number: u64) -> Written<N> {
+    let too_large = "bytes or rows are more than a page or a table of a Parquet file may have";
+    let error = |_| Fault::limit(format!("{number} {too_large}; make pictures smaller, or episodes shorter"));
+    N::try_from(number).map_err(error)
+}
+
+/// What a page begins with: of so many bytes, its levels counted, and so many values.
+fn page_head(size: usize, count: usize) -> Written<Vec<u8>> {
+    let (size, count) = (number::<i32>(size as u64)?, number::<i32>(count as u64)?);
+    let mut page = Thrift::default();
+    page.int(1, 5, 0); // a page of data
+    page.int(2, 5, size.into());
+    page.int(3, 5, size.into());
+    page.open(5);
+    page.int(1, 5, count.into());
+    page.int(2, 5, 0); // PLAIN
+    page.int(3, 5, 3); // levels: RLE
+    page.int(4, 5, 3);
+    page.close();
+    page.close();
+    Ok(page.bytes)
 }
 
 /// Levels of lists that all have one length: where rows begin, and that nothing is missing; runs of one value each.
@@ -309,8 +320,21 @@ impl Thrift {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+
+    /// Root cause: sizes were made numbers of 64 bits, and written where readers take 32.
+    #[test]
+    fn a_page_that_is_too_large_for_its_head_is_an_error() {
+        let most = i32::MAX as usize;
+        // Field 2 of 32 bits, zigzag: twice the size, seven bits in a byte, behind field 1, which is 0.
+        assert_eq!(page_head(most, 1).unwrap()[2..8], [0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f]);
+        for (size, count) in [(most + 1, 1), (1, most + 1)] {
+            let error = page_head(size, count).unwrap_err();
+            assert!(matches!(error, Fault::Limit(_)) && error.to_string().contains("2147483648"), "{error}");
+        }
+    }
 
     #[test]
     fn numbers_are_as_thrift_has_them() {

@@ -1,4 +1,7 @@
 //! Least, largest, mean and deviation of what is in a dataset: learning scales by them.
+//!
+//! They are those of numbers that are finite: one that is not would make them useless for all the others. Where none is, they are
+//! `null`, which JSON has instead of NaN. The frames keep what was measured.
 
 use serde_json::{Value, json};
 
@@ -66,7 +69,9 @@ impl Statistics {
 
     pub(super) fn add(&mut self, values: &[f32]) {
         self.frames += 1;
-        self.of.iter_mut().zip(values).for_each(|(moments, value)| moments.join(&Moments::one((*value).into())));
+        for (moments, value) in self.of.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+            moments.join(&Moments::one((*value).into()));
+        }
     }
 
     pub(super) fn add_picture(&mut self, of: &OfPicture) {
@@ -77,15 +82,39 @@ impl Statistics {
     /// As `meta/stats.json` has it; pictures have shape (3, 1, 1).
     pub(super) fn told(&self) -> Value {
         let of = |one: fn(&Moments) -> f64| -> Value {
-            let values = self.of.iter().map(one);
+            let values = self.of.iter().map(|moments| if moments.count > 0.0 { one(moments) } else { f64::NAN });
             if self.picture { values.map(|x| json!([[x]])).collect() } else { values.map(|x| json!(x)).collect() }
         };
         json!({
             "min": of(|m| m.ends[0]),
             "max": of(|m| m.ends[1]),
             "mean": of(|m| m.mean),
-            "std": of(|m| (m.squares / m.count.max(1.0)).sqrt()),
+            "std": of(|m| (m.squares / m.count).sqrt()),
             "count": [self.frames],
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Root cause: one number that was not finite made mean and deviation of all frames `null`.
+    #[test]
+    fn what_is_not_finite_is_in_no_statistics() {
+        let mut all = Statistics::new(3);
+        for row in [[1.0, f32::NAN, 5.0], [f32::INFINITY, f32::NAN, 7.0], [3.0, f32::NEG_INFINITY, 9.0]] {
+            all.add(&row);
+        }
+        // By hand: of 1 and 3; of nothing; of 5, 7 and 9, whose variance is 8 / 3.
+        let told = all.told();
+        assert_eq!(told["min"], json!([1.0, null, 5.0]));
+        assert_eq!(told["max"], json!([3.0, null, 9.0]));
+        assert_eq!(told["mean"], json!([2.0, null, 7.0]));
+        assert_eq!(told["count"], json!([3]));
+        let deviation = |k: usize| told["std"][k].as_f64().unwrap_or(f64::NAN);
+        // A few roundings of numbers below 10.
+        assert!((deviation(0) - 1.0).abs() < 1e-14 && (deviation(2) - (8.0_f64 / 3.0).sqrt()).abs() < 1e-14, "{told}");
+        assert!(told["std"][1].is_null(), "{told}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::error::{RecordError, Result};
-use crate::ros::{MessageType, Step, Value};
+use crate::ros::{MessageType, Step};
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError};
@@ -84,11 +84,6 @@ fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()>
     Ok(())
 }
 
-fn unreadable(path: &Path, channel: &Channel) -> RecordError {
-    let (topic, kind) = (&channel.topic, &channel.kind);
-    RecordError::Malformed { path: path.into(), what: format!("a message of {topic} is no {kind}") }
-}
-
 /// What there is, and what of it cannot be read.
 pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     /// A topic on its way; fields are kept in the order in which they were seen.
@@ -98,28 +93,33 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         count: u64,
         fields: Vec<String>,
         known: BTreeSet<String>,
-        varies: bool,
-        /// Which of its messages cannot be read.
-        unread: Option<u64>,
+        /// Whether fields of the messages to come are to be looked for.
+        looks: bool,
+        /// How many of its messages cannot be read, and which is the first.
+        unread: u64,
+        first_unread: u64,
     }
     let mut all: BTreeMap<String, Found> = BTreeMap::new();
     walk(path, |told| {
         let Told::Message { channel, data, .. } = told else { return Ok(()) };
         if !all.contains_key(&channel.topic) {
-            all.insert(channel.topic.clone(), Found { kind: channel.kind.clone(), ..Found::default() });
+            all.insert(channel.topic.clone(), Found { kind: channel.kind.clone(), looks: true, ..Found::default() });
         }
         let Some(found) = all.get_mut(&channel.topic) else { return Ok(()) };
         found.count += 1;
-        if found.unread.is_some() || (found.count > 1 && !found.varies) {
-            return Ok(());
-        }
         let Some(reads) = &channel.reads else { return Ok(()) };
         let Some(value) = reads.read(data) else {
             // The others can be read all the same.
-            found.unread = Some(found.count);
+            if found.unread == 0 {
+                found.first_unread = found.count;
+            }
+            found.unread += 1;
             return Ok(());
         };
-        found.varies = value.varies();
+        if !found.looks {
+            return Ok(());
+        }
+        found.looks = value.varies();
         let mut fields = Vec::new();
         value.fields("", &mut fields);
         let known = &mut found.known;
@@ -127,11 +127,14 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         Ok(())
     })?;
     let mut warnings = Vec::new();
-    let mut topic = |(name, Found { kind, count, fields, unread, .. })| {
-        if let Some(number) = unread {
-            warnings.push(format!("{name} is left out: its message {number} of {count} is no {kind}"));
+    let mut topic = |(name, Found { kind, count, fields, unread, first_unread, .. })| {
+        if unread == count {
+            warnings.push(format!("{name} is left out: none of its {count} messages is a {kind}"));
+        } else if unread > 0 {
+            warnings.push(format!(
+                "{name} lacks {unread} of its {count} messages, which are no {kind}; the first is message {first_unread}"
+            ));
         }
-        let fields = if unread.is_some() { Vec::new() } else { fields };
         RecordedTopic { name, kind, count, fields }
     };
     let topics = all.into_iter().map(&mut topic).collect();
@@ -150,7 +153,8 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
         let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else {
             return Ok(());
         };
-        let value: Value = reads.read(data).ok_or_else(|| unreadable(path, channel))?;
+        // `topics` has told of those that cannot be read.
+        let Some(value) = reads.read(data) else { return Ok(()) };
         for (place, steps) in of_topic {
             if let Some(number) = value.number(steps) {
                 samples[*place].times.push(time as f64 / 1e9);

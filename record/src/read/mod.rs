@@ -108,7 +108,8 @@ impl Recording {
         &self.topics
     }
 
-    /// What of it cannot be read, and why: topics with a message that is not what its type says. They have no numbers.
+    /// What of it cannot be read, and why: messages that are not what their type says. Their topics lack them; those that have no
+    /// others have no numbers.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -158,7 +159,7 @@ impl Recording {
     }
 
     /// Numbers over time, one series for each that is wanted, in the order of the file. A message without that number, such as one
-    /// of transforms of other frames, has no sample.
+    /// of transforms of other frames, has no sample, nor has one that cannot be read ([`warnings`](Self::warnings)).
     ///
     /// # Errors
     /// A topic or a field that is not known, with the nearest ones; a file that is not what it was when it was opened.

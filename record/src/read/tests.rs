@@ -148,36 +148,53 @@ fn what_is_no_whole_recording_is_refused() {
     }
 }
 
+/// Root cause: of topics whose messages all have the same fields only the first message was looked at when a recording was opened,
+/// so that a later one made all reading fail; and of others one message cost all.
 #[test]
-fn a_message_that_cannot_be_read_costs_its_topic_and_no_other() {
+fn messages_that_cannot_be_read_are_told_and_cost_no_others() {
     let folder = tempfile::tempdir().unwrap();
     let (path, other) = (folder.path().join("run.mcap"), folder.path().join("other.mcap"));
     recorded(&path, None);
-    // As somebody else might write it: a topic whose second message is cut.
+    // As somebody else might write it: two topics whose second and fourth messages are cut, and one that has no others.
     let bytes = std::fs::read(&path).unwrap();
     let mut writer = ::mcap::Writer::new(std::fs::File::create(&other).unwrap()).unwrap();
-    let mut cut = 0;
+    let mut seen = std::collections::BTreeMap::new();
     for message in ::mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         writer.write(&message).unwrap();
-        if message.channel.topic == "/env_0/cart/tf" || message.channel.topic == "/env_0/tf" {
-            let channel = ::mcap::Channel { id: 99, topic: "/env_0/torn".into(), ..(*message.channel).clone() };
-            let keep = if cut == 1 { 10 } else { message.data.len() };
-            let data = message.data[..keep].to_vec().into();
-            writer.write(&::mcap::Message { channel: channel.into(), data, ..message.clone() }).unwrap();
-            cut += 1;
+        for (id, of, topic, cuts) in [
+            (97, "/env_0/tf", "/env_0/torn", &[2, 4][..]),
+            (98, "/env_0/cart/joint_states", "/env_0/torn/joint_states", &[2, 4]),
+            (99, "/env_0/tf", "/env_0/none", &[][..]),
+        ] {
+            if message.channel.topic == of {
+                let number = seen.entry(topic).or_insert(0);
+                *number += 1;
+                let channel = ::mcap::Channel { id, topic: topic.into(), ..(*message.channel).clone() };
+                let cut = cuts.is_empty() || cuts.contains(number);
+                let data = message.data[..if cut { 10 } else { message.data.len() }].to_vec().into();
+                writer.write(&::mcap::Message { channel: channel.into(), data, ..message.clone() }).unwrap();
+            }
         }
     }
     writer.finish().unwrap();
-    assert!(cut > 2, "{cut}");
+    let all = u64::from(STEPS) + 1;
+    assert!(seen.len() == 3 && seen.values().all(|count| *count == all), "{seen:?}");
     assert!(Recording::open(&path).unwrap().warnings().is_empty());
     let recording = Recording::open(&other).unwrap();
-    let [warning] = recording.warnings() else { panic!("{:?}", recording.warnings()) };
-    assert!(
-        warning.contains("/env_0/torn") && warning.contains("message 2") && warning.contains("TFMessage"),
-        "{warning}"
-    );
-    assert!(recording.topic("torn", None).unwrap().fields.is_empty());
-    let wanted = [Wanted::new("/env_0/cart/joint_states", "position[x]")];
-    assert_eq!(recording.samples(&wanted).unwrap(), Recording::open(&path).unwrap().samples(&wanted).unwrap());
+    let [none, torn, joints] = recording.warnings() else { panic!("{:?}", recording.warnings()) };
+    assert!(none.contains("/env_0/none is left out") && none.contains("TFMessage"), "{none}");
+    assert!(torn.contains("/env_0/torn lacks 2 of its 301 messages") && torn.contains("message 2"), "{torn}");
+    assert!(joints.contains("/env_0/torn/joint_states lacks 2 of its 301 messages"), "{joints}");
+    assert!(recording.topic("none", None).unwrap().fields.is_empty());
+    let x = |topic: &str| Wanted::new(topic, "position[x]");
+    let [whole, lacking] =
+        &recording.samples(&[x("/env_0/cart/joint_states"), x("/env_0/torn/joint_states")]).unwrap()[..]
+    else {
+        panic!("two series")
+    };
+    let own = Recording::open(&path).unwrap().samples(&[x("/env_0/cart/joint_states")]).unwrap();
+    assert_eq!(*whole, own[0]);
+    let without = |all: &[f64]| all.iter().enumerate().filter(|(k, _)| ![1, 3].contains(k)).map(|(_, x)| *x).collect();
+    assert_eq!(*lacking, Samples { times: without(&whole.times), values: without(&whole.values) });
 }

@@ -3,6 +3,7 @@ use crate::file::tests::FullDisk;
 use crate::mcap_file::recover;
 use crate::npy;
 use crate::packet::Values;
+use crate::writer::Written;
 use crate::zip;
 use scene::{Pose, SceneState};
 use sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
@@ -32,7 +33,7 @@ struct Slow {
 }
 
 impl Sink for Slow {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> std::io::Result<()> {
+    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         std::thread::sleep(self.pause);
         assert_eq!(streams.len(), 1);
         let Values::F64(values) = &packet.blocks[0].values else { panic!("states are f64") };
@@ -40,11 +41,11 @@ impl Sink for Slow {
         Ok(())
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> Written {
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> std::io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         Ok(0)
     }
 
@@ -228,17 +229,17 @@ fn only_what_is_finished_has_its_name() {
 struct Panics(u32);
 
 impl Sink for Panics {
-    fn write(&mut self, _streams: &[Stream], _packet: &Packet) -> std::io::Result<()> {
+    fn write(&mut self, _streams: &[Stream], _packet: &Packet) -> Written {
         self.0 += 1;
         assert!(self.0 < 3, "a test of panics");
         Ok(())
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> Written {
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> std::io::Result<u64> {
+    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         Ok(0)
     }
 
@@ -493,4 +494,45 @@ fn damage_in_the_middle_is_told_and_the_rest_is_kept() {
     assert!(error.contains("nothing of it can be read"), "{error}");
     let left: Vec<PathBuf> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(left, [part]);
+}
+
+/// Resets the first environment at some steps; added before a recorder, it is told of every step first.
+#[derive(Debug)]
+struct Resets(&'static [u64]);
+
+impl Observer for Resets {
+    fn due_in(&self, _sim: &SimulationManager) -> u64 {
+        1
+    }
+
+    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
+        if matches!(moment, Moment::Stepped) && self.0.contains(&sim.steps()) {
+            sim.reset(Some(&[EnvId(0)])).unwrap();
+        }
+    }
+}
+
+/// Root cause: what sensors had measured was counted again in all environments when something happened to one, so that a
+/// measurement that the recorder had not been told of yet was lost in the others.
+#[test]
+fn what_one_environment_measures_is_not_lost_by_the_reset_of_another() {
+    const STEPS: u32 = 20;
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |resets: &'static [u64]| {
+        let path = folder.path().join(format!("{}.npz", resets.len()));
+        let mut sim = falling(2);
+        sim.add_observer(Resets(resets));
+        sim.add_sensor("imu", ImuCfg::on("ball/ball")).unwrap();
+        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+        sim.update(STEPS);
+        sim.finish_recording(recorder).unwrap();
+        // Rows of two environments: those of the second, each once.
+        let heights = array(&path, "imu/pos_w").chunks(6).map(|row| row[5]).collect::<Vec<f64>>();
+        let mut heights: Vec<f64> = heights;
+        heights.dedup();
+        heights
+    };
+    let undisturbed = rows(&[]);
+    assert_eq!(undisturbed.len(), STEPS as usize);
+    assert_eq!(rows(&[7, 13]), undisturbed);
 }

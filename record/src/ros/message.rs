@@ -1,6 +1,7 @@
 //! The messages, field by field.
 
 use super::cdr::Cdr;
+use crate::stream::Distortion;
 
 /// When and where something was measured.
 #[derive(Clone, Copy, Debug)]
@@ -39,9 +40,9 @@ pub(crate) fn joint_state(to: &mut Cdr, stamp: Stamp<'_>, names: &[String], rows
     header(to, stamp);
     to.count(names.len());
     names.iter().for_each(|name| to.text(name));
-    for row in rows.chunks(names.len().max(1)) {
-        to.list(row);
-    }
+    // Three lists, also of nothing.
+    let count = names.len();
+    (0..3).for_each(|k| to.list(rows.get(k * count..(k + 1) * count).unwrap_or(&[])));
 }
 
 /// `tf2_msgs/msg/TFMessage`: poses `[x, y, z, qw, qx, qy, qz]` of `frames`, whose names get `prefix`.
@@ -79,13 +80,19 @@ pub(crate) fn image(
     to.blob_of(height * bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo` of a lens without distortion; `k` are the nine numbers of its matrix.
-pub(crate) fn camera_info(to: &mut Cdr, stamp: Stamp<'_>, (height, width): (usize, usize), k: &[f64]) {
+/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of its matrix.
+pub(crate) fn camera_info(
+    to: &mut Cdr,
+    stamp: Stamp<'_>,
+    (height, width): (usize, usize),
+    k: &[f64],
+    distortion: &Distortion,
+) {
     header(to, stamp);
     to.count(height);
     to.count(width);
-    to.text("plumb_bob");
-    to.list(&[0.0; 5]);
+    to.text(&distortion.model);
+    to.list(&distortion.coefficients);
     to.f64s(k);
     to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     for row in k.chunks_exact(3) {
@@ -154,4 +161,27 @@ pub(crate) fn log(to: &mut Cdr, nanos: u64, name: &str, message: &str) {
     to.text("");
     to.text("");
     to.u32(0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Root cause: lists were written as often as there were rows of as many numbers as joints, which is never without joints; the
+    /// message ended before its lists.
+    #[test]
+    fn joints_of_which_there_are_none_have_three_lists_of_nothing() {
+        let of = |names: &[String], rows: &[f64]| {
+            let mut cdr = Cdr::default();
+            cdr.begin();
+            joint_state(&mut cdr, Stamp { nanos: 0, frame: "" }, names, rows);
+            cdr.bytes().to_vec()
+        };
+        // Of the encoding: four bytes before it, eight of the time, a text of nothing with its zero, filled up to a multiple of
+        // four, and four counts.
+        assert_eq!(of(&[], &[]), [&[0, 1, 0, 0][..], &[0; 8], &[1, 0, 0, 0, 0, 0, 0, 0], &[0; 16]].concat());
+        // The control: of one joint, three numbers.
+        let one = of(&["j".into()], &[1.0, 2.0, 3.0]);
+        assert!(one.ends_with(&3.0_f64.to_le_bytes()));
+    }
 }

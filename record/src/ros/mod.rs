@@ -12,5 +12,5 @@ pub(crate) use cdr::Cdr;
 pub(crate) use message::{
     Stamp, camera_info, compressed_image, image, imu, joint_state, log, numbers, points, transforms,
 };
-pub(crate) use read::{MessageType, Step, Value};
+pub(crate) use read::{MessageType, Step};
 pub(crate) use schema::Schema;

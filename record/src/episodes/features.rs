@@ -1,36 +1,71 @@
-//! What the streams of a recording are called in a LeRobot dataset.
+//! What the streams of a recording are in frames: features, whose names are the dataset's.
 
-use super::COMMON;
-use super::parquet;
 use crate::error::{RecordError, Result};
+use crate::format::Format;
 use crate::stream::{Kind, Stream};
-use serde_json::{Map, Value, json};
+use std::ops::Range;
 use std::path::Path;
 
 /// Everything that a frame has, in the order of its columns.
-pub(super) struct Features {
-    pub(super) numbers: Vec<Feature>,
-    /// Stream, name, width and height.
-    pub(super) pictures: Vec<(usize, String, [usize; 2])>,
+pub(crate) struct Features {
+    pub(crate) numbers: Vec<Feature>,
+    pub(crate) pictures: Vec<Seen>,
     /// The stream whose rows are frames.
-    pub(super) base: usize,
+    pub(crate) base: usize,
 }
 
 /// Numbers of a frame.
-pub(super) struct Feature {
-    name: String,
-    /// What each of them is.
-    pub(super) names: Vec<String>,
+pub(crate) struct Feature {
+    pub(crate) role: Role,
+    /// What it is called in the dataset.
+    pub(crate) name: String,
+    /// What each of the numbers is.
+    pub(crate) names: Vec<String>,
     /// Streams, and which numbers of their rows.
-    parts: Vec<(usize, std::ops::Range<usize>)>,
-    /// Whether it is an action: that of a frame comes with the row after it.
-    pub(super) later: bool,
+    parts: Vec<(usize, Range<usize>)>,
 }
 
-const STATE: [(&str, bool); 3] =
-    [("observation.state", false), ("observation.velocity", false), ("observation.effort", false)];
-const TARGETS: [(&str, bool); 3] = [("action", true), ("target.velocity", true), ("target.effort", true)];
-const CONTROLS: [(&str, bool); 3] = [STATE[0], STATE[1], TARGETS[0]];
+/// Pictures of frames.
+pub(crate) struct Seen {
+    pub(crate) stream: usize,
+    /// What they are called in the dataset.
+    pub(crate) name: String,
+    /// Width and height.
+    pub(crate) size: [usize; 2],
+}
+
+/// What a feature is of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Positions of joints.
+    Positions,
+    Velocities,
+    Efforts,
+    /// What joints are told: positions, or controls.
+    Action,
+    TargetVelocities,
+    TargetEfforts,
+    /// Poses of objects.
+    Objects,
+    /// A channel of a sensor.
+    Sensor {
+        stream: String,
+        channel: String,
+    },
+    /// Colour of a camera.
+    Picture(String),
+}
+
+const STATE: [Role; 3] = [Role::Positions, Role::Velocities, Role::Efforts];
+const TARGETS: [Role; 3] = [Role::Action, Role::TargetVelocities, Role::TargetEfforts];
+const CONTROLS: [Role; 3] = [Role::Positions, Role::Velocities, Role::Action];
+
+impl Role {
+    /// Whether that of a frame comes with the row after it.
+    pub(crate) fn is_action(&self) -> bool {
+        matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
+    }
+}
 
 /// Whether a dataset has a place for a stream.
 pub(crate) fn holds(stream: &Stream) -> bool {
@@ -52,25 +87,25 @@ fn is_mjcf(stream: &Stream) -> bool {
         && stream.parts.iter().map(|part| &*part.name).eq(["positions", "velocities", "controls"])
 }
 
-/// Names of features have no strokes.
-fn dotted(name: &str) -> String {
-    name.replace('/', ".")
-}
-
 impl Features {
-    pub(super) fn of(path: &Path, streams: &[Stream]) -> Result<Self> {
+    /// `name` gives the names of roles in the dataset.
+    ///
+    /// # Errors
+    /// There is nothing whose rows could be frames, or two things have the same name.
+    pub(crate) fn of(path: &Path, format: Format, streams: &[Stream], name: fn(&Role) -> String) -> Result<Self> {
         let mut all = Self { numbers: Vec::new(), pictures: Vec::new(), base: 0 };
         let mut base = None;
         for (s, stream) in streams.iter().enumerate() {
             let uid = stream.name.rsplit_once('/').map_or(stream.name.as_str(), |(uid, _)| uid);
-            let roles: Option<[(&str, bool); 3]> = match &stream.kind {
+            let roles: Option<[Role; 3]> = match &stream.kind {
                 Kind::Joints { .. } if stream.name.ends_with("/targets") => Some(TARGETS),
                 Kind::Joints { .. } => Some(STATE),
                 _ if is_mjcf(stream) => Some(CONTROLS),
                 _ => None,
             };
             if let Kind::Picture { camera, height, width, .. } = &stream.kind {
-                all.pictures.push((s, format!("observation.images.{}", dotted(camera)), [*width, *height]));
+                let name = name(&Role::Picture(camera.clone()));
+                all.pictures.push(Seen { stream: s, name, size: [*width, *height] });
                 continue;
             }
             if roles.is_some() || is_object(stream) {
@@ -87,18 +122,18 @@ impl Features {
                         .into(),
                     _ => (0..part.width()).map(|number| format!("{}/{}[{number}]", stream.name, part.name)).collect(),
                 };
-                let (feature, later) = match roles {
-                    Some(roles) => (roles[k].0.to_string(), roles[k].1),
-                    None if is_object(stream) => ("observation.environment_state".to_string(), false),
-                    None => (format!("sensors.{}.{}", dotted(&stream.name), dotted(&part.name)), false),
+                let role = match &roles {
+                    Some(roles) => roles[k].clone(),
+                    None if is_object(stream) => Role::Objects,
+                    None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
-                all.append(feature, later, names, (s, range));
+                all.append(role, name, names, (s, range));
             }
         }
         all.numbers.retain(|feature| !feature.names.is_empty());
         all.base = base.ok_or_else(|| RecordError::NoPlace {
             path: path.into(),
-            format: crate::Format::LeRobot,
+            format,
             topic: "sensors alone: frames are rows of joints or objects".into(),
         })?;
         let mut names: Vec<&str> = all.names().collect();
@@ -110,50 +145,30 @@ impl Features {
     }
 
     /// Joints of several robots are one feature.
-    fn append(&mut self, name: String, later: bool, names: Vec<String>, part: (usize, std::ops::Range<usize>)) {
-        match self.numbers.iter_mut().find(|feature| feature.name == name && !name.starts_with("sensors.")) {
+    fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: (usize, Range<usize>)) {
+        let joins = !matches!(role, Role::Sensor { .. });
+        match self.numbers.iter_mut().find(|feature| joins && feature.role == role) {
             Some(feature) => {
                 feature.names.extend(names);
                 feature.parts.push(part);
             }
-            None => self.numbers.push(Feature { name, names, parts: vec![part], later }),
+            None => self.numbers.push(Feature { name: name(&role), role, names, parts: vec![part] }),
         }
     }
 
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.numbers.iter().map(|feature| &*feature.name).chain(self.pictures.iter().map(|(_, name, _)| &**name))
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.numbers.iter().map(|feature| &*feature.name).chain(self.pictures.iter().map(|picture| &*picture.name))
     }
 
     /// Width and height of the pictures of a stream, if it has any.
-    pub(super) fn size_of(&self, stream: usize) -> Option<[usize; 2]> {
-        self.pictures.iter().find(|(of, ..)| *of == stream).map(|(.., size)| *size)
-    }
-
-    pub(super) fn columns(&self) -> Vec<(String, parquet::Kind)> {
-        let numbers = self.numbers.iter().map(|feature| (feature.name.clone(), feature.kind()));
-        let pictures = self.pictures.iter().map(|(_, name, _)| (name.clone(), parquet::Kind::Picture));
-        let common = COMMON.iter().map(|(name, kind)| {
-            (name.to_string(), if *kind == "int64" { parquet::Kind::Int64 } else { parquet::Kind::Float32(1) })
-        });
-        numbers.chain(pictures).chain(common).collect()
-    }
-
-    /// As `meta/info.json` has them.
-    pub(super) fn described(&self) -> Map<String, Value> {
-        let numbers = self.numbers.iter().map(|Feature { name, names, .. }| {
-            (name.clone(), json!({ "dtype": "float32", "shape": [names.len()], "names": names }))
-        });
-        let pictures = self.pictures.iter().map(|(_, name, [width, height])| {
-            let names = ["height", "width", "channels"];
-            (name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
-        });
-        numbers.chain(pictures).collect()
+    pub(crate) fn size_of(&self, stream: usize) -> Option<[usize; 2]> {
+        self.pictures.iter().find(|picture| picture.stream == stream).map(|picture| picture.size)
     }
 }
 
 impl Feature {
     /// Its numbers among the rows of all streams, if they are all there.
-    pub(super) fn values(&self, rows: &[Option<Vec<f32>>]) -> Option<Vec<f32>> {
+    pub(crate) fn values(&self, rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
         let mut values = Vec::with_capacity(self.names.len());
         for (stream, range) in &self.parts {
             values.extend_from_slice(rows.get(*stream)?.as_ref()?.get(range.clone())?);

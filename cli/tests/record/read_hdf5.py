@@ -1,0 +1,49 @@
+"""Says as JSON what is in an HDF5 file as robomimic has them, read by h5py."""
+
+import json
+import sys
+
+import h5py
+import numpy as np
+from told import tell
+
+told = {"episodes": []}
+# As robomimic opens it.
+with h5py.File(sys.argv[1], "r", swmr=True, libver="latest") as file:
+    assert list(file) == ["data"]
+    data = file["data"]
+    about = json.loads(data.attrs["env_args"])
+    assert set(about) == {"env_name", "env_type", "type", "env_kwargs"} and about["env_type"] == about["type"] == 2
+    columns = about["env_kwargs"]["columns"]
+    # Its order of episodes.
+    names = sorted(data, key=lambda name: int(name[5:]))
+    assert names == [f"demo_{k}" for k in range(len(names))]
+    for name in names:
+        demo = data[name]
+        frames = int(demo.attrs["num_samples"])
+        low, images = {}, {}
+
+        def visit(path, dataset):
+            if not isinstance(dataset, h5py.Dataset):
+                return
+            values = dataset[()]
+            assert len(values) == frames, path
+            if path.endswith("_image"):
+                assert dataset.dtype == np.uint8 and values.ndim == 4 and values.shape[3] == 3, path
+                # One picture is read without the others.
+                assert dataset.chunks == (1, *values.shape[1:]) and dataset.compression == "gzip", path
+                images[path] = [picture.tobytes().hex() for picture in values]
+            elif path == "dones":
+                assert values.shape == (frames,)
+                low[path] = values.tolist()
+            else:
+                assert dataset.dtype == np.float64 and values.ndim == 2, path
+                assert len(columns[path.removeprefix("next_").removeprefix("obs/")]) == values.shape[1], path
+                low[path] = values.tolist()
+
+        demo.visititems(visit)
+        assert set(demo["obs"]) == set(demo["next_obs"])
+        told["episodes"].append({"env": int(demo.attrs["env_id"]), "frames": frames, "numbers": low, "images": images})
+    assert int(data.attrs["total"]) == sum(episode["frames"] for episode in told["episodes"])
+told["about"] = about
+tell(told)

@@ -1,0 +1,149 @@
+//! Levels of H.264: what a player has to be able to do (ITU-T H.264, table A-1, and what clause A.3.1 asks of a stream).
+
+/// Side of a square \[pixels\]: of a macroblock.
+pub(super) const SIDE: usize = 16;
+
+/// A row of the table. Level 1b, which other bits tell, is left out: 1.1 does.
+pub(super) struct Level {
+    /// Ten times the level.
+    pub(super) code: u8,
+    /// Squares in a second (MaxMBPS).
+    per_second: u64,
+    /// Squares of a picture (MaxFS).
+    squares: usize,
+    /// Bits in a second, in thousands (MaxBR).
+    rate: u64,
+    /// Bits that wait to be decoded, in thousands (MaxCPB).
+    waiting: u64,
+    /// How many times fewer bytes come in than go out while squares are decoded as fast as may be (MinCR).
+    fewer: u64,
+}
+
+const fn level(code: u8, per_second: u64, squares: usize, rate: u64, waiting: u64, fewer: u64) -> Level {
+    Level { code, per_second, squares, rate, waiting, fewer }
+}
+
+const LEVELS: [Level; 19] = [
+    level(10, 1_485, 99, 64, 175, 2),
+    level(11, 3_000, 396, 192, 500, 2),
+    level(12, 6_000, 396, 384, 1_000, 2),
+    level(13, 11_880, 396, 768, 2_000, 2),
+    level(20, 11_880, 396, 2_000, 2_000, 2),
+    level(21, 19_800, 792, 4_000, 4_000, 2),
+    level(22, 20_250, 1_620, 4_000, 4_000, 2),
+    level(30, 40_500, 1_620, 10_000, 10_000, 2),
+    level(31, 108_000, 3_600, 14_000, 14_000, 4),
+    level(32, 216_000, 5_120, 20_000, 20_000, 4),
+    level(40, 245_760, 8_192, 20_000, 25_000, 4),
+    level(41, 245_760, 8_192, 50_000, 62_500, 2),
+    level(42, 522_240, 8_704, 50_000, 62_500, 2),
+    level(50, 589_824, 22_080, 135_000, 135_000, 2),
+    level(51, 983_040, 36_864, 240_000, 240_000, 2),
+    level(52, 2_073_600, 36_864, 240_000, 240_000, 2),
+    level(60, 4_177_920, 139_264, 240_000, 240_000, 2),
+    level(61, 8_355_840, 139_264, 480_000, 480_000, 2),
+    level(62, 16_711_680, 139_264, 800_000, 800_000, 2),
+];
+
+/// The last one: what is too much for it too is said to be of it.
+pub(super) const HIGHEST: &Level = &LEVELS[LEVELS.len() - 1];
+
+impl Level {
+    /// Whether it has pictures of so many squares per row, and so many rows of them: eight times as long as wide at most.
+    pub(super) fn has(&self, [width, height]: [usize; 2]) -> bool {
+        let side = (8 * self.squares).isqrt();
+        width.max(height) <= side && width * height <= self.squares
+    }
+
+    /// The largest pictures \[pixels\]: their sides, and how many in all.
+    pub(super) fn largest(&self) -> [usize; 2] {
+        [(8 * self.squares).isqrt() * SIDE, self.squares * SIDE * SIDE]
+    }
+
+    /// The first one that has pictures of so many squares, one after the other: how long each is shown, in units of which a second
+    /// has `per_second`, and its bytes.
+    pub(super) fn of(
+        squares: [usize; 2],
+        per_second: u32,
+        frames: impl Iterator<Item = [u32; 2]> + Clone,
+    ) -> &'static Self {
+        let [second, all] = [u64::from(per_second), (squares[0] * squares[1]) as u64];
+        let bits = |bytes: u32| 8 * u64::from(bytes);
+        // What comes in within a second: the frames that begin in it.
+        let (mut most, mut largest, mut inside, mut since) = (0, 0, 0_u64, 0_u64);
+        let mut first = frames.clone();
+        for [shown, bytes] in frames.clone() {
+            largest = largest.max(bits(bytes));
+            inside += bits(bytes);
+            most = most.max(inside);
+            since += u64::from(shown);
+            while since >= second {
+                let Some([shown, bytes]) = first.next() else { break };
+                inside -= bits(bytes);
+                since -= u64::from(shown);
+            }
+        }
+        let fits = |level: &&Self| {
+            // A picture is decoded while the one before is shown, and its bytes come in meanwhile.
+            let mut pairs = frames.clone().zip(frames.clone().skip(1));
+            let in_time = pairs.all(|([shown, _], [_, bytes])| {
+                let shown = u64::from(shown);
+                all * second <= level.per_second * shown
+                    && u64::from(bytes) * level.fewer * second <= 384 * level.per_second * shown
+            });
+            level.has(squares) && in_time && most <= 1000 * level.rate && largest <= 1000 * level.waiting
+        };
+        LEVELS.iter().find(fits).unwrap_or(HIGHEST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pictures of these sides \[pixels\], so many in a second, each of so many bytes.
+    fn of(sides: [usize; 2], rate: u32, bytes: u32) -> u8 {
+        let shown = 90_000 / rate;
+        Level::of(sides.map(|side| side.div_ceil(SIDE)), 90_000, (0..3 * rate).map(|_| [shown, bytes])).code
+    }
+
+    /// The judge: frame sizes and the rates that they reach at most, as table A-6 of the standard lists them for levels.
+    #[test]
+    fn a_level_is_the_first_that_table_a_1_allows() {
+        for (sides, rate, code) in [
+            ([128, 96], 30, 10),
+            ([176, 144], 15, 10),
+            ([176, 144], 30, 11),
+            ([352, 288], 15, 12),
+            ([352, 288], 30, 13),
+            ([352, 576], 25, 21),
+            ([720, 480], 15, 22),
+            ([720, 480], 30, 30),
+            ([720, 576], 25, 30),
+            ([1280, 720], 30, 31),
+            ([1280, 720], 60, 32),
+            ([1920, 1088], 30, 40),
+            ([1920, 1088], 60, 42),
+            ([3840, 2160], 30, 51),
+            ([3840, 2160], 60, 52),
+            ([7680, 4320], 30, 60),
+            ([7680, 4320], 60, 61),
+            ([8192, 4320], 120, 62),
+        ] {
+            assert_eq!(of(sides, rate, 1), code, "{sides:?} {rate}");
+        }
+    }
+
+    #[test]
+    fn a_level_has_the_bytes_too() {
+        // 64 000 bits in a second are 800 bytes ten times: level 1; one byte more is level 1.1.
+        assert_eq!([800, 801].map(|bytes| of([128, 96], 10, bytes)), [10, 11]);
+        // One picture alone, of as many bits as come in in a second of levels 1 and 1.1, and a byte more.
+        let alone = |bytes| Level::of([8, 6], 90_000, [[90_000, bytes]].into_iter()).code;
+        assert_eq!([8_000, 8_001, 24_000, 24_001].map(alone), [10, 11, 11, 12]);
+        // 1280 x 720 at 30 in a second, all squares as they are (384 bytes each): 332 Mbit/s.
+        assert_eq!(of([1280, 720], 30, 3600 * 384), 61);
+        // More than any level has.
+        assert_eq!(of([1920, 1088], 60, 8160 * 384), 62);
+    }
+}

@@ -1,0 +1,319 @@
+//! Datasets as robomimic reads them: one HDF5 file.
+//!
+//! | what | shape | |
+//! |---|---|---|
+//! | `data`, attribute `total` | | frames of all episodes |
+//! | `data`, attribute `env_args` | | JSON: `env_name`, `env_type`, `type` (the same), `env_kwargs` with `task`, `physics_dt`, `every`, `columns` |
+//! | `data/demo_0`, attributes `num_samples`, `env_id` | | frames of the episode, and its environment |
+//! | `actions` | (T, A) | what joints were told: positions, or controls of MJCF files; f64, as all numbers |
+//! | `action_dict/joint_vel`, `action_dict/joint_effort` | (T, A) | the same of velocities and efforts |
+//! | `dones` | (T,) | 1 in the last frame, i64 |
+//! | `obs/joint_pos`, `obs/joint_vel`, `obs/joint_effort` | (T, J) | joints of all robots |
+//! | `obs/object` | (T, 7 K) | poses of objects in the environment, x, y, z, qw, qx, qy, qz |
+//! | `obs/SENSOR_CHANNEL` | (T, W) | numbers of other sensors |
+//! | `obs/CAMERA_image` | (T, H, W, 3) | colour, u8, a chunk for each picture, packed by deflate |
+//! | `next_obs/...` | | the same when the action had been done |
+//!
+//! Until the end, rows and packed pictures are in two files without a name in the same folder: how many episodes there are and how
+//! long each is, is known only then, and a killed process leaves nothing.
+
+mod heap;
+
+use crate::cfg::RecorderCfg;
+use crate::episodes::{self, Dataset, Episodes, Features, Frame, Role};
+use crate::error::{RecordError, Result};
+use crate::file::{PartFile, folder_of};
+use crate::format::Format;
+use crate::stream::Stream;
+use crate::writer::{Fault, Sink, Written};
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use heap::{Heap, Place};
+use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5FileOptions, H5Group, Hdf5Error};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Rows of an episode are written when they have so many bytes.
+const BYTES: usize = 1 << 16;
+
+/// The type of environments that come from Gymnasium: of those that robomimic knows, the one that says least.
+const GYM: i64 = 2;
+
+/// A dataset on its way.
+struct Robomimic {
+    part: PartFile,
+    features: Arc<Features>,
+    columns: Vec<Column>,
+    /// What `env_args` says.
+    about: Value,
+    envs: Vec<usize>,
+    /// The episode that goes on in each environment.
+    running: Vec<Option<Running>>,
+    episodes: Vec<Episode>,
+    rows: Heap,
+    pictures: Heap,
+    rgb: Vec<u8>,
+}
+
+/// A dataset of each episode.
+struct Column {
+    /// Its name below the episode.
+    path: String,
+    /// Where it stands in the record of a frame \[bytes\].
+    at: usize,
+    kind: Kind,
+}
+
+enum Kind {
+    /// So many f64.
+    Numbers(usize),
+    /// The place of a picture of this width and height.
+    Picture([usize; 2]),
+}
+
+/// An episode that goes on: records of frames that are not written yet.
+struct Running {
+    episode: usize,
+    rows: Vec<u8>,
+}
+
+struct Episode {
+    env: usize,
+    frames: usize,
+    /// Where its records are.
+    blocks: Vec<Place>,
+}
+
+/// What a role is called below an episode, for what was measured below `obs` and `next_obs`.
+fn name_of(role: &Role) -> String {
+    let flat = |name: &str| name.replace('/', "_");
+    match role {
+        Role::Positions => "joint_pos".into(),
+        Role::Velocities => "joint_vel".into(),
+        Role::Efforts => "joint_effort".into(),
+        Role::Action => "actions".into(),
+        Role::TargetVelocities => "action_dict/joint_vel".into(),
+        Role::TargetEfforts => "action_dict/joint_effort".into(),
+        Role::Objects => "object".into(),
+        Role::Sensor { stream, channel } => format!("{}_{}", flat(stream), flat(channel)),
+        Role::Picture(camera) => format!("{}_image", flat(camera)),
+    }
+}
+
+/// The datasets of an episode, and what the record of a frame takes \[bytes\].
+fn columns(features: &Features) -> (Vec<Column>, usize) {
+    let (mut columns, mut at) = (Vec::new(), 0);
+    let mut add = |path: String, kind: Kind| {
+        let bytes = match kind {
+            Kind::Numbers(width) => 8 * width,
+            Kind::Picture(_) => Place::BYTES,
+        };
+        columns.push(Column { path, at, kind });
+        at += bytes;
+    };
+    for of in ["obs", "next_obs"] {
+        for feature in &features.numbers {
+            let width = feature.names.len();
+            match feature.role.is_action() {
+                false => add(format!("{of}/{}", feature.name), Kind::Numbers(width)),
+                true if of == "obs" => add(feature.name.clone(), Kind::Numbers(width)),
+                true => {}
+            }
+        }
+        for picture in &features.pictures {
+            add(format!("{of}/{}", picture.name), Kind::Picture(picture.size));
+        }
+    }
+    (columns, at)
+}
+
+/// Begins a dataset; `dt` is the time of a step \[s\].
+pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Box<dyn Sink>> {
+    let RecorderCfg { path, every, overwrite, task, .. } = cfg;
+    let features = Arc::new(Features::of(path, Format::Hdf5, streams, name_of)?);
+    if !features.numbers.iter().any(|feature| feature.role == Role::Action) {
+        let topic = "a run that nobody acts in: record targets of joints, or states with controls".into();
+        return Err(RecordError::NoPlace { path: path.clone(), format: Format::Hdf5, topic });
+    }
+    // A picture is a chunk.
+    let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
+    if let Some([width, height]) = features.pictures.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
+        let fits = "three bytes for each pixel must be less than 4 GiB".into();
+        return Err(RecordError::Size { path: path.clone(), format: Format::Hdf5, width, height, fits });
+    }
+    let envs = episodes::environments(path, streams)?;
+    let (columns, _) = columns(&features);
+    let names = features.numbers.iter().map(|feature| (feature.name.clone(), json!(feature.names)));
+    let names: Map<String, Value> = names.collect();
+    let about = json!({
+        "env_name": "kinetoscope",
+        "env_type": GYM,
+        "type": GYM,
+        "env_kwargs": { "task": task, "physics_dt": dt, "every": every, "columns": names },
+    });
+    let (part, _) = PartFile::create(path, *overwrite, false)?;
+    let heap = || Heap::create(folder_of(path)).map_err(|error| RecordError::file(path, error));
+    let dataset = Robomimic {
+        part,
+        features: Arc::clone(&features),
+        columns,
+        about,
+        envs: envs.clone(),
+        running: envs.iter().map(|_| None).collect(),
+        episodes: Vec::new(),
+        rows: heap()?,
+        pictures: heap()?,
+        rgb: Vec::new(),
+    };
+    Ok(Box::new(Episodes::new(dataset, features, *every, &envs, streams)))
+}
+
+impl Dataset for Robomimic {
+    type Picture = Place;
+
+    fn picture(&mut self, rgba: &[u8], _size: [usize; 2]) -> Written<Place> {
+        self.rgb.clear();
+        for pixel in rgba.as_chunks::<4>().0 {
+            self.rgb.extend_from_slice(&pixel[..3]);
+        }
+        let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(&self.rgb)?;
+        Ok(self.pictures.put(&packed.finish()?)?)
+    }
+
+    fn add(&mut self, env: usize, frame: &Frame<Place>, next: &Frame<Place>) -> Written {
+        if self.running[env].is_none() {
+            let episode = self.episodes.len();
+            self.episodes.push(Episode { env: self.envs[env], frames: 0, blocks: Vec::new() });
+            self.running[env] = Some(Running { episode, rows: Vec::new() });
+        }
+        let Some(Running { episode, rows }) = &mut self.running[env] else { return Ok(()) };
+        // In the order of the columns.
+        for (of, actions) in [(frame, true), (next, false)] {
+            let features = self.features.numbers.iter().zip(&of.numbers);
+            for (_, numbers) in features.filter(|(feature, _)| actions || !feature.role.is_action()) {
+                numbers.iter().for_each(|number| rows.extend_from_slice(&number.to_le_bytes()));
+            }
+            of.pictures.iter().for_each(|place| rows.extend_from_slice(&place.to_bytes()));
+        }
+        let episode = &mut self.episodes[*episode];
+        episode.frames += 1;
+        if rows.len() >= BYTES {
+            episode.blocks.push(self.rows.put(rows)?);
+            rows.clear();
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, env: usize) -> Written {
+        if let Some(Running { episode, rows }) = self.running[env].take().filter(|running| !running.rows.is_empty()) {
+            self.episodes[episode].blocks.push(self.rows.put(&rows)?);
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Written<u64> {
+        if self.episodes.is_empty() {
+            return Err(Fault::NoFrame(episodes::NO_FRAME));
+        }
+        // The part is locked already, by this process.
+        let file = H5FileOptions::new().no_locking().create(self.part.part()).map_err(fault)?;
+        self.write_all(&file)?;
+        // The part is brought to the disk before it gets its name.
+        file.close_no_sync().map_err(fault)?;
+        Ok(self.part.commit()?)
+    }
+
+    fn kept(&self) -> Option<PathBuf> {
+        self.part.kept()
+    }
+}
+
+impl Robomimic {
+    fn write_all(&mut self, file: &H5File) -> Written {
+        let data = file.create_group("data").map_err(fault)?;
+        let total: usize = self.episodes.iter().map(|episode| episode.frames).sum();
+        data.set_attr_numeric("total", &(total as i64)).map_err(fault)?;
+        data.set_attr_string("env_args", &self.about.to_string()).map_err(fault)?;
+        for (number, episode) in self.episodes.iter().enumerate() {
+            let demo = data.create_group(&format!("demo_{number}")).map_err(fault)?;
+            demo.set_attr_numeric("num_samples", &(episode.frames as i64)).map_err(fault)?;
+            demo.set_attr_numeric("env_id", &(episode.env as i64)).map_err(fault)?;
+            write(&demo, episode, &self.columns, &mut self.rows, &mut self.pictures)?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the datasets of an episode.
+fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap, pictures: &mut Heap) -> Written {
+    let frames = episode.frames;
+    let mut groups = BTreeMap::new();
+    let mut datasets: Vec<H5Dataset> = Vec::new();
+    for Column { path, kind, .. } in columns {
+        let (group, name) = path.split_once('/').unwrap_or(("", path));
+        if !group.is_empty() && !groups.contains_key(group) {
+            groups.insert(group, demo.create_group(group).map_err(fault)?);
+        }
+        let group = groups.get(group).unwrap_or(demo);
+        let dataset = match *kind {
+            Kind::Numbers(width) => group.new_dataset::<f64>().shape([frames, width]).create(name),
+            Kind::Picture([width, height]) => group
+                .new_dataset::<u8>()
+                .shape([frames, height, width, 3])
+                .chunk(&[1, height, width, 3])
+                .filter_pipeline(FilterPipeline::deflate(Compression::fast().level()))
+                .create(name),
+        };
+        datasets.push(dataset.map_err(fault)?);
+    }
+    let dones = demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(fault)?;
+    let record = columns.iter().map(Column::end).max().unwrap_or(0);
+    let (mut block, mut picture, mut numbers, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for place in &episode.blocks {
+        rows.take(*place, &mut block)?;
+        let count = block.len() / record.max(1);
+        for (column, dataset) in columns.iter().zip(&datasets) {
+            let cells = || block.chunks_exact(record).map(|row| &row[column.at..column.end()]);
+            match column.kind {
+                Kind::Numbers(width) => {
+                    numbers.clear();
+                    numbers.extend(cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| f64::from_le_bytes(*x)));
+                    dataset.write_slice(&[first, 0], &[count, width], &numbers).map_err(fault)?;
+                }
+                Kind::Picture(_) => {
+                    for (frame, cell) in (first..).zip(cells()) {
+                        pictures.take(Place::from_bytes(cell), &mut picture)?;
+                        // It is packed already.
+                        dataset.write_chunk_raw(frame, &picture, 0).map_err(fault)?;
+                    }
+                }
+            }
+        }
+        let done: Vec<i64> = (first..first + count).map(|frame| i64::from(frame + 1 == frames)).collect();
+        dones.write_slice(&[first], &[count], &done).map_err(fault)?;
+        first += count;
+    }
+    Ok(())
+}
+
+impl Column {
+    /// Where it ends in a record.
+    fn end(&self) -> usize {
+        self.at
+            + match self.kind {
+                Kind::Numbers(width) => 8 * width,
+                Kind::Picture(_) => Place::BYTES,
+            }
+    }
+}
+
+fn fault(error: Hdf5Error) -> Fault {
+    match error {
+        Hdf5Error::Io(error) => Fault::Io(error),
+        other => Fault::Io(io::Error::other(other.to_string())),
+    }
+}
