@@ -2,7 +2,7 @@
 
 use crate::model::ModelArgs;
 use crate::render::{Look, rate};
-use crate::{Ending, Result, excerpt};
+use crate::{Ending, Result, excerpt, progress};
 use kinetoscope::prelude::*;
 use std::time::Instant;
 
@@ -11,6 +11,7 @@ use std::time::Instant;
 /// Rates of one program on one machine: to compare with other simulators in one run, see `cargo xtask bench` in the
 /// source tree.
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
@@ -27,6 +28,14 @@ pub(crate) struct Args {
     look: Look,
 }
 
+const HELP: &str = "\
+Examples:
+  kinetoscope bench arm.urdf
+  kinetoscope bench humanoid.xml --floating-base --num-envs 1024 --seconds 10
+  kinetoscope bench arm.urdf --renderer fast-rt --width 320 --height 240
+
+Exit codes: 0 done; 1 done, with warnings (something was repaired or ignored, an environment diverged); 2 refused.";
+
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(args.seconds > 0.0 && args.seconds <= 3600.0) {
         return Err(format!("--seconds {}: give more than 0 and at most 3600", args.seconds).into());
@@ -39,16 +48,18 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let view = args.look.view(&still)?;
     let mut rasterizer = args.look.rasterizer()?;
     let (start, mut steps) = (Instant::now(), 0u64);
-    let elapsed = loop {
+    let step = || loop {
         sim.update(8);
         steps += 8;
         // Who trains reads the state after each step.
         let _ = sim.robot(id).get_qpos();
         let elapsed = start.elapsed().as_secs_f64();
         if elapsed >= args.seconds {
-            break elapsed;
+            return elapsed;
         }
     };
+    let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
+    let elapsed = progress::during("steps", share, step);
     let each = steps as f64 / elapsed;
     let all = each * args.num_envs as f64;
     println!("{} environments on {} threads, steps of {dt} s", args.num_envs, sim.threads());

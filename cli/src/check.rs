@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Tree, joints, masses, dynamics and warnings of a robot, with the lines that they are about
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
@@ -19,6 +20,14 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
+
+const HELP: &str = "\
+Examples:
+  kinetoscope check arm.urdf hand.urdf            the hand hangs from the tip of the arm
+  kinetoscope check arm.urdf --qpos hinge=0.5     inertia and torques at another position
+  kinetoscope check humanoid.xml --floating-base --json humanoid.json
+
+Exit codes: 0 nothing is odd; 1 with warnings; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let mut out = std::io::stdout().lock();

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// The robot as MJCF that plain MuJoCo loads, one file for 2.2.2 and one for 4.x, with meshes and textures beside them
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
@@ -17,6 +18,13 @@ pub(crate) struct Args {
     #[arg(long)]
     force: bool,
 }
+
+const HELP: &str = "\
+Examples:
+  kinetoscope convert arm.urdf -o arm_mjcf
+  kinetoscope convert arm.urdf -o arm_mjcf --force --package arm_description=robots/arm_description
+
+Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or left out); 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !args.force && !is_empty(&args.out)? {

@@ -78,9 +78,11 @@ fn place(message: &str) -> Option<Place<'_>> {
     })
 }
 
-/// What of a line is meant: the first thing that the message quotes and that stands there, else all that is written.
+/// What of a line is meant: the first thing that the message quotes and that stands there, else all that is written. MuJoCo
+/// quotes with single marks.
 fn marked(text: &str, message: &str) -> Range<usize> {
-    let quoted = message.split('"').skip(1).step_by(2).filter(|quoted| !quoted.is_empty());
+    let of = |mark: char| message.split(mark).skip(1).step_by(2).filter(|quoted| !quoted.trim().is_empty());
+    let quoted = of('"').chain(of('\''));
     let found = quoted.filter_map(|quoted| text.find(quoted).map(|at| at..at + quoted.len())).next();
     found.unwrap_or_else(|| text.len() - text.trim_start().len()..text.len())
 }
@@ -110,6 +112,13 @@ mod tests {
         let under = lines[line + 1];
         assert_eq!(under.find('^'), lines[line].find("rotary"), "{text}");
         assert_eq!(under.matches('^').count(), "rotary".len(), "{text}");
+    }
+
+    #[test]
+    fn what_mujoco_quotes_is_underlined() {
+        let line = "  <geom type=\"box\" sise=\"1\"/>";
+        let said = "robot \"arm\": MuJoCo refuses the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
+        assert_eq!(&line[marked(line, said)], "sise");
     }
 
     #[test]

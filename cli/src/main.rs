@@ -8,6 +8,7 @@ mod interrupt;
 mod model;
 mod picture;
 mod plot;
+mod progress;
 mod render;
 mod replay;
 mod view;

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 /// A topic may be named by its end: joint_states is /env_0/arm/joint_states where there is one arm. Each --field is plotted of
 /// each --topic, so that two topics with the same names of joints lie over each other: what was wanted, and what came.
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     /// A recording, .mcap or .npz
     #[arg(value_name = "FILE")]
@@ -38,15 +39,25 @@ pub(crate) struct Args {
     height: usize,
 }
 
+const HELP: &str = "\
+Examples:
+  kinetoscope plot run.mcap                       lists what there is
+  kinetoscope plot run.mcap --topic joint_states  lists its numbers
+  kinetoscope plot run.mcap --topic joint_states --field 'position[*]' --out plot.svg
+
+Exit codes: 0 done; 1 done, with warnings; 2 refused.";
+
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let recording = Recording::open(&args.file)?;
+    let mut warned = !recording.warnings().is_empty();
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let listed = if warned { Ending::Warned } else { Ending::Done };
     if args.topic.is_empty() {
         if args.out.is_some() || !args.field.is_empty() {
             return Err("--topic: say of which topic; without --out and --field all of them are listed".into());
         }
         list(&recording, &recording.topics().iter().collect::<Vec<_>>());
-        return Ok(Ending::Done);
+        return Ok(listed);
     }
     let topics: Vec<&RecordedTopic> =
         args.topic.iter().map(|name| recording.topic(name, args.env)).collect::<std::result::Result<_, _>>()?;
@@ -56,7 +67,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
             return Err(format!("--field: say which numbers; there are {}", fields.join(", ")).into());
         }
         list(&recording, &topics);
-        return Ok(Ending::Done);
+        return Ok(listed);
     }
     let Some(out) = &args.out else {
         return Err("--out: say where the plot goes, to a name that ends in .svg or .png".into());
@@ -83,7 +94,6 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         if same { with_unit(stem) } else { "value".into() },
     );
     plot.size = [args.width, args.height];
-    let mut warned = false;
     for (wanted, samples) in wanted.iter().zip(samples) {
         if samples.values.is_empty() {
             eprintln!("warning: there is no {} in any message of {}", wanted.field, wanted.topic);

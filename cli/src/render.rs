@@ -2,18 +2,19 @@
 
 use crate::model::{Files, ModelArgs};
 use crate::picture::{self, Channel};
-use crate::{Ending, Result, excerpt};
+use crate::{Ending, Result, excerpt, progress};
 use clap::ValueEnum;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::staying_crew;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// A picture of a model as it starts
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
@@ -80,9 +81,17 @@ fn point(text: &str) -> std::result::Result<Point, String> {
     }
 }
 
+const HELP: &str = "\
+Examples:
+  kinetoscope render arm.urdf -o arm.png
+  kinetoscope render humanoid.xml -o depth.png --channel depth --eye 2,-1,1.5 --target 0,0,1
+  kinetoscope render humanoid.xml -o out.png --renderer rt --samples 256
+
+Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused.";
+
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let (still, mut warned) = match args.model.files()? {
-        Files::Mjcf(path) => (Still::of_mjcf(path, None)?, false),
+        Files::Mjcf(path) => (of_mjcf(&path)?, false),
         Files::Urdf(_) => {
             let cfg = SimulationManagerCfg { num_envs: 1, ground: None, ..Default::default() };
             let (mut sim, _) = args.model.simulation(cfg)?;
@@ -98,11 +107,27 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
     let start = Instant::now();
-    args.look.rasterizer()?.render(&mut [(still.shot(&view), frame.as_mut())]).map_err(|(_, error)| error)?;
+    let mut rasterizer = args.look.rasterizer()?;
+    let progress = rasterizer.progress().clone();
+    let mut job = [(still.shot(&view), frame.as_mut())];
+    progress::during("paths", || progress.fraction(), || rasterizer.render(&mut job)).map_err(|(_, error)| error)?;
     let seconds = start.elapsed().as_secs_f64();
     picture::write(&frame, args.channel, [view.width, view.height], &args.out)?;
     println!("{}: {} x {} pixels in {:.1} ms", args.out.display(), view.width, view.height, 1e3 * seconds);
     Ok(if warned { Ending::Warned } else { Ending::Done })
+}
+
+/// The model of an MJCF file; an error has the line of the file that MuJoCo names. Of a file that includes others it does not
+/// say whose line that is.
+fn of_mjcf(path: &Path) -> Result<Still> {
+    Still::of_mjcf(path, None).map_err(|error| {
+        let line = if let Error::Compile(refused) = &error { refused.line } else { None };
+        let is_of_it = || std::fs::read_to_string(path).is_ok_and(|text| !text.contains("<include"));
+        match line.filter(|_| is_of_it()) {
+            Some(line) => format!("{}:{line}: {error}", path.display()).into(),
+            None => error.into(),
+        }
+    })
 }
 
 impl Look {
@@ -158,12 +183,13 @@ pub(crate) fn rate(rasterizer: &mut ParallelRasterizer, shot: Shot<'_>, seconds:
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
     let (start, mut pictures) = (Instant::now(), 0u32);
-    loop {
+    let draw = || loop {
         rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
         pictures += 1;
         let elapsed = start.elapsed().as_secs_f64();
         if elapsed >= seconds {
             return Ok(f64::from(pictures) / elapsed);
         }
-    }
+    };
+    progress::during("pictures", move || Some(start.elapsed().as_secs_f64() / seconds), draw)
 }

@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 /// A recording holds its scene, so that the file is enough to show it. To run its actions again, the scene has to be built as it
 /// was, drives and all: give the scene file with --scene.
 #[derive(Debug, clap::Args)]
-#[command(after_help = ENDINGS)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     /// A recording, .mcap or .npz; to be verified it is .npz
     #[arg(value_name = "FILE")]
@@ -45,9 +45,14 @@ pub(crate) struct Args {
     seconds: Option<f64>,
 }
 
-const ENDINGS: &str = "\
-Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 --verify found a difference, or something was left
-out; 2 refused, or the display was lost.";
+const HELP: &str = "\
+Examples:
+  kinetoscope replay run.mcap                     in a window; --serve: in a browser
+  kinetoscope replay run.mcap --out pictures --at 0,1.5,3
+  kinetoscope replay run.npz --verify --scene scene.toml
+
+Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
+recording or of the scene was left out), or --verify found a difference; 2 refused, or the display was lost.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     if args.verify {
@@ -57,12 +62,14 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         return Err(format!("--seconds {seconds}: give more than 0").into());
     }
     let recording = Recording::open(&args.file)?;
+    let mut warned = !recording.warnings().is_empty();
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let envs = recording.env_ids().last().map_or(1, |last| last.saturating_add(1));
     let scene = args.scene.as_deref().map(|file| built(file, envs)).transpose()?;
-    let (film, sim) = Film::of(&recording, scene.as_ref().map(InteractiveScene::sim))?;
-    let warned = !film.unmoved().is_empty();
-    if warned {
+    warned |= scene.as_ref().is_some_and(|(_, warned)| *warned);
+    let (film, sim) = Film::of(&recording, scene.as_ref().map(|(scene, _)| scene.sim()))?;
+    if !film.unmoved().is_empty() {
+        warned = true;
         eprintln!("warning: nothing was recorded of {}: they stay where they begin", film.unmoved().join(", "));
     }
     match &args.out {
@@ -72,18 +79,18 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     Ok(if warned { Ending::Warned } else { Ending::Done })
 }
 
-/// The scene of a file, in as many environments as were recorded.
-fn built(file: &Path, num_envs: usize) -> Result<InteractiveScene> {
+/// The scene of a file, in as many environments as were recorded, and whether there were warnings.
+fn built(file: &Path, num_envs: usize) -> Result<(InteractiveScene, bool)> {
     let mut cfg = SceneCfg::from_file(file)?;
     cfg.simulation.num_envs = num_envs;
     let scene = InteractiveScene::new(cfg)?;
-    excerpt::print_warnings(scene.sim().diagnostics());
-    Ok(scene)
+    let warned = excerpt::print_warnings(scene.sim().diagnostics());
+    Ok((scene, warned))
 }
 
 fn verify(args: &Args) -> Result<Ending> {
     let Some(file) = &args.scene else { return Err("--verify: give the scene with --scene".into()) };
-    let mut scene = built(file, replay::num_envs(&args.file)?)?;
+    let (mut scene, _) = built(file, replay::num_envs(&args.file)?)?;
     let verdict = replay::verify(scene.sim_mut(), &args.file)?;
     println!("{}: {verdict}", args.file.display());
     Ok(if verdict.is_same() { Ending::Done } else { Ending::Warned })
@@ -121,7 +128,7 @@ fn show(args: &Args, mut film: Film, mut sim: SimulationManager) -> Result<()> {
     };
     match &args.serve {
         Some(address) => {
-            let served = sim.serve_with(address, ServeCfg { speed: Speed::REAL, ..ServeCfg::default() })?;
+            let served = sim.serve_with(address, ServeCfg { speed: Some(Speed::REAL), ..ServeCfg::default() })?;
             println!("Look at {}; Ctrl+C ends it.", served.url());
             sim.play(&mut film, &mut || goes_on())?;
             served.close(&mut sim)?;

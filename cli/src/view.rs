@@ -11,8 +11,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// A model as it moves: in a window, or in a browser with --serve
 ///
 /// Its drives hold it where it starts; sliders and the mouse move it. It goes on until the window is closed, all --steps are
-/// done, or Ctrl+C; each of them is a good end (exit code 0). H in the window shows its keys.
+/// done, or Ctrl+C; each of them is a good end. H in the window shows its keys.
 #[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
@@ -43,6 +44,16 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
 }
+
+const HELP: &str = "\
+Examples:
+  kinetoscope view arm.urdf
+  kinetoscope view humanoid.xml --floating-base --num-envs 16 --speed 0.5
+  kinetoscope view arm.urdf --serve               in a browser, at http://127.0.0.1:8080
+  kinetoscope view arm.urdf --record run.mcap
+
+Exit codes: 0 shown until a good end; 1 the same, with warnings (something was repaired or ignored, an environment diverged); 2
+refused, or the display was lost.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let [slow, fast] = Speed::RANGE;
@@ -99,7 +110,7 @@ impl Args {
     /// # Errors
     /// There is no display, or nothing can listen at the address.
     fn show(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
-        let (speed, recording) = (Speed::Times(self.speed), Some(button));
+        let (speed, recording) = (Some(Speed::Times(self.speed)), Some(button));
         let names = self.model.names();
         if let Some(address) = &self.serve {
             let served = sim.serve_with(address, ServeCfg { speed, recording, ..ServeCfg::default() });
@@ -108,7 +119,7 @@ impl Args {
             return Ok(None);
         }
         let title = format!("{names} - Kinetoscope");
-        let cfg = WindowCfg { title, speed: Some(speed), recording, ..WindowCfg::default() };
+        let cfg = WindowCfg { title, speed, recording, ..WindowCfg::default() };
         let window = sim.open_window_with(cfg).map_err(|error| no_window(&error, &names))?;
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))

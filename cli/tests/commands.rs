@@ -25,6 +25,53 @@ fn check_lists_the_robot_and_ends_with_0() {
     assert!((torque - 2.0 * 9.81 * 0.5 * 0.5f64.sin()).abs() < 1e-9, "{torque}");
 }
 
+/// A rod of which one axis is turned by an eighth of a turn: `[[a, b], [b, a]]` has the moments `a - b` and `a + b`.
+#[test]
+fn check_lists_principal_moments() {
+    let folder = tempfile::tempdir().unwrap();
+    let turned = "ixx=\"0.1\" iyy=\"0.1\" izz=\"0.05\" ixy=\"0.02\"";
+    let arm = write(folder.path(), "arm.urdf", &ARM.replace("ixx=\"0.1\" iyy=\"0.1\" izz=\"0.1\" ixy=\"0\"", turned));
+    let (out, err, code) = said(&kinetoscope(&["check", &arm]));
+    assert_eq!((err.as_str(), code), ("", 0));
+    let mut after = out.lines().skip_while(|line| !line.contains("Principal moments"));
+    assert!(after.next().is_some_and(|line| line.contains("kg m²")), "{out}");
+    let row = after.find(|line| line.starts_with("rod")).unwrap();
+    let numbers: Vec<f64> = row.split_whitespace().skip(1).map(|word| word.parse().unwrap()).collect();
+    assert_eq!(numbers, [0.05, 0.08, 0.12], "{row}");
+}
+
+/// What MuJoCo or a robot does not take of an MJCF file is shown in its line, by every command that reads one.
+#[test]
+fn an_error_of_an_mjcf_file_is_shown_in_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = |name: &str, from: &str, to: &str| write(folder.path(), name, &PENDULUM.replace(from, to));
+    let picture = folder.path().join("a.png");
+    let picture = picture.to_str().unwrap();
+    let unknown = bad("unknown.xml", "size=", "sise=");
+    for args in [
+        vec!["check", &unknown],
+        vec!["view", &unknown],
+        vec!["bench", &unknown],
+        vec!["render", &unknown, "-o", picture],
+        vec!["convert", &unknown, "-o", picture],
+    ] {
+        let (out, err, code) = said(&kinetoscope(&args));
+        assert_eq!((out.as_str(), code), ("", 2), "{args:?}");
+        assert!(err.starts_with("error: ") && err.contains("unknown.xml:3"), "{args:?}: {err}");
+        let lines: Vec<&str> = err.lines().collect();
+        let line = lines.iter().position(|line| line.contains("3 |   <geom")).unwrap_or_else(|| panic!("{err}"));
+        assert_eq!(lines[line + 1].find('^'), lines[line].find("sise"), "{args:?}: {err}");
+    }
+    // A mass that the compiler refuses; a joint that robots do not have.
+    for (name, from, to, line) in [
+        ("mass.xml", "mass=\"1\"", "mass=\"-1\"", 3),
+        ("ball.xml", "type=\"hinge\" axis=\"0 1 0\" range=\"-90 90\" limited=\"true\"", "type=\"ball\"", 2),
+    ] {
+        let (_, err, code) = said(&kinetoscope(&["check", &bad(name, from, to)]));
+        assert!(code == 2 && err.contains(&format!("{name}:{line}")) && err.contains('^'), "{name}: {err}");
+    }
+}
+
 #[test]
 fn check_shows_the_line_of_an_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,9 +191,25 @@ fn bench_measures() {
     assert!(rate("per second") > 0.0);
 }
 
+/// Every command, with those to come: examples that are of the command, and what exit codes mean.
 #[test]
 fn help_has_examples_and_exit_codes() {
-    let (out, _, code) = said(&kinetoscope(&["--help"]));
-    assert_eq!(code, 0);
+    let help = |args: &[&str]| {
+        let (out, err, code) = said(&kinetoscope(args));
+        assert_eq!((err.as_str(), code), ("", 0), "{args:?}");
+        out
+    };
+    let out = help(&["--help"]);
     assert!(out.contains("kinetoscope check") && out.contains("Exit codes: 0"), "{out}");
+    let listed = out.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let commands: Vec<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(commands.len() >= 8, "{commands:?}");
+    for command in commands.into_iter().filter(|command| *command != "help") {
+        for flag in ["-h", "--help"] {
+            let out = help(&[command, flag]);
+            let examples = out.lines().filter(|line| line.starts_with(&format!("  kinetoscope {command} "))).count();
+            assert!(out.contains("Examples:") && examples >= 2, "{command} {flag}: {out}");
+            assert!(out.contains("Exit codes: 0"), "{command} {flag}: {out}");
+        }
+    }
 }

@@ -145,6 +145,42 @@ fn it_is_served_and_what_cannot_be_shown_is_said() {
     }
 }
 
+/// What is left out of a recording is a warning, and the exit code says so.
+#[test]
+fn a_recording_of_which_something_is_left_out_ends_with_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut scene, file) = scene(folder.path());
+    let [path, torn] = ["run.mcap", "torn.mcap"].map(|name| folder.path().join(name));
+    let recorder = scene.sim_mut().record(RecorderCfg::new(&path)).unwrap();
+    scene.update(20);
+    scene.sim_mut().finish_recording(recorder).unwrap();
+    // As somebody else might write it: besides, a topic whose messages are cut.
+    let bytes = std::fs::read(&path).unwrap();
+    let mut writer = mcap::Writer::new(std::fs::File::create(&torn).unwrap()).unwrap();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        writer.write(&message).unwrap();
+        if message.channel.topic.ends_with("joint_states") {
+            let channel = mcap::Channel { id: 99, topic: "/env_0/torn".into(), ..(*message.channel).clone() };
+            let data = message.data[..10].to_vec().into();
+            writer.write(&mcap::Message { channel: channel.into(), data, ..message.clone() }).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    let [path, torn] = [&path, &torn].map(|path| path.to_str().unwrap());
+    for (file_of, code_of, words) in [(path, 0, ""), (torn, 1, "/env_0/torn is left out")] {
+        let out = folder.path().join(format!("pictures{code_of}"));
+        let show = ["replay", file_of, "--scene", &file, "--out", out.to_str().unwrap(), "--at", "0.1"];
+        let serve = ["replay", file_of, "--scene", &file, "--serve", "127.0.0.1:0", "--seconds", "0.3"];
+        for args in [&show[..], &serve[..], &["plot", file_of][..]] {
+            let (out, err, code) = said(&kinetoscope(args));
+            assert_eq!(code, code_of, "{args:?}: {out}{err}");
+            assert!(err.contains(words), "{args:?}: {err}");
+        }
+    }
+}
+
 /// A cart that swings for a second: the file, and the folder that holds it.
 fn swing() -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();

@@ -38,10 +38,23 @@ mod shown {
         /// The address is none, or in use.
         pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
             let Some(address) = &self.serve else { return Ok(()) };
-            let cfg = ServeCfg { speed: Speed::REAL, recording: self.record_button(), ..ServeCfg::default() };
+            let cfg = ServeCfg { speed: Some(Speed::REAL), recording: self.record_button(), ..ServeCfg::default() };
             let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser", served.url());
             keep_key(sim);
+            Ok(())
+        }
+
+        /// Draws the stage as a window first shows it, to a PNG in the folder of `--out`, where that is given.
+        ///
+        /// # Errors
+        /// The file cannot be written.
+        pub(crate) fn screenshot(&self, sim: &mut SimulationManager, name: &str) -> Result {
+            let Some(out) = &self.out else { return Ok(()) };
+            crate::launcher::make_folder(out)?;
+            let path = out.join(name);
+            sim.screenshot(&path)?;
+            println!("Drawn to {}", path.display());
             Ok(())
         }
 
@@ -84,6 +97,19 @@ impl Launcher {
         match self.serve {
             Some(_) => {
                 Err("--serve: this build has no views; build with the feature `view`, which is on by default".into())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// This build draws no stage.
+    ///
+    /// # Errors
+    /// `--out` asks for it.
+    pub(crate) fn screenshot(&self, _: &mut SimulationManager, _: &str) -> Result {
+        match self.out {
+            Some(_) => {
+                Err("--out: this build has no views; build with the feature `view`, which is on by default".into())
             }
             None => Ok(()),
         }

@@ -105,7 +105,7 @@ pub enum Error {
     #[error(transparent)]
     Compile(#[from] CompileError),
     /// MuJoCo refuses an MJCF file; its words name element and line.
-    #[error("part {part:?}: {file}: {error}")]
+    #[error("{}", in_file(&format_args!("part {part:?}"), .file, .error))]
     MjcfFile {
         /// The part.
         part: String,
@@ -116,7 +116,7 @@ pub enum Error {
         error: Box<CompileError>,
     },
     /// An MJCF file is no robot.
-    #[error("{robot}: {file}: {error}")]
+    #[error("{}", in_file(.robot, .file, .error))]
     RobotFile {
         /// The robot or articulation.
         robot: Named,
@@ -462,6 +462,19 @@ impl From<LoadError> for Error {
             LoadError::Version(e) => Self::MujocoVersion(e),
             LoadError::Compile(e) => Self::Compile(e),
         }
+    }
+}
+
+/// An error of a file: the place comes first where it has one, as in all messages that have a place.
+fn in_file(of: &dyn std::fmt::Display, file: &str, error: &dyn std::fmt::Display) -> String {
+    let said = error.to_string();
+    let place = said.split_once(": ").filter(|(place, _)| {
+        let line = place.strip_prefix(file).and_then(|rest| rest.strip_prefix(':'));
+        !file.is_empty() && line.is_some_and(|line| line.parse::<u32>().is_ok())
+    });
+    match place {
+        Some((place, rest)) => format!("{place}: {of}: {rest}"),
+        None => format!("{of}: {file}: {said}"),
     }
 }
 

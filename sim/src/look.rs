@@ -132,28 +132,34 @@ impl SimulationManager {
         }))
     }
 
-    /// Pulls at a body with a force \[N\] in the axes of the environment, at `point` of the environment \[m\] as the body is
-    /// now, from the next step on, until it is pulled otherwise, the environment is reset, or something is added to the
-    /// simulation; a force of zero ends it. The force stays as it is while the body moves: who means a spring pulls anew in every step. What
-    /// [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) applies acts besides.
+    /// Pulls at a body with forces, together: each is a point of the environment \[m\], as the body is now, and the force there
+    /// \[N\] in the axes of the environment. They act from the next step on, until the body is pulled otherwise, the environment is
+    /// reset, or something is added to the simulation; none ends it. They stay as they are while the body moves: who means a
+    /// spring pulls anew in every step. What [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) applies acts
+    /// besides.
     ///
     /// `body` is its place in [`body_names`](Self::body_names).
     ///
     /// # Errors
     /// There is no such environment or body, or a number is not finite; then nothing has changed.
-    pub fn pull(&mut self, env: EnvId, body: usize, point: [f64; 3], force: [f64; 3]) -> Result<()> {
+    pub fn pull(&mut self, env: EnvId, body: usize, forces: &[([f64; 3], [f64; 3])]) -> Result<()> {
         env_mask(Some(&[env]), self.num_envs())?;
         let &(mujoco_body, _) = self.place_of(body)?;
-        for (argument, of, numbers) in [("pull", "the point", point), ("pull", "the force", force)] {
+        for (of, numbers) in forces.iter().flat_map(|(point, force)| [("the point", point), ("the force", force)]) {
             if let Some(column) = numbers.iter().position(|x| !x.is_finite()) {
                 let (of, value) = (of.to_string(), numbers[column]);
-                return Err(Error::NotFinite { argument, row: env.0, column, of, value });
+                return Err(Error::NotFinite { argument: "pull", row: env.0, column, of, value });
             }
         }
         self.simulation.batch.write(env.0, |env| {
             let center = &env.data().xipos()[3 * mujoco_body..3 * mujoco_body + 3];
-            let force = Vector3::from(force);
-            let torque = (Vector3::from(point) - Vector3::new(center[0], center[1], center[2])).cross(&force);
+            let center = Vector3::new(center[0], center[1], center[2]);
+            let of = |&(point, force): &([f64; 3], [f64; 3])| {
+                let force = Vector3::from(force);
+                [force, (Vector3::from(point) - center).cross(&force)]
+            };
+            let none = [Vector3::zeros(); 2];
+            let [force, torque] = forces.iter().map(of).fold(none, |[f, t], [force, torque]| [f + force, t + torque]);
             env.set_wrenches(|wrenches| wrenches.pull(body, mujoco_body, force, torque));
         });
         Ok(())

@@ -286,7 +286,16 @@ impl SimulationManager {
     /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
     /// configured to ([`SensorCfg::debug_vis`]), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
-        self.sensors.markers(&self.simulation)
+        self.sensors.markers(&self.simulation, None)
+    }
+
+    /// The same without those of a sensor: what is drawn into the colours of a camera that draws markers.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn markers_beside<S: Sensor>(&self, id: SensorId<S>) -> Vec<(EnvId, Marker)> {
+        self.sensors.markers(&self.simulation, Some(self.sensors.index_of(id)))
     }
 
     /// Whether the markers of a sensor are among [`markers`](Self::markers).

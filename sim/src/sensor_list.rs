@@ -266,9 +266,9 @@ impl SensorList {
         gather::gather(simulation, self.substeps, all, &mut self.state);
     }
 
-    /// What they show of their last measurements.
-    pub(crate) fn markers(&self, simulation: &Simulation) -> Vec<(EnvId, Marker)> {
-        let markers = self.markers_beside(simulation, None).into_iter().enumerate();
+    /// What they show of their last measurements, without what the sensor at a place in the list does.
+    pub(crate) fn markers(&self, simulation: &Simulation, own: Option<usize>) -> Vec<(EnvId, Marker)> {
+        let markers = self.markers_beside(simulation, own).into_iter().enumerate();
         markers.flat_map(|(env, markers)| markers.into_iter().map(move |marker| (EnvId(env), marker))).collect()
     }
 

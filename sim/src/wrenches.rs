@@ -62,10 +62,11 @@ impl Wrenches {
         self.list.extend(wrench);
     }
 
-    /// Pulls at a body, whatever else acts on it; a force of zero ends it.
+    /// Pulls at a body, whatever else acts on it; nothing at all ends it.
     pub(crate) fn pull(&mut self, body: usize, mujoco_body: usize, force: Vector3<f64>, torque: Vector3<f64>) {
         let wrench = Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque };
-        self.replace((PULLED, body), (force != Vector3::zeros()).then_some(wrench));
+        let pulls = force != Vector3::zeros() || torque != Vector3::zeros();
+        self.replace((PULLED, body), pulls.then_some(wrench));
     }
 
     /// Gives bodies their weight, or takes it.

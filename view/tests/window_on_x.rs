@@ -5,16 +5,19 @@
 #[allow(dead_code, reason = "each test uses its part")]
 mod display;
 
-use display::{Display, LONG, SIZE, cfg_on, pixels, press, screenshot, simulation, until};
+use display::{Display, LONG, SIZE, cfg_on, hold, pixels, press, screenshot, send, simulation, until};
 use sim::SimulationManager;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use view::window::App;
-use view::{Canvas, Closed, OpenWindow, Speed, Viewing, Wants, Window, WindowError};
+use view::{Canvas, Closed, Command, Eye, OpenWindow, Speed, Viewing, Wants, Window, WindowError};
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask};
+use x11rb::protocol::xproto::{
+    BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent, ConfigureWindowAux, ConnectionExt as _, EventMask,
+    MOTION_NOTIFY_EVENT,
+};
 
 /// Below the status, which counts pictures per second \[pixels\].
 const BELOW_STATUS: usize = 70;
@@ -51,8 +54,9 @@ impl Running {
     }
 }
 
-fn threads() -> usize {
-    std::fs::read_dir("/proc/self/task").unwrap().count()
+/// Threads of this process, and files that it has open.
+fn threads_and_files() -> [usize; 2] {
+    ["task", "fd"].map(|of| std::fs::read_dir(format!("/proc/self/{of}")).unwrap().count())
 }
 
 fn ended(window: &Window) -> Closed {
@@ -69,12 +73,34 @@ fn a_window_shows_obeys_and_goes() {
     let window = sim.open_window_with(cfg_on(&display)).unwrap();
     let connection = display.connect();
     let viewer = sim.viewer(Wants::default());
-    let mut expected = Canvas::default();
+    let (mut expected, mut expected_after) = (Canvas::default(), Canvas::default());
     let mut app = App::new(SIZE, 2);
     app.show(viewer.newest().unwrap());
     app.draw(&mut expected, Instant::now());
     let (from, expected) = (BELOW_STATUS * SIZE[0], pixels(&expected));
     until("the display shows what was drawn", || screenshot(&connection, SIZE)[from..] == expected[from..]);
+    // The mouse: dragged by 60 and 20 pixels with the left button, with the right one, and one notch of the wheel.
+    let (number, at) = (window.number(), [200i16, 150]);
+    let mut eye = app.eye();
+    let mut moved = |what: &str, eye: Eye| {
+        app.look_from(eye);
+        app.draw(&mut expected_after, Instant::now());
+        let expected = pixels(&expected_after);
+        until(what, || screenshot(&connection, SIZE)[from..] == expected[from..]);
+    };
+    for (button, way) in [(1, Eye::orbit as fn(&mut Eye, [f64; 2], usize)), (3, Eye::pan)] {
+        send(&connection, number, (BUTTON_PRESS_EVENT, button), 0, at);
+        send(&connection, number, (MOTION_NOTIFY_EVENT, 0), 0, [at[0] + 60, at[1] + 20]);
+        send(&connection, number, (BUTTON_RELEASE_EVENT, button), 0, [at[0] + 60, at[1] + 20]);
+        way(&mut eye, [60.0, 20.0], SIZE[1]);
+        moved("it is turned and moved", eye);
+    }
+    for (button, steps) in [(4, 1.0), (5, -1.0), (5, -1.0)] {
+        send(&connection, number, (BUTTON_PRESS_EVENT, button), 0, at);
+        send(&connection, number, (BUTTON_RELEASE_EVENT, button), 0, at);
+        eye.zoom(steps);
+        moved("it comes nearer and goes away", eye);
+    }
     let red = expected[from..].iter().filter(|p| p[0] > 90 && p[1] < p[0] / 2).count();
     assert!(red > 200, "cubes are in the picture: {red}");
     // The control: another view is another picture.
@@ -93,8 +119,26 @@ fn a_window_shows_obeys_and_goes() {
     press(&connection, window.number(), 0x20);
     until("it goes on", || paused(false));
     // As fast as can be.
+    let speed = |is: Speed| viewer.newest().is_some_and(|snapshot| snapshot.run.speed == is);
     press(&connection, window.number(), 0x30);
-    until("it is as fast as can be", || viewer.newest().is_some_and(|snapshot| snapshot.run.speed == Speed::Free));
+    until("it is as fast as can be", || speed(Speed::Free));
+    // Held, it pauses once and does not flicker: an odd number of repeats would let it go on. The key after it says when.
+    hold(&connection, window.number(), 0x20, 5);
+    press(&connection, window.number(), 0x31);
+    until("the last key is obeyed", || speed(Speed::REAL));
+    assert!(paused(true), "a held space bar pauses");
+    press(&connection, window.number(), 0x20);
+    until("it goes on", || paused(false));
+    // Steps repeat: one and four more.
+    press(&connection, window.number(), 0x20);
+    until("it pauses", || paused(true));
+    let steps = || viewer.newest().unwrap().run.steps;
+    let before = steps();
+    hold(&connection, window.number(), 0x2e, 4);
+    until("five steps", || steps() == before + 5);
+    press(&connection, window.number(), 0x30);
+    press(&connection, window.number(), 0x20);
+    until("it goes on as fast as can be", || paused(false) && speed(Speed::Free));
     let mut sim = run.end();
 
     // Sizes that nobody wants: the window stays, and shows something down to its last pixel, where a new size leaves black.
@@ -118,22 +162,51 @@ fn a_window_shows_obeys_and_goes() {
     connection.flush().unwrap();
     assert_eq!(ended(&window), Closed::ByUser);
 
-    // Opened and closed again: no thread stays.
+    // Opened and closed again: no thread stays, and no file.
     drop(viewer);
-    let before = threads();
+    let before = threads_and_files();
     for _ in 0..20 {
         let window = sim.open_window_with(cfg_on(&display)).unwrap();
         sim.update(1);
         window.close();
         assert_eq!(ended(&window), Closed::ByUser);
     }
-    until("the threads of windows end", || threads() <= before);
+    until("what belongs to windows ends", || threads_and_files().iter().zip(before).all(|(now, then)| *now <= then));
 
     // The simulation ends the window.
     let mut short = simulation();
     let window = short.open_window_with(cfg_on(&display)).unwrap();
     drop(short);
     assert_eq!(ended(&window), Closed::WithSimulation);
+
+    // The display stands still while the window is open and has paused the simulation: that goes on. Nobody opens another one.
+    let window = sim.open_window_with(cfg_on(&display)).unwrap();
+    let viewer = sim.viewer(Wants::default());
+    press(&connection, window.number(), 0x20);
+    let run = Running::start(sim);
+    until("it pauses", || viewer.newest().is_some_and(|snapshot| snapshot.run.paused));
+    let held = run.steps();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(run.steps() <= held + 1, "it is held");
+    let other = std::thread::spawn({
+        let (cfg, mut sim) = (cfg_on(&display), simulation());
+        display.signal("STOP");
+        move || sim.open_window_with(cfg).unwrap_err()
+    });
+    // Snapshots of a paused simulation come where somebody wants something else: then a picture is due.
+    while window.is_open() {
+        viewer.set_wants(Wants { markers: run.steps() % 2 == 0, ..Wants::default() });
+        viewer.send(Command::SetSpeed(Speed::REAL));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let Closed::DisplayLost(reason) = ended(&window) else { panic!("{:?}", window.closed()) };
+    assert!(reason.contains("not answered for 15 s"), "{reason}");
+    until("it goes on", || run.steps() > held + 10);
+    let error = other.join().unwrap().to_string();
+    assert!(error.contains("not answered for 15 s"), "{error}");
+    display.signal("CONT");
+    drop(viewer);
+    let mut sim = run.end();
 
     // The display is lost while the window is open and the simulation is paused by it: it goes on.
     let window = sim.open_window_with(cfg_on(&display)).unwrap();

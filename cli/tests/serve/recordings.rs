@@ -35,7 +35,7 @@ fn a_browser_seeks_in_a_recording_and_sees_where_things_were() {
     drop(sim);
 
     let (film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
-    let served = sim.serve_with("127.0.0.1:0", ServeCfg { speed: Speed::REAL, ..ServeCfg::default() }).unwrap();
+    let served = sim.serve_with("127.0.0.1:0", ServeCfg { speed: Some(Speed::REAL), ..ServeCfg::default() }).unwrap();
     let (address, over) = (served.address(), AtomicBool::new(false));
     std::thread::scope(|scope| {
         let over = &over;

@@ -98,7 +98,8 @@ fn who_pauses_and_leaves_does_not_hold_the_simulation_for_ever() {
 
 #[test]
 fn a_pause_that_no_browser_made_stays_when_the_browsers_leave() {
-    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { speed: Speed::Times(3.0), ..ServeCfg::default() });
+    let running =
+        Running::start_at(1, "127.0.0.1:0", ServeCfg { speed: Some(Speed::Times(3.0)), ..ServeCfg::default() });
     let run = || running.key.newest().unwrap().run.clone();
     // As a window does it.
     running.key.send(Command::Pause);

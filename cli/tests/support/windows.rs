@@ -1,6 +1,7 @@
 //! Windows of the command on an X server without a screen.
 
 #[path = "../../../view/tests/display/x_server.rs"]
+#[allow(dead_code, reason = "each test uses its part")]
 mod x_server;
 
 pub(crate) use x_server::Display;

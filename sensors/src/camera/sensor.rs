@@ -415,6 +415,11 @@ impl Camera {
         Ok(Optics::new(self.rays.lens(), pixels)?)
     }
 
+    /// Whether its colours show what other sensors show of their measurements.
+    pub fn draws_markers(&self) -> bool {
+        self.draws_markers
+    }
+
     /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
     pub fn lens_bytes(&self) -> usize {
         self.rays.bytes()

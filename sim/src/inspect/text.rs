@@ -1,6 +1,7 @@
 //! The report for people: tree, joints, dynamics and warnings in columns.
 
 use super::{JointReport, LinkReport, Report};
+use nalgebra::Matrix3;
 use std::collections::HashMap;
 use std::fmt;
 
@@ -58,6 +59,10 @@ impl Report {
         writeln!(f, "total mass {} kg{}", number(self.total_mass, 6), com.unwrap_or_default())?;
 
         write!(f, "\nLinks\n\n{}", self.tree())?;
+        let inertias = self.inertia_table();
+        if !inertias.rows.is_empty() {
+            write!(f, "\nPrincipal moments of inertia about the centre of mass (kg m²)\n\n{inertias}")?;
+        }
         if movable > 0 {
             write!(f, "\nMovable joints (axis in the joint frame, SI units)\n\n{}", self.joint_table())?;
             self.write_couplings(f)?;
@@ -96,6 +101,19 @@ impl Report {
                 let branch = if i + 1 == count { Branch::Last } else { Branch::Inner };
                 open.push((child, trunk.clone(), branch));
             }
+        }
+        table
+    }
+
+    /// Of each link that has one, from the smallest moment to the largest.
+    fn inertia_table(&self) -> Table {
+        let mut table = Table::new("<link >smallest >middle >largest");
+        for (link, inertia) in self.links.iter().filter_map(|link| Some((link, link.inertia?))) {
+            let moments = Matrix3::from_fn(|row, column| inertia[row][column]).symmetric_eigenvalues();
+            let mut moments: [f64; 3] = moments.into();
+            moments.sort_by(f64::total_cmp);
+            let [a, b, c] = moments.map(|moment| format!("{moment:.4e}"));
+            table.push([link.name.clone(), a, b, c]);
         }
         table
     }

@@ -213,6 +213,7 @@ pub(crate) fn read(
     text: Option<&str>,
     refused: impl FnOnce(CompileError) -> Error,
 ) -> Result<(String, Model)> {
+    let is_file = text.is_none();
     let (text, compiled) = match text {
         Some(text) => (text.to_string(), mj::compile(text, &[])),
         None => {
@@ -223,9 +224,16 @@ pub(crate) fn read(
     };
     let compiled = compiled.map_err(|error| match error {
         LoadError::Version(error) => Error::MujocoVersion(error),
+        LoadError::Compile(error) if is_file => refused(located(error, path, &text)),
         LoadError::Compile(error) => refused(error),
     })?;
     Ok((text, compiled.into_model()))
+}
+
+/// With the line of the file that MuJoCo names; of a file that includes others it does not say whose line that is.
+fn located(error: CompileError, path: &Path, text: &str) -> CompileError {
+    let source_line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
+    CompileError { source_line, ..error }
 }
 
 /// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.

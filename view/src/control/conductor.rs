@@ -1,16 +1,18 @@
 //! The observer that shows a simulation to its viewers and does what they ask for.
 
 mod playback;
+mod refusals;
 
 pub use playback::{Film, Play, PlayError};
 
 use super::hub::{Hub, Mail, Viewer};
 use super::pace::Pace;
 use super::recording::{RecordButton, RecordingState};
-use super::spring::Spring;
+use super::spring::{self, Spring};
 use super::{Command, Speed, Wants};
 use crate::stage::{Pool, Run};
 use ndarray::arr2;
+use refusals::{Kind, Refusals};
 use sim::{EnvId, Moment, Observer, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -44,12 +46,14 @@ pub struct Conductor {
     /// Something changed that no snapshot shows.
     dirty: bool,
     springs: BTreeMap<u64, Spring>,
+    /// Bodies that springs pulled at last.
+    pulled: Vec<(EnvId, usize)>,
     button: Option<RecordButton>,
     /// How the recording stood when that was asked last.
     recording: Option<RecordingState>,
     /// Who began what is recorded; `None` where the program did.
     recorded_by: Option<u64>,
-    refused: Option<String>,
+    refusals: Refusals,
 }
 
 impl Conductor {
@@ -66,10 +70,11 @@ impl Conductor {
             shown: None,
             dirty: true,
             springs: BTreeMap::new(),
+            pulled: Vec::new(),
             button: None,
             recording: None,
             recorded_by: None,
-            refused: None,
+            refusals: Refusals::default(),
         }
     }
 
@@ -87,7 +92,7 @@ impl Conductor {
             return;
         }
         if let Some(old) = self.button.replace(button) {
-            self.refused = old.set(sim, false).err().or(self.refused.take());
+            self.refusals.note(Kind::Other, old.set(sim, false).err());
         }
         (self.recording, self.recorded_by) = (None, None);
         if self.hub.viewers() > 0 {
@@ -115,7 +120,8 @@ impl Conductor {
     fn end_recording_of_gone(&mut self, sim: &mut SimulationManager, viewers: &[u64]) {
         if let Some(viewer) = self.recorded_by.filter(|viewer| !viewers.contains(viewer)) {
             self.dirty = true;
-            self.refused = self.record(sim, viewer, false).err().or(self.refused.take());
+            let ended = self.record(sim, viewer, false);
+            self.refusals.note(Kind::Other, ended.err());
         }
     }
 
@@ -129,7 +135,8 @@ impl Conductor {
             paused: self.hold_at.is_some_and(|step| step <= sim.steps()),
             speed: self.pace.as_ref().map_or(Speed::Free, Pace::speed),
             measured_speed: self.pace.as_ref().and_then(Pace::measured),
-            refused: self.refused.clone(),
+            refused: self.refusals.reason(),
+            refusals: self.refusals.count(),
             recording: self.recording.clone(),
             timeline: None,
         };
@@ -152,9 +159,8 @@ impl Conductor {
         self.wants = wants;
         for (viewer, command) in commands {
             self.dirty = true;
-            if let Err(reason) = self.act(sim, viewer, command) {
-                self.refused = Some(reason);
-            }
+            let done = self.act(sim, viewer, command);
+            self.refusals.answer(Kind::of(&command), done);
         }
         let gone: Vec<u64> = self.springs.keys().copied().filter(|viewer| !viewers.contains(viewer)).collect();
         for viewer in gone {
@@ -233,11 +239,12 @@ impl Conductor {
             }
             Command::Drag { env, body, hold, target } => {
                 let spring = Spring { env, body, hold, target };
-                if self.springs.get(&viewer).is_some_and(|old| (old.env, old.body) != (env, body)) {
+                if self.springs.get(&viewer).is_some_and(|old| old.held() != spring.held()) {
                     self.release(sim, viewer);
                 }
                 spring.apply(sim).map_err(|error| error.to_string())?;
                 self.springs.insert(viewer, spring);
+                self.pull(sim);
             }
             Command::Release => self.release(sim, viewer),
             Command::Record(on) => self.record(sim, viewer, on)?,
@@ -247,21 +254,41 @@ impl Conductor {
     }
 
     fn release(&mut self, sim: &mut SimulationManager, viewer: u64) {
-        self.springs.remove(&viewer).into_iter().for_each(|spring| spring.release(sim));
-        // Another viewer may hold the same body.
-        self.pull(sim);
+        if self.springs.remove(&viewer).is_some() {
+            self.pull(sim);
+        }
     }
 
-    /// Springs pull for the next step.
+    /// Springs pull for the next step; those of several viewers at one body, together.
     fn pull(&mut self, sim: &mut SimulationManager) {
-        let Self { springs, refused, .. } = self;
-        springs.retain(|_, spring| match spring.apply(sim) {
-            Ok(()) => true,
+        let Self { springs, refusals, pulled, .. } = self;
+        let mut forces: Vec<((EnvId, usize), Vec<_>)> = Vec::new();
+        springs.retain(|_, spring| match spring.force_now(sim) {
+            Ok(force) => {
+                match forces.iter_mut().find(|(held, _)| *held == spring.held()) {
+                    Some((_, of_body)) => of_body.extend(force),
+                    None => forces.push((spring.held(), force.into_iter().collect())),
+                }
+                true
+            }
             Err(error) => {
-                *refused = Some(error.to_string());
+                refusals.note(Kind::Spring, Some(error.to_string()));
                 false
             }
         });
+        for let_go in pulled.drain(..).filter(|held| !forces.iter().any(|(now, _)| now == held)) {
+            spring::release(sim, let_go);
+        }
+        for (held, forces) in forces {
+            match sim.pull(held.0, held.1, &forces) {
+                Ok(()) => pulled.push(held),
+                Err(error) => {
+                    refusals.note(Kind::Spring, Some(error.to_string()));
+                    springs.retain(|_, spring| spring.held() != held);
+                    spring::release(sim, held);
+                }
+            }
+        }
     }
 
     fn restart(&mut self, steps: u64) {
@@ -270,10 +297,10 @@ impl Conductor {
 
     /// Nobody watches: the simulation is on its own again.
     fn let_go(&mut self, sim: &mut SimulationManager) {
-        for spring in std::mem::take(&mut self.springs).into_values() {
-            spring.release(sim);
-        }
-        (self.hold_at, self.pace, self.refused) = (None, None, None);
+        self.springs.clear();
+        self.pull(sim);
+        (self.hold_at, self.pace) = (None, None);
+        self.refusals.forget();
         self.held_by.clear();
         self.speeds.clear();
     }
@@ -326,6 +353,7 @@ impl Observer for Conductor {
                 self.pool.forget_names();
                 // Bodies have other numbers now; whoever drags will drag again.
                 self.springs.clear();
+                self.pulled.clear();
                 if self.hub.viewers() > 0 {
                     self.publish(sim);
                 }

@@ -20,27 +20,40 @@ pub(super) struct Spring {
 impl Spring {
     /// Where it holds the body, and the force there \[N\]: of a critically damped oscillator,
     /// `F = m (w² (target - point) - 2 w v)`, with the mass of the body and all that hangs on it.
-    pub(super) fn force(&self, motion: &BodyMotion) -> [[f64; 3]; 2] {
+    pub(super) fn force(&self, motion: &BodyMotion) -> ([f64; 3], [f64; 3]) {
         let point = (motion.pose * Point3::from(self.hold)).coords;
         let arm = point - motion.pose.translation.vector;
         let velocity = Vector3::from(motion.linear) + Vector3::from(motion.angular).cross(&arm);
         let pull = FREQUENCY.powi(2) * (Vector3::from(self.target) - point) - 2.0 * FREQUENCY * velocity;
-        [point.into(), (motion.carried_mass * pull).into()]
+        (point.into(), (motion.carried_mass * pull).into())
     }
 
-    /// Pulls for the next step.
-    pub(super) fn apply(&self, sim: &mut SimulationManager) -> sim::Result<()> {
+    /// What it holds.
+    pub(super) fn held(&self) -> (EnvId, usize) {
+        (self.env, self.body)
+    }
+
+    /// Where it pulls with which force now; nowhere at what cannot move.
+    ///
+    /// # Errors
+    /// There is no such environment or body.
+    pub(super) fn force_now(&self, sim: &SimulationManager) -> sim::Result<Option<([f64; 3], [f64; 3])>> {
         let motion = sim.body_motion(self.env, self.body)?;
-        if motion.is_fixed {
-            return Ok(());
-        }
-        let [point, force] = self.force(&motion);
-        sim.pull(self.env, self.body, point, force)
+        Ok((!motion.is_fixed).then(|| self.force(&motion)))
     }
 
-    /// Lets go.
-    pub(super) fn release(&self, sim: &mut SimulationManager) {
-        // Of a body that is gone nothing has to be let go.
-        let _ = sim.pull(self.env, self.body, [0.0; 3], [0.0; 3]);
+    /// Pulls for the next step, alone.
+    ///
+    /// # Errors
+    /// There is nothing to pull at, or a number is not finite.
+    pub(super) fn apply(&self, sim: &mut SimulationManager) -> sim::Result<()> {
+        let force = self.force_now(sim)?;
+        sim.pull(self.env, self.body, force.as_slice())
     }
+}
+
+/// Lets go of a body.
+pub(super) fn release(sim: &mut SimulationManager, (env, body): (EnvId, usize)) {
+    // Of a body that is gone nothing has to be let go.
+    let _ = sim.pull(env, body, &[]);
 }

@@ -5,7 +5,7 @@ use super::*;
 use crate::sample::{MASS, sample};
 use crate::stage::Snapshot;
 use scene::Pose;
-use sim::{BodyMotion, RigidObjectCfg, SimulationManagerCfg};
+use sim::{BodyMotion, ObjectId, ObjectShape, RigidObjectCfg, SimulationManagerCfg};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -259,12 +259,12 @@ fn the_force_of_a_spring_points_to_its_end_and_slows_what_moves() {
         is_fixed: false,
     };
     let spring = Spring { env: EnvId(0), body: 0, hold: [0.1, 0.0, 0.0], target: [1.1, 2.0, 3.5] };
-    let [point, force] = spring.force(&motion);
+    let (point, force) = spring.force(&motion);
     // 2 kg (8 rad/s)² 0.5 m = 64 N, straight up.
     assert!((0..3).all(|k| (point[k] - [1.1, 2.0, 3.0][k]).abs() < 1e-12));
     assert!((0..3).all(|k| (force[k] - [0.0, 0.0, 64.0][k]).abs() < 1e-9), "{force:?}");
     // Turning about z with 1 rad/s, the point moves along y with 0.1 m/s: 2 kg 2 (8 rad/s) 0.1 m/s against it.
-    let [_, force] = spring.force(&BodyMotion { angular: [0.0, 0.0, 1.0], ..motion });
+    let (_, force) = spring.force(&BodyMotion { angular: [0.0, 0.0, 1.0], ..motion });
     assert!((force[1] + 3.2).abs() < 1e-9, "{force:?}");
 }
 
@@ -304,6 +304,69 @@ fn a_dragged_body_follows_as_the_closed_form_says() {
     let v = speed(&sim);
     sim.update(50);
     assert_eq!(v, speed(&sim));
+}
+
+/// A free cube without gravity, edges of 0.2 m, steps of 1 ms.
+fn floating_cube() -> (SimulationManager, ObjectId) {
+    let cfg = SimulationManagerCfg { gravity: [0.0; 3].into(), physics_dt: 1e-3, ground: None, ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let shape = ObjectShape::cube(0.2);
+    let id = sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape, mass: Some(MASS), ..Default::default() });
+    (sim, id.unwrap())
+}
+
+/// Two springs at one body act together. At its centre, to x and to y: `x'' = w² (1 - 2 x) - 4 w x'`, so it comes to rest half
+/// way to either. At points of its own, to either side: a couple.
+#[test]
+fn springs_of_two_viewers_at_one_body_add_up() {
+    let (mut sim, id) = floating_cube();
+    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    let drag = |hold, target| Command::Drag { env: EnvId(0), body: 0, hold, target };
+    first.send(drag([0.0; 3], [1.0, 0.0, 0.0]));
+    second.send(drag([0.0; 3], [0.0, 1.0, 0.0]));
+    // The slower pole is (2 - √2) w = 4.7 s⁻¹: e^-14 of the way is left after 3 s.
+    sim.update(3000);
+    let pose = sim.rigid_object(id).get_pose();
+    assert!((pose[(0, 0)] - 0.5).abs() < 1e-5 && (pose[(0, 1)] - 0.5).abs() < 1e-5, "{pose}");
+    // One lets go: the other has it alone. Its pole is w = 8 s⁻¹, twice: (1 + 24) e^-24 is left.
+    first.send(Command::Release);
+    sim.update(3000);
+    let pose = sim.rigid_object(id).get_pose();
+    assert!(pose[(0, 0)].abs() < 1e-6 && (pose[(0, 1)] - 1.0).abs() < 1e-6, "{pose}");
+    drop((first, second));
+
+    let (mut sim, id) = floating_cube();
+    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    first.send(drag([0.0, 0.1, 0.0], [1.0, 0.1, 0.0]));
+    second.send(drag([0.0, -0.1, 0.0], [-1.0, -0.1, 0.0]));
+    // Obeyed after the first step; the second is the first that is pulled.
+    sim.update(2);
+    let v = sim.rigid_object(id).get_velocity();
+    // 2 kg (8 rad/s)² 1 m = 128 N, each 0.1 m beside the centre, against m a² / 6, for a millisecond.
+    let spin = -2.0 * 0.1 * 128.0 / (MASS * 0.04 / 6.0) * 1e-3;
+    assert!((v[(0, 5)] - spin).abs() < 1e-6 * spin.abs(), "{v} instead of {spin}");
+    assert!((0..3).all(|k| v[(0, k)].abs() < 1e-9), "the forces cancel: {v}");
+}
+
+#[test]
+fn a_refusal_is_told_until_something_else_is_done_and_told_again() {
+    let mut sim = sample(1).sim;
+    let viewer = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
+    let run = || viewer.newest().unwrap().run.clone();
+    assert_eq!((run().refused, run().refusals), (None, 0));
+    for count in 1..=2 {
+        viewer.send(Command::Record(true));
+        step_until(&mut sim, |_| run().refusals == count);
+        assert!(run().refused.is_some_and(|reason| reason.contains("record button")), "{count}");
+    }
+    // A spring says nothing about it, and what is done does.
+    viewer.send(Command::Drag { env: EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] });
+    viewer.send(Command::Release);
+    sim.update(100);
+    assert!(run().refused.is_some());
+    viewer.send(Command::SetSpeed(Speed::Free));
+    step_until(&mut sim, |_| run().refused.is_none());
+    assert_eq!(run().refusals, 2);
 }
 
 /// Watching, with everything that can be wanted, changes no bit; nor does a viewer that never looks and lets nothing go.

@@ -48,7 +48,9 @@ struct Shared {
 
 impl Theatre {
     pub(super) fn new(usher: Viewer, cfg: ServeCfg) -> Self {
-        usher.send(control::Command::SetSpeed(cfg.speed));
+        if let Some(speed) = cfg.speed {
+            usher.send(control::Command::SetSpeed(speed));
+        }
         let hands = Mutex::new(usher.another(Wants::NOTHING));
         Self { usher, shared: Arc::new(Shared { cfg, hands, brush: Mutex::new(()), seated: AtomicUsize::new(0) }) }
     }
@@ -138,10 +140,7 @@ impl OwnEyes {
     }
 
     fn env(&self) -> Option<EnvId> {
-        match self.shown {
-            Shown::All => None,
-            Shown::One(env) => Some(EnvId(env)),
-        }
+        self.shown.env()
     }
 
     fn send(&self, command: control::Command) -> Result<(), String> {

@@ -55,15 +55,16 @@ pub struct ServeCfg {
     pub rate: f64,
     /// Quality of the pictures, 1 to 100: how much of what JPEG leaves out is kept.
     pub quality: u8,
-    /// How fast simulated time passes until some viewer says otherwise, and again when the last one has gone.
-    pub speed: Speed,
+    /// How fast simulated time passes until some viewer says otherwise, and again when the last one has gone; `None` leaves it as
+    /// it is: what a window set, else as fast as can be.
+    pub speed: Option<Speed>,
     /// The simulation's record button; where `None`, the one that another view has brought, if any.
     pub recording: Option<RecordButton>,
 }
 
 impl Default for ServeCfg {
     fn default() -> Self {
-        Self { max_viewers: 16, rate: 30.0, quality: 85, speed: Speed::Free, recording: None }
+        Self { max_viewers: 16, rate: 30.0, quality: 85, speed: None, recording: None }
     }
 }
 
@@ -157,4 +158,38 @@ impl Observer for Host {
     }
 
     fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::control::Command;
+    use crate::sample::sample;
+    use std::time::{Duration, Instant};
+
+    /// Who opens a window, in real time, and serves the simulation besides, goes on in real time.
+    #[test]
+    fn serving_leaves_the_speed_as_it_is_unless_it_says_one() {
+        let mut sim = sample(1).sim;
+        let window = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
+        window.send(Command::SetSpeed(Speed::REAL));
+        let until = |sim: &mut SimulationManager, speed: Speed| {
+            let start = Instant::now();
+            while window.newest().unwrap().run.speed != speed {
+                assert!(start.elapsed() < Duration::from_secs(30), "never {speed:?}");
+                sim.update(1);
+            }
+        };
+        until(&mut sim, Speed::REAL);
+        let _served = sim.serve("127.0.0.1:0").unwrap();
+        // Commands are obeyed within some milliseconds, steps are 10 ms long.
+        sim.update(10);
+        until(&mut sim, Speed::REAL);
+        let cfg = ServeCfg { speed: Some(Speed::Times(2.0)), ..ServeCfg::default() };
+        let other = sim.serve_with("127.0.0.1:0", cfg).unwrap();
+        until(&mut sim, Speed::Times(2.0));
+        other.close(&mut sim).unwrap();
+        until(&mut sim, Speed::REAL);
+    }
 }

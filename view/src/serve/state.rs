@@ -1,7 +1,7 @@
 //! What the page is told, as JSON.
 
 use crate::control::Speed;
-use crate::stage::{JointName, Names, Overlays, Picked, Shown, Snapshot, describe};
+use crate::stage::{JointName, Names, Overlays, Picked, Shown, Snapshot, describe, slider_range};
 use serde_json::{Value, json};
 
 /// Name, words for people, and the switch of what can be drawn over the scene.
@@ -37,6 +37,7 @@ pub(super) fn contents(snapshot: &Snapshot, overlays: &Overlays) -> Value {
             "driven": name.driven,
             "lower": finite(lower),
             "upper": finite(upper),
+            "slider": slider_range([lower, upper], name.slides),
         })
     };
     let robots: Vec<Value> = by_robot(&snapshot.names)
@@ -86,6 +87,7 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, picked: Option<&Picked>, 
         "robots": robots,
         "diverged": diverged.map(|(k, why)| format!("environment {k}: {why}")).collect::<Vec<_>>(),
         "refused": snapshot.run.refused,
+        "refusals": snapshot.run.refusals,
         "selected": picked.map(|picked| selected(picked, snapshot)),
         "recording": snapshot.run.recording.as_ref().map(|now| json!({"on": now.on, "text": now.text})),
         "timeline": snapshot.run.timeline.map(|line| json!({"now": line.now, "start": line.start, "end": line.end})),

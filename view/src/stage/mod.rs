@@ -1,6 +1,7 @@
 //! What a viewer sees: snapshots of the whole stage, and everything that is drawn of them.
 
 mod assembly;
+mod camera;
 mod canvas;
 mod color;
 mod eye;
@@ -11,12 +12,14 @@ mod pick;
 mod png;
 mod pool;
 mod pull;
+mod slider;
 mod snapshot;
 mod trail;
 
 #[cfg(test)]
 mod tests;
 
+pub use camera::CameraView;
 pub use canvas::Canvas;
 pub use eye::Eye;
 pub use overlay::Overlays;
@@ -26,5 +29,6 @@ pub(crate) use pick::contacts_wanted;
 pub use pick::{Picked, describe};
 pub(crate) use pool::Pool;
 pub(crate) use pull::Pull;
+pub(crate) use slider::slider_range;
 pub use snapshot::{EnvStage, JointName, Names, Run, Shown, Snapshot, Timeline};
 pub use trail::Trails;

@@ -1,50 +1,89 @@
 //! What a camera sensor sees, live: colour, depth, mask and normals in a grid of 2 x 2.
 
+use super::assembly::MARKERS;
 use super::canvas::Canvas;
 use super::snapshot::Snapshot;
 use embedded_graphics::mono_font::ascii::FONT_6X10;
+use scene::{Instance, Marker, PoseF32, RenderScene};
 use sensors::camera::colormap::{depth_color, mask_color, normal_color};
-use sensors::camera::{Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
+use sensors::camera::{
+    Channels, Frame, FrameMut, Lens, LensRays, Optics, ParallelRasterizer, PixelIntrinsics, RasterCfg, Renderer, Shot,
+};
 use sensors::visibility::View;
 
 /// Draws what camera sensors see from snapshots, without asking the sensors for anything: with the pose and the lens of the
-/// camera at its last measurement, and everything else where it is now.
+/// camera at its last measurement, and everything else where it is now. Behind a lens that bends them, rays are followed; what
+/// other sensors show is in the colours of cameras that draw it.
 #[derive(Debug)]
 pub struct Panel {
     rasterizer: ParallelRasterizer,
     frame: Frame,
     size: [usize; 2],
+    /// The lens of the last picture that had one.
+    rays: Option<LensRays>,
+}
+
+/// What the panel draws with.
+fn cfg() -> RasterCfg {
+    RasterCfg { samples: 1, ..RasterCfg::of_cameras() }
 }
 
 impl Panel {
     /// Draws on `threads` threads.
     pub fn new(threads: usize) -> Self {
-        let cfg = RasterCfg { samples: 1, ..RasterCfg::of_cameras() };
-        Self { rasterizer: ParallelRasterizer::new(cfg, threads), frame: Frame::default(), size: [0; 2] }
+        let rasterizer = ParallelRasterizer::new(cfg(), threads);
+        Self { rasterizer, frame: Frame::default(), size: [0; 2], rays: None }
     }
 
     /// Draws camera `camera` of environment `env` in a grid, each picture at most `width` pixels wide. `false`, and nothing is
     /// drawn, where that camera does not look at that environment.
     pub fn draw(&mut self, snapshot: &Snapshot, camera: usize, env: usize, width: usize, canvas: &mut Canvas) -> bool {
         let Some(stage) = snapshot.envs.get(env) else { return false };
-        let Some((view, scene)) = stage.views.get(camera).copied().flatten().zip(snapshot.scene_of(stage)) else {
+        let looks = stage.views.get(camera).and_then(Option::as_ref);
+        let Some((looks, scene)) = looks.zip(snapshot.scene_of(stage)) else {
             return false;
         };
-        let view = shrunk(&view, width);
+        let view = shrunk(&looks.view, width);
         let size = [view.width, view.height];
         if self.size != size || self.frame.color.is_none() {
             let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
             (self.frame, self.size) = (Frame::new(size[0], size[1], channels), size);
         }
-        let poses = &stage.look.instances;
-        let shot =
-            Shot { scene: &scene, poses, view: &view, lights: Some(&stage.look.lights), lens: None, before: None };
+        let bends = !looks.lens.is_pinhole();
+        if bends && !self.has_rays(looks.lens, &view) {
+            return false;
+        }
+        self.rasterizer.set_renderer(if bends { Renderer::FastRayTraced } else { Renderer::Raster });
+        self.rasterizer.set_cfg(cfg());
+        let (poses, lights) = (stage.look.instances.as_slice(), Some(stage.look.lights.as_slice()));
+        let lens = self.rays.as_ref().filter(|_| bends);
+        let shot = Shot { scene: &scene, poses, view: &view, lights, lens, before: None };
         if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
             return false;
+        }
+        if let Some((scene, poses)) = with_markers(&scene, poses, &looks.markers) {
+            self.rasterizer.set_cfg(RasterCfg { groups: cfg().groups | 1 << MARKERS, ..cfg() });
+            let shot = Shot { scene: &scene, poses: &poses, ..shot };
+            let frame = FrameMut { color: self.frame.color.as_deref_mut(), ..FrameMut::default() };
+            if self.rasterizer.render(&mut [(shot, frame)]).is_err() {
+                return false;
+            }
         }
         canvas.resize(2 * size[0], 2 * size[1]);
         self.compose(canvas);
         true
+    }
+
+    /// Makes the rays of a lens in front of these pixels, unless they are those of the last picture. `false` where a lens sees
+    /// nothing through so few pixels.
+    fn has_rays(&mut self, lens: Lens, view: &View) -> bool {
+        let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
+        let Ok(optics) = Optics::new(lens, PixelIntrinsics { fx, fy, cx, cy }) else { return false };
+        let size = [view.width, view.height];
+        if !self.rays.as_ref().is_some_and(|rays| *rays.optics() == optics && rays.size() == size) {
+            self.rays = LensRays::new(&optics, size, 1).ok();
+        }
+        self.rays.is_some()
     }
 
     fn compose(&self, canvas: &mut Canvas) {
@@ -73,6 +112,19 @@ impl Panel {
             canvas.text(title, [left as i32 + 4, top as i32 + 3], &FONT_6X10, [240; 3]);
         }
     }
+}
+
+/// A scene with markers among its instances, and where all of them are; `None` where there is nothing to add.
+fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> Option<(RenderScene, Vec<PoseF32>)> {
+    let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
+    if added.is_empty() {
+        return None;
+    }
+    let added = added.into_iter().map(|instance| Instance { group: MARKERS, ..instance });
+    let instances = scene.instances().iter().cloned().chain(added).collect();
+    // There may be too many triangles together.
+    let scene = scene.with_instances(instances).ok()?;
+    Some((scene, poses.iter().copied().chain(places).collect()))
 }
 
 /// The colour of a pixel, by its number.

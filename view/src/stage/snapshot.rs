@@ -1,12 +1,11 @@
 //! The whole stage at one moment.
 
+use super::camera::{self, CameraId, CameraView};
 use crate::control::{RecordingState, Speed, Wants};
 use scene::state::Contact;
 use scene::{Marker, RenderScene};
-use sensors::camera::Camera;
-use sensors::visibility::View;
 use sim::description::{Joint, JointKind};
-use sim::{EnvId, JointIndex, Look, MaskId, RobotId, SensorId, SimulationManager};
+use sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager};
 use std::sync::Arc;
 
 /// Which environments.
@@ -23,6 +22,14 @@ impl Shown {
     /// Whether an environment is among them.
     pub fn has(self, env: usize) -> bool {
         self == Self::All || self == Self::One(env)
+    }
+
+    /// The one; `None` where it is all.
+    pub(crate) fn env(self) -> Option<EnvId> {
+        match self {
+            Self::All => None,
+            Self::One(env) => Some(EnvId(env)),
+        }
     }
 }
 
@@ -56,8 +63,10 @@ pub struct Run {
     pub speed: Speed,
     /// How many simulated seconds pass in a second, over the last half second; `None` where that is not known yet.
     pub measured_speed: Option<f64>,
-    /// Why the last command that was refused was refused.
+    /// Why the last command was refused; `None` once another one was done.
     pub refused: Option<String>,
+    /// How many commands were refused so far: who sees the same reason again sees whether it was refused again.
+    pub refusals: u64,
     /// How the recording stands; `None` where there is no record button.
     pub recording: Option<RecordingState>,
     /// Where in a recording this is; `None` for a simulation that runs.
@@ -82,11 +91,11 @@ pub struct Names {
     pub bodies: Arc<[String]>,
     /// Joints of robots, one after the other.
     pub joints: Vec<JointName>,
-    /// Camera sensors.
+    /// Camera sensors of every kind; the eyes of a pair are `NAME/left` and `NAME/right`.
     pub cameras: Vec<String>,
     /// Which mask id the ground has: it is there once for all environments.
     pub(crate) ground: Option<i32>,
-    camera_ids: Vec<SensorId<Camera>>,
+    camera_ids: Vec<CameraId>,
 }
 
 /// A joint of a robot.
@@ -120,7 +129,7 @@ pub struct EnvStage {
     /// Effort of the drive of each joint in the last step \[N m or N\]; 0 without a drive.
     pub efforts: Vec<f64>,
     /// What each camera of [`Names::cameras`] looks at; `None` where it does not look at this environment.
-    pub views: Vec<Option<View>>,
+    pub views: Vec<Option<CameraView>>,
 }
 
 impl Names {
@@ -140,13 +149,13 @@ impl Names {
                 slides: prismatic.contains(&name),
             }));
         }
-        let (cameras, camera_ids) = sim.sensor_ids::<Camera>().into_iter().unzip();
+        let (cameras, camera_ids) = camera::cameras(sim).into_iter().unzip();
         Self { bodies: sim.body_names(), joints, cameras, ground, camera_ids }
     }
 
     /// Whether they are still those of `sim`: sensors are added without a word.
     pub(super) fn fit(&self, sim: &SimulationManager) -> bool {
-        sim.sensor_ids::<Camera>().len() == self.cameras.len()
+        camera::count(sim) == self.cameras.len()
     }
 }
 
@@ -199,9 +208,8 @@ impl Snapshot {
         }
         if wants.cameras {
             for id in &names.camera_ids {
-                let camera = sim.sensor(*id).ok();
-                for (k, env) in self.envs.iter_mut().enumerate() {
-                    env.views.push(camera.and_then(|camera| camera.view(k).ok()));
+                for (env, view) in self.envs.iter_mut().zip(id.views(sim)) {
+                    env.views.push(view);
                 }
             }
         }

@@ -5,7 +5,11 @@ use crate::control::{Viewing, Wants};
 use crate::sample::{HALF, MASS, Sample, sample};
 use nalgebra::{Point3, Vector3};
 use sensors::camera::colormap::{depth_color, mask_color, normal_color};
+use sensors::camera::lens::Equidistant;
+use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement, Renderer, StereoCameraCfg};
+use sensors::ray::RayCasterCameraCfg;
 use sim::EnvId;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A snapshot with everything, after the cube has come to rest.
@@ -151,6 +155,25 @@ fn every_overlay_changes_the_picture_and_goes_again() {
     assert!(unlike(&draw(&moved, trail, Some(&trails)), &draw(&moved, none, None)) > 5);
 }
 
+/// Where there are more bodies than trails, the picture says so.
+#[test]
+fn trails_that_are_left_out_are_said() {
+    let (_, snapshot) = stage(2);
+    let bodies = snapshot.names.bodies.len();
+    let view = Eye::default().view(400, 100);
+    let written = |envs: usize| {
+        let envs = snapshot.envs.iter().cycle().take(envs).cloned().collect();
+        let snapshot = Snapshot { envs, ..Snapshot::clone(&snapshot) };
+        let (mut trails, mut canvas) = (Trails::default(), Canvas::new(400, 100));
+        trails.add(&snapshot);
+        trails.draw(&snapshot, Shown::All, &view, &mut canvas);
+        let below = (86..96).flat_map(|y| (0..400).map(move |x| (x, y)));
+        below.filter(|&(x, y)| canvas.pixel(x, y) == Some(color::TRAIL)).count()
+    };
+    assert_eq!(written(1024 / bodies), 0, "each has its own");
+    assert!(written(1024 / bodies + 1) > 100, "some forty letters");
+}
+
 /// The panel draws what the sensor itself measures, pixel by pixel, where nothing moved since.
 #[test]
 fn the_panel_shows_what_the_camera_measures() {
@@ -163,9 +186,21 @@ fn the_panel_shows_what_the_camera_measures() {
     let (depth, mask, normal) = (camera.depth().unwrap(), camera.mask().unwrap(), camera.normal().unwrap());
     let finite = depth.index_axis(ndarray::Axis(0), 1).iter().copied().filter(|d| d.is_finite()).collect::<Vec<f32>>();
     let range = finite.iter().fold([f32::MAX, f32::MIN], |[low, high], d| [low.min(*d), high.max(*d)]);
-    let mut seen = std::collections::BTreeSet::new();
+    let color = camera.color().unwrap();
+    let (mut seen, mut colors) = (BTreeSet::new(), BTreeSet::new());
     // Below the titles.
-    for (v, u) in (15..48).flat_map(|v| (0..64).map(move |u| (v, u))) {
+    for (v, u) in (15..48usize).flat_map(|v| (0..64usize).map(move |u| (v, u))) {
+        // Where several things, or lit and shaded parts, are in a pixel, its colour is a mixture of four samples.
+        let rgb = |v: usize, u: usize| [0, 1, 2].map(|k| color[(1, v, u, k)]);
+        let around = [(v - 1, u), (v + 1, u), (v, u.saturating_sub(1)), (v, (u + 1).min(63)), (v, u)];
+        let flat = around.iter().all(|&(v, u)| {
+            v < 48 && rgb(v, u).iter().zip(rgb(around[4].0, around[4].1)).all(|(a, b)| a.abs_diff(b) < 3)
+        });
+        if flat {
+            let seen = canvas.pixel(u, v).unwrap();
+            assert!(seen.iter().zip(rgb(v, u)).all(|(a, b)| a.abs_diff(b) <= 1), "{seen:?}, not {:?}", rgb(v, u));
+            colors.insert(seen);
+        }
         let expected = [
             (64 + u, v, depth_color(depth[(1, v, u)], range)),
             (u, 48 + v, mask_color(mask[(1, v, u)])),
@@ -177,9 +212,106 @@ fn the_panel_shows_what_the_camera_measures() {
         seen.insert(mask[(1, v, u)]);
     }
     assert!(seen.len() >= 2, "the cube and the ground: {seen:?}");
+    assert!(colors.iter().any(|c| c[0] > 2 * c[1].max(c[2])), "the cube is red: {colors:?}");
+    assert!(colors.len() > 3, "{colors:?}");
     assert!(!panel.draw(&snapshot, 1, 0, 64, &mut canvas), "there is no such camera");
     assert!(!panel.draw(&snapshot, 0, 9, 64, &mut canvas), "there is no such environment");
     assert!(panel.draw(&snapshot, 0, 0, 0, &mut canvas), "as small as can be");
+}
+
+/// The masks in a panel of 64 x 48 pixels each, below the title.
+fn masks(canvas: &Canvas) -> Vec<[u8; 3]> {
+    (15..48).flat_map(|v| (0..64).map(move |u| (u, 48 + v))).map(|(u, v)| canvas.pixel(u, v).unwrap()).collect()
+}
+
+/// What a sensor's own mask looks like there.
+fn masks_of(mask: ndarray::ArrayView3<'_, i32>) -> Vec<[u8; 3]> {
+    (15..48).flat_map(|v| (0..64).map(move |u| (v, u))).map(|(v, u)| mask_color(mask[(0, v, u)])).collect()
+}
+
+/// Cameras of every kind are there, each as it sees: a pair of eyes, one ray for each pixel, a lens that bends the rays.
+#[test]
+fn the_panel_has_cameras_of_every_kind() {
+    let mut sample = sample(1);
+    let placement = Placement::LookAt { eye: [0.6, 0.5, 0.8], target: [0.2, 0.0, 0.1], up: [0.0, 0.0, 1.0] };
+    let cfg = CameraCfg {
+        width: 64,
+        height: 48,
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { mask: true, ..Channels::NONE },
+        ..Default::default()
+    };
+    let pair = StereoCameraCfg { camera: cfg.clone(), left_to_right_pos: [0.2, 0.0, 0.0], ..Default::default() };
+    let pair = sample.sim.add_sensor("pair", pair).unwrap();
+    let intrinsics = Intrinsics::Pixels { fx: 25.0, fy: 25.0, cx: 32.0, cy: 24.0 };
+    let lens = Equidistant { max_angle: 1.6 }.into();
+    let fish = CameraCfg { renderer: Renderer::FastRayTraced, intrinsics, lens, ..cfg.clone() };
+    let fish = sample.sim.add_sensor("fish", fish).unwrap();
+    let rays = RayCasterCameraCfg {
+        width: 64,
+        height: 48,
+        intrinsics: cfg.intrinsics.clone(),
+        extrinsics: cfg.extrinsics.clone(),
+        ..Default::default()
+    };
+    let rays = sample.sim.add_sensor("rays", rays).unwrap();
+    sample.sim.update(100);
+    let snapshot = sample.sim.viewer(Wants::default()).newest().unwrap();
+    assert_eq!(snapshot.names.cameras, ["eye", "fish", "pair/left", "pair/right", "rays"]);
+    let (mut panel, mut canvas) = (Panel::new(1), Canvas::default());
+    let mut drawn = |camera: usize| {
+        assert!(panel.draw(&snapshot, camera, 0, 64, &mut canvas));
+        masks(&canvas)
+    };
+    let [fisheye, left, right, cast] = [1, 2, 3, 4].map(&mut drawn);
+    let sim = &sample.sim;
+    assert!(fisheye == masks_of(sim.sensor(fish).unwrap().mask().unwrap()));
+    assert!(left == masks_of(sim.sensor(pair).unwrap().left().mask().unwrap()));
+    assert!(right == masks_of(sim.sensor(pair).unwrap().right().mask().unwrap()));
+    // Rays and rasterizer may differ where an edge goes through the middle of a pixel.
+    let own = masks_of(sim.sensor(rays).unwrap().mask());
+    let unlike = own.iter().zip(&cast).filter(|(a, b)| a != b).count();
+    assert!(unlike < 20, "{unlike} of {} pixels", own.len());
+    // The controls: each of them sees something else.
+    assert!(left != right && fisheye != left);
+    let colors: BTreeSet<_> = fisheye.iter().collect();
+    assert!(colors.len() >= 2, "{colors:?}");
+}
+
+/// What other sensors show is in the colours of a camera that draws it, there and in the panel, and in nothing else.
+#[test]
+fn the_panel_shows_markers_where_the_camera_draws_them() {
+    let mut sample = sample(1);
+    let placement = Placement::LookAt { eye: [0.6, 0.5, 0.8], target: [0.2, 0.0, 0.1], up: [0.0, 0.0, 1.0] };
+    let cfg = CameraCfg {
+        width: 64,
+        height: 48,
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { color: true, ..Channels::NONE },
+        draw_markers: true,
+        ..Default::default()
+    };
+    sample.sim.add_sensor("marked", cfg).unwrap();
+    // Another camera above the cube shows its frame.
+    let placement = Placement::LookAt { eye: [0.2, 0.1, 0.4], target: [0.0; 3], up: [0.0, 0.0, 1.0] };
+    let other = CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..CameraCfg::default() };
+    let other = sample.sim.add_sensor("other", other).unwrap();
+    sample.sim.set_debug_vis(other, true).unwrap();
+    sample.sim.update(100);
+    let snapshot = sample.sim.viewer(Wants::default()).newest().unwrap();
+    let [plain, marked] = [0, 1].map(|camera| {
+        let mut canvas = Canvas::default();
+        assert!(Panel::new(1).draw(&snapshot, camera, 0, 64, &mut canvas));
+        canvas
+    });
+    let differs = |x: [usize; 2], y: [usize; 2]| {
+        let places = (y[0]..y[1]).flat_map(|v| (x[0]..x[1]).map(move |u| (u, v)));
+        places.filter(|&(u, v)| plain.pixel(u, v) != marked.pixel(u, v)).count()
+    };
+    assert!(differs([0, 64], [0, 48]) > 5, "colours");
+    assert_eq!([differs([64, 128], [0, 48]), differs([0, 128], [48, 96])], [0, 0], "depth, mask and normals");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::color;
 use super::eye::project;
 use super::overlay::in_overview;
 use super::snapshot::{Shown, Snapshot};
+use embedded_graphics::mono_font::ascii::FONT_6X10;
 use sensors::visibility::View;
 use std::collections::VecDeque;
 
@@ -15,24 +16,26 @@ const BODIES: usize = 1024;
 /// A new place is kept where the body is this far from the last one \[m\].
 const APART: f64 = 0.01;
 
-/// Trails of bodies, kept by the viewer who draws them.
+/// Trails of bodies, kept by the viewer who draws them: of the first 1024 bodies, environment by environment. Where there are
+/// more, that is written into the picture.
 #[derive(Debug, Default)]
 pub struct Trails {
     /// One for each body of each environment.
     places: Vec<VecDeque<[f64; 3]>>,
     bodies: usize,
-    steps: u64,
+    /// Bodies of all environments, those without a trail too.
+    there_are: usize,
 }
 
 impl Trails {
     /// Takes over where bodies are now. A simulation of other bodies, or an environment that was put back, begins anew.
     pub fn add(&mut self, snapshot: &Snapshot) {
         let bodies = snapshot.names.bodies.len();
-        let count = (bodies * snapshot.envs.len()).min(BODIES);
+        self.there_are = bodies * snapshot.envs.len();
+        let count = self.there_are.min(BODIES);
         if self.bodies != bodies || self.places.len() != count {
             (self.bodies, self.places) = (bodies, vec![VecDeque::new(); count]);
         }
-        self.steps = snapshot.run.steps;
         let all = snapshot.envs.iter().flat_map(|env| &env.look.bodies);
         for (trail, pose) in self.places.iter_mut().zip(all) {
             let now: [f64; 3] = pose.translation.vector.into();
@@ -69,6 +72,13 @@ impl Trails {
                     canvas.line(from, to, shade);
                 }
             }
+        }
+        if self.there_are > self.places.len() {
+            let text = format!("trails of the first {} of {} bodies", self.places.len(), self.there_are);
+            let [width, height] = canvas.dimensions().map(|n| i32::try_from(n).unwrap_or(i32::MAX));
+            // In the middle below: the corners have other words.
+            let left = (width - 6 * text.len() as i32) / 2;
+            canvas.text(&text, [left.max(2), height - 14], &FONT_6X10, color::TRAIL);
         }
     }
 }

@@ -6,8 +6,7 @@ use super::keys::{Action, Key, action};
 use super::{hud, timeline};
 use crate::control::{Command, Speed, Wants};
 use crate::stage::{
-    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Timeline, Trails, contacts_wanted,
-    describe,
+    Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
 };
 use nalgebra::Vector3;
 use sensors::visibility::View;
@@ -20,8 +19,10 @@ use std::time::Instant;
 /// What happens to a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
-    /// A key was pressed, or is held and repeats.
+    /// A key was pressed.
     Press(Key),
+    /// A key is held, and repeats.
+    Repeat(Key),
     /// A key was let go.
     Release(Key),
     /// A button of the mouse was pressed at a pixel: 1 is the left one, 2 the middle one, 3 the right one.
@@ -61,6 +62,16 @@ enum Grip {
     Spring(Pull),
 }
 
+/// What the mouse is doing since a button was pressed, until that button is let go.
+#[derive(Clone, Debug, PartialEq)]
+struct Held {
+    button: u8,
+    grip: Grip,
+    /// Where it was pressed, and where the mouse was last.
+    start: [f64; 2],
+    last: [f64; 2],
+}
+
 /// Pictures per second, at most: what most screens show.
 const RATE: f64 = 60.0;
 /// A mouse that moved less than this between press and release clicked \[pixels\].
@@ -88,7 +99,7 @@ pub struct App {
     overlays: Overlays,
     picked: Option<Picked>,
     follow: Option<[f64; 3]>,
-    grip: Option<(Grip, [f64; 2], [f64; 2])>,
+    grip: Option<Held>,
     held: HashSet<Key>,
     sliders: Option<usize>,
     help: bool,
@@ -98,8 +109,8 @@ pub struct App {
     desks: Desks,
     /// Where pictures may have fewer samples to keep pace.
     fineness: Option<Fineness>,
-    /// What the last picture showed: steps, the moment of a recording, from where.
-    showed: Option<(u64, Option<Timeline>, View)>,
+    /// What the last picture showed: which snapshot, from where.
+    showed: Option<(u64, View)>,
 }
 
 /// Short: snapshots and pictures are long.
@@ -144,7 +155,7 @@ impl App {
             commands: Vec::new(),
             drawn: Vec::new(),
             flown: Instant::now(),
-            desks: Desks { most: threads.max(1), behind: None },
+            desks: Desks::new(threads),
             fineness: None,
             showed: None,
         }
@@ -157,7 +168,7 @@ impl App {
             self.eye = Some(Eye::overview(&snapshot));
         }
         self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
-        if let Some((Grip::Spring(pull), ..)) = &mut self.grip {
+        if let Some(Held { grip: Grip::Spring(pull), .. }) = &mut self.grip {
             pull.renumber(&snapshot.names);
         }
         if let (Some(last), Some(picked), Some(eye)) = (self.follow, &self.picked, &mut self.eye) {
@@ -187,7 +198,7 @@ impl App {
 
     /// What it wants to find in snapshots.
     pub fn wants(&self) -> Wants {
-        let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
+        let contacts = contacts_wanted(self.shown_now(), &self.overlays, self.picked.as_ref());
         Wants { rate: RATE, contacts, markers: self.overlays.sensors, ..Wants::default() }
     }
 
@@ -207,22 +218,27 @@ impl App {
         !self.held.is_empty() || self.fineness.is_some_and(|fineness| fineness.wants_better(now))
     }
 
-    fn env_id(&self) -> Option<EnvId> {
-        match self.shown {
-            Shown::All => None,
-            Shown::One(env) => Some(EnvId(env)),
-        }
+    /// Which environments are in the picture: where somebody looks through a camera, that of the camera.
+    fn shown_now(&self) -> Shown {
+        if self.looks_through() { Shown::One(self.env) } else { self.shown }
+    }
+
+    /// Whether the picture is a camera sensor's: one is chosen, and it looks at the environment.
+    fn looks_through(&self) -> bool {
+        self.through_view(1, 1).is_some()
     }
 
     /// Something happened.
     pub fn handle(&mut self, input: Input) {
         match input {
             Input::Press(key) => self.press(key),
+            Input::Repeat(key) if action(key).is_some_and(Action::repeats) => self.press(key),
+            Input::Repeat(_) => {}
             Input::Release(key) => {
                 self.held.remove(&key);
             }
             Input::ButtonPress(button, at, modifiers) => self.grip(button, at, modifiers),
-            Input::ButtonRelease(_, at) => self.release(at),
+            Input::ButtonRelease(button, at) => self.release(button, at),
             Input::Move(at) => self.drag(at),
             Input::Wheel(steps, at) => self.wheel(steps, at),
             Input::Resize(size) => self.size = size,
@@ -258,7 +274,7 @@ impl App {
             Action::Faster => self.commands.push(Command::SetSpeed(Speed::Times((factor * 2.0).min(Speed::RANGE[1])))),
             Action::RealTime => self.commands.push(Command::SetSpeed(Speed::REAL)),
             Action::FreeSpeed => self.commands.push(Command::SetSpeed(Speed::Free)),
-            Action::Reset => self.commands.push(Command::Reset(self.env_id())),
+            Action::Reset => self.commands.push(Command::Reset(self.shown_now().env())),
             Action::Record => self.commands.push(Command::Record(!records(&snapshot))),
             Action::NextEnv => self.show_env((self.env + 1) % envs),
             Action::PreviousEnv => self.show_env((self.env + envs - 1) % envs),
@@ -290,7 +306,7 @@ impl App {
     /// Shows one environment; the eye goes along.
     fn show_env(&mut self, env: usize) {
         let Some(snapshot) = &self.snapshot else { return };
-        let from = self.env_id().and_then(|EnvId(k)| snapshot.envs.get(k)).map(|env| env.origin);
+        let from = self.shown.env().and_then(|EnvId(k)| snapshot.envs.get(k)).map(|env| env.origin);
         let to = snapshot.envs.get(env).map(|env| env.origin);
         if let (Some(to), Some(eye)) = (to, &mut self.eye) {
             match from {
@@ -313,7 +329,7 @@ impl App {
     /// What a camera sensor looks at, its picture as large as fits.
     fn through_view(&self, width: usize, height: usize) -> Option<View> {
         let env = self.snapshot.as_ref()?.envs.get(self.env)?;
-        let view = env.views.get(self.through?).copied().flatten()?;
+        let view = env.views.get(self.through?)?.as_ref()?.view;
         let scale = (width as f32 / view.width as f32).min(height as f32 / view.height as f32);
         let mut pose = view.world_from_camera;
         (0..3).for_each(|k| pose.translation[k] += env.origin[k] as f32);
@@ -325,11 +341,18 @@ impl App {
 
     fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
         let Some(snapshot) = self.snapshot.clone() else { return };
+        match &self.grip {
+            // One thing at a time.
+            Some(held) if held.button != button => return,
+            // That it was let go was not heard.
+            Some(_) => self.release(button, at),
+            None => {}
+        }
         if button == 1 && snapshot.run.recording.is_some() && hud::on_record_button(self.size[0], self.aside(), at) {
             self.commands.push(Command::Record(!records(&snapshot)));
             return;
         }
-        let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size[0], at));
+        let on_slider = self.sliders.and_then(|first| hud::slider_at(&snapshot, self.env, first, self.size, at));
         let on_timeline = timeline::time_at(&snapshot, self.size, at).filter(|_| button == 1);
         let grip = match button {
             1 if on_timeline.is_some() => {
@@ -349,31 +372,31 @@ impl App {
             3 => Some(Grip::Pan),
             _ => None,
         };
-        self.grip = grip.map(|grip| (grip, at, at));
+        self.grip = grip.map(|grip| Held { button, grip, start: at, last: at });
     }
 
     /// A body to be pulled.
     fn spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<Grip> {
         let view = self.view();
-        let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
+        let look = Look { shown: self.shown_now(), overlays: self.overlays, ..Look::default() };
         let pull = Pull::at(&mut self.painter, snapshot, &view, &look, at)?;
         self.picked = Some(pull.picked().clone());
         Some(Grip::Spring(pull))
     }
 
     fn drag(&mut self, at: [f64; 2]) {
-        let Some((mut grip, start, last)) = self.grip.take() else { return };
-        let by = [at[0] - last[0], at[1] - last[1]];
+        let Some(mut held) = self.grip.take() else { return };
+        let by = [at[0] - held.last[0], at[1] - held.last[1]];
         let height = self.size[1];
-        let free = self.through.is_none();
-        match (&mut grip, &mut self.eye) {
+        let free = !self.looks_through();
+        match (&held.grip, &mut self.eye) {
             (Grip::Orbit, Some(eye)) if free => eye.orbit(by, height),
             (Grip::Pan, Some(eye)) if free => eye.pan(by, height),
             (Grip::Turn, Some(eye)) if free => eye.turn(by, height),
             _ => {}
         }
         if let Some(snapshot) = self.snapshot.clone() {
-            match &mut grip {
+            match &mut held.grip {
                 Grip::Slider(joint) => {
                     let value = hud::slider_value(&snapshot, self.env, *joint, self.size[0], at[0]);
                     value.into_iter().for_each(|value| self.set_target(&snapshot, *joint, value));
@@ -386,13 +409,13 @@ impl App {
                 Grip::Orbit | Grip::Pan | Grip::Turn => {}
             }
         }
-        self.grip = Some((grip, start, at));
+        self.grip = Some(Held { last: at, ..held });
         self.pull();
     }
 
     /// Sends the spring as it is.
     fn pull(&mut self) {
-        if let Some((Grip::Spring(pull), ..)) = &self.grip
+        if let Some(Held { grip: Grip::Spring(pull), .. }) = &self.grip
             && let Some(drag) = pull.command()
         {
             self.commands.retain(|command| !matches!(command, Command::Drag { .. }));
@@ -400,8 +423,8 @@ impl App {
         }
     }
 
-    fn release(&mut self, at: [f64; 2]) {
-        let Some((grip, start, _)) = self.grip.take() else { return };
+    fn release(&mut self, button: u8, at: [f64; 2]) {
+        let Some(Held { grip, start, .. }) = self.grip.take_if(|held| held.button == button) else { return };
         match grip {
             Grip::Spring(_) => self.commands.push(Command::Release),
             Grip::Orbit if (at[0] - start[0]).hypot(at[1] - start[1]) < CLICK => self.select(at),
@@ -411,7 +434,7 @@ impl App {
 
     fn select(&mut self, at: [f64; 2]) {
         let Some(snapshot) = self.snapshot.clone() else { return };
-        let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
+        let look = Look { shown: self.shown_now(), overlays: self.overlays, ..Look::default() };
         let view = self.view();
         self.picked = self.painter.pick(&snapshot, &view, &look, at);
         self.follow = None;
@@ -427,7 +450,9 @@ impl App {
         {
             let moved = first.saturating_add_signed(-(steps as isize));
             *first = moved.min(count.saturating_sub(1));
-        } else if let Some(eye) = self.eye.as_mut().filter(|_| self.through.is_none()) {
+        } else if !self.looks_through()
+            && let Some(eye) = &mut self.eye
+        {
             eye.zoom(steps);
         }
     }
@@ -442,7 +467,10 @@ impl App {
     fn fly(&mut self, now: Instant) {
         let seconds = now.saturating_duration_since(self.flown).as_secs_f64().min(0.1);
         self.flown = now;
-        let Some(eye) = self.eye.as_mut().filter(|_| self.through.is_none()) else { return };
+        if self.looks_through() {
+            return;
+        }
+        let Some(eye) = &mut self.eye else { return };
         let mut way = Vector3::zeros();
         for key in &self.held {
             if let Some(Action::Fly(direction)) = action(*key) {
@@ -463,14 +491,14 @@ impl App {
         self.drawn.push(now);
         let view = self.view();
         let spring = match &self.grip {
-            Some((Grip::Spring(pull), ..)) => Some(pull.spring(&snapshot)),
+            Some(Held { grip: Grip::Spring(pull), .. }) => Some(pull.spring(&snapshot)),
             _ => None,
         };
-        let shown = if self.through.is_some() { Shown::One(self.env) } else { self.shown };
-        let look =
-            Look { shown, overlays: self.overlays, picked: self.picked.as_ref(), trails: Some(&self.trails), spring };
+        let (shown, overlays, picked) = (self.shown_now(), self.overlays, self.picked.as_ref());
+        let look = Look { shown, overlays, picked, trails: Some(&self.trails), spring };
         self.painter.use_threads(self.desks.now(&snapshot.run, now));
-        let shows = (snapshot.run.steps, snapshot.run.timeline, view);
+        // Held by a pause, a simulation shows another snapshot where somebody moved something, and only there.
+        let shows = (snapshot.number, view);
         let changed = self.showed.replace(shows) != Some(shows);
         if let Some(fineness) = &mut self.fineness {
             self.painter.set_samples(fineness.samples(changed, now));
@@ -481,10 +509,8 @@ impl App {
         if let Some(fineness) = &mut self.fineness {
             fineness.drew(self.painter.samples(), start.elapsed());
         }
-        let through = self.through.and_then(|camera| snapshot.names.cameras.get(camera));
-        let name =
-            through.map_or_else(|| "free view".into(), |name| format!("camera {name}, environment {}", self.env));
-        hud::status(canvas, &snapshot, self.shown, &name, self.drawn.len() as f64);
+        let name = self.caption(&snapshot);
+        hud::status(canvas, &snapshot, shown, &name, self.drawn.len() as f64);
         if let Some(picked) = &self.picked {
             let mut lines = describe(picked, &snapshot);
             lines.extend(self.follow.map(|_| "followed".into()));
@@ -502,6 +528,23 @@ impl App {
         timeline::draw(canvas, &snapshot);
         if self.help {
             hud::help(canvas);
+        }
+    }
+
+    /// What it is looked through.
+    fn caption(&self, snapshot: &Snapshot) -> String {
+        let Some(name) = self.through.and_then(|camera| snapshot.names.cameras.get(camera)) else {
+            return "free view".into();
+        };
+        let env = self.env;
+        let looks = snapshot.envs.get(env).and_then(|env| env.views.get(self.through?)?.as_ref());
+        match looks {
+            Some(looks) if looks.lens.is_pinhole() => format!("camera {name}, environment {env}"),
+            // The rasterizer draws straight lines; the panel follows the rays.
+            Some(looks) => {
+                format!("camera {name} without its {} lens (I: with it), environment {env}", looks.lens.name())
+            }
+            None => format!("free view: camera {name} does not look at environment {env}"),
         }
     }
 

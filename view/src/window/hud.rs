@@ -2,7 +2,7 @@
 
 use super::keys;
 use crate::control::{RecordingState, Speed};
-use crate::stage::{Canvas, Shown, Snapshot};
+use crate::stage::{Canvas, Shown, Snapshot, slider_range};
 use embedded_graphics::mono_font::MonoFont;
 use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13};
 
@@ -100,18 +100,22 @@ pub(super) fn caption(canvas: &mut Canvas, text: &str, [x, y]: [usize; 2]) {
     canvas.text(text, [int(x), int(y)], SMALL, WHITE);
 }
 
-/// All keys, in the middle.
+/// Width of a column of the help \[pixels\].
+const COLUMN: i32 = 315;
+
+/// All keys, in the middle: in two columns where there is room for them, else in one.
 pub(super) fn help(canvas: &mut Canvas) {
     let lines = keys::help();
     let [width, height] = canvas.dimensions().map(int);
-    let rows = int(lines.len().div_ceil(2));
-    let [w, h] = [640, rows * 15 + 34];
+    let columns = if width < 2 * COLUMN + 10 { 1 } else { 2 };
+    let rows = int(lines.len().div_ceil(columns));
+    let [w, h] = [COLUMN * int(columns) + 10, rows * 15 + 34];
     let [x, y] = [((width - w) / 2).max(0), ((height - h) / 2).max(0)];
     canvas.fill([x, y], [w, h], DARK, 225);
     canvas.text("Keys and mouse", [x + 12, y + 8], FONT, YELLOW);
     for (index, [keys, text]) in lines.iter().enumerate() {
         let (column, row) = (int(index) / rows.max(1), int(index) % rows.max(1));
-        let [left, top] = [x + 12 + column * 315, y + 28 + row * 15];
+        let [left, top] = [x + 12 + column * COLUMN, y + 28 + row * 15];
         canvas.text(keys, [left, top], SMALL, WHITE);
         canvas.text(text, [left + 84, top], SMALL, GREY);
     }
@@ -122,14 +126,15 @@ pub(super) fn driven(snapshot: &Snapshot) -> Vec<usize> {
     snapshot.names.joints.iter().enumerate().filter(|(_, joint)| joint.driven).map(|(k, _)| k).collect()
 }
 
-/// The ends of a slider; joints without limits turn once around.
-fn ends(joint: &[f64; 4]) -> [f64; 2] {
-    let (low, high) = (joint[2], joint[3]);
-    if low.is_finite() && high.is_finite() && high > low {
-        [low, high]
-    } else {
-        [-std::f64::consts::PI, std::f64::consts::PI]
-    }
+/// The ends of the slider of a joint.
+fn ends(snapshot: &Snapshot, joint: usize, values: &[f64; 4]) -> [f64; 2] {
+    let slides = snapshot.names.joints.get(joint).is_some_and(|name| name.slides);
+    slider_range([values[2], values[3]], slides)
+}
+
+/// How many sliders there is room for.
+fn rows(height: i32) -> usize {
+    usize::try_from((height - TOP) / ROW).unwrap_or(0)
 }
 
 /// Sliders of the joints of environment `env`, along the right side, from number `first` on.
@@ -139,18 +144,15 @@ pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, firs
     canvas.fill([left, 0], [SLIDERS, height], DARK, 170);
     canvas.text(&format!("Joints, environment {env}"), [left + 8, 5], SMALL, YELLOW);
     let Some(stage) = snapshot.envs.get(env) else { return };
-    for (row, joint) in driven(snapshot).into_iter().skip(first).enumerate() {
+    for (row, joint) in driven(snapshot).into_iter().skip(first).take(rows(height)).enumerate() {
         let top = TOP + ROW * int(row);
         let Some((name, values)) = snapshot.names.joints.get(joint).zip(stage.joints.get(joint)) else { return };
-        if top + ROW > height {
-            return;
-        }
         let [position, target, ..] = *values;
         let short = name.name.rsplit('/').next().unwrap_or(&name.name);
         // No zero has a sign that means nothing.
         let shown = if position.abs() < 5e-4 { 0.0 } else { position };
         canvas.text(&format!("{short:<20.20} {shown:+.3}"), [left + 8, top], SMALL, WHITE);
-        let [low, high] = ends(values);
+        let [low, high] = ends(snapshot, joint, values);
         let place = |value: f64| {
             left + 8
                 + ((value - low) / (high - low) * f64::from(SLIDERS - 16)).clamp(0.0, f64::from(SLIDERS - 16)) as i32
@@ -161,17 +163,17 @@ pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, firs
     }
 }
 
-/// The slider at a pixel of a canvas of this width: number of the joint, and the target there.
+/// The slider at a pixel of a canvas of this size: number of the joint, and the target there.
 pub(super) fn slider_at(
     snapshot: &Snapshot,
     env: usize,
     first: usize,
-    width: usize,
+    [width, height]: [usize; 2],
     [x, y]: [f64; 2],
 ) -> Option<(usize, f64)> {
     let left = f64::from(int(width) - SLIDERS);
     let row = (y - f64::from(TOP)) / f64::from(ROW);
-    if x < left || row < 0.0 {
+    if x < left || row < 0.0 || row as usize >= rows(int(height)) {
         return None;
     }
     let joint = *driven(snapshot).get(first + row as usize)?;
@@ -180,7 +182,7 @@ pub(super) fn slider_at(
 
 /// The target that a slider has where the mouse is, beside it too.
 pub(super) fn slider_value(snapshot: &Snapshot, env: usize, joint: usize, width: usize, x: f64) -> Option<f64> {
-    let [low, high] = ends(snapshot.envs.get(env)?.joints.get(joint)?);
+    let [low, high] = ends(snapshot, joint, snapshot.envs.get(env)?.joints.get(joint)?);
     let left = f64::from(int(width) - SLIDERS) + 8.0;
     let share = ((x - left) / f64::from(SLIDERS - 16)).clamp(0.0, 1.0);
     Some(low + share * (high - low))

@@ -64,6 +64,13 @@ pub(crate) enum Action {
     Unselect,
 }
 
+impl Action {
+    /// Whether a key that is held does it again and again: what goes a step further does, what turns to and fro does not.
+    pub(crate) fn repeats(self) -> bool {
+        matches!(self, Self::Steps(_) | Self::NextEnv | Self::PreviousEnv | Self::Slower | Self::Faster)
+    }
+}
+
 /// A key and what it does.
 #[derive(Debug)]
 pub(crate) struct Binding {

@@ -9,6 +9,7 @@ mod keys;
 #[cfg(test)]
 mod tests;
 mod timeline;
+mod watch;
 mod x11;
 
 pub use app::{App, Input, Modifiers};
@@ -143,8 +144,8 @@ pub trait OpenWindow {
     }
 
     /// Opens a window, on a thread of its own: it is drawn while `update` steps, and `update` waits where the user pauses.
-    /// When it is closed, or its display is lost, the simulation goes on, as fast as it can. There may be several, one
-    /// after the other or at the same time.
+    /// When it is closed, or its display is lost or does not answer for 15 s, the simulation goes on, as fast as it can. There
+    /// may be several, one after the other or at the same time.
     ///
     /// # Errors
     /// [`WindowError::NoDisplay`] where there is none.
@@ -167,8 +168,10 @@ impl OpenWindow for SimulationManager {
             if let Some(speed) = cfg.speed {
                 viewer.send(Command::SetSpeed(speed));
             }
-            // Whoever opened it waits for this.
-            let _ = opened.send(Ok(()));
+            // Whoever opened it waits for this; where the display took too long nobody does any more.
+            if opened.send(Ok(())).is_err() {
+                return;
+            }
             let closed = match show(screen, &viewer, &cfg, &shared) {
                 Ok(closed) => closed,
                 Err(failure) => Closed::DisplayLost(failure.to_string()),
@@ -180,13 +183,16 @@ impl OpenWindow for SimulationManager {
         };
         let thread = std::thread::Builder::new().name("kinetoscope-window".into());
         thread.spawn(run).map_err(|error| WindowError::Thread(error.to_string()))?;
-        match result.recv() {
+        match result.recv_timeout(watch::PATIENCE) {
             Ok(Ok(())) => {
                 button.into_iter().for_each(|button| self.record_button(button));
                 Ok(window)
             }
             Ok(Err(error)) => Err(error),
-            Err(_) => Err(WindowError::Thread("it ended before the window was there".into())),
+            Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&Failure::Frozen)),
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                Err(WindowError::Thread("it ended before the window was there".into()))
+            }
         }
     }
 }

@@ -5,7 +5,8 @@ use super::keys::{Action, TABLE};
 use super::*;
 use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample};
-use crate::stage::{Eye, Shown};
+use crate::stage::{Eye, Look, Painter, Shown, Snapshot};
+use sensors::visibility::View;
 use sim::EnvId;
 
 const SIZE: [usize; 2] = [640, 360];
@@ -26,27 +27,152 @@ fn drawn(app: &mut App) -> Canvas {
     canvas
 }
 
+/// The middle of the picture.
+const MIDDLE: [f64; 2] = [SIZE[0] as f64 / 2.0, SIZE[1] as f64 / 2.0];
+
+fn click(app: &mut App, at: [f64; 2]) {
+    app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+    app.handle(Input::ButtonRelease(1, at));
+}
+
 fn press(app: &mut App, key: Key) -> Vec<Command> {
     app.handle(Input::Press(key));
     app.handle(Input::Release(key));
     app.take_commands()
 }
 
+/// Where each key would change something: a cube is selected, and one environment is seen through its camera.
+fn busy_app() -> (Sample, Viewer, App) {
+    let (sample, viewer, mut app) = app(3);
+    over_the_cube(&mut app, &sample, 0);
+    click(&mut app, MIDDLE);
+    assert!(app.picked().is_some_and(|picked| picked.name == "cube"), "{:?}", app.picked());
+    press(&mut app, Key::PageDown);
+    press(&mut app, Key::Char('v'));
+    (sample, viewer, app)
+}
+
 #[test]
 fn every_key_does_something() {
     for binding in TABLE {
-        let (_sample, _viewer, mut app) = app(3);
-        // Something is selected, that may be followed or let go; and speed is one that can be halved.
-        app.look_from(Eye::looking([0.3, 0.2, 1.5], [0.0, 0.0, 2.0 * HALF]).unwrap());
-        app.handle(Input::Press(Key::Char('p')));
+        let (_sample, _viewer, mut app) = busy_app();
         let before = format!("{app:?}");
         app.handle(Input::Press(binding.key));
         let commands = app.take_commands();
-        let changed = format!("{app:?}") != before || !commands.is_empty();
-        let may_rest = matches!(binding.action, Action::Follow | Action::FreeView | Action::AllEnvs | Action::Unselect);
-        assert!(changed || may_rest, "{binding:?}");
+        assert!(format!("{app:?}") != before || !commands.is_empty(), "{binding:?}");
         assert!(!drawn(&mut app).bytes().is_empty());
     }
+}
+
+/// A key that is held turns nothing to and fro: it pauses once, and begins one recording.
+#[test]
+fn held_keys_repeat_steps_and_nothing_else() {
+    for binding in TABLE {
+        let (_sample, _viewer, mut app) = busy_app();
+        app.handle(Input::Press(binding.key));
+        let first = app.take_commands();
+        let before = format!("{app:?}");
+        app.handle(Input::Repeat(binding.key));
+        let again = app.take_commands();
+        let goes_on = matches!(
+            binding.action,
+            Action::Steps(_) | Action::Slower | Action::Faster | Action::NextEnv | Action::PreviousEnv
+        );
+        assert_eq!(again, if goes_on { first } else { Vec::new() }, "{binding:?}");
+        let turns_pages = matches!(binding.action, Action::NextEnv | Action::PreviousEnv);
+        assert_eq!(format!("{app:?}") != before, turns_pages, "{binding:?}");
+    }
+}
+
+#[test]
+fn slower_and_faster_are_half_and_twice_as_fast() {
+    let (_sample, viewer, mut app) = app(1);
+    let mut run_at = |speed, measured_speed, key| {
+        let mut snapshot = Snapshot::clone(&viewer.newest().unwrap());
+        (snapshot.run.speed, snapshot.run.measured_speed) = (speed, measured_speed);
+        app.show(Arc::new(snapshot));
+        press(&mut app, Key::Char(key))
+    };
+    let times = Speed::Times;
+    for (speed, key, expected) in [
+        (Speed::REAL, '-', 0.5),
+        (Speed::REAL, '=', 2.0),
+        (Speed::REAL, '+', 2.0),
+        (times(0.25), '-', 0.125),
+        // The ends of the range.
+        (times(1.5e-3), '-', 1e-3),
+        (times(700.0), '+', 1e3),
+    ] {
+        assert_eq!(run_at(speed, Some(0.9), key), [Command::SetSpeed(times(expected))], "{speed:?} {key}");
+    }
+    // As fast as can be: half and twice of what that is.
+    assert_eq!(run_at(Speed::Free, Some(8.0), '-'), [Command::SetSpeed(times(4.0))]);
+    assert_eq!(run_at(Speed::Free, None, '='), [Command::SetSpeed(times(2.0))]);
+}
+
+/// What dragging and the wheel do to the eye; what that does to the picture is tested with the eye.
+#[test]
+fn drags_turn_move_and_look_around_and_the_wheel_comes_nearer() {
+    let (_sample, _viewer, mut app) = app(1);
+    let by = [40.0, -15.0];
+    let shift = Modifiers { shift: true, ctrl: false };
+    let ways: [(u8, Modifiers, fn(&mut Eye, [f64; 2], usize)); 4] = [
+        (1, Modifiers::default(), Eye::orbit),
+        (1, shift, Eye::pan),
+        (2, Modifiers::default(), Eye::turn),
+        (3, Modifiers::default(), Eye::pan),
+    ];
+    for (button, modifiers, way) in ways {
+        let mut expected = app.eye();
+        // In two parts, as a mouse moves.
+        way(&mut expected, [by[0], 0.0], SIZE[1]);
+        way(&mut expected, [0.0, by[1]], SIZE[1]);
+        let before = app.eye();
+        app.handle(Input::ButtonPress(button, [100.0, 100.0], modifiers));
+        app.handle(Input::Move([100.0 + by[0], 100.0]));
+        app.handle(Input::Move([100.0 + by[0], 100.0 + by[1]]));
+        app.handle(Input::ButtonRelease(button, [100.0 + by[0], 100.0 + by[1]]));
+        assert!(app.eye() == expected && expected != before, "button {button}: {:?}", app.eye());
+        // Let go, it moves no more.
+        app.handle(Input::Move([10.0, 10.0]));
+        assert_eq!(app.eye(), expected);
+    }
+    let mut expected = app.eye();
+    expected.zoom(2.0);
+    app.handle(Input::Wheel(2.0, MIDDLE));
+    assert_eq!(app.eye(), expected);
+    // Through a camera nothing moves.
+    press(&mut app, Key::Char('v'));
+    app.handle(Input::ButtonPress(1, MIDDLE, Modifiers::default()));
+    app.handle(Input::Move([10.0, 10.0]));
+    app.handle(Input::ButtonRelease(1, [10.0, 10.0]));
+    app.handle(Input::Wheel(2.0, MIDDLE));
+    assert_eq!(app.eye(), expected);
+}
+
+/// A second button changes nothing of what the first one holds, nor does letting it go.
+#[test]
+fn what_one_button_holds_another_does_not_let_go() {
+    let (sample, _viewer, mut app) = app(1);
+    over_the_cube(&mut app, &sample, 0);
+    let ctrl = Modifiers { ctrl: true, shift: false };
+    let before = app.eye();
+    app.handle(Input::ButtonPress(1, MIDDLE, ctrl));
+    app.handle(Input::Move([MIDDLE[0] + 20.0, MIDDLE[1]]));
+    assert!(matches!(app.take_commands()[..], [Command::Drag { .. }]));
+    app.handle(Input::ButtonPress(3, MIDDLE, Modifiers::default()));
+    app.handle(Input::Move([MIDDLE[0] + 60.0, MIDDLE[1]]));
+    assert!(matches!(app.take_commands()[..], [Command::Drag { .. }]), "it is pulled on");
+    app.handle(Input::ButtonRelease(3, MIDDLE));
+    assert!(!app.take_commands().contains(&Command::Release), "the spring is of the first button");
+    assert_eq!(app.eye(), before);
+    app.handle(Input::ButtonRelease(1, MIDDLE));
+    assert_eq!(app.take_commands().last(), Some(&Command::Release));
+    // Where it was not heard that a button was let go, it is when it is pressed again.
+    app.handle(Input::ButtonPress(1, MIDDLE, ctrl));
+    app.take_commands();
+    app.handle(Input::ButtonPress(1, MIDDLE, Modifiers::default()));
+    assert_eq!(app.take_commands(), [Command::Release]);
 }
 
 #[test]
@@ -150,6 +276,109 @@ fn looking_through_a_sensor_shows_what_it_sees() {
         tried += usize::from(mask[(1, v, u)] == cube);
     }
     assert!(tried > 3, "the cube was looked at {tried} times");
+}
+
+/// Through a camera only its environment is seen, so only that is clicked on, reset, and asked for contacts; also where all
+/// environments are shown otherwise, and another one stands between.
+#[test]
+fn through_a_sensor_only_its_environment_is_there() {
+    let (_sample, viewer, mut app) = app(2);
+    let mut snapshot = Snapshot::clone(&viewer.newest().unwrap());
+    let [x, y, z] = snapshot.envs[0].origin;
+    snapshot.envs[1].origin = [x + 0.15, y + 0.15, z + 0.2];
+    let through = snapshot.envs[0].views[0].as_ref().unwrap().view;
+    app.show(Arc::new(snapshot.clone()));
+    press(&mut app, Key::Char('c'));
+    assert_eq!(app.wants().contacts, Some(Shown::All));
+    press(&mut app, Key::Char('v'));
+    assert_eq!(app.wants().contacts, Some(Shown::One(0)));
+    assert_eq!(press(&mut app, Key::Backspace), [Command::Reset(Some(EnvId(0)))]);
+    let points =
+        || (0..12).flat_map(|row| (0..16).map(move |column| [85.0 + 31.0 * column as f64, 8.0 + 30.0 * row as f64]));
+    let mut cubes = 0;
+    for at in points() {
+        click(&mut app, at);
+        let picked = app.picked().unwrap();
+        assert_eq!(picked.env, 0, "{picked:?} at {at:?}");
+        cubes += usize::from(picked.name == "cube");
+    }
+    assert!(cubes > 3, "{cubes}");
+    // The control: from the same place, freely, the other one is in the way.
+    let mut painter = Painter::new(1);
+    let mut pose = through.world_from_camera;
+    (0..3).for_each(|k| pose.translation[k] += [x, y, z][k] as f32);
+    let view = View { world_from_camera: pose, ..through };
+    let look = Look::default();
+    let mut others = (0..48).flat_map(|v| (0..64).map(move |u| [f64::from(u) + 0.5, f64::from(v) + 0.5]));
+    let other = others.find_map(|at| painter.pick(&snapshot, &view, &look, at).filter(|picked| picked.env == 1));
+    assert!(other.is_some());
+}
+
+/// In a window with too few rows for a slider there is none to be moved.
+#[test]
+fn sliders_are_where_they_are_drawn() {
+    let (_sample, _viewer, mut app) = app(1);
+    press(&mut app, Key::Tab);
+    let at = [SIZE[0] as f64 - 100.0, 35.0];
+    // The first row is from 22 to 48.
+    for (height, is_there) in [(47, false), (48, true), (360, true)] {
+        app.handle(Input::Resize([SIZE[0], height]));
+        let canvas = drawn(&mut app);
+        // The mark of the target; the letters above are of the same yellow.
+        let mut places = (30..height.min(48)).flat_map(|y| (SIZE[0] - 202..SIZE[0] - 8).map(move |x| (x, y)));
+        let mark = places.any(|(x, y)| canvas.pixel(x, y) == Some([255, 210, 60]));
+        assert_eq!(mark, is_there, "{height}");
+        app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+        assert_eq!(app.take_commands().len(), usize::from(is_there), "{height}");
+        app.handle(Input::ButtonRelease(1, at));
+    }
+}
+
+/// What somebody moves while time is held moves: where four samples take too long, it has one.
+#[test]
+fn what_is_moved_in_a_pause_is_drawn_coarsely_until_it_rests() {
+    let (_sample, viewer, mut app) = app(1);
+    // Six million pixels on one thread take longer than a thirtieth of a second.
+    const LARGE: [usize; 2] = [3000, 2000];
+    let mut snapshot = Snapshot::clone(&viewer.newest().unwrap());
+    snapshot.run.paused = true;
+    let mut fine = App::new(LARGE, 1);
+    fine.show(Arc::new(snapshot.clone()));
+    let fine = drawn(&mut fine);
+    app.handle(Input::Resize(LARGE));
+    app.keep_pace();
+    let start = Instant::now();
+    let mut coarse_at = |number: u64, milliseconds: u64| {
+        app.show(Arc::new(Snapshot { number, ..snapshot.clone() }));
+        let mut canvas = Canvas::default();
+        app.draw(&mut canvas, start + Duration::from_millis(milliseconds));
+        // Below the status, which counts pictures.
+        canvas.bytes()[4 * 70 * LARGE[0]..] != fine.bytes()[4 * 70 * LARGE[0]..]
+    };
+    // It is found out in three pictures that fine ones take too long.
+    assert_eq!([0, 1, 2].map(|k| coarse_at(10 + k, 100 * k)), [false; 3]);
+    assert_eq!([3, 4, 5, 6, 7].map(|k| coarse_at(10 + k, 100 * k)), [true; 5], "it is moved on and on");
+    assert_eq!([800, 900, 1000].map(|k| coarse_at(17, k)), [true, true, false], "a quarter of a second later it rests");
+}
+
+#[test]
+fn the_help_is_whole_in_a_narrow_window() {
+    let lines = keys::help().len();
+    for (width, columns) in [(325, 1), (639, 1), (640, 2), (960, 2)] {
+        let mut canvas = Canvas::new(width, 15 * lines + 34);
+        hud::help(&mut canvas);
+        let rows = lines.div_ceil(columns);
+        let [left, top] = [width - 315 * columns - 10, 15 * (lines - rows)].map(|free| free / 2);
+        // Of each line, both parts have letters.
+        for line in 0..lines {
+            let [x, y] = [left + 12 + line / rows * 315, top + 28 + line % rows * 15];
+            for (part, wide, color) in [(0, 84, [240; 3]), (84, 222, [170; 3])] {
+                let mut pixels = (y..y + 10).flat_map(|v| (x + part..x + part + wide).map(move |u| (u, v)));
+                let found = pixels.any(|(u, v)| canvas.pixel(u, v) == Some(color));
+                assert!(found, "line {line} at a width of {width}");
+            }
+        }
+    }
 }
 
 #[test]

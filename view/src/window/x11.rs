@@ -3,14 +3,16 @@
 use super::app::{Input, Modifiers};
 use super::enlarge::{self, Enlarged};
 use super::keys::Key;
+use super::watch::{PATIENCE, Watch};
 use crate::stage::Canvas;
+use std::os::fd::AsFd as _;
 use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::errors::{ConnectionError, ReplyError, ReplyOrIdError};
 use x11rb::protocol::Event;
 use x11rb::protocol::render::Pictformat;
 use x11rb::protocol::xproto::{
     AtomEnum, ConnectionExt as _, CreateGCAux, CreateWindowAux, Drawable, EventMask, ImageFormat, ImageOrder,
-    KeyButMask, PropMode, Screen, Window, WindowClass,
+    KeyButMask, KeyPressEvent, KeyReleaseEvent, PropMode, Screen, Window, WindowClass,
 };
 use x11rb::rust_connection::RustConnection;
 use x11rb::wrapper::ConnectionExt as _;
@@ -27,6 +29,7 @@ x11rb::atom_manager! {
 /// A window, its size and its keys.
 #[derive(Debug)]
 pub(super) struct Screened {
+    watch: Watch,
     connection: RustConnection,
     window: Window,
     gc: u32,
@@ -37,6 +40,8 @@ pub(super) struct Screened {
     most_significant_first: bool,
     size: [usize; 2],
     keys: Keys,
+    /// A key that was let go, unless the next event says that it repeats.
+    released: Option<KeyReleaseEvent>,
     /// Pixels as the server has them.
     pixels: Vec<u8>,
     /// How the server calls them, where it can enlarge pictures.
@@ -66,6 +71,10 @@ pub(super) enum Failure {
     Reply(#[from] ReplyError),
     #[error("the display refuses: {0}")]
     Id(#[from] ReplyOrIdError),
+    #[error("the display has not answered for {} s", PATIENCE.as_secs())]
+    Frozen,
+    #[error("the connection to the display cannot be watched: {0}")]
+    Watch(#[from] std::io::Error),
     #[error("the display shows no 8-bit red, green and blue in pixels of 32 bits")]
     Colors,
 }
@@ -78,6 +87,7 @@ impl Screened {
     /// Opens a window of about `size` pixels on a display, that of the variable `DISPLAY` where `None`.
     pub(super) fn open(title: &str, size: [usize; 2], display: Option<&str>) -> Result<Self, Failure> {
         let (connection, number) = x11rb::connect(display)?;
+        let watch = Watch::start(connection.stream().as_fd().try_clone_to_owned()?)?;
         let screen = &connection.setup().roots[number];
         let (depth, shifts) = colors(&connection, screen)?;
         let [width, height] = size.map(|n| u16::try_from(n.clamp(1, 16_000)).unwrap_or(u16::MAX));
@@ -121,8 +131,9 @@ impl Screened {
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
         let format = enlarge::format(&connection, visual)?;
-        let (pixels, enlarged) = (Vec::new(), None);
+        let (pixels, enlarged, released) = (Vec::new(), None, None);
         Ok(Self {
+            watch,
             connection,
             window,
             gc,
@@ -132,6 +143,7 @@ impl Screened {
             most_significant_first,
             size,
             keys,
+            released,
             pixels,
             format,
             enlarged,
@@ -156,9 +168,32 @@ impl Screened {
 
     /// What happened since this was asked last.
     pub(super) fn poll(&mut self) -> Result<Vec<Happened>, Failure> {
+        self.events().map_err(|failure| self.cause(failure))
+    }
+
+    /// Where the display did not answer, that is why the connection was lost.
+    fn cause(&self, failure: Failure) -> Failure {
+        if self.watch.is_frozen() { Failure::Frozen } else { failure }
+    }
+
+    fn events(&mut self) -> Result<Vec<Happened>, Failure> {
         let mut happened: Vec<Happened> = Vec::new();
-        while let Some(event) = self.connection.poll_for_event()? {
-            let next = self.meaning(&event);
+        let mut released = self.released.take();
+        // Whether its successor may still be on its way.
+        let mut is_new = false;
+        while let Some(event) = self.watch.request(|| self.connection.poll_for_event())? {
+            let repeats = matches!((&released, &event), (Some(key), Event::KeyPress(next)) if repeats(key, next));
+            if let Some(key) = released.take().filter(|_| !repeats) {
+                happened.extend(self.key(key.detail, key.state).map(|key| Happened::Input(Input::Release(key))));
+            }
+            if let Event::KeyRelease(key) = event {
+                (released, is_new) = (Some(key), true);
+                continue;
+            }
+            let next = match self.meaning(&event) {
+                Some(Happened::Input(Input::Press(key))) if repeats => Some(Happened::Input(Input::Repeat(key))),
+                next => next,
+            };
             // Of many places of the mouse the last one counts.
             if let (Some(Happened::Input(Input::Move(to))), Some(Happened::Input(Input::Move(last)))) =
                 (&next, happened.last_mut())
@@ -167,6 +202,13 @@ impl Screened {
             } else {
                 happened.extend(next);
             }
+        }
+        match released {
+            Some(key) if is_new => self.released = Some(key),
+            Some(key) => {
+                happened.extend(self.key(key.detail, key.state).map(|key| Happened::Input(Input::Release(key))));
+            }
+            None => {}
         }
         Ok(happened)
     }
@@ -193,12 +235,7 @@ impl Screened {
                 return asks.then_some(Happened::Close);
             }
             Event::DestroyNotify(event) if event.window == self.window => Happened::Close,
-            Event::KeyPress(event) => {
-                Happened::Input(Input::Press(self.keys.get(event.detail, held(event.state).shift)?))
-            }
-            Event::KeyRelease(event) => {
-                Happened::Input(Input::Release(self.keys.get(event.detail, held(event.state).shift)?))
-            }
+            Event::KeyPress(event) => Happened::Input(Input::Press(self.key(event.detail, event.state)?)),
             Event::ButtonPress(event) => Happened::Input(match event.detail {
                 4 => Input::Wheel(1.0, at(event.event_x, event.event_y)),
                 5 => Input::Wheel(-1.0, at(event.event_x, event.event_y)),
@@ -213,26 +250,36 @@ impl Screened {
         })
     }
 
+    /// The key of a code, with what else is held.
+    fn key(&self, code: u8, state: KeyButMask) -> Option<Key> {
+        self.keys.get(code, state.contains(KeyButMask::SHIFT))
+    }
+
     /// Shows a picture.
     pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), Failure> {
+        self.send(canvas).map_err(|failure| self.cause(failure))
+    }
+
+    fn send(&mut self, canvas: &Canvas) -> Result<(), Failure> {
         let (k, picture) = (self.coarseness(), canvas.dimensions());
         let fits = |old: &Enlarged| k > 1 && (old.size, old.factor) == (picture, k);
         if let Some(old) = self.enlarged.take_if(|old| !fits(old)) {
-            old.free(&self.connection)?;
+            self.watch.request(|| old.free(&self.connection))?;
         }
         if let (true, None, Some(format)) = (k > 1, &self.enlarged, self.format) {
             let of = (self.depth, format);
-            self.enlarged = Some(Enlarged::new(&self.connection, self.window, of, picture, k)?);
+            let enlarged = self.watch.request(|| Enlarged::new(&self.connection, self.window, of, picture, k))?;
+            self.enlarged = Some(enlarged);
         }
         match self.enlarged.take() {
             Some(enlarged) => {
                 self.put(canvas, 1, enlarged.pixmap(), picture)?;
-                enlarged.show(&self.connection, self.size)?;
+                self.watch.request(|| enlarged.show(&self.connection, self.size))?;
                 self.enlarged = Some(enlarged);
             }
             None => self.put(canvas, k, self.window, self.size)?,
         }
-        self.connection.flush()?;
+        self.watch.request(|| self.connection.flush())?;
         Ok(())
     }
 
@@ -259,7 +306,9 @@ impl Screened {
             let [width, band] = [width, band].map(|n| u16::try_from(n).unwrap_or(u16::MAX));
             let top = i16::try_from(top).unwrap_or(i16::MAX);
             let (format, gc) = (ImageFormat::Z_PIXMAP, self.gc);
-            self.connection.put_image(format, to, gc, width, band, 0, top, 0, self.depth, &self.pixels)?;
+            let (depth, pixels) = (self.depth, &self.pixels);
+            let put = || self.connection.put_image(format, to, gc, width, band, 0, top, 0, depth, pixels);
+            self.watch.request(put)?;
         }
         Ok(())
     }
@@ -268,9 +317,16 @@ impl Screened {
 impl Drop for Screened {
     fn drop(&mut self) {
         // Where the connection is lost the window is gone anyway.
-        let _ = self.connection.destroy_window(self.window);
-        let _ = self.connection.flush();
+        self.watch.request(|| {
+            let _ = self.connection.destroy_window(self.window);
+            let _ = self.connection.flush();
+        });
     }
+}
+
+/// Whether a key was not let go and pressed again but is held: the server then says both, of the same moment.
+fn repeats(released: &KeyReleaseEvent, next: &KeyPressEvent) -> bool {
+    (released.detail, released.time) == (next.detail, next.time)
 }
 
 /// Depth of the screen, and where the colours are in its pixels.
@@ -301,12 +357,15 @@ impl Keys {
         Ok(Self { first, each: usize::from(mapping.keysyms_per_keycode), signs: mapping.keysyms })
     }
 
-    /// The key of a code; with shift the upper sign, where there is one.
+    /// The key of a code; with shift the upper sign, where there is one. What the first of two alphabets says counts, and that of
+    /// the second where nothing is bound to the first, such as a Cyrillic letter: each has two signs of a key.
     fn get(&self, code: u8, shift: bool) -> Option<Key> {
         let at = usize::from(code.checked_sub(self.first)?) * self.each;
         let signs = self.signs.get(at..at + self.each)?;
-        let upper = signs.get(1).copied().filter(|sign| shift && *sign != 0);
-        key_of(upper.or(signs.first().copied())?)
+        signs.chunks(2).take(2).find_map(|alphabet| {
+            let upper = alphabet.get(1).copied().filter(|sign| shift && *sign != 0);
+            key_of(upper.or(alphabet.first().copied())?)
+        })
     }
 }
 
@@ -345,5 +404,16 @@ mod tests {
         let keys = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
         assert_eq!([keys.get(8, false), keys.get(8, true)], [Some(Key::Char('=')), Some(Key::Char('+'))]);
         assert_eq!([keys.get(9, true), keys.get(7, false), keys.get(10, false)], [Some(Key::Char('a')), None, None]);
+    }
+
+    /// A Russian alphabet before an American one: the key between Tab and W is "short i" in the first, Q in the second.
+    #[test]
+    fn of_two_alphabets_that_counts_which_has_a_key() {
+        let signs = vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca];
+        let keys = Keys { first: 8, each: 4, signs };
+        assert_eq!([keys.get(8, false), keys.get(8, true)], [Some(Key::Char('q')); 2]);
+        assert_eq!(keys.get(9, false), Some(Key::Char(' ')));
+        let one = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
+        assert_eq!(one.get(8, false), None, "there is no other alphabet");
     }
 }

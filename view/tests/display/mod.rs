@@ -9,7 +9,10 @@ use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 use std::time::{Duration, Instant};
 use view::{Canvas, WindowCfg};
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT, KeyButMask, KeyPressEvent};
+use x11rb::protocol::xproto::{
+    BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ConnectionExt as _, EventMask, ImageFormat, KEY_PRESS_EVENT,
+    KEY_RELEASE_EVENT, KeyButMask, KeyPressEvent,
+};
 use x11rb::rust_connection::RustConnection;
 
 /// What is not there by then does not come.
@@ -71,21 +74,46 @@ pub(crate) fn code(connection: &RustConnection, sign: u32) -> u8 {
 }
 
 pub(crate) fn press(connection: &RustConnection, window: u32, sign: u32) {
+    let key = code(connection, sign);
+    send(connection, window, (KEY_PRESS_EVENT, key), 0, [0, 0]);
+}
+
+/// Sends an event of a key or a button of the mouse to a window: what it is, the key or button, when \[ms\], where.
+pub(crate) fn send(connection: &RustConnection, window: u32, (kind, detail): (u8, u8), time: u32, [x, y]: [i16; 2]) {
+    // Events of keys, buttons and the mouse have the same fields.
+    let mask = match kind {
+        KEY_PRESS_EVENT => EventMask::KEY_PRESS,
+        KEY_RELEASE_EVENT => EventMask::KEY_RELEASE,
+        BUTTON_PRESS_EVENT => EventMask::BUTTON_PRESS,
+        BUTTON_RELEASE_EVENT => EventMask::BUTTON_RELEASE,
+        _ => EventMask::POINTER_MOTION,
+    };
     let event = KeyPressEvent {
-        response_type: KEY_PRESS_EVENT,
-        detail: code(connection, sign),
+        response_type: kind,
+        detail,
         sequence: 0,
-        time: 0,
+        time,
         root: connection.setup().roots[0].root,
         event: window,
         child: 0,
-        root_x: 0,
-        root_y: 0,
-        event_x: 0,
-        event_y: 0,
+        root_x: x,
+        root_y: y,
+        event_x: x,
+        event_y: y,
         state: KeyButMask::default(),
         same_screen: true,
     };
-    connection.send_event(false, window, EventMask::KEY_PRESS, event).unwrap();
+    connection.send_event(false, window, mask, event).unwrap();
     connection.flush().unwrap();
+}
+
+/// Holds a key down for as long as it takes to repeat some times, as an X server says it: released and pressed at one moment.
+pub(crate) fn hold(connection: &RustConnection, window: u32, sign: u32, repeats: u32) {
+    let key = code(connection, sign);
+    send(connection, window, (KEY_PRESS_EVENT, key), 1000, [0, 0]);
+    for time in (1..=repeats).map(|k| 1000 + 40 * k) {
+        send(connection, window, (KEY_RELEASE_EVENT, key), time, [0, 0]);
+        send(connection, window, (KEY_PRESS_EVENT, key), time, [0, 0]);
+    }
+    send(connection, window, (KEY_RELEASE_EVENT, key), 2000 + 40 * repeats, [0, 0]);
 }

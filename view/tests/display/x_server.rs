@@ -26,6 +26,12 @@ impl Display {
         Some(Self { server, name: format!(":{}", number.trim()) })
     }
 
+    /// Sends the server a signal by its name.
+    pub(crate) fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args(["-s", name, &self.server.id().to_string()]).status().unwrap();
+        assert!(sent.success(), "{name}");
+    }
+
     pub(crate) fn connect(&self) -> RustConnection {
         x11rb::connect(Some(&self.name)).unwrap().0
     }

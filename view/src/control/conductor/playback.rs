@@ -1,6 +1,6 @@
 //! What was recorded, shown to viewers as a simulation is: they pause it, step, and go to and fro.
 
-use super::{Conductor, PATIENCE};
+use super::{Conductor, Kind, PATIENCE};
 use crate::control::hub::Mail;
 use crate::control::{Command, Speed};
 use crate::stage::{Run, Timeline};
@@ -181,9 +181,7 @@ impl Conductor {
             self.wants = wants;
             head.advance(Instant::now());
             for (_, command) in commands {
-                if let Err(reason) = head.obey(command) {
-                    self.refused = Some(reason);
-                }
+                self.refusals.answer(Kind::of(&command), head.obey(command));
             }
             head.stop_at_the_end();
             self.dirty |= shown != Some((head.frame, head.plays));
@@ -212,7 +210,8 @@ impl Conductor {
             paused: !head.plays,
             speed: head.speed,
             measured_speed: None,
-            refused: self.refused.clone(),
+            refused: self.refusals.reason(),
+            refusals: self.refusals.count(),
             recording: None,
             timeline: Some(Timeline { now: head.times[head.frame], start, end }),
         };

@@ -65,10 +65,7 @@ class Joints {
     slider.id = id;
     slider.dataset.robot = robot.name;
     slider.dataset.joint = joint.name;
-    // A joint without limits turns once to either side, or slides a metre.
-    const reach = joint.unit === "m" ? 1 : Math.PI;
-    row.lower = joint.lower ?? -reach;
-    row.upper = joint.upper ?? reach;
+    [row.lower, row.upper] = joint.slider;
     slider.min = row.lower;
     slider.max = row.upper;
     slider.step = "any";

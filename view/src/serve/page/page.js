@@ -7,7 +7,7 @@ let socket = null;
 let patience = 250; // milliseconds until the next attempt to connect
 let contents = null;
 let state = null;
-let refused = null;
+let refusals = null; // how many commands were refused when that was told last
 let unseen = 0; // pictures that came while the page was hidden
 let noteTimer = 0;
 let arrivals = [];
@@ -180,8 +180,8 @@ function refresh() {
     $("record").setAttribute("aria-pressed", String(recording.on));
   }
   $("record-text").textContent = recording?.text ?? "";
-  if (state.refused !== refused && state.refused !== null) note(state.refused);
-  refused = state.refused;
+  if (state.refusals !== refusals && state.refused !== null) note(state.refused);
+  refusals = state.refusals;
   $("diverged").hidden = state.diverged.length === 0;
   $("diverged").textContent = state.diverged.join("; ");
   select(state.selected);

@@ -1,0 +1,80 @@
+//! How far long work is: a bar on a terminal, a plain line every ten seconds elsewhere. Both are written to standard error.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(100);
+/// Between two lines.
+const LINE: Duration = Duration::from_secs(10);
+
+/// Does some work, and says meanwhile how much of it is done, from 0 to 1, where that is known.
+pub(crate) fn during<T>(what: &str, done: impl Fn() -> Option<f64> + Send, work: impl FnOnce() -> T) -> T {
+    let (ended, until_ended) = channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let (start, terminal) = (Instant::now(), std::io::stderr().is_terminal());
+            let mut lines = Lines::from(start);
+            let bar = ProgressBar::new(1000);
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_message(what.to_owned());
+            while until_ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                let share = done();
+                if terminal {
+                    // What ends at once has no bar.
+                    share.into_iter().for_each(|share| bar.set_position((1000.0 * share) as u64));
+                } else if lines.is_due(Instant::now()) {
+                    eprintln!("{}", line(what, share, start.elapsed()));
+                }
+            }
+            bar.finish_and_clear();
+        });
+        let result = work();
+        drop(ended);
+        result
+    })
+}
+
+/// When lines are due.
+#[derive(Debug)]
+struct Lines {
+    last: Instant,
+}
+
+impl Lines {
+    fn from(start: Instant) -> Self {
+        Self { last: start }
+    }
+
+    fn is_due(&mut self, now: Instant) -> bool {
+        let due = now.saturating_duration_since(self.last) >= LINE;
+        if due {
+            self.last = now;
+        }
+        due
+    }
+}
+
+fn line(what: &str, share: Option<f64>, passed: Duration) -> String {
+    let share = share.map_or_else(String::new, |share| format!(" {:.0} %,", (100.0 * share).clamp(0.0, 100.0)));
+    format!("{what}:{share} after {} s", passed.as_secs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_due_every_ten_seconds_and_says_how_far_it_is() {
+        let start = Instant::now();
+        let mut lines = Lines::from(start);
+        let due: Vec<u64> = (0..35).filter(|s| lines.is_due(start + Duration::from_secs(*s))).collect();
+        assert_eq!(due, [10, 20, 30]);
+        assert_eq!(line("paths", Some(0.254), Duration::from_secs(12)), "paths: 25 %, after 12 s");
+        assert_eq!(line("steps", None, Duration::from_secs(40)), "steps: after 40 s");
+        assert_eq!(during("work", || None, || 7), 7);
+    }
+}

@@ -1,0 +1,93 @@
+//! The camera sensors of a simulation, of every kind, and what they look at.
+
+use scene::pose::from_row;
+use scene::{Marker, PoseF32};
+use sensors::camera::{Camera, CameraConvention, Lens, StereoCamera};
+use sensors::ray::RayCasterCamera;
+use sensors::visibility::View;
+use sim::{EnvId, SensorId, SimulationManager};
+
+/// What a camera looks at in an environment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraView {
+    /// From where, and its picture as a pinhole has it.
+    pub view: View,
+    /// What bends its rays: a pinhole bends none.
+    pub lens: Lens,
+    /// What other sensors show in its colours; nothing where its configuration says so.
+    pub markers: Vec<Marker>,
+}
+
+/// A camera sensor, or one of a pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum CameraId {
+    Camera(SensorId<Camera>),
+    Left(SensorId<StereoCamera>),
+    Right(SensorId<StereoCamera>),
+    Rays(SensorId<RayCasterCamera>),
+}
+
+/// Nearest and farthest that is drawn of what rays measure \[m\].
+const RAYS_SEE: [f32; 2] = [0.01, 1000.0];
+
+/// All cameras with their names; the eyes of a pair are `NAME/left` and `NAME/right`.
+pub(super) fn cameras(sim: &SimulationManager) -> Vec<(String, CameraId)> {
+    let cameras = sim.sensor_ids::<Camera>().into_iter().map(|(name, id)| (name, CameraId::Camera(id)));
+    let eyes = sim.sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
+        [(format!("{name}/left"), CameraId::Left(id)), (format!("{name}/right"), CameraId::Right(id))]
+    });
+    let rays = sim.sensor_ids::<RayCasterCamera>().into_iter().map(|(name, id)| (name, CameraId::Rays(id)));
+    cameras.chain(eyes).chain(rays).collect()
+}
+
+/// How many cameras there are.
+pub(super) fn count(sim: &SimulationManager) -> usize {
+    let pairs = sim.sensor_ids::<StereoCamera>().len();
+    sim.sensor_ids::<Camera>().len() + 2 * pairs + sim.sensor_ids::<RayCasterCamera>().len()
+}
+
+impl CameraId {
+    /// What it looks at in each environment; `None` where it does not look, or has not measured yet.
+    pub(super) fn views(self, sim: &SimulationManager) -> Vec<Option<CameraView>> {
+        let envs = sim.num_envs();
+        match self {
+            Self::Camera(id) => sim
+                .sensor(id)
+                .map_or_else(|_| vec![None; envs], |camera| of_camera(camera, envs, || sim.markers_beside(id))),
+            Self::Left(id) => sim
+                .sensor(id)
+                .map_or_else(|_| vec![None; envs], |pair| of_camera(pair.left(), envs, || sim.markers_beside(id))),
+            Self::Right(id) => sim
+                .sensor(id)
+                .map_or_else(|_| vec![None; envs], |pair| of_camera(pair.right(), envs, || sim.markers_beside(id))),
+            Self::Rays(id) => sim.sensor(id).map_or_else(|_| vec![None; envs], |camera| of_rays(camera, envs)),
+        }
+    }
+}
+
+fn of_camera(camera: &Camera, envs: usize, markers: impl Fn() -> Vec<(EnvId, Marker)>) -> Vec<Option<CameraView>> {
+    let lens = camera.lens();
+    let view = |env: usize| Some(CameraView { view: camera.view(env).ok()?, lens, markers: Vec::new() });
+    let mut views: Vec<Option<CameraView>> = (0..envs).map(view).collect();
+    if camera.draws_markers() {
+        for (EnvId(env), marker) in markers() {
+            views[env].iter_mut().for_each(|view| view.markers.push(marker));
+        }
+    }
+    views
+}
+
+fn of_rays(camera: &RayCasterCamera, envs: usize) -> Vec<Option<CameraView>> {
+    let (poses, lenses) = (camera.pose_w(CameraConvention::Ros), camera.intrinsic_matrices());
+    let (height, width) = camera.image_shape();
+    let [near, far] = RAYS_SEE;
+    let view = |env: usize| {
+        let row: [f64; 7] = std::array::from_fn(|k| poses[(env, k)]);
+        let world_from_camera = PoseF32::from(&row.iter().all(|x| x.is_finite()).then(|| from_row(&row))?);
+        let [fx, fy, cx, cy] = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|(row, column)| lenses[(env, row, column)] as f32);
+        let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera };
+        view.validate().ok()?;
+        Some(CameraView { view, lens: Lens::default(), markers: Vec::new() })
+    };
+    (0..envs).map(view).collect()
+}

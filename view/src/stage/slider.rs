@@ -1,0 +1,41 @@
+//! From where to where a slider of a joint goes: the same in windows and browsers.
+
+use std::f64::consts::PI;
+
+/// The ends of a joint's slider \[rad or m\]: its limits. Where it has none on a side, it goes half a turn to that side, or a metre
+/// where it slides; from a limit that is beyond, as far from there. Limits that leave no way between them are none.
+pub(crate) fn slider_range([low, high]: [f64; 2], slides: bool) -> [f64; 2] {
+    let reach = if slides { 1.0 } else { PI };
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) if low < high => [low, high],
+        (true, false) => [low, reach.max(low + reach)],
+        (false, true) => [(-reach).min(high - reach), high],
+        _ => [-reach, reach],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slider_ends_at_the_limits_and_where_one_is_missing_a_reach_away() {
+        let none = f64::INFINITY;
+        for (limits, turns, slides) in [
+            ([-0.5, 2.0], [-0.5, 2.0], [-0.5, 2.0]),
+            ([-none, none], [-PI, PI], [-1.0, 1.0]),
+            ([f64::NAN, f64::NAN], [-PI, PI], [-1.0, 1.0]),
+            // One limit: before the middle, in it, beyond the reach.
+            ([-0.5, none], [-0.5, PI], [-0.5, 1.0]),
+            ([0.0, none], [0.0, PI], [0.0, 1.0]),
+            ([5.0, none], [5.0, 5.0 + PI], [5.0, 6.0]),
+            ([-none, 0.5], [-PI, 0.5], [-1.0, 0.5]),
+            ([-none, -5.0], [-5.0 - PI, -5.0], [-6.0, -5.0]),
+            // None to choose from.
+            ([1.0, 1.0], [-PI, PI], [-1.0, 1.0]),
+            ([2.0, -2.0], [-PI, PI], [-1.0, 1.0]),
+        ] {
+            assert_eq!([slider_range(limits, false), slider_range(limits, true)], [turns, slides], "{limits:?}");
+        }
+    }
+}
