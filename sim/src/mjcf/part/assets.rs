@@ -56,7 +56,7 @@ impl Writing<'_> {
     fn material(&self, material: usize) -> String {
         let values = self.model.material(material);
         let texture = values.texture.filter(|t| self.is_written(*t)).map(|t| self.full(&self.names.textures[t]));
-        let mut newer = |values: Option<f32>, what: &str| {
+        let newer = |values: Option<f32>, what: &str| {
             values.filter(|value| self.newer("material", material, &format!("{what} {value}")))
         };
         let (metallic, roughness) = (newer(values.metallic, "metallic"), newer(values.roughness, "roughness"));
