@@ -33,6 +33,9 @@ pub type RecorderId = ObserverId<Recorder>;
 pub trait Record {
     /// Begins a recording: states as they are now, then whatever is due.
     ///
+    /// Observers hear of a step in the order in which they were added. One that was added before, and resets an environment when it
+    /// hears of a step, has done so when the recorder hears of it: of that step, the environment is recorded as it was reset.
+    ///
     /// # Errors
     /// A name that is not known, a file that exists or cannot be written, a format that has no place for what is asked for.
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId>;

@@ -2,7 +2,6 @@
 
 use super::support::World;
 use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
 use kinetoscope::sensors::Sampled;
 
 /// What a row of an environment is expected to be.

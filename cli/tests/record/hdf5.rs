@@ -106,7 +106,7 @@ fn h5py_reads_many_episodes_and_long_ones() {
         let q = sim.mjcf_part(cart).get_qpos();
         heights[begun..].iter_mut().enumerate().for_each(|(env, rows)| rows.push(q.row(env).to_vec()));
         let force = kinetoscope::ndarray::Array2::from_shape_fn((ENVS, 1), |(env, _)| (env + step) as f64 * 0.01);
-        sim.mjcf_part_mut(cart).set_ctrl(&force, None).unwrap();
+        sim.mjcf_part_mut(cart).set_ctrl(&force, None, None).unwrap();
         sim.update(1);
     }
     sim.finish_recording(recorder).unwrap();
