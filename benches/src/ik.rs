@@ -1,6 +1,7 @@
 //! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default
 //! positions. The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping,
-//! positions cut at the limits, and the same number of starts. What either says it solved is asked of MuJoCo.
+//! positions cut at the limits, and the same number of starts. What either says it solved is asked of MuJoCo. The same
+//! again with a pose for each of 64 environments in one call.
 
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
@@ -15,6 +16,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 const TARGETS: usize = 1000;
+/// Environments whose poses are solved in one call.
+const ENVS: usize = 64;
 /// Solves of a pose out of reach.
 const FAR: usize = 21;
 /// Square of the rival's damping.
@@ -55,9 +58,21 @@ impl Ours<'_> {
     }
 }
 
+/// Ours, a pose for each environment in one call.
+struct Batched<'t> {
+    task: &'t Task,
+    sim: SimulationManager,
+    robot: RobotId,
+    /// The poses of the calls, one after the other.
+    targets: Vec<Vec<Pose>>,
+    next: usize,
+}
+
 /// A bare MuJoCo loop.
 struct Bare<'t> {
     task: &'t Task,
+    /// Poses in one step.
+    each: usize,
     data: Data,
     body: usize,
     qpos: Vec<usize>,
@@ -75,6 +90,7 @@ impl<'t> Bare<'t> {
         let joints = view.joint_names().iter().map(joint).collect::<Result<Vec<usize>, _>>()?;
         Ok(Self {
             task,
+            each: 1,
             data: Data::new(model)?,
             body,
             qpos: joints.iter().map(|&j| model.jnt_qposadr()[j] as usize).collect(),
@@ -156,6 +172,27 @@ impl Side for Ours<'_> {
     }
 }
 
+impl Side for Batched<'_> {
+    fn restart(&mut self) -> Outcome<()> {
+        self.next = 0;
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        let tip = Tip::of_part("arm").at(self.task.link);
+        let start = Instant::now();
+        for _ in 0..steps {
+            let targets = &self.targets[self.next % self.targets.len()];
+            let found = self.sim.robot(self.robot).compute_ik(targets, tip, &self.task.cfg, None, None)?;
+            if found.success.len() != ENVS {
+                return Err("not all poses were tried".into());
+            }
+            self.next += 1;
+        }
+        Ok(start.elapsed())
+    }
+}
+
 impl Side for Bare<'_> {
     fn restart(&mut self) -> Outcome<()> {
         self.next = 0;
@@ -164,7 +201,7 @@ impl Side for Bare<'_> {
 
     fn block(&mut self, steps: u32) -> Outcome<Duration> {
         let start = Instant::now();
-        for _ in 0..steps {
+        for _ in 0..steps as usize * self.each {
             self.solve(&self.task.targets[self.next % TARGETS])?;
             self.next += 1;
         }
@@ -180,14 +217,19 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     Ok(rows)
 }
 
-fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -> Outcome<Vec<Row>> {
-    let cfg = SimulationManagerCfg { threads: Some(1), ground: None, ..SimulationManagerCfg::default() };
+fn simulation(num_envs: usize, urdf: &Path) -> Outcome<(SimulationManager, RobotId)> {
+    let cfg = SimulationManagerCfg { num_envs, threads: Some(1), ground: None, ..SimulationManagerCfg::default() };
     let mut sim = SimulationManager::new(cfg)?;
     let robot = sim.add_robot(RobotCfg {
         urdf: UrdfCfg::single(urdf),
         control_parts: vec![("arm".into(), vec![".*".into()])],
         ..RobotCfg::default()
     })?;
+    Ok((sim, robot))
+}
+
+fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -> Outcome<Vec<Row>> {
+    let (sim, robot) = simulation(1, &urdf)?;
     let view = sim.robot(robot);
     let limits: Vec<[f64; 2]> =
         view.qpos_limits().index_axis(Axis(0), 0).rows().into_iter().map(|limit| [limit[0], limit[1]]).collect();
@@ -229,6 +271,12 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
         .collect::<Outcome<_>>()?;
     let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
     let times = measure(plan, &mut [&mut ours, &mut bare])?;
+    let (many, its_robot) = simulation(ENVS, &urdf)?;
+    let targets = task.targets.chunks_exact(ENVS).map(<[Pose]>::to_vec).collect();
+    let mut batched = Batched { task: &task, sim: many, robot: its_robot, targets, next: 0 };
+    (bare.each, bare.next) = (ENVS, 0);
+    let together = measure(plan, &mut [&mut batched, &mut bare])?;
+    let each = |side| 1e6 * together.per_step(side) / ENVS as f64;
     let [our_median, their_median] = micros.map(median);
     let rival = "DLS on mj_jac";
     Ok(vec![
@@ -241,6 +289,11 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
             rival,
             their_median,
             their_median / our_median,
+        ),
+        Row::new("ik", format!("{name}, mean of {ENVS} environments in one call"), "us/solve", 1, each(0)).against(
+            rival,
+            each(1),
+            together.ratio(0, 1),
         ),
         Row::new("ik", format!("{name}, median out of reach"), "us/solve", 1, median(far)),
         Row::new("ik", format!("{name}, solved"), "%", 1, solved[0]).against(rival, solved[1], solved[0] / solved[1]),

@@ -1,6 +1,7 @@
 //! Properties of single environments: masses of all links and friction of all shapes, drawn for every environment. The rival
 //! is what one does with bare MuJoCo: a whole model for each environment (`mj_copyModel`), to which the values are written,
-//! then `mj_setConst` (in a small `mjData`, which is made with the copy). Ours checks names and values and does a forward pass as well.
+//! then `mj_setConst` (in a small `mjData`, which is made with the copy). Ours finds names and checks values as well; neither
+//! side does a forward pass, which ours does when somebody reads or steps.
 
 use crate::interleave::{Plan, Side, measure};
 use crate::models::sr5;

@@ -361,15 +361,17 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub fn read<T>(&self, index: usize, read: impl FnOnce(&Env) -> T) -> T {
-        assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
-        let chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
-        read(&chunk.envs[index % self.shared.chunk_size])
+        self.edit(index, |env| {
+            env.freshen();
+            read(env)
+        })
     }
 
     /// Reads all environments in order.
     pub fn for_each(&self, mut read: impl FnMut(usize, &Env)) {
         for (c, chunk) in self.shared.chunks.iter().enumerate() {
-            for (i, env) in lock(chunk).envs.iter().enumerate() {
+            for (i, env) in lock(chunk).envs.iter_mut().enumerate() {
+                env.freshen();
                 read(c * self.shared.chunk_size + i, env);
             }
         }
@@ -381,9 +383,21 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut Env) -> T) -> T {
+        self.edit(index, |env| {
+            env.freshen();
+            write(env)
+        })
+    }
+
+    /// Exchanges what environment `index` is made of, or looks at that: its data may be [stale](Env::freshen).
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn edit<T>(&self, index: usize, edit: impl FnOnce(&mut Env) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
-        write(&mut chunk.envs[index % self.shared.chunk_size])
+        edit(&mut chunk.envs[index % self.shared.chunk_size])
     }
 }
 
@@ -409,6 +423,7 @@ impl Taken<'_> {
             } else if let Some(next) = self.next.and_then(|next| next.try_lock().ok()) {
                 next.envs.iter().take(1).for_each(|env| env.prefetch(self.cold));
             }
+            envs[i].freshen();
             act(self.first + i, &mut envs[i], read);
         }
     }

@@ -609,6 +609,7 @@ impl Simulation {
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = Arc::clone(&self.start);
         let chosen = chosen.to_vec();
+        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.edit(i, Env::expect_reset));
         self.batch.run(Arc::new(move |i, env| {
             if chosen[i] {
                 env.reset(|data, drives| {

@@ -71,6 +71,9 @@ pub struct Env {
     raw_quats: RawQuats,
     /// Whether what MuJoCo solves was last solved for the present state, not for the one before the last step.
     solved_now: bool,
+    /// Whether the model was exchanged since the last forward pass, which is done when somebody wants to know or to step: who
+    /// changes several properties, or resets afterwards, waits for one. Positions are those before a pass then.
+    stale: bool,
     seldom: Box<Seldom>,
     /// What a user applies to bodies; most environments have none.
     wrenches: Option<Box<Wrenches>>,
@@ -107,6 +110,7 @@ impl Env {
             diverged: None,
             raw_quats: RawQuats::new(model),
             solved_now: true,
+            stale: false,
             seldom: Box::default(),
             wrenches: None,
         };
@@ -132,14 +136,25 @@ impl Env {
         self.refresh(&good);
     }
 
-    /// Goes on with another model of the same sizes, after a forward pass.
+    /// Goes on with another model of the same sizes; the forward pass is done by [`freshen`](Self::freshen), which is to follow
+    /// before anything else is asked of the environment but to exchange the model once more.
     pub(crate) fn set_model(&mut self, model: Model) {
-        self.raw_quats.restore(&mut self.data);
-        let good = self.saved();
+        if !self.stale {
+            self.raw_quats.restore(&mut self.data);
+        }
         let welds = &self.seldom.welds;
         self.data.set_model(if welds.is_empty() { model } else { model.with_welds(welds) });
         self.solved_now = true;
-        self.refresh(&good);
+        self.stale = true;
+    }
+
+    /// Does the forward pass that an exchanged model waits for.
+    pub(crate) fn freshen(&mut self) {
+        if self.stale {
+            self.stale = false;
+            let good = self.saved();
+            self.refresh(&good);
+        }
     }
 
     /// Welds that hold.
@@ -207,8 +222,14 @@ impl Env {
         }
     }
 
+    /// Says that a [`reset`](Self::reset) follows: the forward pass that an exchanged model waits for is not needed.
+    pub(crate) fn expect_reset(&mut self) {
+        self.stale = false;
+    }
+
     /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
+        self.stale = false;
         self.data.reset();
         self.data.take_warnings();
         self.drives.reset();

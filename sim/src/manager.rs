@@ -129,7 +129,13 @@ impl SimulationManager {
     }
 
     /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
-    /// error the simulation is as it was. What exists already keeps its state.
+    /// error the simulation is as it was. What exists already keeps its state, to the last bit.
+    ///
+    /// Where it goes from there, as if nothing had been added, is the same to rounding where the scene has no rows of
+    /// constraints. Rows, and implicit drives ([`DriveModel::Implicit`](crate::DriveModel::Implicit)), friction, limits and
+    /// contacts are rows, are solved for the whole scene at once, until what is left is below the solver's tolerance, 1e-8 of
+    /// the mean inertia times the number of degrees of freedom: more in the scene leaves something else. An arm with a hand
+    /// goes on to 1e-6 rad over 1 s.
     ///
     /// It is made of URDF files ([`RobotCfg::urdf`]), or is an MJCF file ([`RobotCfg::mjcf`]).
     ///

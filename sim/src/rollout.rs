@@ -5,7 +5,6 @@
 //! gives is what stepping by hand would give: `set_qpos` and `set_ctrl` with the controls of a step, `update(1)`, read.
 
 use crate::compile::Simulation;
-use crate::contents::Contents;
 use crate::drive::table::DriveState;
 use crate::env::{Env, EnvState, EnvStatus};
 use crate::error::{Error, Result};
@@ -30,8 +29,8 @@ pub struct Rollout {
 /// What a column of controls does.
 #[derive(Clone, Copy, Debug)]
 enum Column {
-    /// The target of a drive, clamped to these limits.
-    Target { drive: usize, low: f64, high: f64 },
+    /// The target of a drive, clamped to the limits that targets have in the environment: those of the state it is in.
+    Target { drive: usize },
     /// Nothing: the joint follows another, or has no drive.
     Ignored,
     /// A control of an MJCF part.
@@ -47,14 +46,10 @@ struct Row {
 }
 
 /// The columns of controls: joints of all robots, then actuators of all MJCF parts.
-fn columns(contents: &Contents, simulation: &Simulation) -> Vec<Column> {
-    let mut columns = Vec::new();
-    for (data, index) in contents.robots.iter().zip(&simulation.robots) {
-        columns.extend(data.plans().iter().zip(&index.joints).map(|(plan, joint)| match joint.drive {
-            Some(drive) => Column::Target { drive, low: plan.usable[0], high: plan.usable[1] },
-            None => Column::Ignored,
-        }));
-    }
+fn columns(simulation: &Simulation) -> Vec<Column> {
+    let joints = simulation.robots.iter().flat_map(|robot| &robot.joints);
+    let target = |drive| Column::Target { drive };
+    let mut columns: Vec<Column> = joints.map(|joint| joint.drive.map_or(Column::Ignored, target)).collect();
     for part in &simulation.parts {
         columns.extend(part.controls.iter().map(|&place| Column::Control { place }));
     }
@@ -65,7 +60,10 @@ fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>)
     let mut controls = Vec::new();
     for (column, value) in columns.iter().zip(values) {
         match *column {
-            Column::Target { drive, low, high } => env.drives.position[drive] = value.clamp(low, high),
+            Column::Target { drive } => {
+                let [low, high] = env.drives.ranges[drive];
+                env.drives.position[drive] = value.clamp(low, high);
+            }
             Column::Ignored => {}
             Column::Control { place } => controls.push((place, value)),
         }
@@ -142,7 +140,7 @@ impl SimulationManager {
 
     /// What would happen under `controls`, shape (N, T, columns of [`control_names`](Self::control_names)): N rows, each
     /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
-    /// limits as [`set_qpos`](crate::RobotMut::set_qpos) does (columns of joints that follow others or have no drive are
+    /// limits of the row's initial state as [`set_qpos`](crate::RobotMut::set_qpos) does (columns of joints that follow others or have no drive are
     /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and
     /// inputs stay as they are in the initial state.
     ///
@@ -165,7 +163,7 @@ impl SimulationManager {
     ) -> Result<Rollout> {
         let controls: ArrayView3<'_, f64> = controls.into();
         let envs = env_list(env_ids, self.num_envs())?;
-        let columns = columns(&self.contents, &self.simulation);
+        let columns = columns(&self.simulation);
         self.check_controls(controls, envs.len(), columns.len())?;
         let rows = self.rows(&envs, start)?;
         let (steps, substeps, model) = (controls.shape()[1], self.cfg.substeps, self.simulation.batch.model());

@@ -680,3 +680,40 @@ fn a_centred_object_may_have_another_centre_of_mass() {
     assert!((sideways - 4.0 * 0.03).abs() < 2e-3, "{sideways}");
     assert!(change[(0, 0)].abs() + change[(0, 1)].abs() < 1e-9);
 }
+
+/// The forward pass after a draw waits until somebody reads or steps: when it is done changes nothing, to the last bit.
+#[test]
+fn when_the_forward_pass_of_a_draw_is_done_changes_nothing() {
+    let drawn = Randomization::new().with(Property::Mass, ".*", Draw::Scale([0.5, 2.0])).with(
+        Property::Friction,
+        ".*",
+        Draw::Scale([0.5, 1.5]),
+    );
+    let run = |draws: bool, read: bool, reset: bool| {
+        let (mut sim, ids) = world(cfg(3, 2));
+        sim.update(50);
+        for envs in [None, Some(&[EnvId(1)][..])] {
+            if draws {
+                sim.randomize(&drawn, envs).unwrap();
+            }
+            if read {
+                let _ = all_bits(&sim);
+            }
+        }
+        if reset {
+            sim.reset(Some(&[EnvId(2)])).unwrap();
+        }
+        // What is read then is of the new masses: MuJoCo's inertia matrix.
+        let of_mass = |env: usize| sim.batch().read(env, |env| env.data().mass_matrix().unwrap());
+        let matrices: Vec<Vec<f64>> = (0..3).map(of_mass).collect();
+        let masses = sim.rigid_object(ids.cube).get_mass();
+        sim.update(20);
+        (matrices, masses, all_bits(&sim))
+    };
+    for reset in [false, true] {
+        let (eager, lazy) = (run(true, true, reset), run(true, false, reset));
+        assert_eq!(eager, lazy);
+        let nominal = run(false, false, reset);
+        assert!(nominal.0 != lazy.0 && nominal.1 != lazy.1 && nominal.2 != lazy.2, "it can be seen");
+    }
+}

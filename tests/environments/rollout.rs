@@ -95,6 +95,49 @@ fn targets_are_clamped_as_those_of_robots_are() {
     assert_eq!(sim.robot(ids.arm).get_target_qpos().row(0), limits.slice(s![0, .., 1]));
 }
 
+/// Controls were once clamped to the limits that the robot was added with, not to those that a row's state has:
+/// `set_qpos_limits` changes them in an environment, and they go with its state.
+#[test]
+fn targets_are_clamped_to_the_limits_of_the_state_that_a_row_starts_in() {
+    let (mut sim, ids) = world(cfg(2, 1));
+    let tight = Array3::from_shape_fn((1, 6, 2), |(_, joint, end)| 0.01 * (joint + 1) as f64 * [-1.0, 1.0][end]);
+    let wide = sim.snapshot(ALL).unwrap();
+    sim.robot_mut(ids.arm).set_qpos_limits(&tight, None, Some(&[EnvId(1)])).unwrap();
+    let narrow = sim.snapshot(ALL).unwrap();
+    let controls = controls(2);
+    // What is present has other limits than the state that is started from, in both directions.
+    for (present, start) in [(&narrow, None), (&narrow, Some(&wide)), (&wide, Some(&narrow))] {
+        sim.restore(present, ALL).unwrap();
+        let rollout = sim.rollout(&controls, start, ALL).unwrap();
+        sim.restore(start.unwrap_or(present), ALL).unwrap();
+        for t in 0..STEPS {
+            let now = controls.index_axis(Axis(1), t);
+            sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
+            sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
+            sim.update(1);
+            assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
+        }
+        let end = all_bits(&sim);
+        sim.restore(&rollout.end, ALL).unwrap();
+        assert_eq!(all_bits(&sim), end);
+        let (targets, limits) = (sim.robot(ids.arm).get_target_qpos(), sim.robot(ids.arm).qpos_limits());
+        for ((env, joint), target) in targets.indexed_iter() {
+            let asked = controls[(env, STEPS - 1, joint)];
+            assert_eq!(*target, asked.clamp(limits[(env, joint, 0)], limits[(env, joint, 1)]));
+        }
+        // It matters here: the last controls are beyond the tight limits of environment 1.
+        let is_tight = start.is_none_or(|start| std::ptr::eq(start, &narrow));
+        let inside =
+            targets.row(1).iter().zip(tight.outer_iter().next().unwrap().rows()).all(|(x, ends)| x.abs() <= ends[1]);
+        assert_eq!(inside, is_tight);
+    }
+    // A state takes its limits to whichever environment it is tried in.
+    sim.restore(&wide, ALL).unwrap();
+    let there = sim.rollout(&controls, Some(&narrow), ALL).unwrap();
+    let elsewhere = sim.rollout(&controls, Some(&narrow), Some(&[EnvId(0); 2])).unwrap();
+    assert!(elsewhere.states == there.states);
+}
+
 #[test]
 fn a_row_that_diverges_stays_where_it_was_and_the_others_go_on() {
     // A slide without damping and a force of 1e12 newtons on 1 kg: beyond MuJoCo's largest acceleration.

@@ -53,7 +53,9 @@ fn told(sim: &SimulationManager, ids: Ids) -> String {
     let mut told = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
     for env in 0..ENVS {
         let properties = sim.properties(EnvId(env)).unwrap();
-        for property in [Property::Mass, Property::Inertia, Property::CenterOfMass, Property::Friction] {
+        for property in
+            [Property::Mass, Property::Inertia, Property::CenterOfMass, Property::Friction, Property::LinearDamping]
+        {
             told += &format!("{:?}", properties.get(property, "o").unwrap());
         }
         sim.batch().read(env, |env| {
@@ -99,6 +101,8 @@ const OF_ROWS: &[OfRows] = &[
     ("set_mass", &[0.5], |s, i, v, e| s.rigid_object_mut(i.object).set_mass(v.index_axis(Axis(1), 0), e)),
     ("set_friction", &[0.5; 3], |s, i, v, e| s.rigid_object_mut(i.object).set_friction(v, e)),
     ("set_inertia", &[0.5; 3], |s, i, v, e| s.rigid_object_mut(i.object).set_inertia(v, e)),
+    ("set_center_of_mass", &[0.02; 3], |s, i, v, e| s.rigid_object_mut(i.object).set_center_of_mass(v, e)),
+    ("set_damping", &[0.5; 2], |s, i, v, e| s.rigid_object_mut(i.object).set_damping(v, e)),
     ("set_external_wrench", &[0.5; 3], |s, i, v, e| {
         s.rigid_object_mut(i.object).set_external_wrench(v, v, WrenchFrame::World, e)
     }),

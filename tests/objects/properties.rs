@@ -40,6 +40,63 @@ fn force_over_mass_is_acceleration() {
     assert_eq!(sim.rigid_object(cube).get_mass().to_vec(), [2.0; 3]);
 }
 
+/// MuJoCo's Euler takes damping at the end of the step: v' = v / (1 + h c / m), and a cube's turns so with b / I. Drawn, set,
+/// and set while it moves; nominally what is configured.
+#[test]
+fn damping_of_each_environment_slows_by_its_law() {
+    let mut sim = weightless(4);
+    let cfg = RigidObjectCfg { mass: Some(2.0), linear_damping: 0.5, angular_damping: 0.001, ..Default::default() };
+    let cube = sim.add_rigid_object(cfg).unwrap();
+    let fixed = RigidObjectCfg { uid: "fixed".into(), body_type: BodyType::Static, ..Default::default() };
+    let fixed = RigidObjectCfg { init_pose: Pose::translation(9.0, 0.0, 0.0), ..fixed };
+    let fixed = sim.add_rigid_object(fixed).unwrap();
+    assert_eq!(sim.rigid_object(fixed).get_damping(), Array2::<f64>::zeros((4, 2)));
+    let drawn = Randomization::new().with(Property::LinearDamping, "object", Draw::Scale([2.0, 4.0])).with(
+        Property::AngularDamping,
+        "object",
+        Draw::Add([0.01, 0.02]),
+    );
+    sim.randomize(&drawn, Some(&[EnvId(3)])).unwrap();
+    sim.rigid_object_mut(cube).set_damping(&array![[3.0, 0.0]], Some(SECOND)).unwrap();
+    let damping = sim.rigid_object(cube).get_damping();
+    assert_eq!(
+        [damping.row(0).to_vec(), damping.row(1).to_vec(), damping.row(2).to_vec()],
+        [vec![0.5, 0.001], vec![3.0, 0.0], vec![0.5, 0.001]]
+    );
+    assert!((1.0..2.0).contains(&damping[(3, 0)]) && (0.011..0.021).contains(&damping[(3, 1)]), "{damping}");
+    assert_eq!(sim.property_bytes(EnvId(2)).unwrap(), 0);
+    assert!(sim.properties(EnvId(3)).unwrap().get(Property::LinearDamping, "object").unwrap() == [damping[(3, 0)]]);
+
+    let mut expected = array![[1.0, -2.0, 3.0, 0.0, 0.0, 4.0]].broadcast((4, 6)).unwrap().to_owned();
+    sim.rigid_object_mut(cube).write_velocity(&expected, None).unwrap();
+    let (m, moment, h) = (2.0, 2.0 * 0.01 / 6.0, sim.cfg().physics_dt);
+    let mut go_on = |sim: &mut SimulationManager, damping: &Array2<f64>| {
+        sim.update(300);
+        let found = sim.rigid_object(cube).get_velocity();
+        for ((env, k), v) in expected.indexed_iter_mut() {
+            let rate = if k < 3 { damping[(env, 0)] / m } else { damping[(env, 1)] / moment };
+            *v *= (1.0 + h * rate).powi(-300);
+            assert!((found[(env, k)] - *v).abs() < 1e-9, "{env} {k}: {found} instead of {v}");
+        }
+    };
+    go_on(&mut sim, &damping);
+    // It is the environment's: adding something leaves it, and it changes from one step to the next.
+    sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [0.0, 9.0, 0.0])).unwrap();
+    assert_eq!(sim.rigid_object(cube).get_damping(), damping);
+    sim.rigid_object_mut(cube).set_damping(&array![[0.0, 0.004]], Some(&[EnvId(0)])).unwrap();
+    let later = sim.rigid_object(cube).get_damping();
+    assert_eq!((later[(0, 0)], later[(0, 1)], later.row(3)), (0.0, 0.004, damping.row(3)));
+    go_on(&mut sim, &later);
+    sim.reset(None).unwrap();
+    assert_eq!(sim.rigid_object(cube).get_damping(), later);
+    sim.reset_properties(None).unwrap();
+    assert_eq!(sim.rigid_object(cube).get_damping().row(3), array![0.5, 0.001]);
+    let refused = sim.rigid_object_mut(fixed).set_damping(&array![[0.0, 0.0]], None);
+    assert!(matches!(refused, Err(Error::NotDynamic { argument: "set_damping", .. })), "{refused:?}");
+    let error = sim.rigid_object_mut(cube).set_damping(&array![[-1.0, 0.0]], None).unwrap_err().to_string();
+    assert!(error.contains("linear_damping") && error.contains(">= 0"), "{error}");
+}
+
 /// A force on a block on the ground moves it beyond mu m g, and not below it.
 #[test]
 fn friction_is_a_threshold() {

@@ -205,9 +205,12 @@ impl Editor {
         let (m, d) = (self.copy.0.as_ptr(), self.scratch.0.as_ptr());
         // SAFETY: the copy and its data are alive, and `self` is borrowed mutably; an engine function (guarded).
         let done = guarded(|| unsafe { mj::mj_setConst(m, d) });
-        // What an error left on the stack.
-        // SAFETY: as above.
-        done.and(guarded(|| unsafe { mj::mj_resetData(m, d) }))?;
+        if done.is_err() {
+            // What the error left on the stack. It sets the positions that it looks at by itself.
+            // SAFETY: as above.
+            guarded(|| unsafe { mj::mj_resetData(m, d) })?;
+        }
+        done?;
         self.update_means();
         Ok(())
     }

@@ -59,7 +59,8 @@ pub struct RigidObjectCfg {
     /// Moments of inertia about the centre of mass along x, y and z of the object's frame \[kg m²\]; those of the shape,
     /// filled evenly, where `None`.
     pub inertia: Option<[f64; 3]>,
-    /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`.
+    /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`. Of single environments, and later:
+    /// [`RigidObjectMut::set_damping`], or the [property](crate::Property).
     pub linear_damping: f64,
     /// Torque against its angular velocity \[N m s/rad\]: `-angular_damping w`.
     pub angular_damping: f64,

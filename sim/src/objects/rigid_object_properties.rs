@@ -53,6 +53,19 @@ impl RigidObject<'_> {
         values
     }
 
+    /// Linear damping \[N s/m\] and angular damping \[N m s/rad\] in each environment, shape (N, 2); 0 where the object is not
+    /// dynamic.
+    pub fn get_damping(&self) -> Array2<f64> {
+        let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
+        if let Some((_, dof)) = self.simulation.objects[self.index].joint {
+            self.simulation.batch.for_each(|i, env| {
+                let damping = env.data().model().dof_damping();
+                [damping[dof], damping[dof + 3]].into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
+            });
+        }
+        values
+    }
+
     /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes with the object where
     /// it is \[N, N m\], shape (N, 6).
     pub fn get_external_wrench(&self) -> Array2<f64> {
@@ -131,6 +144,18 @@ impl RigidObjectMut<'_> {
         let properties = [Property::Friction, Property::TorsionalFriction, Property::RollingFriction];
         let meaning = "environments, sliding torsional rolling";
         self.set("set_friction", meaning, &properties, frictions.into(), env_ids)
+    }
+
+    /// Sets linear damping \[N s/m\], a force against the velocity of the object's frame, and angular damping \[N m s/rad\],
+    /// a torque against its angular velocity: rows of 2, as in [`set_mass`](Self::set_mass).
+    ///
+    /// # Errors
+    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is negative or
+    /// not finite; then nothing is set.
+    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+    pub fn set_damping<'t>(&mut self, dampings: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let properties = [Property::LinearDamping, Property::AngularDamping];
+        self.set("set_damping", "environments, linear angular", &properties, dampings.into(), env_ids)
     }
 
     /// Sets properties from rows, one after the other.

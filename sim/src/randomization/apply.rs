@@ -131,6 +131,9 @@ impl Maker {
                         let quat = editor.body_quat_mut()[4 * place..4 * place + 4].iter_mut();
                         quat.zip(value).for_each(|(to, from)| *to = from / length);
                     }
+                    Property::LinearDamping | Property::AngularDamping => {
+                        editor.dof_damping_mut()[place..place + 3].fill(value[0]);
+                    }
                     Property::Stiffness | Property::DriveDamping | Property::MaxEffort => {}
                 }
                 constants |= matches!(

@@ -94,7 +94,7 @@ impl Simulation {
         let made: Result<Vec<_>> = envs
             .iter()
             .map(|&index| {
-                self.batch.read(index, |env| {
+                self.batch.edit(index, |env| {
                     let mut properties = self.properties_of(&tables, index, env);
                     change(index, &mut properties)?;
                     let own = properties.own();
@@ -116,7 +116,7 @@ impl Simulation {
         }
         for (index, own, made) in made {
             self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
-            self.batch.write(index, |env| made.give(env));
+            self.batch.edit(index, |env| made.give(env));
         }
         self.look_so(looks);
         Ok(())
@@ -199,11 +199,11 @@ impl SimulationManager {
     pub fn properties(&self, env: EnvId) -> Result<Properties> {
         env_mask(Some(&[env]), self.num_envs())?;
         let tables = self.simulation.tables();
-        Ok(self.simulation.batch.read(env.0, |here| self.simulation.properties_of(tables, env.0, here)))
+        Ok(self.simulation.batch.edit(env.0, |here| self.simulation.properties_of(tables, env.0, here)))
     }
 
     /// Draws properties for environments, all of them where `env_ids` is `None`. Properties that no term names stay as they
-    /// are; a forward pass follows.
+    /// are; a forward pass follows, when the environment is read or stepped.
     ///
     /// # Errors
     /// An environment does not exist, a pattern matches nothing or one name twice, a range is none, or a value cannot be,

@@ -64,11 +64,15 @@ pub enum Property {
     Position,
     /// How a static object is turned: a quaternion w, x, y, z of length 1, 4 numbers. It is to be set, rather than drawn.
     Rotation,
+    /// Force against the velocity of the frame of an object, or of another body that moves freely \[N s/m\], 1 number.
+    LinearDamping,
+    /// Torque against its angular velocity \[N m s/rad\], 1 number.
+    AngularDamping,
 }
 
 impl Property {
     /// All properties.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Mass,
         Self::CenterOfMass,
         Self::Inertia,
@@ -86,6 +90,8 @@ impl Property {
         Self::Color,
         Self::Position,
         Self::Rotation,
+        Self::LinearDamping,
+        Self::AngularDamping,
     ];
 
     /// Name in configuration files and messages.
@@ -108,6 +114,8 @@ impl Property {
             Self::Color => "color",
             Self::Position => "position",
             Self::Rotation => "rotation",
+            Self::LinearDamping => "linear_damping",
+            Self::AngularDamping => "angular_damping",
         }
     }
 
@@ -134,6 +142,7 @@ impl Property {
             Self::Size => "body with a box, ball, capsule, cylinder or ellipsoid called",
             Self::Color => "body or terrain called",
             Self::Position | Self::Rotation => "static object called",
+            Self::LinearDamping | Self::AngularDamping => "body that moves freely and is called",
         }
     }
 

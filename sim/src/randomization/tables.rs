@@ -138,6 +138,8 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
         }
         Property::Position => standing(model, &mut table, beside, |body| &model.body_pos()[3 * body..3 * body + 3]),
         Property::Rotation => standing(model, &mut table, beside, |body| &model.body_quat()[4 * body..4 * body + 4]),
+        Property::LinearDamping => free_bodies(model, &mut table, 0),
+        Property::AngularDamping => free_bodies(model, &mut table, 3),
     }
     table
 }
@@ -196,6 +198,18 @@ fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m
             && let Some(name) = model.name(ObjectKind::Body, body)
         {
             table.push(name, body, values(body));
+        }
+    }
+}
+
+/// Free joints, called as the bodies that they move; places are degrees of freedom, the `first` of each joint's six and the two
+/// after it.
+fn free_bodies(model: &Model, table: &mut Table, first: usize) {
+    for joint in 0..model.njnt() {
+        let name = model.name(ObjectKind::Body, usize::try_from(model.jnt_bodyid()[joint]).unwrap_or(0));
+        if let Some(name) = name.filter(|_| model.jnt_type()[joint] as u32 == mj::mjJNT_FREE) {
+            let dof = model.jnt_dofadr()[joint] as usize + first;
+            table.push(name, dof, &[model.dof_damping()[dof]]);
         }
     }
 }
