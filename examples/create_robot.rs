@@ -37,8 +37,8 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    if args.launcher.renderer != Renderer::Auto || args.launcher.out.is_some() {
-        println!("This example draws no images: --renderer and --out have no effect (create_sensor draws).");
+    if args.launcher.renderer != Renderer::Auto {
+        println!("This example has no camera: --renderer has no effect (create_sensor draws).");
     }
     println!("Creating simulation...");
     let mut sim = SimulationManager::new(SimulationManagerCfg {
@@ -86,6 +86,7 @@ fn run(args: &Args) -> launcher::Result {
         eprintln!("environment {} diverged: {reason}", env.0);
     }
     recording.finish(&mut sim)?;
+    args.launcher.screenshot(&mut sim, "create_robot.png")?;
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

@@ -15,7 +15,7 @@ use kinetoscope::sensors::camera::lens::{Domain, Equidistant, Equisolid, FTheta,
 use kinetoscope::sensors::camera::lens::{Orthographic, Stereographic};
 use kinetoscope::sensors::camera::{CameraInfo, Lens, PointFrame};
 use launcher::panel::tile;
-use launcher::{Launcher, PathFlags, Renderer, picture};
+use launcher::{Launcher, PathFlags, Renderer, picture, still};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -58,6 +58,7 @@ fn run(args: &Args) -> launcher::Result {
         other => other,
     };
     let renderer = renderer.of_cameras(args.paths)?;
+    still::refuse(args.launcher.serve.is_some(), args.launcher.record.is_some())?;
     let views = views(args)?;
     let mut sim = SimulationManager::new(args.launcher.simulation_drawn_anyhow()?)?;
     let robot = sim.add_robot(launcher::arm::bundled()?)?;

@@ -47,6 +47,8 @@ the frame of the joint. `mass_matrix` and `gravity_torque` have one row per join
 with --floating-base first base.vx .. base.wz (velocity of the root in world axes, angular velocity in its own axes),
 and last those of floating and planar joints. An MJCF file's armature is in `mass_matrix`. null where there is no value.
 
+Nothing moves here, so there is no --serve and no --record: `kinetoscope view FILE` has them.
+
 Exit code: 0 loaded, 1 loaded with warnings (something was repaired, ignored or missing), 2 refused.";
 
 const LOADED: u8 = 0;

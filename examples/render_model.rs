@@ -13,6 +13,7 @@ use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
+use launcher::still::StillFlags;
 use launcher::{PathFlags, Renderer, picture, waiting};
 use serde_json::json;
 use std::path::PathBuf;
@@ -82,6 +83,8 @@ struct Args {
     /// Also write color.npy, depth.npy, mask.npy and normal.npy
     #[arg(long)]
     raw: bool,
+    #[command(flatten)]
+    live: StillFlags,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -106,6 +109,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
+    args.live.check()?;
     let renderer = args.renderer.of_cameras(args.paths)?;
     let still = load(args)?;
     for left_out in still.visible().left_out() {

@@ -70,6 +70,9 @@ fn run(args: &Args) -> launcher::Result {
     println!("{}", sim.sensor(id)?);
     let out = args.launcher.out_folder(true)?;
 
+    args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
+    let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, 200);
     let mut step = 0;
     while !progress.stop(step) {
@@ -79,6 +82,7 @@ fn run(args: &Args) -> launcher::Result {
         progress.advance(step);
     }
     let rate = progress.env_steps_per_second(step, sim.num_envs());
+    recording.finish(&mut sim)?;
 
     let stereo = sim.sensor(id)?;
     let pair = Pair::of(stereo, args.camera_id)?;

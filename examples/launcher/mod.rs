@@ -11,6 +11,7 @@ pub(crate) mod panel;
 pub(crate) mod picture;
 mod recording;
 pub(crate) mod stage;
+pub(crate) mod still;
 pub(crate) mod trial;
 mod views;
 pub(crate) mod waiting;
@@ -18,6 +19,7 @@ pub(crate) mod waiting;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::prelude::*;
+use std::cell::Cell;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -275,7 +277,12 @@ pub(crate) struct Progress {
     steps: Option<u64>,
     interrupted: Arc<AtomicBool>,
     start: Instant,
+    /// When it was said last how far it is, where there is no terminal.
+    said: Cell<Instant>,
 }
+
+/// Between two lines that say how far it is, where there is no terminal.
+pub(crate) const LINE: Duration = Duration::from_secs(10);
 
 impl Progress {
     /// Starts the clock; `cycle` is the length of the bar where the number of steps is open.
@@ -299,7 +306,8 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} steps  {per_sec}") {
             bar.set_style(style);
         }
-        Self { bar, steps: launcher.steps, interrupted, start: Instant::now() }
+        let start = Instant::now();
+        Self { bar, steps: launcher.steps, interrupted, start, said: Cell::new(start) }
     }
 
     /// Ctrl+C was pressed or all steps are done.
@@ -318,8 +326,13 @@ impl Progress {
         if std::io::stderr().is_terminal() { self.bar.suspend(|| println!("{message}")) } else { println!("{message}") }
     }
 
-    /// Moves the bar.
+    /// Moves the bar; where there is no terminal, a line every ten seconds says how far it is.
     pub(crate) fn advance(&self, step: u64) {
+        if self.bar.is_hidden() && self.said.get().elapsed() >= LINE {
+            self.said.set(Instant::now());
+            let of = self.steps.map_or_else(String::new, |steps| format!(" of {steps}"));
+            eprintln!("step {step}{of}, after {} s", self.start.elapsed().as_secs());
+        }
         if self.steps.is_none() && step > self.bar.length().unwrap_or(0) {
             self.bar.set_length(step);
         }

@@ -1,5 +1,6 @@
 //! How far a long picture is, for who waits for it at a terminal.
 
+use super::LINE;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::sensors::camera::RenderProgress;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -17,6 +18,7 @@ pub(crate) fn draw<T>(progress: &RenderProgress, limit: Option<Duration>, work: 
             let bar = ProgressBar::new(0);
             let style = ProgressStyle::with_template("{percent:>3} % {wide_bar} {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            let mut said = start;
             // Ended, or nobody waits any more.
             while until_done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
                 if limit.is_some_and(|limit| start.elapsed() > limit) {
@@ -28,6 +30,11 @@ pub(crate) fn draw<T>(progress: &RenderProgress, limit: Option<Duration>, work: 
                 bar.set_length(progress.total());
                 bar.set_position(progress.samples());
                 bar.set_message(message(progress));
+                if bar.is_hidden() && said.elapsed() >= LINE {
+                    said = Instant::now();
+                    let share = progress.fraction().map_or(0.0, |share| 100.0 * share);
+                    eprintln!("{share:.0} % of the paths, {}", message(progress));
+                }
             }
             bar.finish_and_clear();
         });

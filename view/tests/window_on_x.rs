@@ -195,7 +195,7 @@ fn a_window_shows_obeys_and_goes() {
     });
     // Snapshots of a paused simulation come where somebody wants something else: then a picture is due.
     while window.is_open() {
-        viewer.set_wants(Wants { markers: run.steps() % 2 == 0, ..Wants::default() });
+        viewer.set_wants(Wants { markers: run.steps().is_multiple_of(2), ..Wants::default() });
         viewer.send(Command::SetSpeed(Speed::REAL));
         std::thread::sleep(Duration::from_millis(5));
     }

@@ -1,5 +1,6 @@
 //! `cargo xtask bench`: ours and the rivals on both lines of MuJoCo, and the page with the results.
 
+use crate::progress::Progress;
 use crate::python::{self, Module};
 use crate::run::{Failure, Outcome, Repo};
 use crate::setup::{self, Line, Need, Wanted};
@@ -56,7 +57,9 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
             }
         }
     }
-    for ready in both {
+    let mut progress = Progress::of(both.len());
+    for (ready, line) in both.into_iter().zip(["2.2.2", "4.0.0"]) {
+        progress.begin(&format!("{} on MuJoCo {line}", args.name.as_deref().unwrap_or("all benchmarks")));
         let file = repo.target.join("bench-rows.json");
         if file.exists() {
             fs::remove_file(&file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
@@ -72,6 +75,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
             .run()?;
         rows.extend(read_rows(&file)?);
     }
+    progress.end();
     if let Some(path) = &args.json {
         write(path, &format!("{:#}\n", Value::Array(rows.clone())))?;
     }

@@ -16,6 +16,7 @@ mod mutations;
 mod physics_page;
 mod physics_report;
 mod plot;
+mod progress;
 mod python;
 mod run;
 mod setup;

@@ -2,6 +2,7 @@
 //! list (`mutations.rs`). All are done in a copy of the tree below the target folder.
 
 use crate::mutations::{MUTATIONS, Mutation};
+use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
 use crate::source_check::files_below;
@@ -46,7 +47,9 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
             return Err(Failure::new(format!("{what}:\n{said}")));
         }
     }
+    let mut progress = Progress::of(chosen.len());
     for mutation in chosen {
+        progress.begin(mutation.name);
         let path = tree.join(mutation.file);
         let good = read(&path)?;
         write(&path, &good.replace(mutation.search, mutation.replacement))?;
@@ -76,6 +79,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     if table.is_empty() {
         return Err(Failure::new("no mutation has such a name"));
     }
+    progress.end();
     println!("\n{table}");
     no_findings("mutations that no test noticed", &findings)
 }

@@ -2,6 +2,7 @@
 
 use crate::physics_page::{self, Measured};
 use crate::plot;
+use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
 use std::fs;
@@ -50,13 +51,16 @@ pub(crate) fn forget_rows(repo: &Repo) -> Outcome {
 
 pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
     let mut failed = Ok(());
+    let mut progress = Progress::of(LINES.len());
     for line in LINES {
+        progress.begin(&format!("the laws of physics on the line {line:?} of MuJoCo"));
         let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
         let rows = fresh_folder(repo, line)?;
         let tests = ready.cargo().env(VARIABLE, rows).args(["test", "--package", "kinetoscope", "--test", "physics"]);
         // What a law that fails measured is on the page, too.
         failed = failed.and(tests.run());
     }
+    progress.end();
     let runs = measured(repo)?;
     if args.check {
         compare(repo, &runs)?;

@@ -251,7 +251,7 @@ fn the_panel_has_cameras_of_every_kind() {
     let rays = RayCasterCameraCfg {
         width: 64,
         height: 48,
-        intrinsics: cfg.intrinsics.clone(),
+        intrinsics: cfg.intrinsics,
         extrinsics: cfg.extrinsics.clone(),
         ..Default::default()
     };

@@ -110,13 +110,16 @@ fn slower_and_faster_are_half_and_twice_as_fast() {
     assert_eq!(run_at(Speed::Free, None, '='), [Command::SetSpeed(times(2.0))]);
 }
 
+/// A way to move an eye.
+type Way = fn(&mut Eye, [f64; 2], usize);
+
 /// What dragging and the wheel do to the eye; what that does to the picture is tested with the eye.
 #[test]
 fn drags_turn_move_and_look_around_and_the_wheel_comes_nearer() {
     let (_sample, _viewer, mut app) = app(1);
     let by = [40.0, -15.0];
     let shift = Modifiers { shift: true, ctrl: false };
-    let ways: [(u8, Modifiers, fn(&mut Eye, [f64; 2], usize)); 4] = [
+    let ways: [(u8, Modifiers, Way); 4] = [
         (1, Modifiers::default(), Eye::orbit),
         (1, shift, Eye::pan),
         (2, Modifiers::default(), Eye::turn),

@@ -1,0 +1,68 @@
+//! How far long work is: a line before each part of it, with a bar where somebody sits at a terminal.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Letters of a bar.
+const BAR: usize = 20;
+
+/// The parts of some work.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    parts: usize,
+    begun: usize,
+    start: Instant,
+    terminal: bool,
+}
+
+impl Progress {
+    /// Work of so many parts, which begins now.
+    pub(crate) fn of(parts: usize) -> Self {
+        Self { parts, begun: 0, start: Instant::now(), terminal: std::io::stderr().is_terminal() }
+    }
+
+    /// Says that the next part begins.
+    pub(crate) fn begin(&mut self, what: &str) {
+        self.begun += 1;
+        let bar = if self.terminal { bar(self.begun - 1, self.parts) } else { String::new() };
+        eprintln!("{bar}{} of {}, after {}: {what}", self.begun, self.parts, words(self.start.elapsed()));
+    }
+
+    /// Says that all of it is done.
+    pub(crate) fn end(&self) {
+        eprintln!("{} of {} done in {}", self.begun, self.parts, words(self.start.elapsed()));
+    }
+}
+
+/// A bar of which so much is filled.
+fn bar(done: usize, parts: usize) -> String {
+    let filled = BAR * done.min(parts) / parts.max(1);
+    format!("[{}{}] ", "#".repeat(filled), "-".repeat(BAR - filled))
+}
+
+/// A duration for people.
+fn words(time: Duration) -> String {
+    match time.as_secs() {
+        seconds @ 0..60 => format!("{seconds} s"),
+        seconds @ 60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),
+        seconds => format!("{} h {} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_fill_and_times_are_words() {
+        assert_eq!(bar(0, 4), "[--------------------] ");
+        assert_eq!(bar(1, 4), "[#####---------------] ");
+        assert_eq!([bar(4, 4), bar(9, 4)], ["[####################] "; 2]);
+        assert_eq!(bar(0, 0), "[--------------------] ");
+        let of = |seconds| words(Duration::from_secs(seconds));
+        assert_eq!(
+            [of(0), of(59), of(60), of(3599), of(3660)],
+            ["0 s", "59 s", "1 min 0 s", "59 min 59 s", "1 h 1 min"]
+        );
+    }
+}
