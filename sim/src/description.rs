@@ -321,11 +321,19 @@ impl RobotDescription {
     }
 
     /// The link.
+    ///
+    /// # Panics
+    /// There is no such link: the id is of another description.
+    #[track_caller]
     pub fn link(&self, id: LinkId) -> &Link {
         &self.links[id.0]
     }
 
     /// The joint.
+    ///
+    /// # Panics
+    /// There is no such joint: the id is of another description.
+    #[track_caller]
     pub fn joint(&self, id: JointId) -> &Joint {
         &self.joints[id.0]
     }
@@ -344,6 +352,10 @@ impl RobotDescription {
     /// `position(id) = multiplier * position(driver) + offset`. For a joint that follows none: itself, 1, 0.
     ///
     /// Mimic chains are free of cycles by construction (`urdf::merge` refuses them, and `mjcf::robot_file` makes none).
+    ///
+    /// # Panics
+    /// There is no such joint: the id is of another description.
+    #[track_caller]
     pub fn mimic_driver(&self, id: JointId) -> (JointId, f64, f64) {
         let (mut driver, mut multiplier, mut offset) = (id, 1.0, 0.0);
         while let Some(mimic) = &self.joint(driver).mimic {

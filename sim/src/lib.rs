@@ -4,6 +4,13 @@
 //! URDF files -> UrdfFile -> RobotDescription -> Mjcf -> mj::Model -> Batch (N x Env)
 //!  urdf::parse  urdf::merge  mjcf::robot   mj::vfs     batch
 //! ```
+//!
+//! Any input gives a value or an error that says what was wrong and what would be right, with one exception: a handle
+//! ([`RobotId`], [`ObjectId`], [`SensorId`] and the like) panics where it is given to another
+//! [`SimulationManager`] than the one that made it, as an index beyond the end of a slice does, and for the same reason. No
+//! input makes such a handle, only a mistake in the program that uses it, and an error could not be handled but by mending
+//! the program. [`SimulationManager::robot`] and its like are then used without `?`. Names, numbers, files and environments
+//! that do not exist are errors.
 
 pub mod batch;
 mod body_inertia;

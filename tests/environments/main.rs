@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod listings;
+mod looked_at;
 mod looks;
 mod observers;
 mod randomize;

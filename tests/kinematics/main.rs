@@ -3,6 +3,7 @@
 
 mod arms;
 mod batches;
+mod chain;
 mod forward;
 mod jacobian;
 mod limits;
@@ -11,3 +12,4 @@ mod mujocos_reader;
 mod planar;
 mod posture;
 mod robots;
+mod singular;

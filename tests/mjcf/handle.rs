@@ -13,6 +13,8 @@ fn positions_velocities_and_controls_are_per_environment() {
     assert_eq!(read.joint_names()[..4], ["shoulder", "wrist", "rail", "free"]);
     assert_eq!(read.actuator_names(), ["servo", "pull", "push"]);
     let model = super::alone(&machine());
+    assert_eq!((read.uid(), read.cfg()), ("m", &MjcfCfg::text("m", machine())));
+    assert_eq!((read.model().nq(), read.model().body_mass()), (model.nq(), model.body_mass()));
     let sites = (0..model.nsite()).map(|site| model.name(ObjectKind::Site, site).unwrap());
     assert_eq!(read.site_names().to_vec(), sites.collect::<Vec<_>>());
     assert_eq!(read.qpos_columns(&["free", "shoulder"]).unwrap(), [6..13, 0..1]);

@@ -21,6 +21,7 @@ fn poses_are_those_of_the_objects() {
     let id = sim.add_rigid_object_group(blocks()).unwrap();
     assert_eq!(sim.rigid_object_group(id).names(), ["blocks.red", "blocks.green", "blocks.blue"]);
     assert_eq!((sim.rigid_object_group(id).len(), sim.rigid_object_group(id).uid()), (3, "blocks"));
+    assert!(!sim.rigid_object_group(id).is_empty());
     let there = Array3::from_shape_fn((2, 3, 7), |(e, k, c)| [e as f64, k as f64, 5.0, 0.0, 0.0, 2.0, 0.0][c]);
     sim.rigid_object_group_mut(id).write_pose(&there, None).unwrap();
     // One row of one environment, and then one for all.

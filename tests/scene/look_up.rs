@@ -23,6 +23,23 @@ fn names_keep_the_order_of_their_declaration() {
     assert_eq!(scene.sim().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
 }
 
+/// Where the type of a sensor is not known, its handle says it, and is that of the sensor for who asks rightly.
+#[test]
+fn a_handle_of_a_sensor_says_its_type() {
+    use kinetoscope::sim::interactive_scene::SensorEntity;
+    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+    sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), ..cube(0.0) }).unwrap();
+    let kinds: [(&str, Box<dyn SensorEntity>); 2] =
+        [("ContactSensor", Box::new(ContactSensorCfg::of("cube"))), ("Imu", Box::new(ImuCfg::on("cube")))];
+    let handles = kinds.map(|(name, cfg)| (name, cfg.add_to(&mut sim, name).unwrap()));
+    for (name, handle) in &handles {
+        assert_eq!(handle.type_name(), *name);
+    }
+    let imu = handles[1].1.get::<Imu>().unwrap();
+    assert_eq!(sim.sensor_ids::<Imu>(), [("Imu".to_string(), imu)]);
+    assert!(handles[0].1.get::<Imu>().is_none());
+}
+
 #[test]
 fn a_sensor_may_stand_before_what_it_watches() {
     let mut scene = InteractiveScene::new(two_cubes()).unwrap();

@@ -32,6 +32,7 @@ fn ball() -> RigidObjectCfg {
 fn a_ball_comes_to_rest_on_it() {
     let mut sim = empty();
     let (terrain, ball) = (sim.add_terrain(pit()).unwrap(), sim.add_rigid_object(ball()).unwrap());
+    assert_eq!((sim.terrain(terrain).uid(), sim.terrain(terrain).cfg()), ("pit", &pit()));
     sim.update(1000);
     let (pose, velocity) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
     for env in 0..2 {

@@ -341,9 +341,10 @@ fn enough_succeeded(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// No environment succeeded, because no cube was lifted. Where hands go afterwards depends on where cubes are left.
+/// No environment succeeded, because no cube was lifted, though hands went there and up again. Where they go afterwards
+/// depends on where cubes are left.
 fn none_lifted(report: &Value) -> Result<(), String> {
-    none(report, |row| Ok(row["lifted"] != false))
+    none(report, |row| Ok(row["planned_to_lift"] != true || row["lifted"] != false))
 }
 
 /// No environment succeeded, though hands went everywhere, because no drawer opened as far as it should.
@@ -589,7 +590,8 @@ mod tests {
     fn controls_have_to_fail_as_they_should() {
         let row = |lifted: bool, planned: bool, open: f64| {
             let diverged = Value::Null;
-            json!({ "success": false, "diverged": diverged, "lifted": lifted, "planned": planned, "open": open })
+            json!({ "success": false, "diverged": diverged, "lifted": lifted, "planned": planned,
+                    "planned_to_lift": planned, "open": open })
         };
         let good = row(false, true, 0.0);
         for control in [none_lifted, none_opened] {
@@ -599,6 +601,7 @@ mod tests {
             assert!(control(&json!({ "successes": 0, "num_envs": 16, "environments": [] })).is_err());
         }
         assert!(none_lifted(&trial(0, &row(true, true, 0.0), &good)).is_err());
+        assert!(none_lifted(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
         assert!(none_opened(&trial(0, &row(false, true, 0.16), &good)).is_err());
         assert!(none_opened(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
         let row = |found: bool, beside: f64, fell: bool| {

@@ -97,8 +97,10 @@ impl Point {
 /// Added to the squares of singular values: a matrix without rank, as that of every chain of fewer than six joints, must
 /// have a factor.
 const FLOOR: f64 = 1e-10;
-/// Bounds of the damping, in multiples of the squared error. At the least a step may be a hundred times longer than the
-/// error; at the most it is lost in rounding.
+/// Bounds of the damping, in multiples of half the squared error e. Along a singular direction of value s a step is
+/// e s / (s² + λ), at most e / (2 √λ) = 1 / √(2 damping) whatever the error is: 2.2 where damping is 0.1, 71 at the least. So
+/// it bounds steps far from the target, and hardly where the error is small; there it is the gain that decides, since a
+/// step that gains nothing is taken back. At the most a step is lost in rounding.
 const LEAST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 1e12;
 /// A step that takes off less than this part of the squared error is a slow one ...
@@ -134,7 +136,7 @@ impl Descent {
     /// Goes down from where it is; returns the number of steps, those included that were taken back.
     ///
     /// Levenberg-Marquardt with the step Jᵀ (J Jᵀ + λ)⁻¹ e, whose matrix has six rows whatever the number of joints. λ
-    /// is a multiple of the squared error, so that it vanishes at the target and bounds steps far from it (T. Sugihara,
+    /// is a multiple of the squared error, so that it vanishes at the target and damps steps far from it (T. Sugihara,
     /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011);
     /// the multiple follows the ratio of what a step gained to what the linear model promised, and steps that gain
     /// nothing are taken back (H. B. Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05).

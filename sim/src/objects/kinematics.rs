@@ -165,6 +165,13 @@ impl Robot<'_> {
     /// No [`Property`](crate::Property) moves a joint or a link's frame, and neither masses nor sizes are looked at: what is
     /// drawn for an environment changes nothing here.
     ///
+    /// Targets that are next to each other may have solutions that are far apart. Where the frame has lost a direction (an arm
+    /// that is stretched, two axes in one line, or parallel ones beside another pair) a small part of a way may take a turn of
+    /// a joint by a right angle, or may have no solution nearby at all: beyond a limit, or on the side to which the arm
+    /// does not bend. Then a random start may lead to another posture of the arm. Who follows a path solves from the
+    /// positions before, in small steps, and compares what comes out with them; with one start
+    /// ([`num_seeds`](IkCfg::num_seeds) 1) no other posture is looked for.
+    ///
     /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the
     /// robot's root is, up to the rounding of the target's pose in the frame of the root.
     ///

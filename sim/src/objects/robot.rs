@@ -389,7 +389,7 @@ impl<'a> Robot<'a> {
             .ok_or_else(|| unknown("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
-    /// Whether a joint follows another one.
+    /// Whether a joint follows another one; a joint that does not exist follows none.
     pub fn is_mimic(&self, joint: JointIndex) -> bool {
         self.data.plans.get(joint.0).is_some_and(|p| p.mimic.is_some())
     }

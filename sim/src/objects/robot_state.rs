@@ -59,7 +59,8 @@ impl Robot<'_> {
         self.active_joint_ids().len()
     }
 
-    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target.
+    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target; a passive joint, one that
+    /// follows another, and one that does not exist have none.
     pub fn is_driven(&self, joint: JointIndex) -> bool {
         self.data.plans().get(joint.0).is_some_and(|plan| plan.actuator.is_some())
     }

@@ -139,7 +139,7 @@ impl MjcfPart {
     }
 
     /// Sensors of the file that a scene has without them, by their numbers.
-    pub fn sensors_left_out(&self) -> &[(usize, LeftOut)] {
+    pub(crate) fn sensors_left_out(&self) -> &[(usize, LeftOut)] {
         &self.sensors_left_out
     }
 

@@ -1,0 +1,174 @@
+//! What viewers ask of a simulation, and what checks its configuration: by MuJoCo's arrays and by closed forms.
+
+use super::worlds::{all_bits, arm, cfg, cube};
+use kinetoscope::ndarray::array;
+use kinetoscope::prelude::*;
+use kinetoscope::scene::PoseF32;
+use kinetoscope::sim::Look;
+use nalgebra::Vector3;
+
+const G: f64 = 9.81;
+
+/// A cube at rest presses with its weight; one that falls touches nothing. Asking changes nothing.
+#[test]
+fn contacts_carry_what_rests_on_them() {
+    let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+    let mass = 2.0;
+    let id = sim.add_rigid_object(cube("cube", mass, [0.0, 0.0, 0.05])).unwrap();
+    sim.update(300);
+    sim.rigid_object_mut(id).write_pose(&array![[0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0]], Some(&[EnvId(1)])).unwrap();
+    let before = all_bits(&sim);
+    let contacts = sim.contacts(None).unwrap();
+    assert_eq!(all_bits(&sim), before);
+    assert_eq!((contacts.len(), contacts[0].len(), contacts[1].len()), (2, 4, 0));
+    let weight: f64 = contacts[0].iter().map(|contact| contact.normal_force).sum();
+    // It rests: its acceleration is below 1e-4 m/s² after 3 s.
+    assert!((weight - mass * G).abs() < 1e-4 * mass * G, "{weight}");
+    for contact in &contacts[0] {
+        // The ground is the world; the force on the cube is up.
+        let sign = if contact.bodies == [None, Some(0)] { 1.0 } else { -1.0 };
+        assert!(contact.bodies == [None, Some(0)] || contact.bodies == [Some(0), None], "{contact:?}");
+        assert!((sign * contact.normal[2] - 1.0).abs() < 1e-9 && sign * contact.force[2] > 0.0, "{contact:?}");
+        assert!((contact.force[2].abs() - contact.normal_force).abs() < 1e-9, "{contact:?}");
+        assert!(contact.point[0].abs() < 0.0501 && contact.point[2].abs() < 1e-3 && contact.distance.abs() < 1e-3);
+    }
+    let one = sim.contacts(Some(&[EnvId(0)])).unwrap();
+    assert_eq!(format!("{one:?}"), format!("{:?}", &contacts[..1]));
+    assert!(matches!(sim.contacts(Some(&[EnvId(2)])), Err(Error::UnknownIndex { index: 2, .. })));
+}
+
+/// Everything that a look holds is what MuJoCo's arrays and the readers of robots and objects say.
+#[test]
+fn a_look_is_the_environment_as_it_is() {
+    let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
+    let robot = sim.add_robot(arm()).unwrap();
+    let id = sim.add_rigid_object(cube("cube", 0.5, [1.0, 0.0, 2.0])).unwrap();
+    sim.robot_mut(robot).set_qpos(&array![[0.2, 0.4, -0.6, 0.1, 0.3, 0.0]], None, Some(&[EnvId(1)])).unwrap();
+    sim.update(20);
+    let mut look = Look::default();
+    sim.look(EnvId(1), &mut look).unwrap();
+    assert_eq!((look.time, look.diverged.clone()), (sim.time()[1], None));
+    let names = sim.body_names();
+    assert_eq!(look.bodies.len(), names.len());
+    for (name, body) in names.iter().zip(&look.bodies) {
+        let pose = match name.strip_prefix("arm/") {
+            Some(link) => sim.robot(robot).link_pose(link).unwrap(),
+            None => sim.rigid_object(id).get_pose(),
+        };
+        let row = kinetoscope::scene::pose::to_row(body);
+        assert!((0..7).all(|k| (row[k] - pose[(1, k)]).abs() < 1e-12), "{name}: {row:?} {pose}");
+    }
+    sim.batch().read(1, |env| {
+        let (data, model) = (env.data(), env.data().model());
+        assert_eq!(look.joints.len(), 6, "the free joint of the cube has no axis");
+        for (joint, axis) in look.joints.iter().enumerate() {
+            assert_eq!(
+                (axis.anchor, axis.axis, axis.slides),
+                (
+                    std::array::from_fn(|k| data.xanchor()[3 * joint + k]),
+                    std::array::from_fn(|k| data.xaxis()[3 * joint + k]),
+                    false
+                )
+            );
+        }
+        let total: f64 = look.masses.iter().map(|(_, mass)| mass).sum();
+        assert!((total - model.body_mass().iter().sum::<f64>()).abs() < 1e-12);
+        let moment: f64 = look.masses.iter().map(|(at, mass)| at[2] * mass).sum();
+        assert!((moment / total - data.subtree_com()[2]).abs() < 1e-12);
+    });
+    let instance = sim.visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
+    let pose = sim.rigid_object(id).get_pose();
+    let expected = PoseF32::from(&kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| pose[(1, k)])));
+    assert_eq!(look.instances[instance].translation, expected.translation);
+    assert!(matches!(sim.look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
+}
+
+/// F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; again in the next; no more once
+/// it is let go.
+#[test]
+fn a_pull_accelerates_and_turns() {
+    let settings = SimulationManagerCfg { gravity: [0.0; 3].into(), ground: None, ..cfg(2, 1) };
+    let mut sim = SimulationManager::new(settings).unwrap();
+    let mass = 2.0;
+    let id = sim.add_rigid_object(cube("cube", mass, [1.0, 2.0, 3.0])).unwrap();
+    let (force, arm) = ([0.3, -0.2, 0.5], [0.05, 0.0, -0.02]);
+    let point = [1.0 + arm[0], 2.0 + arm[1], 3.0 + arm[2]];
+    sim.pull(EnvId(1), 0, point, force).unwrap();
+    let h = sim.cfg().physics_dt;
+    let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
+    let mut first = None;
+    for _ in 0..2 {
+        sim.update(1);
+        let v = sim.rigid_object(id).get_velocity();
+        first.get_or_insert_with(|| v.clone());
+    }
+    let first = first.unwrap();
+    for k in 0..3 {
+        assert!((first[(1, k)] - h * force[k] / mass).abs() < 1e-14 && (first[(1, 3 + k)] - h * turn[k]).abs() < 1e-12);
+    }
+    let second = sim.rigid_object(id).get_velocity();
+    assert!((0..3).all(|k| (second[(1, k)] - 2.0 * first[(1, k)]).abs() < 1e-14), "{second}");
+    assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
+    sim.pull(EnvId(1), 0, point, [0.0; 3]).unwrap();
+    sim.update(1);
+    let third = sim.rigid_object(id).get_velocity();
+    assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
+    let refused = sim.pull(EnvId(0), 0, [0.0, f64::NAN, 0.0], force);
+    assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
+    assert!(matches!(
+        sim.pull(EnvId(0), 1, point, force),
+        Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })
+    ));
+    assert!(matches!(sim.pull(EnvId(2), 0, point, force), Err(Error::UnknownIndex { index: 2, .. })));
+}
+
+#[test]
+fn steps_are_counted_whatever_is_reset() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { substeps: 2, ..cfg(2, 1) }).unwrap();
+    assert_eq!(sim.steps(), 0);
+    sim.update(3);
+    sim.reset(None).unwrap();
+    sim.add_rigid_object(cube("cube", 1.0, [0.0, 0.0, 1.0])).unwrap();
+    sim.update(4);
+    assert_eq!(sim.steps(), 7);
+    let none = sim.snapshot(Some(&[])).unwrap();
+    let both = sim.snapshot(None).unwrap();
+    assert_eq!((none.is_empty(), none.len(), both.is_empty(), both.len()), (true, 0, false, 2));
+}
+
+#[test]
+fn every_number_of_a_configuration_is_checked() {
+    let good = SimulationManagerCfg::default;
+    good().validate().unwrap();
+    SimulationManagerCfg::manipulation().validate().unwrap();
+    SimulationManagerCfg::legged().validate().unwrap();
+    SimulationManagerCfg { num_envs: 1 << 20, physics_dt: 1.0, substeps: 10_000, ..good() }.validate().unwrap();
+    let ground = |half_size, color| Some(GroundCfg { half_size, color, ..GroundCfg::default() });
+    let light = |light: LightCfg| SimulationManagerCfg { lights: vec![light], ..good() };
+    let bad = [
+        ("num_envs", SimulationManagerCfg { num_envs: 0, ..good() }),
+        ("num_envs", SimulationManagerCfg { num_envs: (1 << 20) + 1, ..good() }),
+        ("shard", SimulationManagerCfg { shard: Shard { rank: 2, world: 2 }, ..good() }),
+        ("physics_dt", SimulationManagerCfg { physics_dt: 0.0, ..good() }),
+        ("physics_dt", SimulationManagerCfg { physics_dt: f64::NAN, ..good() }),
+        ("physics_dt", SimulationManagerCfg { physics_dt: 1.1, ..good() }),
+        ("physics_dt", SimulationManagerCfg { physics_dt: 1e-6, substeps: 10_000, ..good() }),
+        ("substeps", SimulationManagerCfg { substeps: 0, ..good() }),
+        ("gravity", SimulationManagerCfg { gravity: [0.0, 0.0, f64::INFINITY].into(), ..good() }),
+        ("impratio", SimulationManagerCfg { impratio: 0.0, ..good() }),
+        ("solver_iterations", SimulationManagerCfg { solver_iterations: 0, ..good() }),
+        ("friction", SimulationManagerCfg { friction: [1.0, -0.1, 0.0], ..good() }),
+        ("threads", SimulationManagerCfg { threads: Some(0), ..good() }),
+        ("arena_space", SimulationManagerCfg { arena_space: -1.0, ..good() }),
+        ("ground.half_size", SimulationManagerCfg { ground: ground(0.0, [0.5; 3]), ..good() }),
+        ("ground.color", SimulationManagerCfg { ground: ground(1.0, [0.5, 1.5, 0.0]), ..good() }),
+        ("lights.direction", light(LightCfg { direction: [0.0; 3].into(), ..LightCfg::default() })),
+        ("lights.color", light(LightCfg { color: [2.0, 0.0, 0.0], ..LightCfg::default() })),
+    ];
+    for (field, cfg) in bad {
+        match cfg.validate() {
+            Err(Error::Config { field: named, .. }) => assert_eq!(named, field),
+            other => panic!("{field}: {other:?}"),
+        }
+    }
+}
