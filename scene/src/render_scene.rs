@@ -258,3 +258,47 @@ impl Instance {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+    use crate::RenderMesh;
+    use crate::material::Texture;
+    use crate::shape::{Box, Mesh, Plane, Sphere};
+
+    fn textured(kind: TextureKind, tex_uniform: bool) -> Material {
+        let height = if kind == TextureKind::Cube { 6 } else { 1 };
+        let texture = Texture::new(kind, 1, height, 3, &vec![200; 3 * height as usize]).unwrap();
+        Material { texture: Some(Arc::new(texture)), tex_repeat: [3.0, 5.0], tex_uniform, ..Material::default() }
+    }
+
+    /// A box has an id for each face and room for 8, as a sphere; a mesh one for each triangle. A colour of the screen is
+    /// linear light by the law of sRGB: c / 12.92 up to 0.04045, ((c + 0.055) / 1.055)^2.4 above. A cube texture is on a cube
+    /// of half length 1 around the shape; another one repeats so often over the shape's size, or a metre.
+    #[test]
+    fn ids_colors_and_scales_of_textures_follow_from_the_instances() {
+        let half = [0.5, 0.25, 2.0];
+        let mesh =
+            Mesh { mesh: Arc::new(RenderMesh::new(&Shape::from(Box { half }).tessellate(1), RenderMesh::CREASE)) };
+        let triangles = mesh.mesh.triangles().len() as u32;
+        assert_eq!(triangles, 12);
+        let scene = RenderScene::new(vec![
+            Instance::new(Box { half }, Material::from_rgba([0.02, 0.5, 1.0, 0.3]), 1),
+            Instance::new(mesh, textured(TextureKind::Cube, false), 2),
+            Instance::new(Sphere { radius: 0.5 }, textured(TextureKind::TwoD, true), 3),
+            Instance::new(Box { half }, textured(TextureKind::TwoD, false), 4),
+            Instance::new(Plane { half: [0.0, 2.0] }, textured(TextureKind::TwoD, false), 5),
+        ])
+        .unwrap();
+        assert_eq!(scene.first_ids(), [0, 8, 20, 28, 36, 44]);
+        assert_eq!(scene.triangle_count(), 12);
+        let linear = [0.02 / 12.92, ((0.5 + 0.055) / 1.055_f32).powf(2.4), 1.0];
+        let far = scene.linear_colors()[0].iter().zip(linear).map(|(found, expected)| (found - expected).abs());
+        // Single precision, and the eight bits of a screen are not asked for.
+        assert!(far.fold(0.0, f32::max) < 1e-6, "{:?}", scene.linear_colors()[0]);
+        let expected = [[2.0, 4.0, 0.5], [3.0, 5.0, 0.0], [3.0, 10.0, 0.0], [3.0, 5.0, 0.0]];
+        assert_eq!(scene.texture_scales()[1..], expected);
+        assert_eq!((RenderScene::empty().first_ids(), RenderScene::empty().linear_colors().len()), (&[0][..], 0));
+    }
+}

@@ -94,6 +94,37 @@ fn vendor_robots_are_drawn_with_their_textures() {
     }
 }
 
+/// Cameras are those of the file in its order, where the file puts them at the positions given: with ROS's axes, MuJoCo's turned
+/// by half a turn about x. A hinge at 0.5 rad about z turns what hangs on it.
+#[test]
+fn cameras_are_those_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("model.xml");
+    let text = "<mujoco><worldbody><camera name='fixed' pos='1 2 3' fovy='30'/><body pos='0 0 1'><joint axis='0 0 1'/>\
+                <geom size='.1'/><camera pos='0.2 0 0'/></body></worldbody></mujoco>";
+    std::fs::write(&path, text).unwrap();
+    let still = Still::of_mjcf(&path, Some(&[0.5])).unwrap();
+    let names: Vec<&str> = still.cameras().iter().map(|camera| camera.name.as_str()).collect();
+    assert_eq!(names, ["fixed", ""]);
+    let [fixed, moved] = still.cameras() else { panic!("{:?}", still.cameras()) };
+    assert!((fixed.fovy - 30.0_f64.to_radians()).abs() < 1e-9 && (moved.fovy - 45.0_f64.to_radians()).abs() < 1e-9);
+    assert_eq!(still.camera("fixed").unwrap().world_from_camera, fixed.world_from_camera);
+    let expected = [
+        (fixed, Pose::translation(1.0, 2.0, 3.0), 0.0_f64),
+        (moved, Pose::translation(0.2 * 0.5_f64.cos(), 0.2 * 0.5_f64.sin(), 1.0), 0.5),
+    ];
+    for (camera, at, turn) in expected {
+        let pose = camera.world_from_camera;
+        assert!((pose.translation.vector - at.translation.vector).norm() < 1e-9, "{pose}");
+        // Right is x, down is -y; it looks along -z.
+        let axes = [[turn.cos(), turn.sin(), 0.0], [turn.sin(), -turn.cos(), 0.0], [0.0, 0.0, -1.0]];
+        for (k, axis) in axes.into_iter().enumerate() {
+            let found = pose.rotation * nalgebra::Vector3::ith(k, 1.0);
+            assert!((found - nalgebra::Vector3::from(axis)).norm() < 1e-9, "{k}: {found}");
+        }
+    }
+}
+
 /// Wrong positions, missing files and unknown cameras say what is wrong.
 #[test]
 fn mistakes_are_told() {

@@ -44,6 +44,11 @@ fn cycle(mut world: World) {
         (&hand, of_hand(1)),
     ];
     let followers: Vec<bool> = (0..view.dof()).map(|i| view.is_mimic(JointIndex(i))).collect();
+    // Drives are those of the others; a joint that does not exist neither follows nor has one.
+    assert!((0..view.dof()).all(|i| view.is_driven(JointIndex(i)) != followers[i]));
+    assert!(followers.contains(&true) && followers.contains(&false));
+    let beyond = JointIndex(view.dof());
+    assert!(!view.is_mimic(beyond) && !view.is_driven(beyond));
     let effort_limits = world.limits();
     let gains = world.env().drives.gains;
     let (mut sag, mut worst, mut law) = (0.0_f64, 0.0_f64, 0.0_f64);

@@ -203,6 +203,51 @@ mod tests {
         assert_eq!(fs::read(only_file(cache.dir().unwrap())).unwrap(), good);
     }
 
+    /// A prism along y in a file that says that y is up: the hull stands where the option says, and each has a file of its own.
+    #[test]
+    fn options_of_the_reader_count() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("prism.dae");
+        let text = r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+            <asset><up_axis>Y_UP</up_axis></asset>
+            <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12">
+              0 0 0  1 0 0  0 3 0  0 0 2</float_array><technique_common><accessor source="#a" count="4" stride="3">
+              <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>
+              </technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+              <triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+              <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
+            <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+            </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"##;
+        fs::write(&path, text).unwrap();
+        let cache = HullCache::at(scratch.path().join("cache"));
+        let size = |dae_up_axis| {
+            let cfg = HullCfg::default();
+            let hull = cache.hull_of_file_with(&path, &MeshOptions { dae_up_axis }, [1.0, 1.0, 2.0], &cfg).unwrap();
+            assert!((hull.signed_volume() - 2.0).abs() < 1e-6, "1 x 3 x 2 / 6, doubled along z");
+            let (lo, hi) = hull.bounds().unwrap();
+            [0, 1, 2].map(|k| hi[k] - lo[k])
+        };
+        for _ in 0..2 {
+            // As the file has it; with y up, what was along y is along z, and is doubled there.
+            let close = |found: [f32; 3], expected: [f32; 3]| (0..3).all(|k| (found[k] - expected[k]).abs() < 1e-5);
+            assert!(close(size(DaeUpAxis::Ignore), [1.0, 3.0, 4.0]), "{:?}", size(DaeUpAxis::Ignore));
+            assert!(close(size(DaeUpAxis::Apply), [1.0, 2.0, 6.0]), "{:?}", size(DaeUpAxis::Apply));
+        }
+        assert_eq!(fs::read_dir(cache.dir().unwrap()).unwrap().count(), 2);
+    }
+
+    /// The folder of this process is one of those that the variables name, whichever are set.
+    #[test]
+    fn the_default_place_is_that_of_the_environment() {
+        let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let expected = match (of("KINETOSCOPE_CACHE"), of("XDG_CACHE_HOME"), of("HOME")) {
+            (Some(dir), ..) => Some(dir),
+            (None, Some(dir), _) => Some(dir.join("kinetoscope")),
+            (None, None, home) => home.map(|dir| dir.join(".cache/kinetoscope")),
+        };
+        assert_eq!(HullCache::default_location().dir(), expected.as_deref());
+    }
+
     #[test]
     fn the_key_covers_everything_that_matters() {
         let base = HullCfg::default();

@@ -72,3 +72,41 @@ fn sizes_must_be_positive() {
     assert_eq!(Shape::from(Plane::INFINITE).bad_size(), None);
     assert!(HeightField::new([1.; 4], 1, 3, &[0.; 3]).is_none());
 }
+
+/// What is drawn of a mesh is the mesh: as many triangles, each with its corners where they were, its winding and its texture
+/// coordinates, in whatever order; with a normal for each vertex.
+#[test]
+fn a_mesh_that_is_drawn_can_be_had_back() {
+    let mut mesh = Box { half: [0.1, 0.2, 0.3] }.tessellate(1);
+    mesh.uvs = Some(mesh.positions.iter().map(|p| [p[0] + 1.0, p[1] - p[2]]).collect());
+    let back = RenderMesh::new(&mesh, RenderMesh::CREASE).to_tri_mesh();
+    back.validate().unwrap();
+    let corners = |mesh: &TriMesh| {
+        let uvs = mesh.uvs.as_ref().unwrap();
+        let mut triangles: Vec<_> = mesh
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let mut corners = triangle.map(|i| {
+                    let (p, uv) = (mesh.positions[i as usize], uvs[i as usize]);
+                    [p[0], p[1], p[2], uv[0], uv[1]].map(|x| (x * 1000.0).round() as i64)
+                });
+                // The winding stays when the least corner comes first.
+                let least = (0..3).min_by_key(|&k| corners[k]).unwrap();
+                corners.rotate_left(least);
+                corners
+            })
+            .collect();
+        triangles.sort_unstable();
+        triangles
+    };
+    assert_eq!(corners(&back), corners(&mesh));
+    assert!((back.signed_volume() - 0.048).abs() < 1e-6);
+    let normals = back.normals.unwrap();
+    for triangle in &back.triangles {
+        let [a, b, c] = triangle.map(|i| nalgebra::Vector3::from(back.positions[i as usize]));
+        let normal = (b - a).cross(&(c - a)).normalize();
+        // Edges of a box are sharp: each vertex has the normal of its face.
+        assert!(triangle.iter().all(|&i| (nalgebra::Vector3::from(normals[i as usize]) - normal).norm() < 1e-6));
+    }
+}

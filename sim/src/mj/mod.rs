@@ -27,6 +27,8 @@ mod options;
 mod prefetch;
 mod ray;
 mod state;
+#[cfg(test)]
+mod tests;
 mod threads;
 mod version;
 mod vfs;
@@ -44,7 +46,7 @@ pub use memory::release_freed;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use options::OptionDifference;
-pub use prefetch::prefetch;
+pub(crate) use prefetch::prefetch;
 pub use ray::RayHit;
 pub use state::{Inputs, Motion, RawQuats};
 pub use threads::staying_crew;

@@ -361,12 +361,6 @@ impl Model {
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32
     }
-
-    /// Size of one `mjData` \[bytes\]: struct, buffer, and (2.2.2) the part of the stack that a step has touched is not
-    /// included.
-    pub fn data_bytes(&self) -> Result<usize, super::EngineError> {
-        Ok(super::Data::new(self)?.bytes())
-    }
 }
 
 #[cfg(mj4)]

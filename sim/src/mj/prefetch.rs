@@ -47,7 +47,7 @@ fn ask(start: *const u8, bytes: usize, level: Level) {
 }
 
 /// Asks for the memory of `values`, which should be few.
-pub fn prefetch<T>(values: &[T]) {
+pub(crate) fn prefetch<T>(values: &[T]) {
     ask(values.as_ptr().cast(), size_of_val(values), Level::First);
 }
 
@@ -80,14 +80,14 @@ impl Places {
 
 impl Data {
     /// Asks for what every step of this data reads first, counters and pointers, and waits for nothing.
-    pub fn prefetch(&self) {
+    pub(crate) fn prefetch(&self) {
         let header = self.places().header;
         ask(header, 2 * LINE, Level::First);
         ask(header.wrapping_add(AFTER_STATISTICS), size_of::<mj::mjData>() - AFTER_STATISTICS, Level::First);
     }
 
     /// As [`prefetch`](Self::prefetch), and for the state and the work memory.
-    pub fn prefetch_arrays(&self) {
+    pub(crate) fn prefetch_arrays(&self) {
         self.prefetch();
         let places = self.places();
         ask(places.buffer, places.buffer_bytes, Level::Second);
@@ -95,7 +95,7 @@ impl Data {
     }
 
     /// How much [`prefetch_arrays`](Self::prefetch_arrays) asks for \[bytes\].
-    pub fn prefetched_bytes(&self) -> usize {
+    pub(crate) fn prefetched_bytes(&self) -> usize {
         let places = self.places();
         size_of::<mj::mjData>() - AFTER_STATISTICS + places.buffer_bytes + places.arena_bytes
     }
