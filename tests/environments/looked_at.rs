@@ -93,7 +93,7 @@ fn a_pull_accelerates_and_turns() {
     let id = sim.add_rigid_object(cube("cube", mass, [1.0, 2.0, 3.0])).unwrap();
     let (force, arm) = ([0.3, -0.2, 0.5], [0.05, 0.0, -0.02]);
     let point = [1.0 + arm[0], 2.0 + arm[1], 3.0 + arm[2]];
-    sim.pull(EnvId(1), 0, point, force).unwrap();
+    sim.pull(EnvId(1), 0, &[(point, force)]).unwrap();
     let h = sim.cfg().physics_dt;
     let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
     let mut first = None;
@@ -109,17 +109,17 @@ fn a_pull_accelerates_and_turns() {
     let second = sim.rigid_object(id).get_velocity();
     assert!((0..3).all(|k| (second[(1, k)] - 2.0 * first[(1, k)]).abs() < 1e-14), "{second}");
     assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
-    sim.pull(EnvId(1), 0, point, [0.0; 3]).unwrap();
+    sim.pull(EnvId(1), 0, &[]).unwrap();
     sim.update(1);
     let third = sim.rigid_object(id).get_velocity();
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
-    let refused = sim.pull(EnvId(0), 0, [0.0, f64::NAN, 0.0], force);
+    let refused = sim.pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
     assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
     assert!(matches!(
-        sim.pull(EnvId(0), 1, point, force),
+        sim.pull(EnvId(0), 1, &[(point, force)]),
         Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })
     ));
-    assert!(matches!(sim.pull(EnvId(2), 0, point, force), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(sim.pull(EnvId(2), 0, &[(point, force)]), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
 #[test]
