@@ -398,7 +398,7 @@ mod tests {
             }
         }
         // The control: an index of 1 is nothing at all.
-        let air = Lobe::new(&Material { refractive_index: 1.0, ..glass }, [1.0; 3], true);
+        let air = Lobe::new(&Material { refractive_index: 1.0, ..glass.clone() }, [1.0; 3], true);
         let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
         // But for its colour.
