@@ -177,7 +177,7 @@ fn where_nothing_is_nearby_only_more_starts_go_far() {
         let q = bent(near);
         let start = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
         for k in 0..12 {
-            let axis = |k: usize| Vector3::ith(k % 3, if k % 2 == 0 { 1.0 } else { -1.0 });
+            let axis = |k: usize| Vector3::ith(k % 3, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
             let turn = UnitQuaternion::from_scaled_axis(AWAY.1 * axis(k));
             let at = start.translation.vector + AWAY.0 * axis(k / 2 + k);
             let target = Pose::from_parts(at.into(), turn * start.rotation);
