@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const PAGE: &str = "docs/physics.md";
 /// The plots, one file per law.
@@ -107,12 +107,56 @@ fn compare(repo: &Repo, runs: &[Measured]) -> Outcome {
     // Fails where the lines differ without a reason.
     physics_page::page(runs)?;
     let mut findings = physics_page::untrue(&repo.read(PAGE)?, runs);
-    for (name, text) in pictures(runs) {
-        match repo.read(&format!("{PLOTS}/{name}")) {
-            Ok(old) if plot::agree(&old, &text, PIXELS) => {}
-            Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves")),
+    findings.extend(untrue_pictures(&repo.root.join(PLOTS), &pictures(runs))?);
+    no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
+}
+
+/// What is in the folder of the plots that the report would not write, and the other way round.
+fn untrue_pictures(folder: &Path, pictures: &[(String, String)]) -> Outcome<Vec<String>> {
+    let mut findings = Vec::new();
+    for (name, text) in pictures {
+        match fs::read_to_string(folder.join(name)) {
+            Ok(old) if plot::agree(&old, text, PIXELS) => {}
+            Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves, or other numbers at its axes")),
             Err(_) => findings.push(format!("{PLOTS}/{name} is not there")),
         }
     }
-    no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
+    let fail = |e: std::io::Error| Failure::new(format!("{PLOTS}: {e}"));
+    let Ok(files) = fs::read_dir(folder) else { return Ok(findings) };
+    for file in files {
+        let name = file.map_err(fail)?.file_name().to_string_lossy().into_owned();
+        if pictures.iter().all(|(known, _)| *known != name) {
+            findings.push(format!("{PLOTS}/{name} is a picture of no law"));
+        }
+    }
+    Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::{Plot, Series};
+
+    #[test]
+    fn a_picture_that_the_report_would_not_write_is_told() {
+        let of = |name: &str, size: f64| {
+            let series = vec![Series { name: "RK4".into(), points: vec![[0.0, 0.0], [1.0, size], [2.0, 0.0]] }];
+            let plot = Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series };
+            (format!("{name}.svg"), plot::svg(&plot))
+        };
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let look = |pictures: &[(String, String)]| untrue_pictures(folder.path(), pictures).expect("readable");
+        let pictures = [of("top", 1.0), of("bounce", 2.0)];
+        for (name, text) in &pictures {
+            fs::write(folder.path().join(name), text).expect("writable");
+        }
+        assert_eq!(look(&pictures), Vec::<String>::new());
+        // What was measured now is twice as large: the curve is in the same place.
+        let found = look(&[of("top", 2.0), of("bounce", 2.0)]);
+        assert!(found.len() == 1 && found[0].contains("top.svg shows other curves"), "{found:?}");
+        let found = look(&pictures[..1]);
+        assert!(found.len() == 1 && found[0].contains("bounce.svg is a picture of no law"), "{found:?}");
+        let found = look(&[of("top", 1.0), of("bounce", 2.0), of("fall", 1.0)]);
+        assert!(found.len() == 1 && found[0].contains("fall.svg is not there"), "{found:?}");
+    }
 }
