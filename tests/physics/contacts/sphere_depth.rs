@@ -3,22 +3,50 @@
 //! the distance of its centre. Elsewhere the ray (x, y, 1) of a pixel meets it at the depth (b - √(b² - a (c² -
 //! R²)))/a, with a = x² + y² + 1, b = (x, y, 1)·c.
 //!
-//! Tolerance: pixels are counted by their centres. Along the silhouette each is off by a part of one with any sign, the
-//! area by √(2 π r/12), r being 60 pixels; a dozen times that is taken, 4 √(2 π r), and of the middle 0.1 pixels.
-//! Depths have single precision, and a root in them. The nearest pixel is 0.71 pixels beside the axis, where the ball
-//! is (0.71/f)² D (D - R)/2R less near: 2e-5 m, five times.
+//! Tolerance: a pixel is of the ball if the ray of its centre meets it, that is if the root is real. How many centres that are and
+//! where their middle is differs from the ellipse of `ball_in_picture` by what [`centres`] counts with this formula, which is all
+//! that a picture may be off by, but for pixels whose root is so near to 0 that single precision decides: a pixel each. Depths
+//! have single precision: some six roundings of 2⁻²⁴ of b², over 2 √ of the least root that is looked at, over a. The
+//! nearest pixel is half of one beside the axis, both ways, where the formula has it a little farther than D - R.
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
 use crate::law::law;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
-use std::f64::consts::TAU;
 
 const RADIUS: f64 = 0.3;
 
 /// A ball of this radius at this place of the optical frame.
 type Ball = ([f64; 3], f64);
+
+/// The least root that is looked at: at the silhouette the depth falls off steeply.
+const LEAST: f64 = 0.01;
+/// Roundings of single precision between a ray and its depth.
+const SINGLE: f64 = 6.0 / 16_777_216.0;
+
+/// Of the ray of a pixel's centre and a ball: a, b, and what is under the root.
+fn ray([u, v]: [usize; 2], center: [f64; 3], r: f64) -> [f64; 3] {
+    let (x, y) = ((u as f64 + 0.5 - MIDDLE[0]) / FOCAL, (v as f64 + 0.5 - MIDDLE[1]) / FOCAL);
+    let (a, b) = (x * x + y * y + 1.0, x * center[0] + y * center[1] + center[2]);
+    [a, b, b * b - a * (center.iter().map(|c| c * c).sum::<f64>() - r * r)]
+}
+
+/// What is seen by the centres of pixels: area and middle, and how many of them single precision may take or leave.
+fn centres(center: [f64; 3], r: f64) -> (Seen, f64) {
+    let (mut area, mut sum, mut either) = (0.0, [0.0; 2], 0.0);
+    for pixel in (0..SIZE[0]).flat_map(|u| (0..SIZE[1]).map(move |v| [u, v])) {
+        let [_, b, root] = ray(pixel, center, r);
+        if root.abs() < SINGLE * b * b {
+            either += 1.0;
+        }
+        if root >= 0.0 {
+            area += 1.0;
+            sum = [0, 1].map(|k: usize| sum[k] + pixel[k] as f64 + 0.5);
+        }
+    }
+    (Seen { area, centroid: sum.map(|x| x / area) }, either)
+}
 
 /// What the rasterizer or the rays show of a ball: area and middle, nearest depth, and the largest error of a pixel's
 /// depth against the closed form of the second ball, up to a metre.
@@ -50,11 +78,8 @@ fn seen((at, radius): Ball, (center, r): Ball, rays: bool) -> (Seen, f64, f64) {
     };
     let (mut nearest, mut worst) = (f64::INFINITY, 0.0_f64);
     for ((v, u), &z) in depth.index_axis(Axis(0), 0).indexed_iter() {
-        let (x, y) = ((u as f64 + 0.5 - MIDDLE[0]) / FOCAL, (v as f64 + 0.5 - MIDDLE[1]) / FOCAL);
-        let (a, b) = (x * x + y * y + 1.0, x * center[0] + y * center[1] + center[2]);
-        let root = b * b - a * (center.iter().map(|c| c * c).sum::<f64>() - r * r);
-        // At the silhouette the depth falls off steeply: what is within a hundredth of it is left out.
-        if root > 0.01 {
+        let [a, b, root] = ray([u, v], center, r);
+        if root > LEAST {
             worst = worst.max((f64::from(z) - (b - root.sqrt()) / a).abs().min(1.0));
         }
         nearest = nearest.min(f64::from(z));
@@ -73,25 +98,30 @@ fn holds() {
                 let (other, other_nearest, other_worst) = seen(beside, this, rays);
                 let form = expected(at, RADIUS);
                 let of = |what: &str| format!("{what} {place}, {name}");
-                let edge = 4.0 * (TAU * (form.area / std::f64::consts::PI).sqrt()).sqrt();
-                m.row(&of("area"), "pixels", form.area, ball.area, (edge, "pixels of the silhouette"));
+                let (whole, either) = centres(at, RADIUS);
+                let pixels = "centres of pixels along the silhouette";
+                // Differences of numbers of this size are rounded.
+                let edge = (whole.area - form.area).abs() * (1.0 + 1e-12) + either;
+                m.row(&of("area"), "pixels", form.area, ball.area, (edge, pixels));
                 m.control(&of("area"), "of a ball 2 % larger", other.area);
                 for (axis, letter) in ["u", "v"].into_iter().enumerate() {
                     let quantity = of(&format!("{letter} of the middle"));
-                    m.row(
-                        &quantity,
-                        "pixels",
-                        form.centroid[axis],
-                        ball.centroid[axis],
-                        (0.1, "pixels of the silhouette"),
-                    );
+                    // A pixel more or less is at most the radius away from the middle, of as many as there are.
+                    let (is, was) = (form.centroid[axis], whole.centroid[axis]);
+                    let edge = (was - is).abs() + either / form.area.sqrt() + 1e-12 * is;
+                    m.row(&quantity, "pixels", is, ball.centroid[axis], (edge, pixels));
                     m.control(&quantity, "of a ball beside it", other.centroid[axis]);
                 }
-                let single = (5e-6, "single precision, steep near the silhouette");
+                // b²/a is at most the square of the distance.
+                let far = at.iter().map(|c| c * c).sum::<f64>();
+                let precision = SINGLE * far / (2.0 * LEAST.sqrt());
+                let single = (precision, "single precision, steep near the silhouette");
                 m.row(&of("largest error of a depth"), "m", 0.0, worst, single);
                 m.control(&of("largest error of a depth"), "of a ball beside it", other_worst);
                 if place == "on the axis" {
-                    m.row(&of("nearest"), "m", at[2] - RADIUS, nearest, (1e-4, "a pixel beside the axis"));
+                    let [a, b, root] = ray([SIZE[0] / 2, SIZE[1] / 2], at, RADIUS);
+                    let beside = (b - root.sqrt()) / a - (at[2] - RADIUS) + precision;
+                    m.row(&of("nearest"), "m", at[2] - RADIUS, nearest, (beside, "half a pixel beside the axis"));
                     m.control(&of("nearest"), "of a ball beside it", other_nearest);
                 }
             }

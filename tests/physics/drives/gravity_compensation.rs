@@ -2,8 +2,11 @@
 //! is, a drive has no error, and an effort τ in a joint at rest gives the same acceleration as without gravity. The
 //! rest of the world falls.
 //!
-//! Tolerance: the compensation is -m g in the centre of mass, gravity as MuJoCo sums it: they differ by rounding, 1e-15
-//! of 30 N m, which moves the arm by 1e-13 rad in a second.
+//! Tolerance: the compensation is -m g in the centre of mass, gravity as MuJoCo sums it: they differ by rounding. A torque of
+//! gravity is the sum of three products over two links, 12 roundings of half a digit of 18 N m at most (3 kg at 0.25 m and
+//! 1.5 kg at 0.7 m). What it accelerates has 0.015 kg m² or more: the lower link has 0.02 about its middle, of which the upper one,
+//! with 0.25 or more about the shoulder, takes a tenth by giving way. The arm drifts by half of that times t² in a second, and the velocity of a
+//! step of h is itself rounded to ε v/h.
 
 use crate::lab::*;
 use crate::law::law;
@@ -28,6 +31,9 @@ fn arm(cfg: SimulationManagerCfg, drive: DriveCfg, compensated: bool) -> (Lab, R
     (lab, robot)
 }
 
+/// What rounding of the torques accelerates the arm with \[rad/s²\].
+const ROUNDING: f64 = 12.0 * f64::EPSILON / 2.0 * 18.0 / 0.015;
+
 /// How far the undriven arm gets in a second, and how far a soft drive is off.
 fn moved(compensated: bool) -> [f64; 2] {
     [passive(), implicit(200.0, 20.0)].map(|drive| {
@@ -49,13 +55,13 @@ fn pushed(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
 fn holds() {
     law(module_path!(), "Σ τ = τ_gravity(q) + Jᵀ (-m g) = 0", |m| {
         let ([free, held], [fallen, sagged]) = (moved(true), moved(false));
-        let rounding = (1e-12, "rounding of 30 N m for a second, ten times");
+        let rounding = (0.5 * ROUNDING, "rounding of the torques, for a second");
         m.row("motion of an arm without drives", "rad", 0.0, free, rounding);
         m.row("error of its drives", "rad", 0.0, held, rounding);
         m.control("motion of an arm without drives", "without compensation", fallen);
         m.control("error of its drives", "without compensation", sagged);
         let expected = pushed(weightless(), false);
-        let sums = (1e-10, "rounding of a velocity over 1 ms");
+        let sums = (ROUNDING + f64::EPSILON * expected.abs(), "rounding of the torques and of the velocity");
         m.row("acceleration under an effort", "rad/s²", expected, pushed(earth(), true), sums);
         m.control("acceleration under an effort", "without compensation", pushed(earth(), false));
     });

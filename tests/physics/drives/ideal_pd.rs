@@ -5,11 +5,14 @@
 //! q(n) = q₀ (cos n θ - tan(θ/2) sin n θ),   cos θ = 1 - (ω h)²/2
 //! ```
 //!
-//! which neither grows nor falls as long as ω h < 2. Beyond, cos θ < -1: it grows by |z| = c + √(c² - 1) a step, c = (ω
-//! h)²/2 - 1.
+//! which neither grows nor falls as long as ω h < 2. Beyond, cos θ < -1: the roots -z and -1/z of the recurrence are real, z = c +
+//! √(c² - 1), c = (ω h)²/2 - 1, and q(n) = α (-z)ⁿ + β (-1/z)ⁿ with α and β from q(0) = q₀ and q(1) = q₀ (1 - (ω h)²): growth by z a
+//! step, up to what the second root leaves.
 //!
-//! Tolerance: rounding of 500 steps of a stable recurrence, ten times; of growth, what the second root 1/z leaves of a
-//! ratio after 15 steps.
+//! Tolerance: rounding. A step rounds six times (target less position, times k, over I, times h, added to v, times h added to q):
+//! numbers of the size of the amplitude Q = q₀/cos(θ/2) times 1 + (ω h)², to ε/2 each. What is off in step k is off by
+//! sin((n - k) θ)/sin θ of it in step n: by n 3 ε Q (1 + (ω h)²)/sin θ in all. A growing solution grows as much as what is off,
+//! and has sinh for sin: the ratio of two is off by that of both.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
@@ -41,14 +44,23 @@ fn holds() {
             let quantity = format!("position after 500 steps, ω h = {rate}");
             let found = swung(rate, true, 500)[1];
             let expected = START * (cos - (0.5 * theta).tan() * sin);
-            m.row(&quantity, "rad", expected, found, (1e-11, "rounding of 500 steps, ten times"));
+            let size = START / (0.5 * theta).cos() * (1.0 + rate * rate);
+            let off = (500.0 * 3.0 * f64::EPSILON * size / theta.sin(), "rounding of 500 steps");
+            m.row(&quantity, "rad", expected, found, off);
             m.control(&quantity, "with the law at the end of the step", swung(rate, false, 500)[1]);
         }
-        let c: f64 = 0.5 * 2.1 * 2.1 - 1.0;
+        let square: f64 = 2.1 * 2.1;
+        let c = 0.5 * square - 1.0;
         let growth = |rate: f64| swung(rate, true, 15).map(f64::abs);
         let [before, after] = growth(2.1);
         let z = c + (c * c - 1.0).sqrt();
-        m.row("growth in a step, ω h = 2.1", "", z, after / before, (1e-7, "1/z of the other root, 30 times"));
+        // Shares of the two roots of q(0) = 1 and q(1) = 1 - (ω h)².
+        let large = (1.0 / z + 1.0 - square) / (1.0 / z - z);
+        let at = |n: i32| (large * (-z).powi(n) + (1.0 - large) * (-1.0 / z).powi(n)).abs();
+        let ratio = at(15) / at(14);
+        let sinh = 0.5 * (z - 1.0 / z);
+        let off = 2.0 * 15.0 * 3.0 * f64::EPSILON * (1.0 + square) / sinh * ratio;
+        m.row("growth in a step, ω h = 2.1", "", ratio, after / before, (off, "rounding of 15 steps"));
         let [before, after] = growth(1.9);
         m.control("growth in a step, ω h = 2.1", "with ω h = 1.9", after / before);
     });

@@ -1,5 +1,6 @@
 //! Drives, limits and friction of joints.
 
+mod variants;
 mod wheel;
 
 mod acceleration_drive;

@@ -14,6 +14,7 @@
 //! (q' - h q''/2). Times are off by ω h of themselves and two steps, the overshoot by d ln/dz of it: π ω h/√(1 - z²) of
 //! itself holds twice that. Of the static error exp(-15) is left.
 
+use super::variants::{self, Variant};
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
 use crate::law::law;
@@ -26,7 +27,6 @@ const RATIO: f64 = 0.5;
 const AIM: f64 = 0.1;
 const LOAD: f64 = 0.3;
 const BAND: f64 = 0.05;
-const DELAY: u32 = 40;
 
 /// What a step of the target looks like: times \[s\], overshoot of the step, error under a load \[rad\].
 #[derive(Clone, Debug)]
@@ -56,30 +56,9 @@ fn settling() -> f64 {
     low
 }
 
-/// Gains are in the units of the mode; `stiffer` multiplies the stiffness.
-fn drive(mode: &str, stiffer: f64) -> DriveCfg {
-    let [k, d] = [stiffer * OMEGA * OMEGA, 2.0 * RATIO * OMEGA];
-    let model = |model: ActuatorModel| {
-        // As a motor: lines of torque and speed that are far away.
-        let [max_effort, max_velocity] = [Some(1e3.into()), Some(1e3.into())];
-        DriveCfg { actuators: vec![(".*".into(), model)], max_effort, max_velocity, ..implicit(MOMENT * k, MOMENT * d) }
-    };
-    match mode {
-        "implicit" => implicit(MOMENT * k, MOMENT * d),
-        "actuator" => explicit(MOMENT * k, MOMENT * d),
-        "acceleration" => DriveCfg { drive_type: DriveType::Acceleration, ..implicit(k, d) },
-        "ideal_pd" => model(IdealPd {}.into()),
-        "dc_motor" => model(DcMotor { saturation_effort: 1e4 }.into()),
-        "delayed_pd" => model(DelayedPd { delay: DELAY, max_delay: DELAY }.into()),
-        "acceleration, actuator" => DriveCfg { drive_type: DriveType::Acceleration, ..explicit(k, d) },
-        _ => panic!("{mode}: no gains are known for it here"),
-    }
-}
-
-/// Modes of drives, and all models of actuators that there are.
-fn modes() -> Vec<&'static str> {
-    let modes = ["implicit", "actuator", "acceleration", "acceleration, actuator"];
-    modes.into_iter().chain(ActuatorModel::examples().iter().map(|model| model.law().name())).collect()
+/// The drive whose poles are those of the formula; `stiffer` multiplies the stiffness.
+fn drive(of: &Variant, stiffer: f64) -> DriveCfg {
+    of.drive(MOMENT * stiffer * OMEGA * OMEGA, MOMENT * 2.0 * RATIO * OMEGA)
 }
 
 fn response(drive: DriveCfg) -> Response {
@@ -113,9 +92,10 @@ fn holds() {
         let root = (1.0 - RATIO * RATIO).sqrt();
         let mut curves =
             vec![("closed form", (0..150).map(|k| 5e-3 * f64::from(k)).map(|t| [t, 1.0 - error(t)]).collect())];
-        for mode in modes() {
-            let delay = if mode == "delayed_pd" { f64::from(DELAY) * H } else { 0.0 };
-            let (found, stiff) = (response(drive(mode, 1.0)), response(drive(mode, 2.0)));
+        let variants = variants::all();
+        for variant in &variants {
+            let (mode, delay) = (variant.name.as_str(), f64::from(variant.delay()) * H);
+            let (found, stiff) = (response(drive(variant, 1.0)), response(drive(variant, 2.0)));
             let rise = (PI - RATIO.acos()) / (OMEGA * root) + delay;
             let overshoot = (-PI * RATIO / root).exp();
             let late = delay + settling();
@@ -133,7 +113,7 @@ fn holds() {
             m.control(&of("overshoot of the step"), without, stiff.overshoot);
             m.control(&of("within 5 %"), without, stiff.settling);
             m.control(&of("error under a load"), without, stiff.error);
-            if mode == "implicit" || mode == "delayed_pd" {
+            if mode == "implicit" || variant.delay() > 0 {
                 curves.push((mode, found.curve));
             }
         }

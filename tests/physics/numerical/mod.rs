@@ -1,6 +1,8 @@
 //! What integrators and batches promise.
 
 mod convergence;
+mod double_pendulum;
+mod free_rotation;
 mod scenes;
 
 mod batch_size;

@@ -1,9 +1,10 @@
 //! Semi-implicit Euler is of order 1: half the step, half the error, on a double pendulum that swings wide.
 //!
-//! Tolerance: C h (1 + D h): the next term, at h = 0.5 ms and rates of 10 rad/s, is 1 % of the ratio, 0.02 of the order.
-//! Control: Runge-Kutta has another.
+//! Tolerance: C h (1 + D h + ...): the next terms, as the same steps have them that [`double_pendulum`](super::double_pendulum)
+//! writes out, and rounding. The error itself is that of these steps, up to rounding. Control: Runge-Kutta.
 
-use super::convergence::{double_pendulum, errors, order, reference};
+use super::convergence::{double_pendulum, errors, off, order, reference};
+use super::double_pendulum::{self as written_out, Steps, rounding};
 use crate::law::law;
 use kinetoscope::prelude::*;
 
@@ -15,8 +16,12 @@ fn holds() {
         let implicit = errors(&steps, &answer, |h| double_pendulum(Integrator::Implicit, h));
         let coarse = [1.6e-2, 8e-3, 4e-3, 2e-3];
         let runge_kutta = errors(&coarse, &answer, |h| double_pendulum(Integrator::Rk4, h));
-        m.row("order", "", 1.0, order(&euler), (0.02, "the next term of the error"));
+        let expected = written_out::errors(&steps, Steps::Euler);
+        let next = (off(&expected, 1.0, rounding(5e-4)), "the next terms of the error");
+        m.row("order", "", 1.0, order(&euler), next);
         m.control("order", "with Runge-Kutta", order(&runge_kutta));
+        m.row("error at 0.5 ms", "rad", expected[3][1], euler[3][1], (rounding(5e-4), "rounding of its steps"));
+        m.control("error at 0.5 ms", "with implicit", implicit[3][1]);
         let curves = [("Euler", euler), ("implicit", implicit), ("RK4", runge_kutta)];
         m.plot("Double pendulum after 0.512 s", ["step [s]", "error of the angles [rad]"], true, &curves);
     });

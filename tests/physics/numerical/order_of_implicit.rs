@@ -1,9 +1,10 @@
 //! The integrators that are implicit in velocity are of order 1, too: `implicit`, and on 4.x `implicitfast`, which leaves
-//! the Coriolis terms out of the derivative and not out of the answer.
+//! the Coriolis terms out of the derivative and not out of the answer: without damping it is Euler.
 //!
-//! Tolerance: as for `order_of_euler`, 0.02.
+//! Tolerance: as for `order_of_euler`.
 
-use super::convergence::{double_pendulum, errors, order, reference};
+use super::convergence::{double_pendulum, errors, off, order, reference};
+use super::double_pendulum::{self as written_out, Steps, rounding};
 use crate::law::law;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
@@ -12,16 +13,21 @@ use kinetoscope::sim::mj::{TARGET, Target};
 fn holds() {
     law(module_path!(), "e(h) = C h", |m| {
         let (steps, answer) = ([1e-3, 5e-4], reference());
-        let mut integrators = vec![("implicit", Integrator::Implicit)];
+        let mut integrators = vec![("implicit", Integrator::Implicit, Steps::Implicit)];
         if TARGET == Target::V4 {
-            integrators.push(("implicitfast", Integrator::ImplicitFast));
+            integrators.push(("implicitfast", Integrator::ImplicitFast, Steps::Euler));
         }
-        for (name, integrator) in integrators {
+        for (name, integrator, same) in integrators {
             let found = errors(&steps, &answer, |h| double_pendulum(integrator, h));
+            let expected = written_out::errors(&steps, same);
             let quantity = format!("order of {name}");
-            m.row(&quantity, "", 1.0, order(&found), (0.02, "the next term of the error"));
+            let next = (off(&expected, 1.0, rounding(5e-4)), "the next terms of the error");
+            m.row(&quantity, "", 1.0, order(&found), next);
             let other = errors(&[4e-3, 2e-3], &answer, |h| double_pendulum(Integrator::Rk4, h));
             m.control(&quantity, "with Runge-Kutta", order(&other));
+            let quantity = format!("error of {name} at 0.5 ms");
+            m.row(&quantity, "rad", expected[1][1], found[1][1], (rounding(5e-4), "rounding of its steps"));
+            m.control(&quantity, "at 1 ms", found[0][1]);
         }
         m.lines_differ("implicitfast is an integrator of 4.x");
     });

@@ -25,7 +25,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 
 /// The solver ends where a step gains less than this \[m/s²\].
-pub(super) const SOLVER: f64 = 1e-6;
+pub(crate) const SOLVER: f64 = 1e-6;
 
 fn sliding(friction: f64, cone: Cone) -> Descent {
     let cfg = SimulationManagerCfg { cone, ..slope(30.0_f64.to_radians(), friction) };

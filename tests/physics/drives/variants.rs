@@ -1,0 +1,78 @@
+//! Every kind of drive that there is, on the wheel: for laws that hold for all of them.
+
+use super::wheel::MOMENT;
+use crate::lab::*;
+use kinetoscope::prelude::*;
+
+/// Of the models that hear of their targets late \[steps\].
+const DELAY: u32 = 40;
+
+/// What makes a drive another one.
+#[derive(Clone, Debug)]
+enum Kind {
+    Mode(DriveType, DriveModel),
+    Law(ActuatorModel),
+}
+
+/// A kind of drive.
+#[derive(Clone, Debug)]
+pub(super) struct Variant {
+    pub(super) name: String,
+    kind: Kind,
+}
+
+/// All modes, by all who evaluate them, and all models of actuators.
+pub(super) fn all() -> Vec<Variant> {
+    let of_mode = |mode: DriveType, model: DriveModel| {
+        let name = match (mode, model) {
+            (DriveType::Force, DriveModel::Implicit) => "implicit".to_string(),
+            (DriveType::Force, DriveModel::Actuator) => "actuator".to_string(),
+            (mode, DriveModel::Implicit) => mode.mode().name().to_string(),
+            (mode, DriveModel::Actuator) => format!("{}, actuator", mode.mode().name()),
+        };
+        Variant { name, kind: Kind::Mode(mode, model) }
+    };
+    let modes = DriveType::ALL.iter().filter(|mode| **mode != DriveType::None);
+    let modes = modes.flat_map(|&mode| [DriveModel::Implicit, DriveModel::Actuator].map(|model| of_mode(mode, model)));
+    let laws = ActuatorModel::examples().into_iter().map(|example| {
+        let name = example.law().name().to_string();
+        // Motors whose lines of torque and speed are far away.
+        let model = match example {
+            ActuatorModel::DcMotor(_) => DcMotor { saturation_effort: 1e4 }.into(),
+            ActuatorModel::DelayedPd(_) => DelayedPd { delay: DELAY, max_delay: DELAY }.into(),
+            other => other,
+        };
+        Variant { name, kind: Kind::Law(model) }
+    });
+    modes.chain(laws).collect()
+}
+
+impl Variant {
+    /// With these gains as the wheel feels them \[N m/rad, N m s/rad\].
+    pub(super) fn drive(&self, stiffness: f64, damping: f64) -> DriveCfg {
+        match &self.kind {
+            Kind::Mode(mode, model) => {
+                let unit = match mode {
+                    DriveType::Force => 1.0,
+                    // Gains are accelerations.
+                    DriveType::Acceleration => MOMENT,
+                    DriveType::None => panic!("no drive has no gains"),
+                };
+                DriveCfg { drive_type: *mode, model: *model, ..implicit(stiffness / unit, damping / unit) }
+            }
+            Kind::Law(law) => {
+                let [max_effort, max_velocity] = [Some(1e3.into()), Some(1e3.into())];
+                let actuators = vec![(".*".into(), *law)];
+                DriveCfg { actuators, max_effort, max_velocity, ..implicit(stiffness, damping) }
+            }
+        }
+    }
+
+    /// Steps after which a target acts.
+    pub(super) fn delay(&self) -> u32 {
+        match &self.kind {
+            Kind::Law(ActuatorModel::DelayedPd(model)) => model.delay,
+            _ => 0,
+        }
+    }
+}

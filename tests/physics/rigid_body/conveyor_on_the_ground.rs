@@ -1,0 +1,107 @@
+//! SimBenchmark's rolling test, as it is: 25 balls of 1 kg on a box of 10 kg, which slides on the ground, pulled obliquely by F =
+//! 150 N for 4 s. Friction μ₁ = 0.4 under the box, μ₂ = 0.8 between it and the balls. From rest, in the notation of `conveyor`:
+//!
+//! ```text
+//! f₁ = μ₁ (M + n m) g,   b = (F - f₁)/(7/2 M + n m),   a = 7/2 b;   V = a t of the box, v = b t of a ball
+//! ```
+//!
+//! Its number is the mean square, over the time, of the distance of the velocities to these. (Published for MuJoCo 1.50: 0.0069
+//! m²/s² with Euler. Source: leggedrobotics, SimBenchmark, "Rolling test".) Here are the roots of it, of box and balls.
+//!
+//! Nothing of this is exact in MuJoCo, as what slides on soft contacts hops, and the tolerance is what hops can do. A contact
+//! that slips with V is pushed as if it were μ₁ B V deeper, B = 2/(dmax tc) (law `sliding_block`), so that in a step of h its
+//! velocity changes by s = h μ₁ B V at most. A box that comes down with w sinks in by w h at most before it is pushed, and leaves
+//! when it has risen as far: from rest k steps of s lead k (k + 1)/2 s h up, to k s. So w = k s becomes a smaller w for k > 2, a
+//! larger one for k < 2 at most, and w <= 2 s. The ground has carried the weight but for the momentum w (M + n m) that is on its
+//! way up, and friction lacks, or exceeds, μ₁ of that. Box and rolling balls, M + 2/7 n m, are off by it, the box by
+//!
+//! ```text
+//! e = 2 h μ₁² B V (M + n m)/(M + 2/7 n m)
+//! ```
+//!
+//! and a ball by 2/7 e, and by as much as the box gains on it while it is in the air, 2 w/g a.
+//!
+//! (Second to that, a box that lands on one corner is turned by its friction, and corners that turn do not move along the pull:
+//! an impulse that changes the corner's velocity by 2 w, 7 J/M, moves it by 3 μ₁ J/M across, ε = 6/7 μ₁ w/V of its way, and
+//! friction lacks ε²/2 = 4e-4 of itself. It is why `conveyor` is on a rail.)
+
+use super::soft_contact::{LARGEST, TIME};
+use crate::lab::*;
+use crate::law::law;
+use kinetoscope::prelude::*;
+use nalgebra::{Vector2, Vector3};
+
+const BOX: f64 = 10.0;
+const BALL: f64 = 1.0;
+const RADIUS: f64 = 0.5;
+const FRICTION: [f64; 2] = [0.4, 0.8];
+const PULL: f64 = 150.0;
+/// Balls in a row, and rows.
+const ROWS: usize = 5;
+const SECONDS: f64 = 4.0;
+
+/// Accelerations of box and balls in closed form.
+fn expected() -> [f64; 2] {
+    let n = (ROWS * ROWS) as f64;
+    let rolls = (PULL - FRICTION[0] * (BOX + n * BALL) * G) / (3.5 * BOX + n * BALL);
+    [3.5 * rolls, rolls]
+}
+
+/// Roots of the mean squares of what the velocities of box and balls are off by \[m/s\].
+fn off(friction_of_balls: f64) -> [f64; 2] {
+    let mut lab = Lab::new(slope(0.0, FRICTION[0]));
+    let board = lab.object(RigidObjectCfg {
+        uid: "board".into(),
+        friction: Some([0.0; 3]),
+        shape: ObjectShape::Box { size: [20.0, 20.0, 0.5] },
+        mass: Some(BOX),
+        init_pose: Pose::translation(0.0, 0.0, 0.25),
+        ..RigidObjectCfg::default()
+    });
+    let place = |k: usize| 2.0 * (k as f64 - 0.5 * (ROWS - 1) as f64);
+    let ball = |k: usize| RigidObjectCfg {
+        uid: format!("ball {k}"),
+        shape: ObjectShape::Sphere { radius: RADIUS },
+        mass: Some(BALL),
+        friction: Some([friction_of_balls, 0.0, 0.0]),
+        init_pose: Pose::translation(place(k / ROWS), place(k % ROWS), 0.5 + RADIUS),
+        ..RigidObjectCfg::default()
+    };
+    let balls: Vec<ObjectId> = (0..ROWS * ROWS).map(|k| lab.object(ball(k))).collect();
+    lab.run(0.5);
+    let along = Vector2::new(0.5, 0.75_f64.sqrt());
+    lab.push(board, PULL * Vector3::new(along.x, along.y, 0.0), Vector3::zeros());
+    let [a, b] = expected();
+    let steps = (SECONDS / lab.dt()).round() as u32;
+    let mut squares = [0.0; 2];
+    lab.watch(steps, |t, sim| {
+        let apart = |id: ObjectId, rate: f64| (body(sim, id).velocity.xy() - rate * t * along).norm_squared();
+        squares[0] += apart(board, a);
+        squares[1] += balls.iter().map(|&ball| apart(ball, b)).sum::<f64>() / balls.len() as f64;
+    });
+    squares.map(|sum| (sum / f64::from(steps)).sqrt())
+}
+
+#[test]
+fn holds() {
+    law(module_path!(), "V = a t, v = b t; b = (F - μ₁ (M + n m) g)/(7/2 M + n m), a = 7/2 b", |m| {
+        let ([board, ball], [alone, left]) = (off(FRICTION[1]), off(0.0));
+        let [a, _] = expected();
+        let others = (ROWS * ROWS) as f64 * BALL;
+        // The root of the mean square of a t over the time.
+        let fast = a * SECONDS / 3.0_f64.sqrt();
+        let hops = 2.0 * 1e-3 * FRICTION[0] * 2.0 / (LARGEST * TIME) * fast;
+        let on_board = FRICTION[0] * hops * (BOX + others) / (BOX + 2.0 / 7.0 * others);
+        let on_ball = 2.0 / 7.0 * on_board + 2.0 * hops / G * a;
+        let why = "momentum of hops, of two steps on a contact that slips";
+        let quantity = "root mean square error of the box";
+        m.row(quantity, "m/s", 0.0, board, (on_board, why));
+        m.control(quantity, "without friction of the balls", alone);
+        let quantity = "root mean square error of the balls";
+        m.row(quantity, "m/s", 0.0, ball, (on_ball, why));
+        m.control(quantity, "without friction of the balls", left);
+        m.lines_differ(
+            "hops are chaotic: each line's solver rounds in its own way; what they can do is in the tolerance",
+        );
+    });
+}
