@@ -9,19 +9,20 @@
 //! soft contacts hops, and takes the fingers along, so that each of them presses with N = F - M u', u being its velocity towards
 //! the block. Friction is μ N at every step (law `sliding_block`): a + μ M (u₁' + u₂')/m = 2 μ F/m - g for any hops, as long as
 //! the drives are at their limit. (That is for the first 0.1 s: in MuJoCo 2.2.2 what slides with 0.7 m/s or more drives such light
-//! fingers off.) Not exact: that what sticks creeps (law `stick_creep`). A row of friction f holds with v = (1 - d)/d A f/B, B =
-//! 2 impratio/(dmax tc); A = 1/m + 1/3M is MuJoCo's estimate of the inverse inertia, d is 0.9 or more, f is m g/2 or less, by
-//! how many points the faces touch.
+//! fingers off.) What sticks creeps (law `stick_creep`): a row of friction f, one at each of the four corners of a face, f = m g/8,
+//! holds with v = (1 - d)/d A f dmax tc/(2 impratio), d being that of a depth under F/4. A is MuJoCo's estimate of the inverse inertia,
+//! 1/m and that of a finger: 1/M in 4.x, in 2.2.2 the mean over three axes, of which it moves along one, 1/3M.
 //!
 //! Tolerance of the solver: it ends where a step gains less than 1e-8 of the mean inertia times the number of degrees of freedom
 //! (two fingers, six of the block), none of which has more inertia than m; accelerations that are off by α cost m α²/2, so that
-//! forces are off by m α = m √(2 · 8 · 1e-8) at most, and what slides, by that over m.
+//! forces are off by m α = m √(2 · 8 · 1e-8) at most, what slides by that over m, and what creeps by as much of itself as f.
 
 use crate::lab::*;
 use crate::law::law;
-use crate::rigid_body::soft_contact::{LARGEST, TIME};
+use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
 use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::Vector3;
 
 const LIMIT: f64 = 5.0;
@@ -98,9 +99,16 @@ fn holds() {
         m.row("force of the left finger", "N", LIMIT, held.left, rest);
         m.row("force of the right finger", "N", LIMIT, held.right, rest);
         m.row("friction of both", "N", MASS * G, held.friction, rest);
-        let inverse = 1.0 / MASS + 1.0 / (3.0 * FINGER);
-        let creep = (1.0 - 0.9) / 0.9 * inverse * 0.5 * MASS * G * LARGEST * TIME / (2.0 * IMPRATIO);
-        m.row("velocity of the block", "m/s", 0.0, held.velocity, (creep, "creep of soft friction"));
+        let of_finger = if TARGET == Target::V4 { 1.0 / FINGER } else { 1.0 / (3.0 * FINGER) };
+        let inverse = 1.0 / MASS + of_finger;
+        let (d, carried) = (impedance(depth(inverse * LIMIT / 4.0)), MASS * G / 8.0);
+        let creep = (1.0 - d) / d * inverse * carried * LARGEST * TIME / (2.0 * IMPRATIO);
+        let share = (creep * MASS * solver / carried, "tolerance of the solver");
+        m.row("velocity of the block", "m/s", -creep, held.velocity, share);
+        m.lines_differ_in(
+            "velocity of the block",
+            "creep goes with MuJoCo's estimate of a finger's inverse inertia: 1/M in 4.x, 1/3M in 2.2.2",
+        );
         let explicit = pinch(DriveCfg { model: DriveModel::Actuator, ..stiff.clone() }, LIMIT, 1.0);
         m.control("force of the left finger", "with drives of the start of the step", explicit.left);
         m.control("force of the right finger", "with drives of the start of the step", explicit.right);
