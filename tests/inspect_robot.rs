@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use kinetoscope::prelude::*;
+use kinetoscope::sim::inspect::{InspectCfg, inspect};
 use kinetoscope::sim::mj::ObjectKind;
 use serde_json::{Value, json};
 use std::ffi::OsString;
@@ -144,6 +145,33 @@ fn a_pendulum_has_the_inertia_and_torque_of_the_textbook() {
 
     let (_, still) = report(&[&file]);
     assert_ne!(still["gravity_torque"], json["gravity_torque"], "the position matters");
+}
+
+/// What the example prints is what a program gets: the textbook's numbers, and the text without the part about warnings.
+#[test]
+fn a_program_asks_for_the_same_report() {
+    let folder = Folder::new();
+    let (m, l, i, q) = (2.0, 0.5, 0.1, 0.7_f64);
+    let file = folder.urdf(&format!(
+        "<link name=\"base\"/>\n{}\n{}\n<gizmo/>",
+        link("arm", m, &format!("{l} 0 0"), i),
+        joint("swing", "revolute", "base", "arm", LIMIT),
+    ));
+    let cfg = InspectCfg { urdf: UrdfCfg::single(&file), qpos: vec![("swing".into(), q)], ..Default::default() };
+    let report = inspect(&cfg).unwrap();
+    assert_eq!((report.total_mass, report.joint_names.as_slice()), (m, &["swing".to_string()][..]));
+    assert!(close(&report.mass_matrix[0], &[i + m * l * l], 1e-15));
+    assert!(close(&report.gravity_torque, &[-m * 9.81 * l * q.cos()], 1e-14));
+    let kinds: Vec<(&str, Option<u32>)> = report.warnings.iter().map(|w| (w.kind, w.line)).collect();
+    assert_eq!(kinds, [("element-ignored", Some(5))]);
+
+    let (with, without) = (report.to_string(), report.without_warnings().to_string());
+    let rest = with.strip_prefix(&without).unwrap();
+    assert!(rest.starts_with("\n1 warning\n") && rest.contains("element-ignored") && rest.contains("gizmo"), "{rest}");
+    assert!(without.contains("total mass 2 kg") && !without.contains("element-ignored"), "{without}");
+    let wrong = InspectCfg { qpos: vec![("swong".into(), q)], ..cfg };
+    let error = inspect(&wrong).unwrap_err().to_string();
+    assert!(error.contains("there is no joint \"swong\"") && error.contains("swing"), "{error}");
 }
 
 #[test]

@@ -117,7 +117,7 @@ fn second_without_rows(added: Added) -> Vec<f64> {
         ..Default::default()
     };
     let body = sim.add_rigid_object(cube("body", 10.0, BodyType::Dynamic)).unwrap();
-    let driven = [pendulum, motor].map(|robot| sim.robot(robot).is_driven(JointIndex(0)));
+    let driven = [pendulum, motor].map(|robot| sim.robot(robot).is_driven(JointIndex(0)).unwrap());
     assert_eq!(driven, [false, true]);
     sim.robot_mut(motor).set_qpos(&kinetoscope::ndarray::array![[1.5], [-0.4]], None, None).unwrap();
     let spin = kinetoscope::ndarray::array![[0.1, 0.2, 1.0, 3.0, -2.0, 1.0]];

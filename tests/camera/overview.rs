@@ -2,8 +2,9 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, PoseF32};
-use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::staying_crew;
 
 const SIZE: [usize; 2] = [400, 400];
 
@@ -22,11 +23,11 @@ fn balls(num_envs: usize) -> SimulationManager {
     sim
 }
 
-/// Masks and positions seen from 12 m above.
-fn from_above(still: &Still) -> (Vec<i32>, Vec<[f32; 3]>) {
+/// From 12 m above.
+fn above() -> View {
     let pose = look_at_pose([0.0, 0.0, 12.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
     let world_from_camera = PoseF32::from(&pose);
-    let view = View {
+    View {
         width: SIZE[0],
         height: SIZE[1],
         fx: 500.0,
@@ -36,9 +37,13 @@ fn from_above(still: &Still) -> (Vec<i32>, Vec<[f32; 3]>) {
         near: 0.1,
         far: 50.0,
         world_from_camera,
-    };
+    }
+}
+
+/// Masks and positions seen from above.
+fn from_above(still: &Still) -> (Vec<i32>, Vec<[f32; 3]>) {
     let mut frame = Frame::new(SIZE[0], SIZE[1], Channels { mask: true, position: true, ..Channels::default() });
-    Rasterizer::default().render_shot(&still.shot(&view), &mut frame.as_mut()).unwrap();
+    Rasterizer::default().render_shot(&still.shot(&above()), &mut frame.as_mut()).unwrap();
     (frame.mask.unwrap(), frame.position.unwrap().as_chunks().0.to_vec())
 }
 
@@ -92,4 +97,30 @@ fn some_environments_and_mistakes() {
     assert!(Still::overview(&mut sim, Some(&[EnvId(4)]), &[]).is_err());
     let marker = Marker::sphere([0.0; 3], 0.1, [1.0; 4]);
     assert!(Still::overview(&mut sim, None, &[(EnvId(9), marker)]).is_err());
+}
+
+/// Threads that stay draw what a single one draws, picture after picture, and go on drawing after another crew was dropped.
+#[test]
+fn threads_that_stay_draw_the_same_pictures() {
+    let mut sim = balls(5);
+    let still = Still::overview(&mut sim, None, &[]).unwrap();
+    let channels = Channels { depth: true, mask: true, position: true, ..Channels::default() };
+    let draw = |rasterizer: &mut ParallelRasterizer| {
+        let views = [0.0, 0.4, 0.8, 1.2].map(|shift| View { cx: 200.0 + 100.0 * shift, ..above() });
+        let mut frames = [(); 4].map(|()| Frame::new(SIZE[0], SIZE[1], channels));
+        let shots = views.iter().map(|view| still.shot(view)).zip(&mut frames);
+        let mut jobs: Vec<_> = shots.map(|(shot, frame)| (shot, frame.as_mut())).collect();
+        rasterizer.render(&mut jobs).unwrap();
+        drop(jobs);
+        frames
+    };
+    let alone = draw(&mut ParallelRasterizer::new(RasterCfg::default(), 1));
+    let ball = sim.mask_ids().iter().find(|id| id.object == "ball").unwrap().id;
+    assert!(alone.iter().all(|frame| frame.mask.as_ref().unwrap().contains(&ball)));
+    let mut staying = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(staying_crew());
+    assert_eq!(draw(&mut staying), alone);
+    let mut other = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(staying_crew());
+    assert_eq!(draw(&mut other), alone);
+    drop(other);
+    assert_eq!(draw(&mut staying), alone);
 }

@@ -59,7 +59,7 @@ fn followers_stay_with_their_drivers_under_load() {
     let followers: Vec<LinkId> = {
         let view = world.view();
         let moved = view.description().drivable_joints().enumerate();
-        moved.filter(|(i, _)| view.is_mimic(JointIndex(*i))).map(|(_, (_, joint))| joint.child).collect()
+        moved.filter(|(i, _)| view.is_mimic(JointIndex(*i)).unwrap()).map(|(_, (_, joint))| joint.child).collect()
     };
     assert!(followers.len() >= 4, "{followers:?}");
     // The control: without the load, on the way to rest and at rest.

@@ -204,3 +204,20 @@ fn a_scene_file_declares_parts() {
     let error = unknown.unwrap_err().to_string();
     assert!(error.contains("s.toml:3") && error.contains("`path`"), "{error}");
 }
+
+/// What is no XML is told with its line, as what is no MJCF is: of an element that is not closed, the line where it begins.
+#[test]
+fn text_that_is_no_xml_names_its_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("broken.xml");
+    for (what, text, line) in [
+        ("a body that is not closed", "<mujoco>\n <worldbody>\n  <body>\n </worldbody>\n</mujoco>\n", 3),
+        ("a sign that is missing", "<mujoco>\n <worldbody>\n  <geom size=\"1\"\n </worldbody>\n</mujoco>\n", 3),
+        ("a value without quotes", "<mujoco>\n <worldbody>\n  <geom size=1/>\n </worldbody>\n</mujoco>\n", 3),
+        ("an end of nothing", "<mujoco>\n <worldbody/>\n </body>\n</mujoco>\n", 1),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let message = refused(MjcfCfg::file("part", &path));
+        assert!(message.starts_with(&format!("{}:{line}: ", path.display())), "{what}: {message}");
+    }
+}

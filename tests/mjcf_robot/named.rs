@@ -48,8 +48,14 @@ fn control_parts_are_patterns_of_joint_names() {
     assert!(error.contains("lft") && error.contains("\"lift\""), "{error}");
     let error = robot_.link_id("hnd").unwrap_err().to_string();
     assert!(error.contains("\"hand\""), "{error}");
-    // Frames between the joints of a body are nobody's.
+    // Frames behind the joints of a body are nobody's, where a joint follows or the anchor is beside the body's origin: two of
+    // the shoulder, two of the carriage, one of the hand.
     assert!(robot_.link_id("pan.frame").is_err());
+    let description = robot_.description();
+    let named: Vec<&str> = description.named_links().iter().map(|link| link.name.as_str()).collect();
+    assert_eq!(named[..6], ["base", "shoulder", "fore", "carriage", "plate", "hand"]);
+    assert!(named.contains(&"tip") && named.contains(&"shoulder_site"), "{named:?}");
+    assert_eq!(description.links.len() - named.len(), 2 + 2 + 1);
 }
 
 #[test]

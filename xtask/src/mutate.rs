@@ -1,5 +1,6 @@
 //! `cargo xtask mutate`: breaks the code in one place, runs the tests that should notice, and so for every mutation of the
-//! list (`mutations.rs`). All are done in a copy of the tree below the target folder.
+//! list (`mutations.rs`). All are done in a copy of the tree below the target folder. A run of the whole list writes
+//! `docs/mutations.md`.
 
 use crate::mutations::{MUTATIONS, Mutation};
 use crate::progress::Progress;
@@ -34,7 +35,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     copy(&repo.root, &tree)?;
     let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| mutation.name.contains(filter));
     let chosen: Vec<&Mutation> = MUTATIONS.iter().filter(chosen).collect();
-    let (mut findings, mut table) = (Vec::new(), String::new());
+    let (mut findings, mut table, mut rows) = (Vec::new(), String::new(), Vec::new());
     let test = |binary: &str, words: &[&str]| {
         let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
         cargo.args(["test", "--package", "kinetoscope", "--test", binary, "--"]).args(words).success_and_output()
@@ -71,6 +72,9 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         };
         println!("{line}");
         table.push_str(&format!("{line}\n"));
+        if let Verdict::Caught(by, _) = &verdict {
+            rows.push(row(mutation, by));
+        }
         // A law that is said to notice must.
         if !matches!(&verdict, Verdict::Caught(_, not_by) if not_by.is_empty()) {
             findings.push(line);
@@ -81,10 +85,29 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     }
     progress.end();
     println!("\n{table}");
-    no_findings("mutations that no test noticed", &findings)
+    no_findings("mutations that no test noticed", &findings)?;
+    if args.filter.is_none() { write(&repo.root.join(PAGE), &page(&rows)) } else { Ok(()) }
 }
 
-/// Every mutation still finds its place: the search text stands in the file exactly once.
+/// Where the last run of the whole list is written to.
+const PAGE: &str = "docs/mutations.md";
+
+fn page(rows: &[String]) -> String {
+    let head = format!(
+        "# Mutations\n\nWritten by `cargo xtask mutate`; do not edit. The code is broken in {} places, one by one, on MuJoCo 2.2.2, and \
+         tests are run that have to notice: each of these changes made the tests fail that are named behind it.\n\n\
+         | what is wrong then | file | caught by |\n|---|---|---|\n",
+        rows.len()
+    );
+    head + &rows.concat()
+}
+
+fn row(mutation: &Mutation, caught_by: &[String]) -> String {
+    let by: Vec<String> = caught_by.iter().map(|name| format!("`{}`", name.trim_end_matches("::holds"))).collect();
+    format!("| {} | [{}](../{}) | {} |\n", mutation.name, mutation.file, mutation.file, by.join(", "))
+}
+
+/// Every mutation still finds its place: the search text stands in the file exactly once. And the page is of this list.
 pub(crate) fn check(root: &Path) -> Outcome {
     let mut findings = Vec::new();
     for Mutation { name, file, search, replacement, .. } in MUTATIONS {
@@ -93,7 +116,16 @@ pub(crate) fn check(root: &Path) -> Outcome {
             findings.push(format!("{name}: its text stands {times} times in {file}, not once: {search:?}"));
         }
     }
-    no_findings("mutations that do not fit the code (xtask/src/mutations.rs)", &findings)
+    no_findings("mutations that do not fit the code (xtask/src/mutations.rs)", &findings)?;
+    let page = read(&root.join(PAGE))?;
+    let wanted = |mutation: &Mutation| format!("| {} | [{}]", mutation.name, mutation.file);
+    let mut findings: Vec<String> =
+        MUTATIONS.iter().filter(|mutation| !page.contains(&wanted(mutation))).map(|m| m.name.to_string()).collect();
+    let rows = page.lines().filter(|line| line.starts_with("| ")).count() - 1;
+    if findings.is_empty() && rows != MUTATIONS.len() {
+        findings.push(format!("{rows} rows for {} mutations", MUTATIONS.len()));
+    }
+    no_findings("docs/mutations.md is of another list: cargo xtask mutate", &findings)
 }
 
 /// The test binaries of some mutations, each with the words of all of them.

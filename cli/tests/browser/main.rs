@@ -65,6 +65,31 @@ const LOOK: &str = "(() => {
     return { colors: colors.size, red: red / (canvas.width * canvas.height), width: canvas.width, height: canvas.height };
 })()";
 
+/// A number that is another one for another picture on the stage.
+const PICTURE: &str = "(() => {
+    const canvas = document.getElementById('stage');
+    const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    let hash = 0;
+    for (const byte of bytes) hash = (31 * hash + byte) | 0;
+    return hash;
+})()";
+
+/// How many pixels of a plot have nearly the colour of its first line.
+fn of_the_first_line(plot: &str) -> String {
+    format!(
+        "(() => {{
+            const canvas = document.getElementById('{plot}');
+            const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+            let count = 0;
+            for (let k = 0; k < bytes.length; k += 4) {{
+                const off = Math.abs(bytes[k] - 0x2f) + Math.abs(bytes[k + 1] - 0x7e) + Math.abs(bytes[k + 2] - 0xd8);
+                if (bytes[k + 3] > 200 && off < 30) count += 1;
+            }}
+            return count;
+        }})()"
+    )
+}
+
 #[test]
 fn the_page_shows_the_simulation_and_acts_on_it() {
     let Some(browser) = browser() else { return };
@@ -115,6 +140,45 @@ fn the_page_shows_the_simulation_and_acts_on_it() {
     let before = tab.evaluate(time);
     tab.click("document.getElementById('step')");
     tab.wait_until("a step", &format!("{time} !== {before}"));
+
+    // Position and effort of the first joint are plotted, unless its mark is taken away.
+    // (The others would be drawn over it: without them.)
+    let marks = "[...document.querySelectorAll('#joints .mark')]";
+    tab.evaluate(&format!("{marks}.slice(1).filter((mark) => mark.checked).forEach((mark) => mark.click())"));
+    let mark = "document.querySelector('#joints .mark')";
+    for plot in ["positions", "efforts"] {
+        let pixels = of_the_first_line(plot);
+        tab.wait_until("a line", &format!("{pixels} > 30"));
+        tab.click(mark);
+        tab.wait_until("no line", &format!("{pixels} === 0"));
+        tab.click(mark);
+        tab.wait_until("the line again", &format!("{pixels} > 30"));
+    }
+
+    // What is drawn over the scene, and which environments are: another picture, and the same again.
+    let now_shown = |tab: &mut Tab<'_>| {
+        std::thread::sleep(Duration::from_millis(500));
+        tab.evaluate(PICTURE)
+    };
+    // Both from where they are seen as a whole now, which is not quite where the first picture was taken from.
+    tab.choose("environment", "1");
+    tab.choose("environment", "all");
+    let all = now_shown(&mut tab);
+    let frames = "document.querySelector('#overlays input[value=frames]')";
+    tab.click(frames);
+    tab.wait_until("frames", &format!("{PICTURE} !== {all}"));
+    tab.click(frames);
+    tab.wait_until("no frames", &format!("{PICTURE} === {all}"));
+    let red = format!("{LOOK}.red");
+    let of_two = tab.evaluate(&red).as_f64().unwrap();
+    tab.choose("environment", "1");
+    // One alone is looked at from nearer.
+    tab.wait_until("one environment", &format!("{red} > 1.2 * {of_two}"));
+    tab.choose("environment", "all");
+    tab.wait_until("both", &format!("{PICTURE} === {all}"));
+
+    tab.click("document.getElementById('reset')");
+    tab.wait_until("the beginning", &format!("{time} === '0.000 s'"));
     tab.click("document.getElementById('pause')");
     running.wait_until("it goes on", |now| now.steps > held + 50);
 

@@ -44,11 +44,16 @@ impl std::fmt::Display for CompileError {
     }
 }
 
-/// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, parser and compiler).
+/// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, reader and compiler); of text that is no XML the parser writes
+/// `Line number=12`.
 fn line_named_in(message: &str) -> Option<u32> {
-    let after = &message[message.rfind("line")? + 4..];
-    let digits: String = after.trim_start_matches([' ', '=', ':']).chars().take_while(char::is_ascii_digit).collect();
-    digits.parse().ok()
+    let number_after = |word: &str| {
+        let after = &message[message.rfind(word)? + word.len()..];
+        let after = after.trim_start_matches([' ', '=', ':']);
+        let digits = after.find(|c: char| !c.is_ascii_digit()).map_or(after, |end| &after[..end]);
+        digits.parse().ok()
+    };
+    ["line", "Line number"].into_iter().find_map(number_after)
 }
 
 #[cfg(test)]
@@ -59,6 +64,10 @@ mod tests {
     fn the_line_is_found_in_all_of_mujocos_phrasings() {
         assert_eq!(line_named_in("XML Error: bad\nElement 'geom', line 7\n"), Some(7));
         assert_eq!(line_named_in("Error: mass\nObject name = a, id = 1, line = 12, column = 4"), Some(12));
+        let broken = "XML parse error 6:\nError=XML_ERROR_PARSING_ELEMENT ErrorID=6 (0x6) Line number=12\n";
+        assert_eq!(line_named_in(broken), Some(12));
+        let mismatched = "Error=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=outline";
+        assert_eq!(line_named_in(mismatched), Some(3));
         assert_eq!(line_named_in("Error: something else"), None);
     }
 }

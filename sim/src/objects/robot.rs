@@ -389,9 +389,18 @@ impl<'a> Robot<'a> {
             .ok_or_else(|| unknown("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
-    /// Whether a joint follows another one; a joint that does not exist follows none.
-    pub fn is_mimic(&self, joint: JointIndex) -> bool {
-        self.data.plans.get(joint.0).is_some_and(|p| p.mimic.is_some())
+    /// Whether a joint follows another one.
+    ///
+    /// # Errors
+    /// There is no such joint.
+    pub fn is_mimic(&self, joint: JointIndex) -> Result<bool> {
+        Ok(self.plan(joint)?.mimic.is_some())
+    }
+
+    /// What was made of a joint of the description.
+    pub(super) fn plan(&self, joint: JointIndex) -> Result<&JointPlan> {
+        let (what, index, count) = ("joint", joint.0, self.data.plans.len());
+        self.data.plans.get(index).ok_or(Error::UnknownIndex { what, index, count })
     }
 
     /// For every joint: the joint it follows, ratio and offset; itself, 1 and 0 where it follows none.

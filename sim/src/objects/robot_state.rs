@@ -40,7 +40,7 @@ impl Robot<'_> {
 
     /// The joints that follow no other joint, in the order of [`joint_names`](Self::joint_names).
     pub fn active_joint_ids(&self) -> Vec<JointIndex> {
-        (0..self.dof()).map(JointIndex).filter(|&joint| !self.is_mimic(joint)).collect()
+        (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_none()).collect()
     }
 
     /// Names of the joints that follow no other joint.
@@ -51,7 +51,7 @@ impl Robot<'_> {
     /// The joints that follow another one; [`mimic_drivers`](Self::mimic_drivers) says which, and how.
     #[doc(alias = "mimic_ids")]
     pub fn mimic_joint_ids(&self) -> Vec<JointIndex> {
-        (0..self.dof()).map(JointIndex).filter(|&joint| self.is_mimic(joint)).collect()
+        (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_some()).collect()
     }
 
     /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic ones.
@@ -59,10 +59,13 @@ impl Robot<'_> {
         self.active_joint_ids().len()
     }
 
-    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target; a passive joint, one that
-    /// follows another, and one that does not exist have none.
-    pub fn is_driven(&self, joint: JointIndex) -> bool {
-        self.data.plans().get(joint.0).is_some_and(|plan| plan.actuator.is_some())
+    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target; a passive joint and one that
+    /// follows another have none.
+    ///
+    /// # Errors
+    /// There is no such joint.
+    pub fn is_driven(&self, joint: JointIndex) -> Result<bool> {
+        Ok(self.plan(joint)?.actuator.is_some())
     }
 
     /// The joints of a control part that follow no other joint, in the order of its patterns; of all joints where `part` is
@@ -74,7 +77,7 @@ impl Robot<'_> {
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn get_active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let mut joints = self.get_joint_ids(part)?;
-        joints.retain(|&joint| !self.is_mimic(joint));
+        joints.retain(|joint| self.data.plans()[joint.0].mimic.is_none());
         Ok(joints)
     }
 

@@ -290,7 +290,7 @@ impl OwnEyes {
     }
 
     fn draw_stage(&mut self, snapshot: &Snapshot) -> Option<Picture> {
-        self.trails.add(snapshot);
+        self.trails.add(snapshot, self.shown);
         let key = (snapshot.number, self.looks);
         if self.drawn == key {
             return None;

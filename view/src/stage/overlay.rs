@@ -1,4 +1,6 @@
 //! What is drawn over the scene to explain it: contact forces, frames, axes, centres of mass, names.
+//!
+//! Frames, axes and centres of mass are inside of what they belong to: they are drawn over it too, as lines and dots.
 
 use super::assembly::chosen;
 use super::canvas::Canvas;
@@ -10,6 +12,7 @@ use nalgebra::Vector3;
 use scene::Marker;
 use scene::state::Contact;
 use sensors::visibility::View;
+use sim::JointAxis;
 
 /// What is drawn over the scene, and which of its shapes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +25,7 @@ pub struct Overlays {
     pub frames: bool,
     /// Axes of joints.
     pub joints: bool,
-    /// Centres of mass, as balls of the volume that the mass has at the density of water.
+    /// Centres of mass, as dots of four quarters.
     pub masses: bool,
     /// Names of links and objects.
     pub names: bool,
@@ -78,21 +81,49 @@ impl Overlays {
             }
             if self.joints {
                 env.look.joints.iter().for_each(|joint| {
-                    let (axis, rgba) =
-                        (Vector3::from(joint.axis), if joint.slides { color::SLIDE } else { color::HINGE });
-                    let tail = Vector3::from(joint.anchor) - axis * (0.5 * AXIS);
-                    Marker::arrow(tail.into(), (axis * AXIS).into(), rgba).into_iter().for_each(&mut add);
+                    let (tail, way) = axis_of(joint);
+                    Marker::arrow(tail.into(), way.into(), color_of(joint)).into_iter().for_each(&mut add);
                 });
-            }
-            if self.masses {
-                env.look.masses.iter().for_each(|&(at, mass)| add(Marker::sphere(at, mass_radius(mass), color::MASS)));
             }
         }
         markers
     }
 
+    /// What is inside of things, seen through them, and names.
+    pub(super) fn draw_over(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
+        for (_, env) in chosen(snapshot, shown) {
+            let mut line = |from: Vector3<f64>, way: Vector3<f64>, rgba: [f32; 4]| {
+                let ends = [from, from + way].map(|end| project(view, in_overview(env, end.into())));
+                if let [Some(from), Some(to)] = ends {
+                    canvas.line(from, to, color::bytes(rgba));
+                }
+            };
+            if self.frames {
+                for pose in &env.look.bodies {
+                    let colors = [color::X, color::Y, color::Z];
+                    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+                    for (axis, rgba) in axes.into_iter().zip(colors) {
+                        line(pose.translation.vector, pose.rotation * axis * f64::from(FRAME), rgba);
+                    }
+                }
+            }
+            if self.joints {
+                for joint in &env.look.joints {
+                    let (tail, way) = axis_of(joint);
+                    line(tail, way, color_of(joint));
+                }
+            }
+            if self.masses {
+                for (at, _) in env.look.masses.iter().filter(|(_, mass)| *mass > 0.0) {
+                    dot(in_overview(env, *at), view, canvas);
+                }
+            }
+        }
+        self.write_names(snapshot, shown, view, canvas);
+    }
+
     /// Names of links and objects, where they are in the picture.
-    pub(super) fn write_names(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
+    fn write_names(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
         if !self.names {
             return;
         }
@@ -124,9 +155,32 @@ fn force_arrow(contact: &Contact) -> Option<Marker> {
     Marker::arrow(contact.point, (force / size.max(1e-9) * length).into(), color::FORCE).filter(|_| length > 1e-4)
 }
 
-/// Radius of a ball of water of a mass \[m\].
-fn mass_radius(mass: f64) -> f32 {
-    (mass / 1000.0 * 0.75 / std::f64::consts::PI).cbrt() as f32
+/// Where the arrow of an axis begins, and where it goes \[m\]: the joint is in its middle.
+fn axis_of(joint: &JointAxis) -> (Vector3<f64>, Vector3<f64>) {
+    let axis = Vector3::from(joint.axis);
+    (Vector3::from(joint.anchor) - axis * (0.5 * AXIS), axis * AXIS)
+}
+
+fn color_of(joint: &JointAxis) -> [f32; 4] {
+    if joint.slides { color::SLIDE } else { color::HINGE }
+}
+
+/// The sign of a centre of mass: a disc whose quarters are dark and bright. It is as large as a ball of 2 cm there, but never
+/// so small that it is not seen, nor large.
+fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
+    let Some([x, y]) = project(view, at) else { return };
+    let z = view.world_from_camera.apply_inverse(at.map(|p| p as f32))[2];
+    let radius = (view.fx * 0.02 / z).clamp(1.5, 7.0);
+    if !((-radius..view.width as f32 + radius).contains(&x) && (-radius..view.height as f32 + radius).contains(&y)) {
+        return;
+    }
+    let reach = radius.ceil() as i32;
+    for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy))) {
+        if ((dx * dx + dy * dy) as f32) <= radius * radius {
+            let bright = (dx < 0) == (dy < 0);
+            canvas.set(x as i32 + dx, y as i32 + dy, if bright { color::bytes(color::MASS) } else { color::DARK });
+        }
+    }
 }
 
 #[cfg(test)]
@@ -151,11 +205,29 @@ mod tests {
         assert_eq!(force_arrow(&contact([f64::NAN; 3])), None);
     }
 
+    /// A point two metres ahead is in the middle of the picture; the disc there has `pi r^2` pixels, half of them bright.
     #[test]
-    fn a_ball_of_a_mass_has_its_volume() {
-        let r = f64::from(mass_radius(4.18879));
-        // 4.18879 litres of water are 4/3 pi decimetres cubed: a radius of a decimetre.
-        assert!((r - 0.1).abs() < 1e-6, "{r}");
+    fn a_centre_of_mass_is_a_disc_where_it_is() {
+        let view = super::super::Eye::looking([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
+        let bright = |at: [f64; 3]| {
+            let mut canvas = Canvas::new(201, 201);
+            dot(at, &view, &mut canvas);
+            let all = (0..201).flat_map(|y| (0..201).map(move |x| [x, y]));
+            let of = |wanted: [u8; 3]| all.clone().filter(|[x, y]| canvas.pixel(*x, *y) == Some(wanted)).collect();
+            let [bright, dark]: [Vec<[usize; 2]>; 2] = [of(color::bytes(color::MASS)), of(color::DARK)];
+            (bright, dark)
+        };
+        let (pixels, dark) = bright([0.0; 3]);
+        let radius = (view.fx * 0.02 / 2.0).clamp(1.5, 7.0);
+        let area = std::f32::consts::PI * radius * radius;
+        // The rim is of pixels that are in it by their middle: off by less than its length.
+        let off = (pixels.len() + dark.len()) as f32 - area;
+        assert!(off.abs() < 2.0 * std::f32::consts::PI * radius && pixels.len() > 1, "{off} of {area}");
+        let middle =
+            pixels.iter().fold([0.0; 2], |sum, at| [0, 1].map(|k| sum[k] + at[k] as f32 / pixels.len() as f32));
+        assert!(middle.iter().all(|at| (at - 100.0).abs() < 1.0), "{middle:?}");
+        assert!(bright([-5.0, 0.0, 0.0]).0.is_empty(), "behind the camera");
+        assert!(bright([f64::NAN; 3]).0.is_empty());
     }
 
     #[test]

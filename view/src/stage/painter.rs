@@ -99,7 +99,7 @@ impl Painter {
         if let Some(trails) = look.trails.filter(|_| look.overlays.trails) {
             trails.draw(snapshot, look.shown, view, canvas);
         }
-        look.overlays.write_names(snapshot, look.shown, view, canvas);
+        look.overlays.draw_over(snapshot, look.shown, view, canvas);
         Ok(())
     }
 

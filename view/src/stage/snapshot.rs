@@ -145,7 +145,7 @@ impl Names {
                 robot,
                 joint: JointIndex(k),
                 name: format!("{uid}/{name}"),
-                driven: view.is_driven(JointIndex(k)) && !view.is_mimic(JointIndex(k)),
+                driven: view.is_driven(JointIndex(k)).unwrap_or(false) && view.mimic_drivers()[k].0 == JointIndex(k),
                 slides: prismatic.contains(&name),
             }));
         }

@@ -138,7 +138,7 @@ fn every_overlay_changes_the_picture_and_goes_again() {
     assert!(unlike(&draw(&shown, none, None), &draw(&shown, Overlays::default(), None)) > 5);
     // A trail of something that moves.
     let mut trails = Trails::default();
-    trails.add(&shown);
+    trails.add(&shown, Shown::All);
     sample.sim.robot_mut(sample.robot).set_qpos(&ndarray::arr2(&[[1.5]]), None, None).unwrap();
     let trail = Overlays { trails: true, ..none };
     assert_eq!(draw(&shown, trail, Some(&trails)), draw(&shown, none, None), "nothing has moved yet");
@@ -148,7 +148,7 @@ fn every_overlay_changes_the_picture_and_goes_again() {
     for _ in 0..20 {
         sample.sim.update(1);
         let viewer = sample.sim.viewer(Wants::default());
-        trails.add(&viewer.newest().unwrap());
+        trails.add(&viewer.newest().unwrap(), Shown::All);
     }
     let viewer = sample.sim.viewer(Wants::default());
     let moved = viewer.newest().unwrap();
@@ -165,13 +165,47 @@ fn trails_that_are_left_out_are_said() {
         let envs = snapshot.envs.iter().cycle().take(envs).cloned().collect();
         let snapshot = Snapshot { envs, ..Snapshot::clone(&snapshot) };
         let (mut trails, mut canvas) = (Trails::default(), Canvas::new(400, 100));
-        trails.add(&snapshot);
+        trails.add(&snapshot, Shown::All);
         trails.draw(&snapshot, Shown::All, &view, &mut canvas);
         let below = (86..96).flat_map(|y| (0..400).map(move |x| (x, y)));
         below.filter(|&(x, y)| canvas.pixel(x, y) == Some(color::TRAIL)).count()
     };
     assert_eq!(written(1024 / bodies), 0, "each has its own");
     assert!(written(1024 / bodies + 1) > 100, "some forty letters");
+}
+
+/// Who looks at one environment alone sees its trails, also far behind the first 1024 bodies; and keeps them where all have some.
+#[test]
+fn an_environment_that_is_shown_alone_has_trails() {
+    let (mut sample, first) = stage(2);
+    let cube = sample.sim.rigid_object_id("cube").unwrap();
+    let view = Eye { target: [0.0, 0.0, 0.5], distance: 3.0, ..Eye::default() }.view(200, 150);
+    let mut moments = vec![first];
+    for k in 0..10 {
+        let pose = ndarray::arr2(&[[0.0, -0.5 + 0.1 * f64::from(k), 0.9, 1.0, 0.0, 0.0, 0.0]]);
+        sample.sim.rigid_object_mut(cube).write_pose(&pose, None).unwrap();
+        moments.push(sample.sim.viewer(Wants::default()).newest().unwrap());
+    }
+    let drawn = |envs: usize, kept: Shown, shown: Shown| {
+        let mut trails = Trails::default();
+        let of_many = |moment: &Snapshot| {
+            let envs = moment.envs.iter().cycle().take(envs).map(|env| EnvStage { origin: [0.0; 3], ..env.clone() });
+            Snapshot { envs: envs.collect(), ..moment.clone() }
+        };
+        moments.iter().for_each(|moment| trails.add(&of_many(moment), kept));
+        let last = of_many(moments.last().unwrap());
+        trails.add(&last, shown);
+        let mut canvas = Canvas::new(200, 150);
+        trails.draw(&last, shown, &view, &mut canvas);
+        let all = (0..150).flat_map(|y| (0..200).map(move |x| (x, y)));
+        all.filter(|&(x, y)| canvas.pixel(x, y).is_some_and(|p| p[..3] != [0; 3])).count()
+    };
+    let far = 5000;
+    let of_two = drawn(2, Shown::All, Shown::One(1));
+    assert!(of_two > 20, "{of_two}: kept from when both were shown");
+    assert_eq!(drawn(far + 1, Shown::One(far), Shown::One(far)), drawn(2, Shown::One(0), Shown::One(0)));
+    assert!(drawn(far + 1, Shown::One(far), Shown::One(far)) > 20);
+    assert_eq!(drawn(far + 1, Shown::All, Shown::One(far)), 0, "it had none: they begin now");
 }
 
 /// The panel draws what the sensor itself measures, pixel by pixel, where nothing moved since.

@@ -11,32 +11,38 @@ use std::collections::VecDeque;
 
 /// Places that are kept of each body.
 const LENGTH: usize = 120;
-/// Bodies whose trails are kept, at most: those of the first environments.
+/// Bodies whose trails are kept, at most.
 const BODIES: usize = 1024;
 /// A new place is kept where the body is this far from the last one \[m\].
 const APART: f64 = 0.01;
 
-/// Trails of bodies, kept by the viewer who draws them: of the first 1024 bodies, environment by environment. Where there are
-/// more, that is written into the picture.
+/// Trails of bodies, kept by the viewer who draws them: of the environments that are shown, and of 1024 bodies at most,
+/// environment by environment. Where there are more, that is written into the picture.
 #[derive(Debug, Default)]
 pub struct Trails {
-    /// One for each body of each environment.
+    /// One for each body, from those of environment `first_env` on.
     places: Vec<VecDeque<[f64; 3]>>,
+    first_env: usize,
+    /// Bodies of an environment.
     bodies: usize,
-    /// Bodies of all environments, those without a trail too.
-    there_are: usize,
 }
 
 impl Trails {
-    /// Takes over where bodies are now. A simulation of other bodies, or an environment that was put back, begins anew.
-    pub fn add(&mut self, snapshot: &Snapshot) {
+    /// Takes over where bodies are now. A simulation of other bodies, an environment that was put back, and one that was not
+    /// among those with trails begin anew.
+    pub fn add(&mut self, snapshot: &Snapshot, shown: Shown) {
         let bodies = snapshot.names.bodies.len();
-        self.there_are = bodies * snapshot.envs.len();
-        let count = self.there_are.min(BODIES);
-        if self.bodies != bodies || self.places.len() != count {
-            (self.bodies, self.places) = (bodies, vec![VecDeque::new(); count]);
+        let (first_env, wanted) = match shown {
+            Shown::All => (0, bodies * snapshot.envs.len()),
+            // One of those that have trails anyway: all of them keep theirs.
+            Shown::One(env) if self.bodies == bodies && self.has_all_of(env) => (self.first_env, self.places.len()),
+            Shown::One(env) => (env, if env < snapshot.envs.len() { bodies } else { 0 }),
+        };
+        let count = wanted.min(BODIES);
+        if (self.bodies, self.first_env, self.places.len()) != (bodies, first_env, count) {
+            (self.bodies, self.first_env, self.places) = (bodies, first_env, vec![VecDeque::new(); count]);
         }
-        let all = snapshot.envs.iter().flat_map(|env| &env.look.bodies);
+        let all = snapshot.envs.iter().skip(first_env).flat_map(|env| &env.look.bodies);
         for (trail, pose) in self.places.iter_mut().zip(all) {
             let now: [f64; 3] = pose.translation.vector.into();
             let distance = trail.back().map(|last| (0..3).map(|k| (now[k] - last[k]).powi(2)).sum::<f64>().sqrt());
@@ -53,6 +59,11 @@ impl Trails {
         }
     }
 
+    /// Whether every body of this environment has a trail.
+    fn has_all_of(&self, env: usize) -> bool {
+        env >= self.first_env && (env - self.first_env + 1) * self.bodies <= self.places.len()
+    }
+
     /// Forgets them.
     pub fn clear(&mut self) {
         self.places.clear();
@@ -61,7 +72,7 @@ impl Trails {
     /// Draws those of the environments that are shown, older places darker.
     pub(super) fn draw(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
         for (index, trail) in self.places.iter().enumerate() {
-            let env = index / self.bodies.max(1);
+            let env = self.first_env + index / self.bodies.max(1);
             let Some(stage) = snapshot.envs.get(env).filter(|_| shown.has(env)) else { continue };
             let points = || trail.iter().map(|place| project(view, in_overview(stage, *place)));
             for (k, pair) in points().zip(points().skip(1)).enumerate() {
@@ -73,8 +84,13 @@ impl Trails {
                 }
             }
         }
-        if self.there_are > self.places.len() {
-            let text = format!("trails of the first {} of {} bodies", self.places.len(), self.there_are);
+        let envs_drawn = match shown {
+            Shown::All => snapshot.envs.len(),
+            Shown::One(env) => usize::from(env < snapshot.envs.len()),
+        };
+        let there_are = envs_drawn * snapshot.names.bodies.len();
+        if there_are > BODIES {
+            let text = format!("trails of the first {BODIES} of {there_are} bodies");
             let [width, height] = canvas.dimensions().map(|n| i32::try_from(n).unwrap_or(i32::MAX));
             // In the middle below: the corners have other words.
             let left = (width - 6 * text.len() as i32) / 2;

@@ -176,7 +176,7 @@ impl App {
             (0..3).for_each(|k| eye.target[k] += now[k] - last[k]);
             self.follow = Some(now);
         }
-        self.trails.add(&snapshot);
+        self.trails.add(&snapshot, self.shown_now());
         self.snapshot = Some(snapshot);
         self.pull();
     }
