@@ -23,6 +23,8 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
         uid: "floater".into(),
         mjcf: Some(MjcfFile::text(FLOATER)),
         fix_base: false,
+        // From -0.1 to 1.1: the middle of its range and 0.4 of its half.
+        soft_limit_factor: 0.4,
         drive: DriveCfg { drive_type: DriveType::None, ..Default::default() },
         ..Default::default()
     };
@@ -88,8 +90,7 @@ fn episodes_end_after_their_time_and_where_joints_are_at_their_ends() {
     assert!(terms::joint_out_of_limits(&sim, "limits", robot, &["none"]).is_err());
     let mut env = task(sim, robot).termination(limits).termination(terms::time_out("late", 4)).build().unwrap();
     env.reset(None, Some(1)).unwrap();
-    env.sim_mut().robot_mut(robot).set_qpos_limits(&array![[[-0.5, 0.5]]].view(), None, None).unwrap();
-    let places = array![[0.4], [0.6], [-0.6]];
+    let places = array![[1.0], [1.2], [-0.2]];
     env.sim_mut().robot_mut(robot).write_qpos(&places, None, None).unwrap();
     assert_eq!(ends(&mut env), [None, Some("limits".into()), Some("limits".into())]);
     for _ in 0..2 {
@@ -188,8 +189,7 @@ fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
     let (sim, robot) = floater(2, false);
     let upright = terms::flat_orientation("flat", 1.0, robot);
     let fast = terms::track_lin_vel("fast", 2.0, robot, "speed", 0.5);
-    let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
-    let builder = |reward: RewardTerm, sim| {
+    let builder = |reward: RewardTerm, sim, robot| {
         task(sim, robot)
             .command(CommandTerm::new("speed", ["x", "y"], |_| [0.3, 0.0]))
             .observation(terms::base_lin_vel("v", robot))
@@ -197,7 +197,7 @@ fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
             .observation(terms::projected_gravity("down", robot))
             .reward(reward)
     };
-    let mut env = builder(upright, sim).reward(fast).build().unwrap();
+    let mut env = builder(upright, sim, robot).reward(fast).build().unwrap();
     env.reset(None, Some(1)).unwrap();
     // The second lies on its side: a quarter turn about x. Both go along the world's x and turn about it.
     let half = 0.5f64.sqrt();
@@ -223,8 +223,9 @@ fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
     near(rewards[(1, 1)], 1.0);
     near(rewards[(0, 2)], 2.0 * (-(0.2f64 / 0.5).powi(2)).exp());
     near(rewards[(1, 2)], 2.0 * (-(fall / 0.5).powi(2)).exp());
-    let (sim, _) = floater(2, false);
-    let mut env = builder(wrong, sim).build().unwrap();
+    let (sim, robot) = floater(2, false);
+    let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
+    let mut env = builder(wrong, sim, robot).build().unwrap();
     env.reset(None, Some(1)).unwrap();
     let error = env.step(&Array2::zeros((2, 1))).unwrap_err().to_string();
     assert!(error.contains("nothing") && error.contains("speed"), "{error}");

@@ -191,6 +191,7 @@ fn sensed(path: &Path) -> serde_json::Value {
         .flat_map(|k| scanner.normals().index_axis(Axis(0), 1).row(k).to_vec())
         .map(|x| f64::from(x as f32))
         .collect();
+    let infos = ["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info"));
     let scanner_pose = [scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat();
     let names: std::collections::BTreeMap<String, String> =
         sim.mask_ids().iter().map(|id| (id.id.to_string(), id.name())).collect();
@@ -217,7 +218,7 @@ fn sensed(path: &Path) -> serde_json::Value {
         "mask_ids": names,
         "bodies": "cube",
         "fish": ["equidistant", [0.02, -0.003, 0.0005, -0.0001], matrix],
-        "infos": ["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info")),
+        "infos": infos,
         "round": true,
     });
     assert!(upward > 0 && upward < 24 * 16, "{upward}");
