@@ -114,10 +114,13 @@ impl VectorEnv for Broken {
     }
 }
 
+/// Whether a finding is the one that is looked for.
+type Is = fn(&Finding) -> bool;
+
 #[test]
 fn what_is_broken_is_found_and_said() {
     assert_eq!(check(&mut Broken::new(Fault::None), 7), [], "the control");
-    let cases: [(Fault, fn(&Finding) -> bool, &str); 11] = [
+    let cases: [(Fault, Is, &str); 11] = [
         (
             Fault::RowMissing,
             |f| matches!(f, Finding::Shape { found, expected, .. } if found == &[3, 1] && expected == &[4, 1]),
