@@ -64,6 +64,12 @@ impl FileRecording {
         self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.done)), Err)
     }
 
+    /// Why what is being recorded has stopped, as soon as it is known: a full disk, say. `None` while it goes on, and where nothing
+    /// is recorded. [`end`](Self::end) says it too.
+    pub fn failure(&self, sim: &SimulationManager) -> Option<String> {
+        self.recorder(sim).and_then(|(recorder, _)| recorder.failure())
+    }
+
     fn begin_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> record::Result<()> {
         let recorder = sim.record(RecorderCfg { path: path.clone(), ..self.cfg.clone() })?;
         self.begun += 1;
@@ -132,7 +138,7 @@ impl Recording for FileRecording {
             return RecordingState { on: false, text: self.said.clone() };
         };
         let rows = recorder.so_far().packets;
-        let how = if recorder.has_failed() { "broken off".into() } else { format!("{rows} rows") };
+        let how = recorder.failure().map_or_else(|| format!("{rows} rows"), |why| format!("broken off: {why}"));
         RecordingState { on: true, text: format!("{}: {how}", name(path)) }
     }
 }

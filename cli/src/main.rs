@@ -9,6 +9,7 @@ mod model;
 mod picture;
 mod plot;
 mod progress;
+mod recover;
 mod render;
 mod replay;
 mod view;
@@ -34,6 +35,7 @@ Examples:
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
   kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
   kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
+  kinetoscope recover run.mcap                  a whole file of what a recording has left that was killed
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or broken off.
 A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
@@ -48,6 +50,7 @@ enum Command {
     Bench(bench::Args),
     Plot(plot::Args),
     Replay(replay::Args),
+    Recover(recover::Args),
 }
 
 /// How a command ended that did its work.
@@ -78,6 +81,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(args),
         Command::Plot(args) => plot::run(args),
         Command::Replay(args) => replay::run(args),
+        Command::Recover(args) => recover::run(args),
     };
     match ended {
         Ok(Ending::Done) => ExitCode::SUCCESS,

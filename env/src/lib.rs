@@ -56,6 +56,7 @@
 mod action;
 mod builder;
 mod cfg;
+mod check;
 mod command;
 mod dice;
 mod environment;
@@ -74,6 +75,7 @@ mod watch;
 pub use action::ActionTerm;
 pub use builder::EnvBuilder;
 pub use cfg::EnvCfg;
+pub use check::{Apart, Finding, check};
 pub use command::CommandTerm;
 pub use dice::{Dice, env_ids};
 pub use environment::Env;

@@ -1,5 +1,27 @@
 //! Terms that most tasks of robots have; what else a task needs is a function away.
 
+// Those that have a file of their own.
+macro_rules! terms {
+    ($($file:ident: $($name:ident),+;)*) => {$(
+        mod $file;
+        pub use $file::{$($name),+};
+    )*};
+}
+
+terms! {
+    bad_orientation: bad_orientation;
+    base_below: base_below;
+    base_motion: base_lin_vel, base_ang_vel, projected_gravity;
+    flat_orientation: flat_orientation;
+    illegal_contact: illegal_contact;
+    joint_effort_squares: joint_effort_squares;
+    joint_out_of_limits: joint_out_of_limits;
+    reset_joints_by_offset: reset_joints_by_offset;
+    reset_root_uniform: reset_root_uniform, RootRanges;
+    time_out: time_out;
+    track_lin_vel: track_lin_vel;
+}
+
 use crate::action::ActionTerm;
 use crate::error::{Result, TermResult};
 use crate::now::Now;

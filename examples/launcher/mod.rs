@@ -78,10 +78,22 @@ pub(crate) struct Launcher {
     /// Replace the file of --record, and what a recording that was killed has left
     #[arg(long, requires = "record")]
     pub(crate) overwrite: bool,
+    /// Physics steps from one recorded row of states to the next
+    #[arg(long, value_name = "STEPS", default_value_t = 1)]
+    pub(crate) record_every: u64,
+    /// The same for what has a rate of its own: NAME=STEPS, where NAME is as in the file, such as arm/link_poses=10 or camera=30
+    #[arg(long, value_name = "NAME=STEPS,...", value_delimiter = ',', value_parser = rate)]
+    pub(crate) record_rate: Vec<(String, u64)>,
     /// What records: made when somebody first asks.
     #[cfg(all(feature = "record", feature = "view"))]
     #[arg(skip)]
     files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
+}
+
+fn rate(text: &str) -> std::result::Result<(String, u64), String> {
+    let (name, steps) = text.rsplit_once('=').ok_or("write NAME=STEPS, such as camera=30")?;
+    let steps = steps.trim().parse().map_err(|_| format!("{steps:?} is no number of steps"))?;
+    Ok((name.trim().to_owned(), steps))
 }
 
 /// Where physics runs.

@@ -6,7 +6,9 @@ use kinetoscope::prelude::*;
 #[cfg(all(feature = "record", feature = "view"))]
 mod recorded {
     use super::*;
+    use kinetoscope::sim::{Moment, Observer};
     use std::sync::{Arc, Mutex, PoisonError};
+    use std::time::{Duration, Instant};
 
     impl Launcher {
         /// What `--record` and the record button of window and browser do: they record to the file of `--record`, or, where the
@@ -15,7 +17,8 @@ mod recorded {
             self.files.get_or_init(|| {
                 let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
                 let path = self.record.clone().unwrap_or_else(folder);
-                let cfg = RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) };
+                let (every, rates) = (self.record_every, self.record_rate.clone());
+                let cfg = RecorderCfg { overwrite: self.overwrite, every, rates, ..RecorderCfg::new(path) };
                 Arc::new(Mutex::new(FileRecording::new(cfg)))
             })
         }
@@ -29,10 +32,40 @@ mod recorded {
             if self.record.is_some() {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
                 begun.map_err(|error| format!("--record {error}"))?;
+                sim.add_observer(Watch { files: Arc::clone(files), looked: Instant::now(), told: false });
             }
             Ok(Recording { files: Arc::clone(files) })
         }
     }
+
+    /// Says at once, not only at the end, that a recording has stopped.
+    struct Watch {
+        files: Arc<Mutex<FileRecording>>,
+        looked: Instant,
+        told: bool,
+    }
+
+    impl Observer for Watch {
+        fn due_in(&self, _: &SimulationManager) -> u64 {
+            if self.told { u64::MAX } else { LOOK_EVERY }
+        }
+
+        fn observe(&mut self, sim: &mut SimulationManager, _: &Moment) {
+            if self.told || self.looked.elapsed() < Duration::from_secs(1) {
+                return;
+            }
+            self.looked = Instant::now();
+            // Whoever holds it is asking for the same.
+            let failure = self.files.try_lock().ok().and_then(|files| files.failure(sim));
+            if let Some(why) = &failure {
+                eprintln!("--record {why}; nothing is recorded any more");
+            }
+            self.told = failure.is_some();
+        }
+    }
+
+    /// Steps from one look at the clock to the next.
+    const LOOK_EVERY: u64 = 10;
 
     /// What `--record` or the record button has begun, if anything.
     #[derive(Debug)]

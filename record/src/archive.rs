@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+/// Kinds of events after which an environment has another state: resets, and what somebody wrote.
+const CHANGES: [f64; 2] = [0.0, 1.0];
+
 /// An archive that was read, without its pictures.
 #[derive(Debug)]
 pub(crate) struct Archive {
@@ -106,8 +109,11 @@ impl Archive {
     pub(crate) fn happened(&self, env: usize) -> Result<Vec<(f64, f64)>> {
         let of = |name: &str| Ok::<_, RecordError>(&self.array(&format!("events/{name}"))?.1);
         let (steps, envs, times) = (of("step")?, of("env")?, of("time")?);
-        let of_env = steps.iter().zip(envs).zip(times).filter(|((_, of), _)| **of == env as f64);
-        Ok(of_env.map(|((step, _), time)| (*step, *time)).collect())
+        let kinds = of("kind")?;
+        let of_env = steps.iter().zip(envs).zip(times.iter().zip(kinds));
+        // Other events leave the state as it is.
+        let of_env = of_env.filter(|((_, of), (_, kind))| **of == env as f64 && CHANGES.contains(*kind));
+        Ok(of_env.map(|((step, _), (time, _))| (*step, *time)).collect())
     }
 
     /// The environments that were reset, and those that were written to, at a step.
@@ -116,7 +122,7 @@ impl Archive {
         let (steps, envs, kinds) = (of("step")?, of("env")?, of("kind")?);
         let (mut reset, mut written) = (Vec::new(), Vec::new());
         for ((at, env), kind) in steps.iter().zip(envs).zip(kinds) {
-            if *at == step {
+            if *at == step && CHANGES.contains(kind) {
                 // Negative numbers become 0: no recorder writes them.
                 let to = if *kind == 0.0 { &mut reset } else { &mut written };
                 to.push(EnvId(*env as usize));

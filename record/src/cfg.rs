@@ -17,8 +17,14 @@ pub struct RecorderCfg {
     pub topics: Vec<Topic>,
     /// Of which environments; `None` for all.
     pub envs: Option<Vec<EnvId>>,
-    /// Physics steps from one row of states, targets and poses to the next. Sensors are recorded whenever they measure.
+    /// Physics steps from one row of states, targets and poses to the next. Sensors are recorded whenever they measure. Where
+    /// something has a rate of its own, see [`rates`](Self::rates).
     pub every: u64,
+    /// Physics steps from one row to the next of what has a rate of its own: the names that things have in files, such as
+    /// `arm/link_poses`, or `camera` for everything of it, and numbers of steps; the last one counts that names something. Of
+    /// sensors, what was measured last is recorded at these steps, if it is new. Not of datasets of episodes, whose frames have
+    /// one rate.
+    pub rates: Vec<(String, u64)>,
     /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
     /// written, the simulation waits too. All together may take 16 GiB.
     pub packets: usize,
@@ -52,6 +58,7 @@ impl Default for RecorderCfg {
             topics: vec![Topic::Everything],
             envs: None,
             every: 1,
+            rates: Vec::new(),
             packets: 8,
             scene: true,
             task: String::new(),

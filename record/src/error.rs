@@ -271,7 +271,7 @@ fn known(candidates: &[String]) -> String {
 
 fn advice(recoverable: &bool) -> &'static str {
     match recoverable {
-        true => "record::recover makes a whole file of it, or set `overwrite`",
+        true => "`kinetoscope recover` (record::recover) makes a whole file of it, or set `overwrite`",
         false => "keep what you need of it under another name, delete it, or set `overwrite`",
     }
 }

@@ -104,6 +104,11 @@ impl Format {
         (self.known().holds)(stream)
     }
 
+    /// Whether it tells what happens to environments: [`Topic::Events`](crate::Topic::Events).
+    pub fn has_events(self) -> bool {
+        matches!(self, Self::Mcap | Self::Npz)
+    }
+
     /// Whether it shows one camera in one environment.
     pub fn is_animation(self) -> bool {
         matches!(self, Self::Apng | Self::Gif | Self::Webp | Self::Mp4)

@@ -40,6 +40,7 @@ mod picture;
 mod picture_folder;
 mod read;
 mod recorder;
+mod recover;
 pub mod replay;
 #[cfg(feature = "hdf5")]
 mod robomimic;
@@ -55,9 +56,9 @@ pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
 pub use film::Film;
 pub use format::Format;
-pub use mcap_file::{Recovered, recover};
 pub use packet::{Event, EventKind};
 pub use read::{RecordedTopic, Recording, Samples, Wanted};
 pub use recorder::{Record, Recorded, Recorder, RecorderId};
+pub use recover::{Recovered, recover, recover_to};
 pub use stream::{Distortion, Element, Kind, Part, Stream};
 pub use topic::Topic;

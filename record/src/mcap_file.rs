@@ -5,36 +5,40 @@
 //! | joint states, targets | `/env_0/arm/joint_states`, `/env_0/arm/targets` | `sensor_msgs/msg/JointState` |
 //! | poses of links and objects | `/env_0/tf` | `tf2_msgs/msg/TFMessage`, frames `env_0/arm/link` |
 //! | colour | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
-//! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32SC1`, `32FC3` |
+//! | colour without light | `/env_0/camera/albedo` | the same; what it shows is opaque where the mask is not 0 |
+//! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32FC2`, `32FC3` |
+//! | masks | `/env_0/camera/mask` | `sensor_msgs/msg/Image`, `16UC1`; `32SC1` where there is an id that has no place in it |
+//! | eyes of a pair | `/env_0/pair/left/depth`, `/env_0/pair/disparity` | as cameras; frames `env_0/sensors/pair/left` |
 //! | lens and pose of a camera | `/env_0/camera/camera_info`, where ROS has words for the lens, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
-//! | IMU | `/env_0/imu` | `sensor_msgs/msg/Imu` |
-//! | ray caster | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2` |
-//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
-//! | resets, writes | `/events` | `rcl_interfaces/msg/Log` |
+//! | IMU | `/env_0/imu`, `/env_0/tf` | `sensor_msgs/msg/Imu` |
+//! | its velocities and accelerations, in its axes | `/env_0/imu/velocity`, `/env_0/imu/acceleration` | `geometry_msgs/msg/TwistStamped`, `AccelStamped` |
+//! | ray caster, what it hit | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2`: x, y, z, distance, normal, mask id |
+//! | its distances, of all rays | `/env_0/scanner/distances` | `std_msgs/msg/Float64MultiArray`; infinite for a miss |
+//! | its body | `/env_0/tf` | frame `env_0/sensors/scanner` |
+//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray`; metadata `rows` and `filters` of the channel name bodies |
+//! | resets, writes, divergence, notes | `/events` | `rcl_interfaces/msg/Log` |
+//! | names of mask ids | metadata `mask_ids`, `mask_classes` | from the number to the thing and its class |
 //! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
 //! | the scene | attachment `scene.zip` | MJCF with meshes: see `scene_file.rs` |
 //!
 //! Messages have the time of capture, on the clock of the recording (`clock.rs`): forces, efforts and accelerations of sensors
 //! that of the beginning of the step. The message of joint states of a robot has one time, that of its positions; its efforts
 //! are those of the step that led there.
-//!
-//! Of ray casters, points that hit something are written; NumPy archives have the distances and the misses too.
 
-use crate::error::{RecordError, Result};
-use crate::file::{PartFile, Storage, lock_left, part_of, remove};
-use crate::packet::{Block, Event, Packet};
+use crate::file::{PartFile, Storage};
+use crate::packet::{Block, Event, Packet, Values};
 use crate::picture::Png;
-use crate::ros::{self, Cdr, Schema, Stamp};
+use crate::ros::{self, Cdr, Hits, Schema, Stamp};
 use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Stream};
 use crate::writer::{Sink, Written};
-use mcap::records::{AttachmentHeader, MessageHeader, Record};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use ndarray::Array2;
+use sim::MaskId;
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Read, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::PathBuf;
 
 /// Messages that are compressed together \[bytes\].
 const CHUNK: u64 = 1 << 20;
@@ -65,7 +69,13 @@ struct Channels {
 }
 
 impl Channels {
-    fn add(&mut self, writer: &mut Writer<impl Write + Seek>, topic: String, schema: Schema) -> io::Result<u16> {
+    fn add(
+        &mut self,
+        writer: &mut Writer<impl Write + Seek>,
+        topic: String,
+        schema: Schema,
+        about: &BTreeMap<String, String>,
+    ) -> io::Result<u16> {
         if let Some(id) = self.known.get(&topic) {
             return Ok(*id);
         }
@@ -78,7 +88,7 @@ impl Channels {
                 id
             }
         };
-        let id = writer.add_channel(schema_id, &topic, ENCODING, &BTreeMap::new()).map_err(io_error)?;
+        let id = writer.add_channel(schema_id, &topic, ENCODING, about).map_err(io_error)?;
         self.known.insert(topic, id);
         Ok(id)
     }
@@ -97,7 +107,7 @@ impl Channels {
     }
 }
 
-fn io_error(error: McapError) -> io::Error {
+pub(crate) fn io_error(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         other => io::Error::other(other),
@@ -113,7 +123,7 @@ fn nanos(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-fn options() -> WriteOptions {
+pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
         .chunk_size(Some(CHUNK))
@@ -131,6 +141,7 @@ impl McapFile {
         storage: Box<dyn Storage>,
         streams: &[Stream],
         origins: &Array2<f64>,
+        masks: &[MaskId],
         start: f64,
         scene: Option<&[u8]>,
     ) -> io::Result<Self> {
@@ -141,21 +152,28 @@ impl McapFile {
             let at = nanos(start);
             writer.attach(&Attachment { log_time: at, create_time: at, name, media_type, data }).map_err(io_error)?;
         }
+        let class = |id: &MaskId| id.class.clone();
+        for (name, of) in [("mask_ids", MaskId::name as fn(&MaskId) -> String), ("mask_classes", class)] {
+            let metadata = masks.iter().map(|id| (id.id.to_string(), of(id))).collect();
+            writer.write_metadata(&Metadata { name: name.into(), metadata }).map_err(io_error)?;
+        }
         let mut channels = Channels::default();
         let mut rows = Vec::new();
+        let nothing = BTreeMap::new();
         for stream in streams {
+            let about = about(stream);
             let mut of_stream = Vec::new();
             for env in &stream.env_ids {
                 let mut of_row = Vec::new();
                 for (topic, schema) in topics(stream) {
-                    of_row.push(channels.add(&mut writer, format!("/env_{env}/{topic}"), schema)?);
+                    of_row.push(channels.add(&mut writer, format!("/env_{env}/{topic}"), schema, &about)?);
                 }
                 of_stream.push(of_row);
             }
             rows.push(of_stream);
         }
-        let events = channels.add(&mut writer, "/events".into(), Schema::Log)?;
-        let places = channels.add(&mut writer, "/tf_static".into(), Schema::TfMessage)?;
+        let events = channels.add(&mut writer, "/events".into(), Schema::Log, &nothing)?;
+        let places = channels.add(&mut writer, "/tf_static".into(), Schema::TfMessage, &nothing)?;
         let mut cdr = Cdr::default();
         cdr.begin();
         let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
@@ -176,8 +194,11 @@ impl McapFile {
         for (env, time) in event.env_ids.iter().zip(&event.times) {
             let (kind, step) = (event.kind.name(), event.step);
             self.cdr.begin();
-            let message = format!("{kind} at step {step}, simulation time now {time} s");
-            ros::log(&mut self.cdr, at, &format!("env_{env}"), &message);
+            let mut message = format!("{kind} at step {step}, simulation time now {time} s");
+            if !event.text.is_empty() {
+                message = format!("{message}: {}", event.text);
+            }
+            ros::log(&mut self.cdr, at, event.kind.is_bad(), &format!("env_{env}"), &message);
             self.channels.write(writer, self.events, at, self.cdr.bytes())?;
         }
         Ok(())
@@ -208,10 +229,16 @@ impl McapFile {
                     ros::compressed_image(cdr, stamp, self.png.rgb(pixels, [*width, *height])?);
                 } else {
                     let components = stream.parts.first().map_or(1, |part| part.shape.get(2).copied().unwrap_or(1));
-                    let kind = if stream.element == Element::I32 { "32SC" } else { "32FC" };
-                    let shape = (*height, *width, 4 * components * *width);
-                    let put = |bytes: &mut Vec<u8>| block.values.put(range, bytes);
-                    ros::image(cdr, stamp, &format!("{kind}{components}"), shape, put);
+                    if let Some(ids) = small(&block.values, range.clone()) {
+                        let put =
+                            |bytes: &mut Vec<u8>| ids.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
+                        ros::image(cdr, stamp, "16UC1", (*height, *width, 2 * *width), put);
+                    } else {
+                        let kind = if stream.element == Element::I32 { "32SC" } else { "32FC" };
+                        let shape = (*height, *width, 4 * components * *width);
+                        let put = |bytes: &mut Vec<u8>| block.values.put(range, bytes);
+                        ros::image(cdr, stamp, &format!("{kind}{components}"), shape, put);
+                    }
                 }
             }
             Kind::Lens { camera, height, width, distortion } => {
@@ -226,25 +253,35 @@ impl McapFile {
                 ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k, distortion);
             }
             Kind::Imu => {
-                let part = |name: &str| {
-                    let before = stream.parts.iter().take_while(|part| part.name != name);
-                    let first: usize = before.map(|part| part.width()).sum();
-                    let width = stream.parts.iter().find(|part| part.name == name).map_or(0, |part| part.width());
-                    states.get(first..first + width).unwrap_or(&[])
-                };
+                let part = |name| stream.part(states, name);
                 let pose = [part("pos_w"), part("quat_w")].concat();
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(&stream.name), &pose);
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(&stream.name);
                 let stamp = Stamp { nanos: at, frame: &frame };
+                ros::motion(cdr, stamp, part("lin_vel_b"), part("ang_vel_b"));
+                self.channels.write(writer, channels[2], at, cdr.bytes())?;
+                cdr.begin();
+                ros::motion(cdr, stamp, part("lin_acc_b"), part("ang_acc_b"));
+                self.channels.write(writer, channels[3], at, cdr.bytes())?;
+                cdr.begin();
                 ros::imu(cdr, stamp, part("quat_w"), part("ang_vel_b"), part("lin_acc_b"));
             }
             Kind::Points => {
-                let points = stream.parts.first().map_or(0, |part| part.width());
-                ros::points(cdr, in_env, states.get(..points).unwrap_or(&[]));
+                let part = |name| stream.part(states, name);
+                let pose = [part("pos_w"), part("quat_w")].concat();
+                ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(&stream.name), &pose);
+                self.channels.write(writer, channels[1], at, cdr.bytes())?;
+                cdr.begin();
+                let distances = part("distances");
+                ros::numbers(cdr, "distances", &[distances.len()], distances);
+                self.channels.write(writer, channels[2], at, cdr.bytes())?;
+                cdr.begin();
+                let hits = Hits { points: part("hits"), distances, normals: part("normals"), ids: part("ids") };
+                ros::points(cdr, in_env, hits);
             }
-            Kind::Numbers => {
+            Kind::Numbers { .. } => {
                 let mut rest = states;
                 for (part, channel) in stream.parts.iter().zip(&channels) {
                     let (mine, after) = rest.split_at(part.width().min(rest.len()));
@@ -258,6 +295,19 @@ impl McapFile {
         }
         Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?)
     }
+}
+
+/// Mask ids of two bytes, which viewers show; `None` for other numbers, and where an id is larger.
+fn small(values: &Values, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
+    let Values::I32(ids) = values else { return None };
+    ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
+}
+
+/// What is said of the channels of a stream: names, with commas between them.
+fn about(stream: &Stream) -> BTreeMap<String, String> {
+    let Kind::Numbers { rows, filters } = &stream.kind else { return BTreeMap::new() };
+    let lists = [("rows", rows), ("filters", filters)].into_iter().filter(|(_, names)| !names.is_empty());
+    lists.map(|(what, names)| (what.to_string(), names.join(","))).collect()
 }
 
 /// A topic that streams would share whose messages are of different types: one of them would be read as the other.
@@ -283,9 +333,21 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
         Kind::Picture { .. } => vec![(name, Schema::Image)],
         Kind::Lens { distortion: None, .. } => vec![transforms()],
         Kind::Lens { camera, .. } => vec![(format!("{camera}/camera_info"), Schema::CameraInfo), transforms()],
-        Kind::Imu => vec![(name, Schema::Imu), transforms()],
-        Kind::Points => vec![(format!("{name}/points"), Schema::PointCloud2)],
-        Kind::Numbers => {
+        Kind::Imu => {
+            let (velocity, acceleration) = (format!("{name}/velocity"), format!("{name}/acceleration"));
+            vec![
+                (name, Schema::Imu),
+                transforms(),
+                (velocity, Schema::TwistStamped),
+                (acceleration, Schema::AccelStamped),
+            ]
+        }
+        Kind::Points => vec![
+            (format!("{name}/points"), Schema::PointCloud2),
+            transforms(),
+            (format!("{name}/distances"), Schema::Float64MultiArray),
+        ],
+        Kind::Numbers { .. } => {
             let topic = |part: &crate::stream::Part| (format!("{name}/{}", part.name), Schema::Float64MultiArray);
             stream.parts.iter().map(topic).collect()
         }
@@ -320,112 +382,4 @@ impl Sink for McapFile {
     fn kept(&self) -> Option<PathBuf> {
         self.part.kept()
     }
-}
-
-/// How many messages stand in whole and undamaged chunks at the beginning of a file, what is attached there, and what is wrong with the next chunk, if
-/// that is more than a torn end. Chunks are compared with their checksums before anything in them is believed: a length that is
-/// no length would be asked for as memory.
-fn sound_messages(bytes: &[u8]) -> (usize, Vec<Attachment<'static>>, Option<String>) {
-    let options = LinearReaderOptions::default()
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(bytes.len().max(LARGEST_CHUNK));
-    let (mut reader, mut rest, mut messages) = (LinearReader::new_with_options(options), bytes, 0);
-    let (mut attachments, mut lost) = (Vec::new(), None);
-    while let Some(event) = reader.next_event() {
-        match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let (given, left) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(given.len())[..given.len()].copy_from_slice(given);
-                reader.notify_read(given.len());
-                rest = left;
-            }
-            Ok(LinearReadEvent::Record { opcode, data }) => {
-                messages += usize::from(opcode == mcap::records::op::MESSAGE);
-                if opcode != mcap::records::op::ATTACHMENT {
-                    continue;
-                }
-                match mcap::parse_record(opcode, data) {
-                    Ok(Record::Attachment { header, data, .. }) => {
-                        let AttachmentHeader { log_time, create_time, name, media_type } = header;
-                        let data = data.into_owned().into();
-                        attachments.push(Attachment { log_time, create_time, name, media_type, data });
-                    }
-                    Ok(_) => {}
-                    // The messages may be whole; that something is lost is said.
-                    Err(error) => lost = Some(error.to_string()),
-                }
-            }
-            // Where the process was killed.
-            Err(McapError::UnexpectedEof) => break,
-            Err(error) => return (messages, attachments, Some(error.to_string())),
-        }
-    }
-    (messages, attachments, lost)
-}
-
-/// Chunks are smaller by far, before they are compressed \[bytes\].
-const LARGEST_CHUNK: usize = 1 << 30;
-
-/// What was made of a recording that was killed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Recovered {
-    /// Messages in the file.
-    pub messages: u64,
-    /// What stands in the way of the rest, where that is more than a last chunk that was not written whole: then what was left
-    /// is still there, for other tools.
-    pub damage: Option<String>,
-}
-
-/// Makes a whole file of what a recording has left that was killed: `path` is the name that it was to have. The scene, and
-/// the messages of all chunks from the beginning that are whole, are in it, and what was left is taken away, unless something in it is damaged.
-///
-/// # Errors
-/// There is no such recording, somebody is writing it, there is a file called `path` already, or no message can be read.
-/// What was left is as it was then.
-pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
-    let path = path.as_ref();
-    let left = part_of(path);
-    let missing = || RecordError::file(&left, io::ErrorKind::NotFound.into());
-    let mut locked = lock_left(&left)?.ok_or_else(missing)?;
-    let mut bytes = Vec::new();
-    locked.read_to_end(&mut bytes).map_err(|error| RecordError::file(&left, error))?;
-    let nothing =
-        |why: String| RecordError::Malformed { path: left.clone(), what: format!("nothing of it can be read: {why}") };
-    if !bytes.starts_with(mcap::MAGIC) {
-        return Err(nothing("this is no MCAP file".into()));
-    }
-    // What an earlier attempt left that was killed is of no use.
-    let on_the_way = left.with_extension("recovered");
-    remove(&on_the_way)?;
-    let (mut part, file) = PartFile::create_as(path, on_the_way, false)?;
-    let failed = |error: McapError| RecordError::file(path, io_error(error));
-    let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
-    let (sound, attachments, mut damage) = sound_messages(&bytes);
-    for attachment in &attachments {
-        writer.attach(attachment).map_err(failed)?;
-    }
-    let messages = mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into());
-    let mut recovered = Recovered { messages: 0, damage: None };
-    for message in messages.map_err(|error| nothing(error.to_string()))?.take(sound) {
-        match message {
-            Ok(message) => writer.write(&message).map_err(failed)?,
-            Err(error) => {
-                damage = Some(error.to_string());
-                break;
-            }
-        }
-        recovered.messages += 1;
-    }
-    recovered.damage = damage;
-    if recovered.messages == 0 {
-        return Err(nothing(recovered.damage.unwrap_or_else(|| "there is no whole message in it".into())));
-    }
-    writer.finish().map_err(failed)?;
-    writer.into_inner().flush().map_err(|error| RecordError::file(path, error))?;
-    part.commit().map_err(|error| RecordError::file(path, error))?;
-    if recovered.damage.is_none() {
-        remove(&left)?;
-    }
-    Ok(recovered)
 }

@@ -7,8 +7,9 @@
 //! | `arm/joint_states/time` | (T, N) | simulation time of capture \[s\] |
 //! | `joints/force_time` | (T, N) | that of efforts and forces, where a sensor measures them at another instant than the rest \[s\] |
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
-//! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written |
-//! | `recording.json` | | time step, environments, names of joints and frames, how lenses distort |
+//! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written, 2: diverged, 3: note |
+//! | `notes.jsonl` | | a line of JSON for each event with a text: `event` is its row |
+//! | `recording.json` | | time step, environments, names of joints, frames and bodies, how lenses distort, what mask ids are |
 //! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
@@ -20,13 +21,13 @@
 
 use crate::file::{PartFile, Storage, folder_of};
 use crate::npy;
-use crate::packet::{Block, Event, EventKind, Packet};
+use crate::packet::{Block, Event, Packet};
 use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Part, Stream};
 use crate::writer::{Fault, Sink, Written};
 use crate::zip::Archive;
 use serde_json::{Value, json};
-use sim::Snapshot;
+use sim::{MaskId, Snapshot};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -34,6 +35,8 @@ use std::path::{Path, PathBuf};
 
 /// The member that says what the others are.
 pub(crate) const ABOUT: &str = "recording.json";
+/// The member with the texts of events.
+const NOTES: &str = "notes.jsonl";
 /// The member with the state at the beginning.
 pub(crate) const START: &str = "start.snapshot";
 
@@ -47,6 +50,8 @@ pub(crate) struct NpzFile {
     spools: Vec<Spool>,
     /// The events, one record each: step, environment, kind, time.
     events: Spool,
+    /// Their texts, a line of JSON each.
+    notes: BufWriter<File>,
 }
 
 /// The rows of a stream, one record each: the step, a time or two for each environment, then the quantities, each of all
@@ -70,6 +75,7 @@ impl NpzFile {
         part: PartFile,
         storage: Box<dyn Storage>,
         streams: &[Stream],
+        masks: &[MaskId],
         dt: f64,
         start: &Snapshot,
         scene: Option<&[u8]>,
@@ -82,15 +88,16 @@ impl NpzFile {
         start.save(&path).map_err(io::Error::other)?;
         let (start, events) = (std::fs::read(path)?, Spool::create(folder)?);
         let scene = scene.map(<[u8]>::to_vec);
-        Ok(Self { part, storage: Some(storage), about: about(streams, dt), start, scene, spools, events })
+        let (about, notes) = (about(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
+        Ok(Self { part, storage: Some(storage), about, start, scene, spools, events, notes })
     }
 }
 
-fn about(streams: &[Stream], dt: f64) -> Value {
+fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     let stream = |stream: &Stream| {
-        let names = match &stream.kind {
-            Kind::Joints { names } => Some(names),
-            Kind::Poses { frames } => Some(frames),
+        let names = Some(stream.kind.names()).filter(|names| !names.is_empty());
+        let filters = match &stream.kind {
+            Kind::Numbers { filters, .. } if !filters.is_empty() => Some(filters),
             _ => None,
         };
         let distortion = match &stream.kind {
@@ -105,13 +112,16 @@ fn about(streams: &[Stream], dt: f64) -> Value {
             "env_ids": stream.env_ids,
             "arrays": parts.collect::<Vec<_>>(),
             "columns": names,
+            "filters": filters,
             "distortion": distortion,
         })
     };
+    let mask = |mask: &MaskId| json!({ "id": mask.id, "name": mask.name(), "class": mask.class });
     json!({
         "recording": 1,
         "physics_dt": dt,
         "mujoco_version": sim::mj::version_string(),
+        "mask_ids": masks.iter().map(mask).collect::<Vec<_>>(),
         "streams": streams.iter().map(stream).collect::<Vec<_>>(),
     })
 }
@@ -140,7 +150,7 @@ impl Spool {
             let env = i32::try_from(*env).unwrap_or(i32::MAX);
             self.file.write_all(&(event.step as f64).to_le_bytes())?;
             self.file.write_all(&env.to_le_bytes())?;
-            self.file.write_all(&[u8::from(event.kind == EventKind::Written)])?;
+            self.file.write_all(&[event.kind.number()])?;
             self.file.write_all(&time.to_le_bytes())?;
             self.rows += 1;
         }
@@ -216,6 +226,10 @@ impl Element {
 impl Sink for NpzFile {
     fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
         if let Some(event) = &packet.event {
+            for (k, env) in event.env_ids.iter().enumerate().filter(|_| !event.text.is_empty()) {
+                let line = json!({ "event": self.events.rows + k, "env": env, "step": event.step, "text": event.text });
+                writeln!(self.notes, "{line}")?;
+            }
             self.events.write_event(event)?;
         }
         for ((stream, block), spool) in streams.iter().zip(&packet.blocks).zip(&mut self.spools) {
@@ -243,6 +257,10 @@ impl Sink for NpzFile {
         if let Some(scene) = &self.scene {
             archive.add(SCENE, b"", &mut &scene[..])?;
         }
+        self.notes.flush()?;
+        let notes = self.notes.get_mut();
+        notes.seek(SeekFrom::Start(0))?;
+        archive.add(NOTES, b"", notes)?;
         let record = EVENT[3].2.end;
         for (name, element, range) in EVENT {
             let head = header(element, &[self.events.rows])?;

@@ -15,6 +15,8 @@ pub struct Event {
     pub step: u64,
     /// The time of the recording \[s\].
     pub at: f64,
+    /// What there is to say of it: of a note its text, of a divergence the reason; else empty.
+    pub text: String,
 }
 
 /// What happened.
@@ -24,6 +26,10 @@ pub enum EventKind {
     Reset,
     /// Somebody wrote to the state of environments.
     Written,
+    /// A step could not be done in environments: they stand still in their last good state.
+    Diverged,
+    /// Somebody had something to say: see [`Record::note`](crate::Record::note).
+    Note,
 }
 
 impl EventKind {
@@ -32,7 +38,24 @@ impl EventKind {
         match self {
             Self::Reset => "reset",
             Self::Written => "written",
+            Self::Diverged => "diverged",
+            Self::Note => "note",
         }
+    }
+
+    /// Its number in NumPy archives.
+    pub fn number(self) -> u8 {
+        match self {
+            Self::Reset => 0,
+            Self::Written => 1,
+            Self::Diverged => 2,
+            Self::Note => 3,
+        }
+    }
+
+    /// Whether it is told as a warning.
+    pub(crate) fn is_bad(self) -> bool {
+        self == Self::Diverged
     }
 }
 

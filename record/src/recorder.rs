@@ -20,9 +20,9 @@ use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager};
 use std::fmt;
 use std::fs::File;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -40,6 +40,16 @@ pub trait Record {
     /// A name that is not known, a file that exists or cannot be written, a format that has no place for what is asked for.
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId>;
 
+    /// Writes what somebody has to say of an environment, or of all that are recorded, into the recording, at the step that was done
+    /// last: [`Topic::Events`] has it. Of an environment that is not recorded nothing is written.
+    ///
+    /// # Errors
+    /// There is no such environment, the format has no place for events, or the recorder was removed.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    fn note(&mut self, recorder: RecorderId, env: Option<EnvId>, text: &str) -> Result<()>;
+
     /// Ends a recording: the file is whole, and has its name, when this returns.
     ///
     /// # Errors
@@ -55,6 +65,15 @@ impl Record for SimulationManager {
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId> {
         let recorder = Recorder::start(self, cfg, &mut |file| Box::new(file))?;
         Ok(self.add_observer(recorder))
+    }
+
+    #[track_caller]
+    fn note(&mut self, recorder: RecorderId, env: Option<EnvId>, text: &str) -> Result<()> {
+        if let Some(EnvId(env)) = env.filter(|env| env.0 >= self.num_envs()) {
+            return Err(RecordError::Env { env, count: self.num_envs() });
+        }
+        let (steps, times) = (self.steps(), self.time());
+        self.observer_mut(recorder)?.note(steps, &times, env, text)
     }
 
     #[track_caller]
@@ -112,8 +131,13 @@ pub struct Recorder {
     spare: Vec<Packet>,
     thread: Option<JoinHandle<Result<u64, Failure>>>,
     failed: Arc<AtomicBool>,
+    /// Why the thread could not go on.
+    why: Arc<OnceLock<String>>,
     failure: Option<RecordError>,
     recorded: Recorded,
+    format: Format,
+    /// Environments that are recorded and were said to have diverged.
+    diverged: Vec<usize>,
 }
 
 impl fmt::Debug for Recorder {
@@ -154,13 +178,14 @@ impl Recorder {
         };
         let left_out = [left_out, not_in_it].concat();
         let sink = open(sim, &cfg, format, &streams, scene.as_deref(), wrap)?;
-        Self::begin(sim, cfg, sources, left_out, sink)
+        Self::begin(sim, cfg, format, sources, left_out, sink)
     }
 
     /// Begins to record into `sink`.
     fn begin(
         sim: &SimulationManager,
         cfg: RecorderCfg,
+        format: Format,
         sources: Vec<Source>,
         left_out: Vec<String>,
         sink: Box<dyn Sink>,
@@ -173,8 +198,9 @@ impl Recorder {
             let _ = empty.send(Packet::new(&streams));
         }
         let failed = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&failed);
-        let work = move || writer::run(sink, &streams, &filled, &empty, &flag);
+        let why = Arc::new(OnceLock::new());
+        let (flag, reason) = (Arc::clone(&failed), Arc::clone(&why));
+        let work = move || writer::run(sink, &streams, &filled, &empty, &flag, &reason);
         let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
         let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
         let clock = Clock::new(sim.cfg().physics_dt, sim.steps(), &sim.time());
@@ -188,8 +214,11 @@ impl Recorder {
             spare: Vec::new(),
             thread: Some(thread),
             failed,
+            why,
             failure: None,
             recorded,
+            format,
+            diverged: Vec::new(),
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
         recorder.take(sim, None, &all);
@@ -209,7 +238,19 @@ impl Recorder {
         &self.recorded
     }
 
-    /// Whether the recording has stopped because something went wrong; [`finish`](Self::finish) says what.
+    /// Why the recording has stopped, as soon as it is known; `None` while it goes on.
+    pub fn failure(&self) -> Option<String> {
+        if let Some(failure) = &self.failure {
+            return Some(failure.to_string());
+        }
+        let path = self.cfg.path.display();
+        match self.why.get() {
+            Some(why) => Some(format!("{path}: {why}")),
+            None => self.has_failed().then(|| format!("{path}: the thread that writes has ended")),
+        }
+    }
+
+    /// Whether the recording has stopped because something went wrong; [`failure`](Self::failure) says what.
     pub fn has_failed(&self) -> bool {
         // The thread ends when the recorder does, or panics.
         let ended = self.thread.as_ref().is_none_or(JoinHandle::is_finished);
@@ -279,7 +320,7 @@ impl Recorder {
         packet.event = event;
         for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
             let due = source.due_at <= steps;
-            if source.sensor.is_none() && !due && renewed.is_empty() {
+            if !due && (source.sensor.is_some() || renewed.is_empty()) {
                 continue;
             }
             if let Err(error) = source.read(sim, &times, renewed, due, block) {
@@ -288,8 +329,8 @@ impl Recorder {
                 self.spare.push(packet);
                 return self.fail(error);
             }
-            if source.sensor.is_none() && due {
-                source.due_at = steps.saturating_add(self.cfg.every);
+            if let Some(every) = source.every.filter(|_| due) {
+                source.due_at = steps.saturating_add(every);
             }
             let (clock, envs) = (&self.clock, &source.stream.env_ids);
             let stamps = |times: &[f64], to: &mut Vec<f64>| {
@@ -335,16 +376,65 @@ impl Recorder {
         let (steps, times) = (sim.steps(), sim.time());
         self.clock.restarted(&envs, &times, steps);
         self.recount(sim, &envs);
-        let of: Vec<usize> = match &self.cfg.envs {
-            Some(wanted) => envs.into_iter().filter(|env| wanted.contains(&EnvId(*env))).collect(),
-            None => envs,
-        };
+        let of: Vec<usize> = envs.into_iter().filter(|env| self.records(*env)).collect();
         if of.is_empty() {
             return;
         }
         let times = of.iter().map(|env| times[*env]).collect();
         let (step, at) = (self.clock.step(steps), self.clock.now(steps));
-        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at }), &of);
+        let text = String::new();
+        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of);
+    }
+
+    fn records(&self, env: usize) -> bool {
+        self.cfg.envs.as_ref().is_none_or(|wanted| wanted.contains(&EnvId(env)))
+    }
+
+    /// Says which environments have diverged since it was asked last.
+    fn look_for_divergence(&mut self, sim: &SimulationManager) {
+        if !self.format.has_events() {
+            return;
+        }
+        let diverged: Vec<(usize, String)> =
+            sim.diverged().into_iter().map(|(env, why)| (env.0, why)).filter(|(env, _)| self.records(*env)).collect();
+        if !diverged.is_empty() {
+            let (steps, times) = (sim.steps(), sim.time());
+            let known = std::mem::take(&mut self.diverged);
+            for (env, why) in diverged.iter().filter(|(env, _)| !known.contains(env)) {
+                self.tell(EventKind::Diverged, vec![*env], why.clone(), steps, &times);
+            }
+        }
+        self.diverged = diverged.into_iter().map(|(env, _)| env).collect();
+    }
+
+    /// Writes what somebody has to say.
+    fn note(&mut self, steps: u64, times: &[f64], env: Option<EnvId>, text: &str) -> Result<()> {
+        if !self.format.has_events() {
+            let (path, topic) = (self.cfg.path.clone(), format!("{:?}", Topic::Events));
+            return Err(RecordError::NoPlace { path, format: self.format, topic });
+        }
+        let of = |one: &usize| env.is_none_or(|env| env.0 == *one) && self.records(*one);
+        let envs: Vec<usize> = (0..times.len()).filter(of).collect();
+        if !envs.is_empty() {
+            self.tell(EventKind::Note, envs, text.into(), steps, times);
+        }
+        Ok(())
+    }
+
+    /// Records something that happened and changed no state.
+    fn tell(&mut self, kind: EventKind, env_ids: Vec<usize>, text: String, steps: u64, times: &[f64]) {
+        if self.has_failed() {
+            return;
+        }
+        let Some(mut packet) = self.packet() else { return };
+        let times = env_ids.iter().map(|env| times[*env]).collect();
+        let (step, at) = (self.clock.step(steps), self.clock.now(steps));
+        packet.step = step;
+        packet.event = Some(Event { kind, env_ids, times, step, at, text });
+        self.recorded.packets += 1;
+        if let Some(full) = &self.full {
+            let _ = full.send(packet);
+        }
     }
 
     fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) {
@@ -392,16 +482,20 @@ impl Observer for Recorder {
             return u64::MAX;
         }
         let now = sim.steps();
-        let wait = |source: &Source| match &source.sensor {
-            Some(uid) => sim.sensor_due_in(uid).unwrap_or(u64::MAX),
-            None => source.due_at.saturating_sub(now).max(1),
+        let wait = |source: &Source| match (&source.sensor, source.every) {
+            (Some(uid), None) => sim.sensor_due_in(uid).unwrap_or(u64::MAX),
+            _ => source.due_at.saturating_sub(now).max(1),
         };
-        self.sources.iter().map(wait).min().unwrap_or(u64::MAX)
+        // Where nothing but events is recorded, it looks for them as often as it would have recorded.
+        self.sources.iter().map(wait).min().unwrap_or(self.cfg.every)
     }
 
     fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
         match moment {
-            Moment::Stepped => self.take(sim, None, &[]),
+            Moment::Stepped => {
+                self.look_for_divergence(sim);
+                self.take(sim, None, &[]);
+            }
             Moment::Reset { env_ids } => self.happened(sim, EventKind::Reset, env_ids),
             Moment::Written { env_ids } => self.happened(sim, EventKind::Written, env_ids),
             Moment::Compiled => self.compiled(sim),
@@ -436,6 +530,10 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
             Topic::MjcfState(uid) => vec![Source::mjcf_state(sim, uid, &envs)?],
             Topic::Sensor(uid) => Source::sensor(sim, uid, &envs)?,
             Topic::Channel { sensor, channel } => vec![Source::picture(sim, sensor, channel, &envs)?],
+            Topic::Events if !format.has_events() => {
+                return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
+            }
+            Topic::Events => Vec::new(),
         };
         let any = !found.is_empty();
         let (held, without): (Vec<_>, Vec<_>) = found.into_iter().partition(|source| format.holds(&source.stream));
@@ -474,7 +572,8 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
         });
         left_out.extend(unspoken);
     }
-    if sources.is_empty() {
+    set_rates(&mut sources, cfg, format)?;
+    if sources.is_empty() && !cfg.topics.contains(&Topic::Events) {
         return Err(RecordError::Nothing { path: cfg.path.clone(), format });
     }
     let pictures: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
@@ -490,6 +589,36 @@ fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result
         animation::check(&cfg.path, format, size)?;
     }
     Ok((sources, left_out))
+}
+
+/// Says of everything how many steps are between its rows.
+fn set_rates(sources: &mut [Source], cfg: &RecorderCfg, format: Format) -> Result<()> {
+    for source in sources.iter_mut().filter(|source| source.sensor.is_none()) {
+        source.every = Some(cfg.every);
+    }
+    for (name, every) in &cfg.rates {
+        if *every == 0 {
+            return Err(RecordError::OutOfRange { field: "a number of steps in rates", value: 0, least: 1 });
+        }
+        if matches!(format, Format::LeRobot | Format::Hdf5) {
+            let topic = format!("a rate of its own for {name:?}: frames have one, `every`");
+            return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic });
+        }
+        let is_of = |source: &&mut Source| {
+            let rest = source.stream.name.strip_prefix(name.as_str());
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+        };
+        let mut found = false;
+        for source in sources.iter_mut().filter(is_of) {
+            source.every = Some(*every);
+            found = true;
+        }
+        if !found {
+            let candidates = sources.iter().map(|source| source.stream.name.clone()).collect();
+            return Err(RecordError::UnknownName { what: "recorded topic", name: name.clone(), candidates });
+        }
+    }
+    Ok(())
 }
 
 /// Everything that there is and the format has a place for.
@@ -561,11 +690,19 @@ fn open(
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Mcap => {
             let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
-            let file = McapFile::create(part, storage, streams, &sim.env_origins(), start, scene);
+            let file = McapFile::create(part, storage, streams, &sim.env_origins(), sim.mask_ids(), start, scene);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Npz => {
-            let file = NpzFile::create(part, storage, streams, sim.cfg().physics_dt, &sim.snapshot(None)?, scene);
+            let file = NpzFile::create(
+                part,
+                storage,
+                streams,
+                sim.mask_ids(),
+                sim.cfg().physics_dt,
+                &sim.snapshot(None)?,
+                scene,
+            );
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         _ => {

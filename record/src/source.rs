@@ -1,14 +1,15 @@
 //! Where the numbers of a stream come from.
 
+mod camera;
+
 use crate::error::{RecordError, Result};
 use crate::packet::{Block, Values};
-use crate::stream::{Distortion, Element, Kind, Part, Stream};
+use crate::stream::{Element, Kind, Part, Stream};
+use camera::{DISPARITY, Eye, timed};
 use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
-use sensors::camera::channel::{Color, Depth, Distance, Mask, Normal, Position, ShadingNormal};
-use sensors::camera::{CameraConvention, Channel, DistortionModel};
 use sensors::{
-    ActuatorState, Camera, ContactSensor, Imu, JointState, JointWrench, MujocoSensor, RayCaster, RayCasterCamera,
-    Sampled, Sensor,
+    ActuatorState, ContactSensor, FrameTransformer, Imu, JointState, JointWrench, MujocoSensor, RayCaster, Sampled,
+    Sensor, StereoCamera,
 };
 use sim::{MjcfId, ObjectId, RobotId, SimulationManager};
 use std::any::Any;
@@ -28,6 +29,8 @@ pub(crate) struct Source {
     last: Vec<f64>,
     /// Steps of the simulation at which it is due.
     pub(crate) due_at: u64,
+    /// Steps from one row to the next; `None` for a sensor that is recorded whenever it measures.
+    pub(crate) every: Option<u64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -37,34 +40,17 @@ enum What {
     LinkPoses(RobotId),
     ObjectPose(ObjectId),
     MjcfState(MjcfId),
-    Picture { uid: String, channel: &'static str },
-    Lens(String),
+    Picture { uid: String, eye: Eye, channel: &'static str },
+    Lens(String, Eye),
     Numbers(String),
     Points(String),
 }
-
-/// Channels that are pictures with a calibration, as the two kinds of camera have them.
-const RAY_CAMERA: [(&str, Element, usize); 4] = [
-    (Depth::NAME, Element::F32, 1),
-    (Distance::NAME, Element::F32, 1),
-    (Normal::NAME, Element::F32, 3),
-    (Mask::NAME, Element::I32, 1),
-];
-const CAMERA: [(&str, Element, usize); 7] = [
-    (Color::NAME, Element::U8, 4),
-    (Depth::NAME, Element::F32, 1),
-    (Distance::NAME, Element::F32, 1),
-    (Mask::NAME, Element::I32, 1),
-    (Normal::NAME, Element::F32, 3),
-    (ShadingNormal::NAME, Element::F32, 3),
-    (Position::NAME, Element::F32, 3),
-];
 
 impl Source {
     fn new(name: String, kind: Kind, element: Element, parts: Vec<Part>, envs: &[usize], what: What) -> Self {
         let stream = Stream { name, kind, element, parts, env_ids: envs.to_vec() };
         let (rows, n) = (envs.to_vec(), envs.len());
-        Self { stream, what, sensor: None, rows, counts: vec![0; n], last: vec![f64::NAN; n], due_at: 0 }
+        Self { stream, what, sensor: None, rows, counts: vec![0; n], last: vec![f64::NAN; n], due_at: 0, every: None }
     }
 
     pub(crate) fn joint_states(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
@@ -108,7 +94,7 @@ impl Source {
         let widths = [part.get_qpos().ncols(), part.get_qvel().ncols(), part.get_ctrl().ncols()];
         let names = ["positions", "velocities", "controls"];
         let parts = names.iter().zip(widths).map(|(name, width)| Part::new(name, [width])).collect();
-        Ok(Self::new(format!("{uid}/state"), Kind::Numbers, Element::F64, parts, envs, What::MjcfState(id)))
+        Ok(Self::new(format!("{uid}/state"), Kind::unnamed(), Element::F64, parts, envs, What::MjcfState(id)))
     }
 
     /// Everything that a sensor measures.
@@ -116,23 +102,37 @@ impl Source {
         let sensor = sim.sensor_called(uid)?;
         let any: &dyn Any = sensor;
         let mut sources = Vec::new();
-        if any.is::<Camera>() || any.is::<RayCasterCamera>() {
-            for (channel, ..) in channels(any) {
-                sources.push(Self::picture(sim, uid, channel, envs)?);
+        let eyes = Eye::of(any);
+        if !eyes.is_empty() {
+            for &eye in eyes {
+                for (channel, ..) in eye.channels(any) {
+                    sources.push(Self::of_eye(sim, uid, eye, channel, envs)?);
+                }
+                let ((height, width), distortion) = (eye.image_shape(any), eye.distortion(any));
+                let kind = Kind::Lens { camera: eye.name(uid), height, width, distortion };
+                let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
+                let name = format!("{}/lens", eye.name(uid));
+                let lens = Self::new(name, kind, Element::F64, parts, envs, What::Lens(uid.into(), eye));
+                sources.push(lens.of_sensor(uid, sensor)?);
             }
-            let shape = image_shape(any);
-            let kind = Kind::Lens { camera: uid.into(), height: shape.0, width: shape.1, distortion: distortion(any) };
-            let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
-            let lens = Self::new(format!("{uid}/lens"), kind, Element::F64, parts, envs, What::Lens(uid.into()));
-            sources.push(lens.of_sensor(uid, sensor)?);
+            if any.downcast_ref().is_some_and(StereoCamera::has_disparity) {
+                sources.push(Self::of_eye(sim, uid, Eye::Left, DISPARITY, envs)?);
+            }
         } else if let Some(caster) = any.downcast_ref::<RayCaster>() {
             let rays = caster.num_rays();
-            let parts = vec![Part::new("hits", [rays, 3]), Part::new("distances", [rays])];
+            let parts = vec![
+                Part::new("hits", [rays, 3]),
+                Part::new("distances", [rays]),
+                Part::new("normals", [rays, 3]),
+                Part::new("ids", [rays]),
+                Part::new("pos_w", [3]),
+                Part::new("quat_w", [4]),
+            ];
             let points = What::Points(uid.into());
             sources
                 .push(Self::new(uid.into(), Kind::Points, Element::F64, parts, envs, points).of_sensor(uid, sensor)?);
         } else if let Some(sampled) = sensor.sampled() {
-            let kind = if any.is::<Imu>() { Kind::Imu } else { Kind::Numbers };
+            let kind = if any.is::<Imu>() { Kind::Imu } else { named(any) };
             let sampler = sampled.sampler();
             let part = |channel| {
                 let of_forces = of_forces(any, channel);
@@ -147,23 +147,43 @@ impl Source {
         Ok(sources)
     }
 
-    /// One channel of a camera.
+    /// One channel of a camera; of a pair `left/depth`, `right/depth` or `disparity`.
     pub(crate) fn picture(sim: &SimulationManager, uid: &str, channel: &str, envs: &[usize]) -> Result<Self> {
-        let sensor = sim.sensor_called(uid)?;
-        let known = channels(sensor);
+        let any: &dyn Any = sim.sensor_called(uid)?;
+        let (eye, asked) = Eye::in_front_of(channel);
+        let pair = any.downcast_ref().is_some_and(StereoCamera::has_disparity);
+        if pair && channel == DISPARITY {
+            return Self::of_eye(sim, uid, Eye::Left, DISPARITY, envs);
+        }
         // Aliases are the cameras' own.
-        let own = sensors::camera::Channels::from_names(&[channel]).map(|one| one.names()).unwrap_or_default();
-        let found = known.iter().find(|(name, ..)| own.contains(name));
-        let &(name, element, components) = found.ok_or_else(|| RecordError::UnknownName {
-            what: "channel",
-            name: format!("{uid}/{channel}"),
-            candidates: known.iter().map(|(name, ..)| format!("{uid}/{name}")).collect(),
-        })?;
-        let (height, width) = image_shape(sensor);
+        let own = sensors::camera::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
+        let known = eye.channels(any);
+        match known.iter().find(|(name, ..)| own.contains(name)) {
+            Some((name, ..)) => Self::of_eye(sim, uid, eye, name, envs),
+            None => {
+                let of = |eye: &Eye| {
+                    let camera = eye.name(uid);
+                    eye.channels(any).into_iter().map(move |(name, ..)| format!("{camera}/{name}"))
+                };
+                let candidates = Eye::of(any).iter().flat_map(of);
+                let candidates = candidates.chain(pair.then(|| format!("{uid}/{DISPARITY}"))).collect();
+                Err(RecordError::UnknownName { what: "channel", name: format!("{uid}/{channel}"), candidates })
+            }
+        }
+    }
+
+    /// One channel of a camera, which has it, by its own name.
+    fn of_eye(sim: &SimulationManager, uid: &str, eye: Eye, channel: &'static str, envs: &[usize]) -> Result<Self> {
+        let sensor = sim.sensor_called(uid)?;
+        let found = eye.channels(sensor).into_iter().find(|(name, ..)| *name == channel);
+        let (_, element, components) = found.unwrap_or((DISPARITY, Element::F32, 1));
+        let (height, width) = eye.image_shape(sensor);
         let shape = if components == 1 { vec![height, width] } else { vec![height, width, components] };
-        let kind = Kind::Picture { camera: uid.into(), channel: name.into(), height, width };
-        let what = What::Picture { uid: uid.into(), channel: name };
-        let stream = format!("{uid}/{name}");
+        // What both eyes tell together is called as the pair, and is where the left one is.
+        let stream =
+            if channel == DISPARITY { format!("{uid}/{channel}") } else { format!("{}/{channel}", eye.name(uid)) };
+        let kind = Kind::Picture { camera: eye.name(uid), channel: channel.into(), height, width };
+        let what = What::Picture { uid: uid.into(), eye, channel };
         Self::new(stream, kind, element, vec![Part::new("", shape)], envs, what).of_sensor(uid, sensor)
     }
 
@@ -171,7 +191,7 @@ impl Source {
     fn of_sensor(mut self, uid: &str, sensor: &dyn Sensor) -> Result<Self> {
         self.sensor = Some(uid.into());
         let any: &dyn Any = sensor;
-        if let Some(camera) = any.downcast_ref::<Camera>() {
+        if let Some(camera) = timed(any) {
             let place = |env: &usize| camera.env_ids().iter().position(|seen| seen == env).map(|row| (row, *env));
             (self.rows, self.stream.env_ids) = self.stream.env_ids.iter().filter_map(place).unzip();
             self.counts.truncate(self.rows.len());
@@ -193,7 +213,7 @@ impl Source {
     /// Counts measurements; gives whether those of each row are more, or others, than before.
     fn count(&mut self, sensor: &dyn Sensor) -> Vec<bool> {
         let any: &dyn Any = sensor;
-        let counts = match (any.downcast_ref::<Camera>(), sensor.sampled()) {
+        let counts = match (timed(any), sensor.sampled()) {
             (Some(camera), _) => Some(camera.frame_counts()),
             (None, sampled) => sampled.map(|sampled| sampled.sample_counts()),
         };
@@ -296,16 +316,9 @@ impl Source {
                 let part = sim.mjcf_part(*id);
                 self.join(values, &[part.get_qpos().view(), part.get_qvel().view(), part.get_ctrl().view()]);
             }
-            What::Picture { uid, channel } => self.copy_picture(sim.sensor_called(uid)?, channel, values)?,
-            What::Lens(uid) => {
-                let any: &dyn Any = sim.sensor_called(uid)?;
-                let lenses = if let Some(camera) = any.downcast_ref::<Camera>() {
-                    Some((camera.arrived_intrinsic_matrices(), camera.arrived_pose_w(CameraConvention::Ros)))
-                } else {
-                    let pictures = any.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::arrived);
-                    pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
-                };
-                let (intrinsics, poses) = lenses.ok_or_else(|| self.changed())?;
+            What::Picture { uid, eye, channel } => self.copy_picture(sim.sensor_called(uid)?, *eye, channel, values)?,
+            What::Lens(uid, eye) => {
+                let (intrinsics, poses) = eye.lenses(sim.sensor_called(uid)?).ok_or_else(|| self.changed())?;
                 let rows = intrinsics.len_of(Axis(0));
                 let flat = intrinsics.into_shape_with_order((rows, 9)).map_err(|_| self.changed())?;
                 self.join(values, &[flat.view(), poses.view()]);
@@ -323,42 +336,16 @@ impl Source {
             What::Points(uid) => {
                 let any: &dyn Any = sim.sensor_called(uid)?;
                 let caster = any.downcast_ref::<RayCaster>().ok_or_else(|| self.changed())?;
-                let (hits, distances) = (caster.arrived_hits(), caster.sampler().arrived("distances"));
-                for &row in self.rows.iter().filter(|row| **row < distances.nrows()) {
+                let hits = caster.arrived_hits();
+                // In the order of the parts, behind the hits.
+                let others = ["distances", "normals", "ids", "pos_w", "quat_w"];
+                let others = others.map(|channel| caster.sampler().arrived(channel));
+                for &row in self.rows.iter().filter(|row| **row < hits.len_of(Axis(0))) {
                     if let Values::F64(values) = values {
                         values.extend(hits.index_axis(Axis(0), row));
-                        values.extend(distances.row(row));
+                        others.iter().for_each(|table| values.extend(table.row(row)));
                     }
                 }
-            }
-        }
-        Ok(())
-    }
-
-    fn copy_picture(&self, sensor: &dyn Sensor, channel: &str, values: &mut Values) -> Result<()> {
-        let any: &dyn Any = sensor;
-        if let Some(camera) = any.downcast_ref::<Camera>() {
-            macro_rules! put {
-                ($($Channel:ident),*) => {
-                    match channel {
-                        $(_ if channel == $Channel::NAME => {
-                            let picture = camera.arrived::<$Channel>().map_err(sim_error(self))?;
-                            self.put(values, &picture);
-                        })*
-                        _ => return Err(self.changed()),
-                    }
-                };
-            }
-            put!(Color, Depth, Distance, Mask, Normal, ShadingNormal, Position);
-        } else {
-            let camera = any.downcast_ref::<RayCasterCamera>().ok_or_else(|| self.changed())?;
-            let taken = camera.arrived();
-            match channel {
-                _ if channel == Depth::NAME => self.put(values, &taken.depth()),
-                _ if channel == Distance::NAME => self.put(values, &taken.distance()),
-                _ if channel == Normal::NAME => self.put(values, &taken.normal()),
-                _ if channel == Mask::NAME => self.put(values, &taken.mask()),
-                _ => return Err(self.changed()),
             }
         }
         Ok(())
@@ -394,12 +381,16 @@ impl Source {
 
 /// A number that [`Values`] hold.
 trait Number: Copy {
+    const ELEMENT: Element;
+
     fn of(values: &mut Values) -> Option<&mut Vec<Self>>;
 }
 
 macro_rules! number {
     ($($number:ty: $Variant:ident),*) => {$(
         impl Number for $number {
+            const ELEMENT: Element = Element::$Variant;
+
             fn of(values: &mut Values) -> Option<&mut Vec<Self>> {
                 if let Values::$Variant(values) = values { Some(values) } else { None }
             }
@@ -421,7 +412,7 @@ impl Stamps {
     /// Those of what arrived last, whether the sensor shows it or not.
     fn of(sensor: &dyn Sensor) -> Self {
         let any: &dyn Any = sensor;
-        if let Some(camera) = any.downcast_ref::<Camera>() {
+        if let Some(camera) = timed(any) {
             let states = camera.arrived_stamps().to_vec();
             return Self { forces: states.clone(), states };
         }
@@ -445,32 +436,17 @@ fn of_forces(sensor: &dyn Any, channel: &str) -> bool {
     }
 }
 
-/// The pictures that a sensor draws.
-fn channels(sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
-    match sensor.downcast_ref::<Camera>() {
-        Some(camera) => {
-            let wanted = camera.channels().names();
-            CAMERA.into_iter().filter(|(name, ..)| wanted.contains(name)).collect()
-        }
-        None if sensor.is::<RayCasterCamera>() => RAY_CAMERA.to_vec(),
-        None => Vec::new(),
-    }
-}
-
-/// What the lens of a camera does to its pictures, which is the same in all environments.
-fn distortion(sensor: &dyn Any) -> Option<Distortion> {
-    let Some(camera) = sensor.downcast_ref::<Camera>() else {
-        // Ray casters that draw pictures are pinholes.
-        return Some(Distortion { model: DistortionModel::PlumbBob.name().into(), coefficients: vec![0.0; 5] });
-    };
-    let info = camera.camera_info("", *camera.env_ids().first()?).ok()?;
-    Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
-}
-
-/// Rows and pixels per row.
-fn image_shape(sensor: &dyn Any) -> (usize, usize) {
-    let camera = sensor.downcast_ref::<Camera>().map(Camera::image_shape);
-    camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
+/// Numbers of a sensor, with the names of what they are of.
+fn named(sensor: &dyn Any) -> Kind {
+    let contacts = sensor.downcast_ref::<ContactSensor>();
+    let rows = contacts.map(ContactSensor::body_names);
+    let rows = rows.or_else(|| sensor.downcast_ref().map(JointWrench::link_names));
+    let rows = rows.or_else(|| sensor.downcast_ref().map(JointState::joint_names));
+    let rows = rows.or_else(|| sensor.downcast_ref().map(ActuatorState::actuator_names));
+    let rows = rows.or_else(|| sensor.downcast_ref().map(FrameTransformer::target_frame_names));
+    let rows = rows.or_else(|| sensor.downcast_ref().map(MujocoSensor::names));
+    let filters = contacts.map(ContactSensor::filters);
+    Kind::Numbers { rows: rows.unwrap_or_default().to_vec(), filters: filters.unwrap_or_default().to_vec() }
 }
 
 fn sim_error(source: &Source) -> impl Fn(sensors::SensorError) -> RecordError + '_ {

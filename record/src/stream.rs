@@ -21,6 +21,13 @@ impl Stream {
         self.parts.iter().map(Part::width).sum()
     }
 
+    /// The numbers of a part in the row of an environment; nothing where there is no such part.
+    pub(crate) fn part<'v>(&self, row: &'v [f64], name: &str) -> &'v [f64] {
+        let first: usize = self.parts.iter().take_while(|part| part.name != name).map(Part::width).sum();
+        let width = self.parts.iter().find(|part| part.name == name).map_or(0, Part::width);
+        row.get(first..first + width).unwrap_or(&[])
+    }
+
     /// Whether its parts are of two instants: see [`Part::of_forces`].
     pub(crate) fn is_mixed(&self) -> bool {
         self.parts.iter().any(|part| part.of_forces) && !self.parts.iter().all(|part| part.of_forces)
@@ -110,8 +117,31 @@ pub enum Kind {
     },
     /// An inertial measurement unit; the quantities are called as its channels.
     Imu,
-    /// Points in the environment \[m\], then distances \[m\]; infinite for a miss.
+    /// What rays hit, the quantities called as the channels of a ray caster: points in the environment \[m\] and distances
+    /// \[m\], infinite for a miss, normals and mask ids, 0 for a miss, and the pose of the body that the sensor hangs on.
     Points,
     /// Numbers of a sensor.
-    Numbers,
+    Numbers {
+        /// What they are of, in order: bodies, links, joints, actuators, frames; empty where they have no names.
+        rows: Vec<String>,
+        /// What each of the bodies may touch, in the order of the second axis of matrices; of sensors of contacts.
+        filters: Vec<String>,
+    },
+}
+
+impl Kind {
+    /// Numbers without names.
+    pub(crate) fn unnamed() -> Self {
+        Self::Numbers { rows: Vec::new(), filters: Vec::new() }
+    }
+
+    /// What the columns of its quantities are of.
+    pub(crate) fn names(&self) -> &[String] {
+        match self {
+            Self::Joints { names: columns } | Self::Poses { frames: columns } | Self::Numbers { rows: columns, .. } => {
+                columns
+            }
+            _ => &[],
+        }
+    }
 }

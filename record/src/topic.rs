@@ -24,9 +24,13 @@ pub enum Topic {
     Channel {
         /// The camera.
         sensor: String,
-        /// The channel; aliases such as `rgb` are known.
+        /// The channel; aliases such as `rgb` are known. Of a pair of eyes `left/depth`, `right/depth` or `disparity`.
         channel: String,
     },
+    /// What happens to environments: resets, writes to their states, divergence, and what somebody has to say
+    /// ([`Record::note`](crate::Record::note)). MCAP files and NumPy archives have them whatever else is recorded; this is for
+    /// recordings of nothing else.
+    Events,
 }
 
 impl Topic {

@@ -5,9 +5,9 @@ use crate::packet::Packet;
 use crate::stream::Stream;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// What is written may be read by others after this long at the latest.
@@ -70,13 +70,14 @@ pub(crate) struct Failure {
 }
 
 /// Writes packets until nobody sends any more, then finishes the file. After an error, packets go back unwritten, and
-/// `failed` is set; if it was set by the recorder, the file is not finished.
+/// `failed` and `why` are set; if it was set by the recorder, the file is not finished.
 pub(crate) fn run(
     mut sink: Box<dyn Sink>,
     streams: &[Stream],
     full: &Receiver<Packet>,
     free: &Sender<Packet>,
-    failed: &Arc<AtomicBool>,
+    failed: &AtomicBool,
+    why: &OnceLock<String>,
 ) -> Result<u64, Failure> {
     let mut result = Ok(());
     let mut flushed = Instant::now();
@@ -107,8 +108,9 @@ pub(crate) fn run(
             result = sink.flush();
             dirty = false;
         }
-        if result.is_err() {
+        if let Err(error) = &result {
             dirty = false;
+            why.get_or_init(|| error.to_string());
             failed.store(true, Ordering::Relaxed);
         }
     }

@@ -3,6 +3,7 @@
 
 mod batches;
 mod cart_pole;
+mod checks;
 mod closed_forms;
 mod episodes;
 mod mistakes;
@@ -11,4 +12,5 @@ mod quarantine;
 mod resets;
 mod sensors;
 mod tasks;
+mod terms;
 mod vector_env;

@@ -8,7 +8,7 @@ use kinetoscope::ndarray::{Array1, Array2, ArrayView2, Axis, array};
 const DT: f64 = 0.01;
 
 /// Carts on rails by their equation alone: v' = F / m, x' = v, by semi-implicit Euler as MuJoCo does it.
-struct Carts {
+pub(crate) struct Carts {
     spaces: [Space; 2],
     mass: f64,
     limit: u64,
@@ -17,7 +17,7 @@ struct Carts {
 }
 
 #[derive(Debug, PartialEq)]
-enum CartError {
+pub(crate) enum CartError {
     Count { found: usize, expected: usize },
     ResetFirst(usize),
 }
@@ -31,7 +31,7 @@ impl std::fmt::Display for CartError {
 impl std::error::Error for CartError {}
 
 impl Carts {
-    fn new(num_envs: usize, mass: f64, limit: u64) -> Self {
+    pub(crate) fn new(num_envs: usize, mass: f64, limit: u64) -> Self {
         let place = Space::uniform(["place/x"], [f64::NEG_INFINITY, f64::INFINITY]).unwrap();
         let push = Space::uniform(["push/slide"], [-10.0, 10.0]).unwrap();
         Self { spaces: [place, push], mass, limit, carts: vec![None; num_envs] }

@@ -51,6 +51,14 @@ const TABLE: &[Run] = &[
     run_of("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/create_robot.lerobot"),
+    run_of(
+        "run_camera",
+        &[0],
+        "--headless --num-envs 2 --steps 60 --record {out}/rates.npz --record-every 4 --record-rate camera=20,camera/depth=30",
+    ),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.npz --record-rate nothing=2"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.npz --record-rate robot"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.npz --record-every 0"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 50 --out {out}/create_robot"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
     // Examples are built without the feature that writes it.

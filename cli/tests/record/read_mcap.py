@@ -38,7 +38,7 @@ assert stamp.sec * 10**9 + stamp.nanosec == last["/env_1/arm/joint_states"][0].l
 target = last["/env_1/arm/targets"][1]
 imu = last["/env_1/imu"][1]
 depth, mask = last["/env_1/camera/depth"][1], last["/env_1/camera/mask"][1]
-assert (depth.encoding, mask.encoding, depth.step) == ("32FC1", "32SC1", 4 * depth.width)
+assert (depth.encoding, mask.encoding, depth.step) == ("32FC1", "16UC1", 4 * depth.width)
 numbers = struct.unpack(f"<{depth.width * depth.height}f", bytes(depth.data))
 finite = [x for x in numbers if x != float("inf")]
 color = last["/env_1/camera/color"][1]
@@ -66,7 +66,7 @@ tell({
     "depth_shape": [depth.height, depth.width],
     "depth_finite": len(finite),
     "depth_range": [min(finite), max(finite)],
-    "mask_sum": weighed(struct.unpack(f"<{mask.width * mask.height}i", bytes(mask.data))),
+    "mask_sum": weighed(struct.unpack(f"<{mask.width * mask.height}H", bytes(mask.data))),
     "color_sum": weighed(picture.tobytes()),
     "rows": counts["/env_1/arm/joint_states"],
     "pictures": counts["/env_1/camera/color"],

@@ -8,7 +8,10 @@ from told import tell, weighed
 
 with np.load(sys.argv[1], allow_pickle=False) as file:
     about = json.loads(file["recording.json"])
-    arrays = {name: file[name] for name in file.files if name not in ("recording.json", "start.snapshot", "scene.zip")}
+    others = ("recording.json", "start.snapshot", "scene.zip", "notes.jsonl")
+    arrays = {name: file[name] for name in file.files if name not in others}
+    assert file["notes.jsonl"] == b"", "nobody had anything to say"
+assert "cube" in [mask["name"] for mask in about["mask_ids"]]
 
 streams = {stream["name"]: stream for stream in about["streams"]}
 for name, stream in streams.items():

@@ -42,8 +42,8 @@ pub(crate) fn bits(value: serde_json::Value) -> serde_json::Value {
     }
 }
 
-/// Records, and gives what the last row should be.
-fn recorded(path: &Path) -> serde_json::Value {
+/// Records, and gives what the last row should be; what is not finished is left as by a process that was killed.
+fn recorded(path: &Path, finish: bool) -> serde_json::Value {
     let mut world = World::new(2, 2);
     let recorder = world.sim.record(RecorderCfg::new(path)).unwrap();
     (0..STEPS).for_each(|step| world.step(step));
@@ -77,7 +77,9 @@ fn recorded(path: &Path) -> serde_json::Value {
         "rows": STEPS + 1,
         "pictures": STEPS / PICTURE_EVERY,
     });
-    world.sim.finish_recording(recorder).unwrap();
+    if finish {
+        world.sim.finish_recording(recorder).unwrap();
+    }
     bits(expected)
 }
 
@@ -86,8 +88,28 @@ fn the_mcap_package_reads_every_message() {
     let Some(python) = python() else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let expected = recorded(&path);
+    let expected = recorded(&path, true);
     assert_eq!(said(&python, "read_mcap.py", &path), expected);
+}
+
+/// What was left by a recording without an end is made whole by the command, with its index, and holds the same.
+#[test]
+fn the_mcap_package_reads_what_was_recovered() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [path, out] = ["run.mcap", "saved.mcap"].map(|name| folder.path().join(name));
+    let expected = recorded(&path, false);
+    assert!(!path.exists());
+    let recover = |file: &Path, out: &Path| {
+        Command::new(env!("CARGO_BIN_EXE_kinetoscope")).arg("recover").arg(file).arg("-o").arg(out).output().unwrap()
+    };
+    let ended = recover(&path, &out);
+    assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(said(&python, "read_mcap.py", &out), expected);
+    // What was left is gone now, and there is nothing to recover any more.
+    let again = recover(&path.with_extension("mcap.part"), &folder.path().join("other.mcap"));
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("run.mcap.part"));
 }
 
 #[test]
@@ -95,7 +117,7 @@ fn numpy_reads_every_array() {
     let Some(python) = python() else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.npz");
-    let expected = recorded(&path);
+    let expected = recorded(&path, true);
     assert_eq!(said(&python, "read_npz.py", &path), expected);
 }
 
@@ -122,9 +144,13 @@ fn sensed(path: &Path) -> serde_json::Value {
         height: 16,
         intrinsics: Intrinsics::Fovy { radians: 0.8 },
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
-        channels: Channels { normal: true, ..Channels::NONE },
+        channels: Channels { normal: true, albedo: true, flow: true, ..Channels::NONE },
         ..CameraCfg::default()
     };
+    let camera = CameraCfg { channels: Channels { depth: true, color: true, ..Channels::NONE }, ..eye.clone() };
+    let pair = StereoCameraCfg { camera, left_to_right_pos: [0.06, 0.0, 0.0], ..Default::default() };
+    let pair = sim.add_sensor("pair", pair).unwrap();
+    let imu = sim.add_sensor("imu", ImuCfg::on("cube")).unwrap();
     let eye = sim.add_sensor("eye", eye).unwrap();
     // Lenses: one that ROS has words for, and one that it has none for.
     let bent = OpenCvFisheye { k1: 0.02, k2: -0.003, k3: 0.0005, k4: -0.0001, max_angle: None };
@@ -147,6 +173,29 @@ fn sensed(path: &Path) -> serde_json::Value {
     // It stands: what holds it is its weight, to what is left of its settling.
     assert!((forces[2] - 2.0 * 9.81).abs() < 0.01, "{forces:?}");
     let normal = sim.sensor(eye).unwrap().normal().unwrap().index_axis(Axis(0), 1).to_owned();
+    let weighed = |numbers: &mut dyn Iterator<Item = u64>| numbers.zip(1..).map(|(x, k)| x * k).sum::<u64>();
+    let flow = sim.sensor(eye).unwrap().flow().unwrap().index_axis(Axis(0), 1).to_owned();
+    let albedo = sim.sensor(eye).unwrap().albedo().unwrap().index_axis(Axis(0), 1).to_owned();
+    assert!(flow.iter().any(|x| *x == 0.0) && albedo.iter().any(|x| ![0, 255].contains(x)), "{flow} {albedo}");
+    let disparity = sim.sensor(pair).unwrap().disparity().unwrap().index_axis(Axis(0), 1).to_owned();
+    assert!(disparity.iter().any(|x| *x > 0.5), "{disparity}");
+    let right = sim.sensor(pair).unwrap().right().color().unwrap().index_axis(Axis(0), 1).to_owned();
+    let imu = sim.sensor(imu).unwrap();
+    let moves = [imu.lin_vel_b(), imu.ang_vel_b(), imu.lin_acc_b(), imu.ang_acc_b()];
+    let moves: Vec<f64> = moves.iter().flat_map(|table| table.row(1).to_vec()).collect();
+    let (ids, distances) = (scanner.hit_ids().row(1).to_owned(), scanner.distances().row(1).to_owned());
+    let of_hits = |k: usize| distances[k].is_finite();
+    let hit_ids: Vec<i32> = (0..ids.len()).filter(|k| of_hits(*k)).map(|k| ids[k]).collect();
+    let hit_normals: Vec<f64> = (0..ids.len())
+        .filter(|k| of_hits(*k))
+        .flat_map(|k| scanner.normals().index_axis(Axis(0), 1).row(k).to_vec())
+        .map(|x| f64::from(x as f32))
+        .collect();
+    let infos = ["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info"));
+    let scanner_pose = [scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat();
+    let names: std::collections::BTreeMap<String, String> =
+        sim.mask_ids().iter().map(|id| (id.id.to_string(), id.name())).collect();
+    assert!(names.values().any(|name| name == "cube"), "{names:?}");
     let up = normal.rows().into_iter().flat_map(|row| row.to_vec()).collect::<Vec<f32>>();
     let upward = up.chunks(3).filter(|n| **n == [0.0, 0.0, 1.0]).count();
     let expected = serde_json::json!({
@@ -157,8 +206,19 @@ fn sensed(path: &Path) -> serde_json::Value {
         "normal_sum": normal.iter().zip(1..).map(|(x, k)| u64::from(x.to_bits()) * k).sum::<u64>(),
         "upward": upward,
         "attached": ["scene.zip"],
+        "flow_sum": weighed(&mut flow.iter().map(|x| u64::from(x.to_bits()))),
+        "albedo_sum": weighed(&mut albedo.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]].map(u64::from))),
+        "disparity_sum": weighed(&mut disparity.iter().map(|x| u64::from(x.to_bits()))),
+        "right_sum": weighed(&mut right.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]].map(u64::from))),
+        "moves": moves,
+        "distances": distances.iter().map(|x| x.to_bits().to_string()).collect::<Vec<_>>(),
+        "hit_ids": hit_ids,
+        "hit_normals": hit_normals,
+        "scanner": scanner_pose,
+        "mask_ids": names,
+        "bodies": "cube",
         "fish": ["equidistant", [0.02, -0.003, 0.0005, -0.0001], matrix],
-        "infos": ["/env_0/eye/camera_info", "/env_0/fish/camera_info", "/env_1/eye/camera_info", "/env_1/fish/camera_info"],
+        "infos": infos,
         "round": true,
     });
     assert!(upward > 0 && upward < 24 * 16, "{upward}");

@@ -70,7 +70,7 @@ impl Role {
 /// Whether a dataset has a place for a stream.
 pub(crate) fn holds(stream: &Stream) -> bool {
     match &stream.kind {
-        Kind::Joints { .. } | Kind::Imu | Kind::Numbers => true,
+        Kind::Joints { .. } | Kind::Imu | Kind::Numbers { .. } => true,
         Kind::Poses { .. } => is_object(stream),
         Kind::Picture { channel, .. } => channel == "color",
         Kind::Lens { .. } | Kind::Points => false,

@@ -1,7 +1,7 @@
 use super::*;
 use crate::cfg::RecorderCfg;
-use crate::mcap_file::recover;
 use crate::recorder::Record;
+use crate::recover::recover;
 use crate::topic::Topic;
 use scene::Pose;
 use sim::{BodyType, EnvId, MjcfCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManagerCfg, UrdfCfg};

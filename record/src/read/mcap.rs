@@ -34,8 +34,9 @@ fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()>
     let file = File::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
-    let torn =
-        || malformed("it ends in the middle; record::recover makes a whole file of what a killed recorder left".into());
+    let torn = || {
+        malformed("it ends in the middle; `kinetoscope recover` (record::recover) makes a whole file of what a killed recorder left".into())
+    };
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(LARGEST));

@@ -90,7 +90,7 @@ impl Recording {
             }
             _ if path.extension().is_some_and(|end| end == "part") => {
                 return Err(malformed(
-                    "this recording was not finished; record::recover makes a whole file of a .mcap.part",
+                    "this recording was not finished; `kinetoscope recover` (record::recover) makes a whole file of a .mcap.part",
                 ));
             }
             _ => return Err(malformed("recordings that can be read are called .mcap or .npz")),

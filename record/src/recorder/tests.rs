@@ -1,8 +1,10 @@
+mod events;
+
 use super::*;
 use crate::file::tests::FullDisk;
-use crate::mcap_file::recover;
 use crate::npy;
 use crate::packet::Values;
+use crate::recover::recover;
 use crate::writer::Written;
 use crate::zip;
 use scene::{Pose, SceneState};
@@ -60,7 +62,7 @@ fn recorded_slowly(packets: usize, steps: u32, pause: Duration) -> (Recorded, Ve
     let (sources, left_out) = resolve(&sim, &cfg, Format::Mcap).unwrap();
     let heights = Arc::new(Mutex::new(Vec::new()));
     let sink = Box::new(Slow { heights: Arc::clone(&heights), pause });
-    let recorder = Recorder::begin(&sim, cfg, sources, left_out, sink).unwrap();
+    let recorder = Recorder::begin(&sim, cfg, Format::Mcap, sources, left_out, sink).unwrap();
     let recorder = sim.add_observer(recorder);
     sim.update(steps);
     let recorded = sim.finish_recording(recorder).unwrap();
@@ -253,7 +255,7 @@ fn a_thread_that_panics_is_noticed() {
     let mut sim = falling(1);
     let cfg = RecorderCfg { packets: 2, ..RecorderCfg::new("nowhere.mcap") };
     let (sources, left_out) = resolve(&sim, &cfg, Format::Mcap).unwrap();
-    let recorder = Recorder::begin(&sim, cfg, sources, left_out, Box::new(Panics(0))).unwrap();
+    let recorder = Recorder::begin(&sim, cfg, Format::Mcap, sources, left_out, Box::new(Panics(0))).unwrap();
     let recorder = sim.add_observer(recorder);
     sim.update(20);
     sim.observer_mut(recorder).unwrap().catch_up();

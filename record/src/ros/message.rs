@@ -13,10 +13,12 @@ pub(crate) struct Stamp<'a> {
 }
 
 const NANOS: u64 = 1_000_000_000;
-/// The level of a log's information.
+/// The levels of a log's information and warnings.
 const INFO: u8 = 20;
-/// The numbers of a point are of this type.
+const WARN: u8 = 30;
+/// Types of the numbers of a point.
 const FLOAT32: u8 = 7;
+const INT32: u8 = 5;
 
 fn time(to: &mut Cdr, nanos: u64) {
     to.i32(i32::try_from(nanos / NANOS).unwrap_or(i32::MAX));
@@ -117,25 +119,60 @@ pub(crate) fn imu(to: &mut Cdr, stamp: Stamp<'_>, wxyz: &[f64], angular: &[f64],
     to.f64s(&COVARIANCE);
 }
 
-/// `sensor_msgs/msg/PointCloud2`: the finite ones of points of three numbers.
-pub(crate) fn points(to: &mut Cdr, stamp: Stamp<'_>, points: &[f64]) {
-    let finite = || points.chunks_exact(3).filter(|point| point.iter().all(|x| x.is_finite()));
-    let count = finite().count();
+/// `geometry_msgs/msg/TwistStamped` and `geometry_msgs/msg/AccelStamped`, which have the same fields: along the axes, then around
+/// them.
+pub(crate) fn motion(to: &mut Cdr, stamp: Stamp<'_>, linear: &[f64], angular: &[f64]) {
+    header(to, stamp);
+    to.f64s(linear);
+    to.f64s(angular);
+}
+
+/// What rays hit: of each ray three numbers of its point, the distance, three of the normal, and the mask id.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hits<'a> {
+    pub(crate) points: &'a [f64],
+    pub(crate) distances: &'a [f64],
+    pub(crate) normals: &'a [f64],
+    pub(crate) ids: &'a [f64],
+}
+
+/// The numbers of a point, each of four bytes.
+const FIELDS: [(&str, u8); 8] = [
+    ("x", FLOAT32),
+    ("y", FLOAT32),
+    ("z", FLOAT32),
+    ("distance", FLOAT32),
+    ("normal_x", FLOAT32),
+    ("normal_y", FLOAT32),
+    ("normal_z", FLOAT32),
+    ("id", INT32),
+];
+
+/// `sensor_msgs/msg/PointCloud2` of the rays that hit something.
+pub(crate) fn points(to: &mut Cdr, stamp: Stamp<'_>, hits: Hits<'_>) {
+    let Hits { points, distances, normals, ids } = hits;
+    let rays = points.chunks_exact(3).zip(distances).zip(normals.chunks_exact(3).zip(ids));
+    let finite = || rays.clone().filter(|((point, _), _)| point.iter().all(|x| x.is_finite()));
+    let (count, size) = (finite().count(), 4 * FIELDS.len());
     header(to, stamp);
     to.u32(1);
     to.count(count);
-    to.count(3);
-    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+    to.count(FIELDS.len());
+    for (k, (name, kind)) in FIELDS.into_iter().enumerate() {
         to.text(name);
         to.count(4 * k);
-        to.u8(FLOAT32);
+        to.u8(kind);
         to.u32(1);
     }
     to.u8(0);
-    to.u32(12);
-    to.count(12 * count);
-    to.blob_of(12 * count, |bytes| {
-        finite().flatten().for_each(|x| bytes.extend_from_slice(&(*x as f32).to_le_bytes()));
+    to.count(size);
+    to.count(size * count);
+    to.blob_of(size * count, |bytes| {
+        for ((point, distance), (normal, id)) in finite() {
+            let floats = point.iter().chain([distance]).chain(normal);
+            floats.for_each(|x| bytes.extend_from_slice(&(*x as f32).to_le_bytes()));
+            bytes.extend_from_slice(&(*id as i32).to_le_bytes());
+        }
     });
     to.u8(1);
 }
@@ -152,10 +189,10 @@ pub(crate) fn numbers(to: &mut Cdr, label: &str, shape: &[usize], values: &[f64]
     to.list(values);
 }
 
-/// `rcl_interfaces/msg/Log`.
-pub(crate) fn log(to: &mut Cdr, nanos: u64, name: &str, message: &str) {
+/// `rcl_interfaces/msg/Log`; `bad`: as a warning.
+pub(crate) fn log(to: &mut Cdr, nanos: u64, bad: bool, name: &str, message: &str) {
     time(to, nanos);
-    to.u8(INFO);
+    to.u8(if bad { WARN } else { INFO });
     to.text(name);
     to.text(message);
     to.text("");

@@ -10,7 +10,7 @@ mod schema;
 
 pub(crate) use cdr::Cdr;
 pub(crate) use message::{
-    Stamp, camera_info, compressed_image, image, imu, joint_state, log, numbers, points, transforms,
+    Hits, Stamp, camera_info, compressed_image, image, imu, joint_state, log, motion, numbers, points, transforms,
 };
 pub(crate) use read::{MessageType, Step};
 pub(crate) use schema::Schema;

@@ -379,7 +379,7 @@ impl Step {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
-    use super::super::{Cdr, Schema, Stamp, imu, joint_state, numbers, points, transforms};
+    use super::super::{Cdr, Hits, Schema, Stamp, imu, joint_state, numbers, points, transforms};
     use super::*;
 
     const STAMP: Stamp<'_> = Stamp { nanos: 1_500_000_000, frame: "env_0" };
@@ -444,7 +444,14 @@ mod tests {
         let value = read(Schema::Float64MultiArray, |cdr| numbers(cdr, "forces", &[2, 2], &[1.0, 2.0, 3.0, 4.0]));
         assert_eq!(number(&value, "data[3]"), Some(4.0));
         assert_eq!(number(&value, "layout.dim[1].size"), Some(2.0));
-        let value = read(Schema::PointCloud2, |cdr| points(cdr, STAMP, &[1.0, 2.0, 3.0]));
+        // Of two rays one hit something.
+        let hits = Hits {
+            points: &[1.0, 2.0, 3.0, f64::INFINITY, f64::INFINITY, f64::INFINITY],
+            distances: &[4.0, f64::INFINITY],
+            normals: &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            ids: &[7.0, 0.0],
+        };
+        let value = read(Schema::PointCloud2, |cdr| points(cdr, STAMP, hits));
         assert_eq!((number(&value, "width"), number(&value, "is_dense")), (Some(1.0), Some(1.0)));
     }
 

@@ -3,6 +3,7 @@
 /// The types of messages that are recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Schema {
+    AccelStamped,
     CameraInfo,
     CompressedImage,
     Float64MultiArray,
@@ -12,11 +13,14 @@ pub(crate) enum Schema {
     Log,
     PointCloud2,
     TfMessage,
+    TwistStamped,
 }
 
 const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
 const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
+/// What moves along an axis and around it.
+const TWO: &str = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n";
 const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
 const TRANSFORM: (&str, &str) =
     ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n");
@@ -37,6 +41,7 @@ impl Schema {
     /// Its name.
     pub(crate) fn name(self) -> &'static str {
         match self {
+            Self::AccelStamped => "geometry_msgs/msg/AccelStamped",
             Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
             Self::CompressedImage => "sensor_msgs/msg/CompressedImage",
             Self::Float64MultiArray => "std_msgs/msg/Float64MultiArray",
@@ -46,12 +51,21 @@ impl Schema {
             Self::Log => "rcl_interfaces/msg/Log",
             Self::PointCloud2 => "sensor_msgs/msg/PointCloud2",
             Self::TfMessage => "tf2_msgs/msg/TFMessage",
+            Self::TwistStamped => "geometry_msgs/msg/TwistStamped",
         }
     }
 
     /// Its fields, then those of the types in it.
     pub(crate) fn text(self) -> String {
         let (own, others): (&str, &[(&str, &str)]) = match self {
+            Self::AccelStamped => (
+                "std_msgs/Header header\ngeometry_msgs/Accel accel\n",
+                &[HEADER, TIME, ("geometry_msgs/Accel", TWO), VECTOR],
+            ),
+            Self::TwistStamped => (
+                "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
+                &[HEADER, TIME, ("geometry_msgs/Twist", TWO), VECTOR],
+            ),
             Self::CameraInfo => (
                 "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\n\
                  float64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\n\

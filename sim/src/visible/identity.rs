@@ -23,6 +23,13 @@ pub struct MaskId {
     pub geoms: Vec<String>,
 }
 
+impl MaskId {
+    /// What it is called: the object, or `object/link`.
+    pub fn name(&self) -> String {
+        self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
+    }
+}
+
 impl From<&MaskId> for Thing {
     fn from(id: &MaskId) -> Self {
         Self { id: id.id, object: id.object.clone(), link: id.link.clone(), class: id.class.clone() }

@@ -1,6 +1,7 @@
 //! How far apart the eyes of a pair see the same point.
 
 use super::sensor::StereoCamera;
+use crate::camera::channel::Depth;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
 use ndarray::{Array1, Array3, ArrayView3, Axis};
@@ -36,6 +37,29 @@ impl StereoCamera {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
         Ok(self.shown.get_or_init(|| self.disparities(baseline, depth)).pixels.view())
+    }
+
+    /// [`disparity`](Self::disparity) of the pictures that arrived last, as [`Camera::arrived`](crate::Camera::arrived) has their
+    /// depth; made when asked.
+    ///
+    /// # Errors
+    ///
+    /// As [`disparity`](Self::disparity).
+    pub fn arrived_disparity(&self) -> Result<Array3<f32>, SensorError> {
+        let baseline = self.baseline()?;
+        let matrices = self.left().arrived_intrinsic_matrices();
+        let mut pixels = self.left().arrived::<Depth>()?.to_owned();
+        for (row, mut picture) in pixels.axis_iter_mut(Axis(0)).enumerate() {
+            let scale = f64::from(matrices[(row, 0, 0)] as f32) * baseline;
+            picture.mapv_inplace(|z| if self.left().is_hit(z) { (scale / f64::from(z)) as f32 } else { 0.0 });
+        }
+        Ok(pixels)
+    }
+
+    /// Whether there is a [`disparity`](Self::disparity): whether the eyes are parallel and side by side, their lenses are equal,
+    /// and the left one measures depth.
+    pub fn has_disparity(&self) -> bool {
+        self.left().channels().depth && self.baseline().is_ok()
     }
 
     /// Where the right eye is along x \[m\].

@@ -1,0 +1,431 @@
+//! Whether a batch of environments keeps what [`VectorEnv`] promises.
+
+use crate::space::Space;
+use crate::step::Step;
+use crate::vector::VectorEnv;
+use ndarray::{Array1, Array2};
+use scene::Random;
+use std::fmt;
+
+/// Steps of a run: ends of episodes are looked at as far as they come within these.
+const STEPS: usize = 100;
+
+/// Something that [`VectorEnv`] promises and an implementation does not keep.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Finding {
+    /// There is no environment.
+    NoEnvironments,
+    /// Something that has to work was refused.
+    Refused {
+        /// What.
+        what: String,
+        /// What was said.
+        error: String,
+    },
+    /// Something that has to be refused was not.
+    Accepted {
+        /// What.
+        what: &'static str,
+    },
+    /// What is given has another shape.
+    Shape {
+        /// What, and when.
+        what: String,
+        /// Its shape.
+        found: Vec<usize>,
+        /// What it should be.
+        expected: Vec<usize>,
+    },
+    /// What is seen is not in the space of observations, or not finite.
+    Outside {
+        /// When.
+        when: String,
+        /// Where.
+        env: usize,
+        /// The column.
+        column: String,
+        /// What is seen.
+        value: f64,
+        /// The bounds of the column.
+        bounds: [f64; 2],
+    },
+    /// A reward is not finite.
+    Reward {
+        /// When.
+        when: String,
+        /// Where.
+        env: usize,
+        /// The reward.
+        value: f64,
+    },
+    /// The last observation of an episode that goes on is another one than what is seen.
+    FinalObservation {
+        /// When.
+        when: String,
+        /// Where.
+        env: usize,
+    },
+    /// An episode that ended is not followed by another one: it ends again in every step, and looks as it did.
+    NoAutoReset {
+        /// When it ended first.
+        when: String,
+        /// Where.
+        env: usize,
+    },
+    /// The same seed and actions gave other numbers.
+    Seed(Apart),
+    /// A reset of some environments changed others.
+    Mask(Apart),
+    /// Actions of one environment changed what others see.
+    Neighbours(Apart),
+    /// Actions beyond their bounds are not taken as the bounds.
+    Bounds(Apart),
+}
+
+/// Where two runs that should be the same are not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Apart {
+    /// When.
+    pub when: String,
+    /// Where.
+    pub env: usize,
+    /// What was compared: a column of the observations, `reward`, `terminated` or `truncated` (1 or 0).
+    pub what: String,
+    /// In one run.
+    pub first: f64,
+    /// In the other.
+    pub second: f64,
+}
+
+impl fmt::Display for Apart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { when, env, what, first, second } = self;
+        write!(f, "{when}, environment {env}: {what} is {first:e} in one run and {second:e} in the other")
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoEnvironments => f.write_str("there is no environment: there must be at least one"),
+            Self::Refused { what, error } => write!(f, "{what} was refused, which has to work: {error}"),
+            Self::Accepted { what } => write!(f, "{what} was taken, and has to be an error"),
+            Self::Shape { what, found, expected } => {
+                write!(f, "{what} has shape {found:?}; it must have {expected:?}")
+            }
+            Self::Outside { when, env, column, value, bounds: [low, high] } => {
+                write!(
+                    f,
+                    "{when}, environment {env}: {column} is {value}, and its space is finite numbers from {low} to {high}"
+                )
+            }
+            Self::Reward { when, env, value } => {
+                write!(f, "{when}, environment {env}: the reward is {value}; it must be finite")
+            }
+            Self::FinalObservation { when, env } => write!(
+                f,
+                "{when}, environment {env}: the episode goes on, but final_observations are not what observations are"
+            ),
+            Self::NoAutoReset { when, env } => write!(
+                f,
+                "{when}, environment {env}: the episode ended and no other began; observations must be the first ones of the next"
+            ),
+            Self::Seed(apart) => write!(f, "the same seed and actions give other numbers: {apart}"),
+            Self::Mask(apart) => write!(f, "a reset of other environments changed this one: {apart}"),
+            Self::Neighbours(apart) => write!(f, "actions of another environment changed this one: {apart}"),
+            Self::Bounds(apart) => write!(f, "actions beyond their bounds are not the bounds: {apart}"),
+        }
+    }
+}
+
+/// Holds a batch of environments against what [`VectorEnv`] promises, as Gymnasium's `check_env` does, and gives everything that
+/// it does not keep; of each kind the first. Nothing found is an empty list.
+///
+/// It runs several times 100 steps with random actions of this seed, each time from a reset with it: shapes, spaces that contain
+/// what is seen, finite rewards, the last observations, episodes that begin by themselves, the same bits for the same seed, resets
+/// by mask that touch nothing else, environments that do not know of each other, actions beyond their bounds, and errors for masks
+/// and actions of another shape and for actions that are no numbers. Reset the environments before they are used again.
+///
+/// ```
+/// # use env::{Space, Step, VectorEnv};
+/// # use ndarray::{Array1, Array2, ArrayView2};
+/// # fn all_is_well<E: VectorEnv>(environments: &mut E) {
+/// let findings = env::check(environments, 7);
+/// assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
+/// # }
+/// ```
+#[must_use = "what is found is only in what this gives"]
+pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
+    let n = env.num_envs();
+    if n == 0 {
+        return vec![Finding::NoEnvironments];
+    }
+    let mut found = Vec::new();
+    let plain = Plan { seed, ..Plan::default() };
+    let Some(first) = run(env, &plain, &mut found) else { return found };
+    let compare = |env: &mut E, plan: &Plan, of: &dyn Fn(usize) -> bool, found: &mut Vec<Finding>, kind: Kind| {
+        let names = env.observation_space().names().to_vec();
+        if let Some(other) = run(env, plan, &mut Vec::new())
+            && let Some(apart) = apart(&first, &other, &names, of)
+        {
+            found.push(kind(apart));
+        }
+    };
+    compare(env, &plain, &|_| true, &mut found, Finding::Seed);
+    // Where numbers are others in every run, the rest would say no more than that.
+    if !found.iter().any(|finding| matches!(finding, Finding::Seed(_))) {
+        if n > 1 {
+            let is_even = |env: usize| env.is_multiple_of(2);
+            compare(env, &Plan { reset_odd: true, ..plain }, &is_even, &mut found, Finding::Mask);
+            compare(env, &Plan { odd_act_otherwise: true, ..plain }, &is_even, &mut found, Finding::Neighbours);
+        }
+        let bounded = Plan { at_bounds: Some(0.0), ..plain };
+        let names = env.observation_space().names().to_vec();
+        let (at, beyond) =
+            (run(env, &bounded, &mut Vec::new()), run(env, &Plan { at_bounds: Some(1.0), ..plain }, &mut Vec::new()));
+        if let (Some(at), Some(beyond)) = (at, beyond)
+            && let Some(apart) = apart(&at, &beyond, &names, &|_| true)
+        {
+            found.push(Finding::Bounds(apart));
+        }
+    }
+    refusals(env, seed, &mut found);
+    found
+}
+
+/// A finding of two runs.
+type Kind = fn(Apart) -> Finding;
+
+/// What happens in a run.
+#[derive(Clone, Copy, Debug, Default)]
+struct Plan {
+    seed: u64,
+    /// Odd environments are reset in the middle.
+    reset_odd: bool,
+    /// Odd environments act otherwise.
+    odd_act_otherwise: bool,
+    /// Actions are bounds where these are finite, or so far beyond them.
+    at_bounds: Option<f64>,
+}
+
+impl Plan {
+    fn actions(&self, space: &Space, n: usize, step: usize) -> Array2<f64> {
+        let mut actions = Array2::zeros((n, space.len()));
+        for (env, mut row) in actions.rows_mut().into_iter().enumerate() {
+            let other = self.odd_act_otherwise && env % 2 == 1;
+            let what = format!("env/check/{step}/{}", if other { "other" } else { "" });
+            let mut random = Random::keyed(self.seed, env as u64, &what);
+            for (k, action) in row.iter_mut().enumerate() {
+                let (low, high, part) = (space.low()[k], space.high()[k], random.uniform());
+                *action = match (self.at_bounds, low.is_finite(), high.is_finite()) {
+                    (Some(beyond), true, true) if part < 0.5 => low - beyond,
+                    (Some(beyond), true, true) => high + beyond,
+                    (_, true, true) => low + (high - low) * part,
+                    (_, true, false) => low + part,
+                    (_, false, true) => high - part,
+                    (_, false, false) => 2.0 * part - 1.0,
+                };
+            }
+        }
+        actions
+    }
+}
+
+/// What came of a run: after the reset, and after each step.
+struct Run {
+    begin: Array2<f64>,
+    steps: Vec<Seen>,
+}
+
+/// What a step gave.
+struct Seen {
+    observations: Array2<f64>,
+    rewards: Array1<f64>,
+    ends: [Array1<bool>; 2],
+}
+
+/// Runs a plan; says what is wrong with it alone. `None` where it could not be run to the end, or where nothing has the right shape.
+fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>) -> Option<Run> {
+    let n = env.num_envs();
+    let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
+    let begin = env.reset(None, Some(plan.seed)).map_err(|error| refused("a reset with a seed", &error, found)).ok()?;
+    if !has_shape("what reset gives", begin.shape(), &[n, seen.len()], found) {
+        return None;
+    }
+    inside(&begin, &seen, "after the reset", found);
+    let mut run = Run { begin, steps: Vec::new() };
+    let mut watch = vec![Watch::default(); n];
+    for step in 0..STEPS {
+        let when = format!("step {step}");
+        if plan.reset_odd && step == STEPS / 2 {
+            let mask: Vec<bool> = (0..n).map(|env| env % 2 == 1).collect();
+            let given = env.reset(Some(&mask), None).map_err(|error| refused("a reset by mask", &error, found)).ok()?;
+            if !has_shape("what reset by mask gives", given.shape(), &[n, seen.len()], found) {
+                return None;
+            }
+            // What it gives of the others is what they saw before.
+            if let Some(last) = run.steps.last_mut() {
+                last.observations = given;
+            }
+        }
+        let actions = plan.actions(&acted, n, step);
+        let done = env.step(actions.view()).map_err(|error| refused(&when, &error, found)).ok()?;
+        let Step { observations, final_observations, rewards, terminated, truncated, .. } = done;
+        let tables = [("observations", &observations), ("final_observations", &final_observations)];
+        let mut right = true;
+        for (what, table) in tables {
+            right &= has_shape(&format!("{what} of {when}"), table.shape(), &[n, seen.len()], found);
+        }
+        let columns = [("rewards", rewards.len()), ("terminated", terminated.len()), ("truncated", truncated.len())];
+        for (what, length) in columns {
+            right &= has_shape(&format!("{what} of {when}"), &[length], &[n], found);
+        }
+        if !right {
+            return None;
+        }
+        for (what, table) in tables {
+            inside(table, &seen, &format!("{what} of {when}"), found);
+        }
+        for env in 0..n {
+            if !rewards[env].is_finite() {
+                add(found, Finding::Reward { when: when.clone(), env, value: rewards[env] });
+            }
+            let same = same_bits(&observations, &final_observations, env);
+            let ended = terminated[env] || truncated[env];
+            if !ended && !same {
+                add(found, Finding::FinalObservation { when: when.clone(), env });
+            }
+            if watch[env].has_stopped(ended, same) {
+                add(found, Finding::NoAutoReset { when: when.clone(), env });
+            }
+        }
+        run.steps.push(Seen { observations, rewards, ends: [terminated, truncated] });
+    }
+    Some(run)
+}
+
+/// Whether an environment begins anew where its episodes end.
+#[derive(Clone, Copy, Debug, Default)]
+struct Watch {
+    /// Steps of the longest episode.
+    longest: usize,
+    /// Steps of this one.
+    steps: usize,
+    /// Ends in a row after which nothing looked otherwise than before.
+    stuck: usize,
+}
+
+impl Watch {
+    /// After a step; `same`: what is seen is what was seen last. Three ends one after the other, where episodes were longer before,
+    /// are no episodes.
+    fn has_stopped(&mut self, ended: bool, same: bool) -> bool {
+        self.steps += 1;
+        self.stuck = match ended && same && (self.stuck == 0 || self.steps == 1) {
+            true => self.stuck + 1,
+            false => 0,
+        };
+        self.longest = self.longest.max(self.steps);
+        if ended {
+            self.steps = 0;
+        }
+        self.stuck >= 3 && self.longest > 1
+    }
+}
+
+/// What has to be an error.
+fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Finding>) {
+    let n = env.num_envs();
+    let width = env.action_space().len();
+    let mut wrong = |what: &'static str, taken: bool| {
+        if taken {
+            found.push(Finding::Accepted { what });
+        }
+    };
+    wrong("a mask that is too long", env.reset(Some(&vec![true; n + 1]), None).is_ok());
+    let middle = Plan { seed, ..Plan::default() }.actions(env.action_space(), n, 0);
+    for (what, shape) in [
+        ("a table of actions with a row too many", (n + 1, width)),
+        ("a table of actions with a column too many", (n, width + 1)),
+    ] {
+        // After an error there need not be an episode any more.
+        if env.reset(None, Some(seed)).is_err() {
+            return;
+        }
+        let actions = Array2::from_shape_fn(shape, |(row, k)| middle.get((row, k)).copied().unwrap_or(0.0));
+        wrong(what, env.step(actions.view()).is_ok());
+    }
+    if width > 0 && env.reset(None, Some(seed)).is_ok() {
+        let mut actions = middle;
+        actions[(0, 0)] = f64::NAN;
+        wrong("an action that is no number", env.step(actions.view()).is_ok());
+    }
+}
+
+/// The first number of environments `of` that is another one in two runs.
+fn apart(first: &Run, second: &Run, names: &[String], of: &dyn Fn(usize) -> bool) -> Option<Apart> {
+    let differ = |when: &str, env, what: &str, one: f64, other: f64| {
+        (one.to_bits() != other.to_bits()).then(|| Apart {
+            when: when.into(),
+            env,
+            what: what.into(),
+            first: one,
+            second: other,
+        })
+    };
+    let tables = |when: &str, one: &Array2<f64>, other: &Array2<f64>| {
+        let mut numbers = one.indexed_iter().filter(|((env, _), _)| of(*env));
+        numbers.find_map(|((env, k), x)| differ(when, env, names.get(k).map_or("", |name| name), *x, other[(env, k)]))
+    };
+    tables("after the reset", &first.begin, &second.begin).or_else(|| {
+        first.steps.iter().zip(&second.steps).enumerate().find_map(|(step, (one, other))| {
+            let when = format!("step {step}");
+            let number = |is: bool| f64::from(u8::from(is));
+            tables(&when, &one.observations, &other.observations).or_else(|| {
+                (0..one.rewards.len()).filter(|env| of(*env)).find_map(|env| {
+                    let ends = ["terminated", "truncated"].into_iter().zip(one.ends.iter().zip(&other.ends));
+                    differ(&when, env, "reward", one.rewards[env], other.rewards[env]).or_else(|| {
+                        let mut ends = ends;
+                        ends.find_map(|(what, (a, b))| differ(&when, env, what, number(a[env]), number(b[env])))
+                    })
+                })
+            })
+        })
+    })
+}
+
+fn same_bits(one: &Array2<f64>, other: &Array2<f64>, env: usize) -> bool {
+    one.row(env).iter().zip(other.row(env)).all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+fn has_shape(what: &str, found: &[usize], expected: &[usize], findings: &mut Vec<Finding>) -> bool {
+    if found != expected {
+        let (found, expected) = (found.to_vec(), expected.to_vec());
+        add(findings, Finding::Shape { what: what.into(), found, expected });
+        return false;
+    }
+    true
+}
+
+fn inside(table: &Array2<f64>, space: &Space, when: &str, found: &mut Vec<Finding>) {
+    for ((env, k), &value) in table.indexed_iter() {
+        let bounds = [space.low()[k], space.high()[k]];
+        if !(value.is_finite() && bounds[0] <= value && value <= bounds[1]) {
+            let column = space.names()[k].clone();
+            add(found, Finding::Outside { when: when.into(), env, column, value, bounds });
+            return;
+        }
+    }
+}
+
+fn refused(what: &str, error: &dyn fmt::Display, found: &mut Vec<Finding>) {
+    add(found, Finding::Refused { what: what.into(), error: error.to_string() });
+}
+
+/// Adds a finding, if there is none of its kind.
+fn add(found: &mut Vec<Finding>, finding: Finding) {
+    let kind = std::mem::discriminant(&finding);
+    if !found.iter().any(|known| std::mem::discriminant(known) == kind) {
+        found.push(finding);
+    }
+}

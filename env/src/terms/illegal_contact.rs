@@ -1,0 +1,18 @@
+//! Bodies that must not touch anything.
+
+use crate::termination::TerminationTerm;
+use ndarray::{Array1, Axis};
+use sensors::ContactSensor;
+use sim::SensorId;
+
+/// Ends where the normal forces on one of a sensor's bodies sum up to more than a force \[N\].
+pub fn illegal_contact(name: &str, sensor: SensorId<ContactSensor>, force: f64) -> TerminationTerm {
+    TerminationTerm::new(name, move |now| {
+        let sensor = now.sim().sensor(sensor)?;
+        let forces = sensor.net_forces_w();
+        let is_touched = |env: usize| {
+            forces.index_axis(Axis(0), env).rows().into_iter().any(|one| one.iter().map(|x| x * x).sum::<f64>().sqrt() > force)
+        };
+        Ok((0..now.num_envs()).map(is_touched).collect::<Array1<bool>>())
+    })
+}

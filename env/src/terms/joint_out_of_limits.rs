@@ -1,0 +1,35 @@
+//! Joints that leave their range.
+
+use super::joints;
+use crate::error::Result;
+use crate::termination::TerminationTerm;
+use ndarray::{Array1, Axis};
+use sim::{RobotId, SimulationManager};
+
+/// Ends where a joint that matches one of `patterns` (whole names) is beyond its [soft limits](sim::Robot::soft_qpos_limits); joints
+/// without limits never are.
+///
+/// # Errors
+/// A pattern that matches nothing.
+///
+/// # Panics
+/// The robot is of another manager.
+pub fn joint_out_of_limits(
+    sim: &SimulationManager,
+    name: &str,
+    robot: RobotId,
+    patterns: &[&str],
+) -> Result<TerminationTerm> {
+    let (_, joints) = joints(sim, robot, patterns)?;
+    Ok(TerminationTerm::new(name, move |now| {
+        let robot = now.sim().robot(robot);
+        let (positions, limits) = (robot.get_qpos(), robot.soft_qpos_limits());
+        let is_out = |env: usize| {
+            joints.iter().any(|joint| {
+                let (at, range) = (positions[(env, joint.0)], limits.index_axis(Axis(0), env));
+                at < range[(joint.0, 0)] || at > range[(joint.0, 1)]
+            })
+        };
+        Ok((0..now.num_envs()).map(is_out).collect::<Array1<bool>>())
+    }))
+}

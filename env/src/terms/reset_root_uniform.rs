@@ -1,0 +1,42 @@
+//! Robots that begin somewhere.
+
+use crate::dice::Dice;
+use crate::event::EventTerm;
+use ndarray::Array2;
+use scene::pose::{from_row, from_xyz_rpy, to_row};
+use sim::RobotId;
+
+/// By how much roots begin beside their start: each number is drawn uniformly between two bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RootRanges {
+    /// x, y, z in the environment \[m\].
+    pub position: [[f64; 2]; 3],
+    /// Roll, pitch, yaw about the axes of the root where it starts \[rad\].
+    pub rpy: [[f64; 2]; 3],
+    /// Velocity in world axes \[m/s\].
+    pub linear: [[f64; 2]; 3],
+    /// Angular velocity in world axes \[rad/s\].
+    pub angular: [[f64; 2]; 3],
+}
+
+/// Puts the root link of a robot without a fixed base beside its start when an episode begins, with a velocity.
+pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
+    let drawn = |die: &mut Dice, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.between(low, high));
+    EventTerm::on_reset(name, move |sim, dice| {
+        for die in dice {
+            let start: [f64; 7] = {
+                let starts = sim.robot(robot).get_default_root_pose();
+                std::array::from_fn(|k| starts[(die.env().0, k)])
+            };
+            let (position, rpy) = (drawn(die, ranges.position), drawn(die, ranges.rpy));
+            let mut pose = from_row(&start) * from_xyz_rpy([0.0; 3], rpy);
+            pose.translation.vector += from_xyz_rpy(position, [0.0; 3]).translation.vector;
+            let velocity = [drawn(die, ranges.linear), drawn(die, ranges.angular)].concat();
+            let row = |numbers: &[f64]| Array2::from_shape_fn((1, numbers.len()), |(_, k)| numbers[k]);
+            let mut robot = sim.robot_mut(robot);
+            robot.write_root_pose(&row(&to_row(&pose)), Some(&[die.env()]))?;
+            robot.write_root_velocity(&row(&velocity), Some(&[die.env()]))?;
+        }
+        Ok(())
+    })
+}

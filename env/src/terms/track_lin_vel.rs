@@ -1,0 +1,19 @@
+//! Going as fast as wanted, as a reward.
+
+use crate::reward::RewardTerm;
+use sim::RobotId;
+
+/// exp(-d² / std²), where d is how far the velocity of the root link, x and y in its own axes, is from the first two columns of a
+/// command \[m/s\]: 1 where it is what was wanted.
+pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
+    let command = command.into();
+    RewardTerm::new(name, weight, move |now| {
+        let (moves, wanted) = (now.sim().robot(robot).get_root_lin_vel_b(), now.command(&command)?);
+        if wanted.ncols() < 2 {
+            return Err(format!("the command {command:?} has {} columns; x and y are wanted of it", wanted.ncols()).into());
+        }
+        let pairs = moves.rows().into_iter().zip(wanted.rows());
+        let square = |k: usize, is: &ndarray::ArrayView1<'_, f64>, to: &ndarray::ArrayView1<'_, f64>| (is[k] - to[k]).powi(2);
+        Ok(pairs.map(|(is, to)| (-(square(0, &is, &to) + square(1, &is, &to)) / (std * std)).exp()).collect())
+    })
+}

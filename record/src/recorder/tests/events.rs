@@ -1,0 +1,185 @@
+//! Events, notes and rates.
+
+use super::*;
+use sim::mj;
+
+/// What a NumPy archive says in `notes.jsonl`.
+fn notes(path: &Path) -> Vec<serde_json::Value> {
+    let bytes = std::fs::read(path).unwrap();
+    let members = zip::parse(&bytes).unwrap();
+    let (_, text) = members.iter().find(|(name, _)| *name == "notes.jsonl").unwrap();
+    std::str::from_utf8(text).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Whole numbers of an array of events.
+fn whole(path: &Path, name: &str) -> Vec<i32> {
+    let bytes = std::fs::read(path).unwrap();
+    let members = zip::parse(&bytes).unwrap();
+    let (_, data) = members.iter().find(|(known, _)| *known == format!("events/{name}.npy")).unwrap();
+    match npy::parse(data).unwrap() {
+        ("<i4", _, data) => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect(),
+        (_, _, data) => data.iter().map(|byte| i32::from(*byte)).collect(),
+    }
+}
+
+/// What the messages of a topic say.
+fn logs(path: &Path) -> Vec<String> {
+    let bytes = std::fs::read(path).unwrap();
+    let all = mcap::MessageStream::new(&bytes).unwrap().map(std::result::Result::unwrap);
+    let of = all.filter(|message| message.channel.topic == "/events");
+    of.map(|message| String::from_utf8_lossy(&message.data).into_owned()).collect()
+}
+
+#[test]
+fn notes_and_resets_are_told_with_their_step_and_environment() {
+    let folder = tempfile::tempdir().unwrap();
+    let [npz, mcap] = ["run.npz", "run.mcap"].map(|name| folder.path().join(name));
+    for path in [&npz, &mcap] {
+        let mut sim = falling(3);
+        let envs = Some(vec![EnvId(0), EnvId(2)]);
+        let recorder = sim.record(RecorderCfg { envs, ..RecorderCfg::new(path) }).unwrap();
+        sim.update(4);
+        sim.note(recorder, Some(EnvId(2)), "the ball is \"low\"").unwrap();
+        sim.note(recorder, Some(EnvId(1)), "nobody records this one").unwrap();
+        sim.reset(Some(&[EnvId(0)])).unwrap();
+        sim.update(2);
+        sim.note(recorder, None, "over").unwrap();
+        let error = sim.note(recorder, Some(EnvId(3)), "where").unwrap_err();
+        assert!(matches!(error, RecordError::Env { env: 3, count: 3 }), "{error}");
+        sim.finish_recording(recorder).unwrap();
+        assert!(sim.note(recorder, None, "too late").is_err());
+    }
+    assert_eq!(array(&npz, "events/step"), [4.0, 4.0, 6.0, 6.0]);
+    assert_eq!(whole(&npz, "env"), [2, 0, 0, 2]);
+    assert_eq!(whole(&npz, "kind"), [3, 0, 3, 3]);
+    let told = notes(&npz);
+    let of = |k: usize, event: u64, env: u64, text: &str| {
+        assert_eq!((&told[k]["event"], &told[k]["env"]), (&event.into(), &env.into()), "{told:?}");
+        assert_eq!(told[k]["text"], text);
+    };
+    of(0, 0, 2, "the ball is \"low\"");
+    of(1, 2, 0, "over");
+    of(2, 3, 2, "over");
+    assert_eq!(told.len(), 3);
+    let logs = logs(&mcap);
+    assert_eq!(logs.len(), 4);
+    assert!(logs[0].contains("note at step 4") && logs[0].contains("the ball is \"low\""), "{logs:?}");
+    // Notes are no states: what is recorded beside them is what it would be without.
+    let mut sim = falling(3);
+    let plain = folder.path().join("plain.npz");
+    let envs = Some(vec![EnvId(0), EnvId(2)]);
+    let recorder = sim.record(RecorderCfg { envs, ..RecorderCfg::new(&plain) }).unwrap();
+    sim.update(4);
+    sim.reset(Some(&[EnvId(0)])).unwrap();
+    sim.update(2);
+    sim.finish_recording(recorder).unwrap();
+    assert_eq!(array(&npz, "ball/state/positions"), array(&plain, "ball/state/positions"));
+}
+
+#[test]
+fn an_environment_that_diverges_is_told_once_and_again_after_a_reset() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = falling(2);
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    let ball = sim.mjcf_id("ball").unwrap();
+    let blow_up = |sim: &mut SimulationManager| {
+        // MuJoCo warns of speeds above its mjMAXVAL, 1e10, and the step is not done.
+        let fast = ndarray::array![[0.0, 0.0, 1e12, 0.0, 0.0, 0.0]];
+        sim.mjcf_part_mut(ball).write_qvel(&fast, Some(&[EnvId(1)])).unwrap();
+    };
+    sim.update(3);
+    blow_up(&mut sim);
+    sim.update(4);
+    assert_eq!(sim.diverged().len(), 1, "{}", mj::version_string());
+    sim.reset(Some(&[EnvId(1)])).unwrap();
+    sim.update(1);
+    blow_up(&mut sim);
+    sim.update(2);
+    sim.finish_recording(recorder).unwrap();
+    let (kinds, envs) = (whole(&path, "kind"), whole(&path, "env"));
+    assert_eq!(kinds, [1, 2, 0, 1, 2]);
+    assert_eq!(envs, [1; 5]);
+    assert_eq!(array(&path, "events/step"), [3.0, 4.0, 7.0, 8.0, 9.0]);
+    let why = notes(&path);
+    assert_eq!(why.len(), 2);
+    assert!(why.iter().all(|note| note["text"].as_str().unwrap().starts_with("step ")), "{why:?}");
+}
+
+#[test]
+fn what_has_a_rate_of_its_own_has_rows_at_its_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let recorded = |rates: &[(&str, u64)], path: &Path| {
+        let mut sim = falling(1);
+        let every = SamplingCfg::every(2.0 * sim.cfg().physics_dt);
+        sim.add_sensor("imu", ImuCfg { sampling: every, ..ImuCfg::on("ball/ball") }).unwrap();
+        sim.add_sensor("second", ImuCfg::on("ball/ball")).unwrap();
+        let rates = rates.iter().map(|(name, steps)| ((*name).to_string(), *steps)).collect();
+        let cfg = RecorderCfg { every: 3, rates, overwrite: true, ..RecorderCfg::new(path) };
+        let recorder = sim.record(cfg)?;
+        sim.update(20);
+        sim.finish_recording(recorder)
+    };
+    recorded(&[("ball", 8), ("imu", 5)], &path).unwrap();
+    assert_eq!(array(&path, "ball/state/step"), [0.0, 8.0, 16.0]);
+    // It measures at even steps; at every fifth step, what it measured last.
+    assert_eq!(array(&path, "imu/step"), [5.0, 10.0, 15.0, 20.0]);
+    assert_eq!(array(&path, "second/step").len(), 20, "the other one as ever");
+    let dt = SimulationManagerCfg::default().physics_dt;
+    let captured: Vec<u64> = array(&path, "imu/time").iter().map(|time| (time / dt).round() as u64).collect();
+    // Steps 4, 10, 14, 20; accelerations are of the beginning of a step.
+    assert_eq!(captured, [3, 9, 13, 19]);
+    // The control: without, as often as `every` says and whenever it measures.
+    recorded(&[], &path).unwrap();
+    assert_eq!(array(&path, "ball/state/step"), [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]);
+    assert_eq!(array(&path, "imu/step").len(), 10);
+    let error = recorded(&[("ball", 0)], &path).unwrap_err();
+    assert!(matches!(error, RecordError::OutOfRange { .. }), "{error}");
+    let error = recorded(&[("bal", 2)], &path).unwrap_err();
+    let RecordError::UnknownName { candidates, .. } = &error else { panic!("{error}") };
+    assert_eq!(candidates, &["ball/state", "imu", "second"]);
+    let dataset = folder.path().join("run.lerobot");
+    let error = recorded(&[("ball", 2)], &dataset).unwrap_err();
+    assert!(matches!(error, RecordError::NoPlace { .. }), "{error}");
+}
+
+#[test]
+fn events_alone_are_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(2);
+    let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::Events])).unwrap();
+    sim.update(3);
+    sim.reset(None).unwrap();
+    sim.note(recorder, Some(EnvId(1)), "again").unwrap();
+    sim.finish_recording(recorder).unwrap();
+    let logs = logs(&path);
+    assert_eq!(logs.len(), 3, "{logs:?}");
+    let pictures = folder.path().join("run.gif");
+    let error = sim.record(RecorderCfg::new(pictures).with_topics([Topic::Events])).unwrap_err();
+    assert!(matches!(error, RecordError::NoPlace { .. }), "{error}");
+}
+
+#[test]
+fn a_full_disk_is_told_before_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(4);
+    let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(&path) };
+    let recorder = Recorder::start(&mut sim, cfg, &mut |file| Box::new(FullDisk { file, left: 20_000 })).unwrap();
+    let recorder = sim.add_observer(recorder);
+    assert_eq!(sim.observer(recorder).unwrap().failure(), None);
+    let begun = Instant::now();
+    let why = loop {
+        sim.update(10);
+        if let Some(why) = sim.observer(recorder).unwrap().failure() {
+            break why;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(20), "nothing is said");
+    };
+    assert!(why.contains("run.mcap") && why.contains("no space left on this disk"), "{why}");
+    // It is what is said at the end, too.
+    let error = sim.finish_recording(recorder).unwrap_err().to_string();
+    assert!(error.contains("no space left on this disk"), "{error}");
+}

@@ -1,0 +1,173 @@
+//! Cameras as they are recorded: their channels, their eyes, their lenses.
+
+use super::{Number, Source, sim_error};
+use crate::error::Result;
+use crate::packet::Values;
+use crate::stream::{Distortion, Element};
+use ndarray::{Array2, Array3};
+use sensors::camera::channel::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal};
+use sensors::camera::{CameraConvention, Channel, DistortionModel};
+use sensors::{Camera, RayCasterCamera, StereoCamera};
+use std::any::Any;
+
+/// The channel that both eyes of a pair tell together.
+pub(super) const DISPARITY: &str = "disparity";
+
+/// Which camera of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Eye {
+    /// The sensor is one.
+    Only,
+    /// Those of a pair.
+    Left,
+    Right,
+}
+
+impl Eye {
+    /// The cameras that a sensor has.
+    pub(super) fn of(sensor: &dyn Any) -> &'static [Self] {
+        if sensor.is::<StereoCamera>() {
+            &[Self::Left, Self::Right]
+        } else if sensor.is::<Camera>() || sensor.is::<RayCasterCamera>() {
+            &[Self::Only]
+        } else {
+            &[]
+        }
+    }
+
+    /// What the camera is called that belongs to the sensor `uid`.
+    pub(super) fn name(self, uid: &str) -> String {
+        match self {
+            Self::Only => uid.into(),
+            Self::Left => format!("{uid}/left"),
+            Self::Right => format!("{uid}/right"),
+        }
+    }
+
+    /// The eye that the name of a channel begins with, and the channel: `left/depth`.
+    pub(super) fn in_front_of(channel: &str) -> (Self, &str) {
+        let of = |prefix| channel.strip_prefix(prefix);
+        let left = of("left/").map(|rest| (Self::Left, rest));
+        left.or_else(|| of("right/").map(|rest| (Self::Right, rest))).unwrap_or((Self::Only, channel))
+    }
+
+    /// The camera.
+    pub(super) fn camera(self, sensor: &dyn Any) -> Option<&Camera> {
+        let pair = sensor.downcast_ref::<StereoCamera>();
+        match self {
+            Self::Only => sensor.downcast_ref(),
+            Self::Left => pair.map(StereoCamera::left),
+            Self::Right => pair.map(StereoCamera::right),
+        }
+    }
+
+    /// The pictures that it draws.
+    pub(super) fn channels(self, sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
+        match self.camera(sensor) {
+            Some(camera) => {
+                let wanted = camera.channels().names();
+                CAMERA.iter().copied().filter(|(name, ..)| wanted.contains(name)).collect()
+            }
+            None if self == Self::Only && sensor.is::<RayCasterCamera>() => RAY_CAMERA.to_vec(),
+            None => Vec::new(),
+        }
+    }
+
+    /// Rows and pixels per row.
+    pub(super) fn image_shape(self, sensor: &dyn Any) -> (usize, usize) {
+        let camera = self.camera(sensor).map(Camera::image_shape);
+        camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
+    }
+
+    /// What its lens does to its pictures, which is the same in all environments.
+    pub(super) fn distortion(self, sensor: &dyn Any) -> Option<Distortion> {
+        let Some(camera) = self.camera(sensor) else {
+            // Ray casters that draw pictures are pinholes.
+            return Some(Distortion { model: DistortionModel::PlumbBob.name().into(), coefficients: vec![0.0; 5] });
+        };
+        let info = camera.camera_info("", *camera.env_ids().first()?).ok()?;
+        Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
+    }
+
+    /// Intrinsic matrices and poses, in the axes of ROS, of the pictures that arrived last.
+    pub(super) fn lenses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
+        if let Some(camera) = self.camera(sensor) {
+            return Some((camera.arrived_intrinsic_matrices(), camera.arrived_pose_w(CameraConvention::Ros)));
+        }
+        let pictures = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::arrived);
+        pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
+    }
+}
+
+/// The camera that tells when a sensor of cameras has taken pictures, and of which environments: both eyes of a pair do together.
+pub(super) fn timed(sensor: &dyn Any) -> Option<&Camera> {
+    Eye::of(sensor).first().and_then(|eye| eye.camera(sensor))
+}
+
+/// Channels of a camera: their names, types and numbers per pixel, and how their pictures are copied.
+macro_rules! cameras {
+    ($($Channel:ident),*) => {
+        const CAMERA: &[(&str, Element, usize)] = &[$(
+            ($Channel::NAME, <<$Channel as Channel>::Number as Number>::ELEMENT, $Channel::COMPONENTS)
+        ),*];
+
+        fn copy(source: &Source, camera: &Camera, channel: &str, values: &mut Values) -> Result<()> {
+            match channel {
+                $(_ if channel == $Channel::NAME => {
+                    source.put(values, &camera.arrived::<$Channel>().map_err(sim_error(source))?);
+                })*
+                _ => return Err(source.changed()),
+            }
+            Ok(())
+        }
+    };
+}
+
+cameras!(Color, Depth, Distance, Mask, Normal, ShadingNormal, Position, Albedo, Flow);
+
+/// The same of ray casters that draw pictures.
+const RAY_CAMERA: [(&str, Element, usize); 4] = [
+    (Depth::NAME, Element::F32, 1),
+    (Distance::NAME, Element::F32, 1),
+    (Normal::NAME, Element::F32, 3),
+    (Mask::NAME, Element::I32, 1),
+];
+
+impl Source {
+    pub(super) fn copy_picture(&self, sensor: &dyn Any, eye: Eye, channel: &str, values: &mut Values) -> Result<()> {
+        if let Some(pair) = sensor.downcast_ref::<StereoCamera>()
+            && channel == DISPARITY
+        {
+            self.put(values, &pair.arrived_disparity().map_err(sim_error(self))?);
+            return Ok(());
+        }
+        if let Some(camera) = eye.camera(sensor) {
+            return copy(self, camera, channel, values);
+        }
+        let camera = sensor.downcast_ref::<RayCasterCamera>().ok_or_else(|| self.changed())?;
+        let taken = camera.arrived();
+        match channel {
+            _ if channel == Depth::NAME => self.put(values, &taken.depth()),
+            _ if channel == Distance::NAME => self.put(values, &taken.distance()),
+            _ if channel == Normal::NAME => self.put(values, &taken.normal()),
+            _ if channel == Mask::NAME => self.put(values, &taken.mask()),
+            _ => return Err(self.changed()),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sensors::camera::Channels;
+
+    /// Root cause: the list was written by hand beside that of the cameras, and lacked two of its channels.
+    #[test]
+    fn every_channel_of_a_camera_is_recorded() {
+        let recorded: Vec<&str> = CAMERA.iter().map(|(name, ..)| *name).collect();
+        assert_eq!(recorded, Channels::NAMES);
+        let bytes: usize = CAMERA.iter().map(|(_, element, components)| element.bytes() * components).sum();
+        assert_eq!(bytes, Channels::ALL.bytes_per_pixel());
+    }
+}

@@ -1,0 +1,146 @@
+//! What `env::check` finds in good tasks (nothing) and in broken ones (what is broken).
+
+use super::tasks::{cart_env, cart_task, cfg, everything, world};
+use super::vector_env::Carts;
+use kinetoscope::env::{Env, EnvCfg, EnvError, Finding, Info, Space, Step, VectorEnv, check};
+use kinetoscope::ndarray::{Array2, ArrayView2, s};
+
+#[test]
+fn nothing_is_found_in_tasks_that_are_well() {
+    assert_eq!(check(&mut cart_env(3, Some(20)), 7), []);
+    assert_eq!(check(&mut cart_env(1, None), 7), []);
+    assert_eq!(check(&mut everything(cfg(4, 2)), 11), []);
+}
+
+#[test]
+fn what_carts_by_hand_take_without_a_word_is_found() {
+    let taken = |finding: &Finding| matches!(finding, Finding::Accepted { .. });
+    let found = check(&mut Carts::new(3, 1.0, 20), 7);
+    assert!(found.iter().all(taken) && found.len() == 2, "{found:?}");
+    let said: Vec<String> = found.iter().map(ToString::to_string).collect();
+    assert!(said[0].contains("a column too many") && said[1].contains("no number"), "{said:?}");
+}
+
+/// What is wrong with an environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    None,
+    RowMissing,
+    Narrow,
+    Restless,
+    MaskIgnored,
+    Neighbours,
+    BeyondBounds,
+    NeverBeginsAnew,
+    FinalIsZero,
+    NoReward,
+    Refuses,
+    TakesAnyMask,
+}
+
+/// A good task with something wrong around it.
+struct Broken {
+    inner: Env,
+    fault: Fault,
+    narrow: Space,
+    resets: u32,
+    steps: u32,
+    over: Option<Array2<f64>>,
+}
+
+impl Broken {
+    fn new(fault: Fault) -> Self {
+        let (sim, robot) = world(cfg(4, 1), false);
+        let inner = cart_task(sim, robot, EnvCfg { episode_steps: Some(30), ..Default::default() }).build().unwrap();
+        let narrow = Space::uniform(["place/x"], [-1e-6, 1e-6]).unwrap();
+        Self { inner, fault, narrow, resets: 0, steps: 0, over: None }
+    }
+}
+
+impl VectorEnv for Broken {
+    type Error = EnvError;
+    type Info = Info;
+
+    fn num_envs(&self) -> usize {
+        self.inner.num_envs()
+    }
+
+    fn observation_space(&self) -> &Space {
+        if self.fault == Fault::Narrow { &self.narrow } else { self.inner.observation_space() }
+    }
+
+    fn action_space(&self) -> &Space {
+        self.inner.action_space()
+    }
+
+    fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
+        (self.resets, self.over) = (self.resets + 1, None);
+        let mask = match (self.fault, mask) {
+            (Fault::MaskIgnored, Some(mask)) if mask.len() == self.num_envs() => None,
+            (Fault::TakesAnyMask, _) => None,
+            (_, mask) => mask,
+        };
+        let seen = self.inner.reset(mask, seed)?;
+        Ok(match self.fault {
+            Fault::RowMissing => seen.slice(s![1.., ..]).to_owned(),
+            Fault::Restless => seen + f64::from(self.resets),
+            _ => seen,
+        })
+    }
+
+    fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step, EnvError> {
+        self.steps += 1;
+        if self.fault == Fault::Refuses && self.steps == 5 {
+            return Err(EnvError::ResetFirst { env: 0 });
+        }
+        let mut step = self.inner.step(actions)?;
+        match self.fault {
+            Fault::Neighbours => step.observations[(0, 0)] += 1e-9 * actions[(1, 0)],
+            Fault::BeyondBounds => step.rewards += &actions.column(0),
+            Fault::FinalIsZero => step.final_observations.fill(0.0),
+            Fault::NoReward => step.rewards[2] = f64::NAN,
+            Fault::NeverBeginsAnew if self.over.is_some() || step.truncated.iter().any(|over| *over) => {
+                // It stays where its episode ended, which it says again and again.
+                let over = self.over.get_or_insert_with(|| step.final_observations.clone()).clone();
+                (step.observations, step.final_observations) = (over.clone(), over);
+                step.truncated.fill(true);
+            }
+            _ => {}
+        }
+        if self.fault == Fault::Neighbours {
+            step.final_observations[(0, 0)] += 1e-9 * actions[(1, 0)];
+        }
+        Ok(step)
+    }
+}
+
+/// Whether a finding is the one that is looked for.
+type Is = fn(&Finding) -> bool;
+
+#[test]
+fn what_is_broken_is_found_and_said() {
+    assert_eq!(check(&mut Broken::new(Fault::None), 7), [], "the control");
+    let cases: [(Fault, Is, &str); 11] = [
+        (
+            Fault::RowMissing,
+            |f| matches!(f, Finding::Shape { found, expected, .. } if found == &[3, 1] && expected == &[4, 1]),
+            "[3, 1]",
+        ),
+        (Fault::Narrow, |f| matches!(f, Finding::Outside { column, .. } if column == "place/x"), "place/x"),
+        (Fault::Restless, |f| matches!(f, Finding::Seed(apart) if apart.when == "after the reset"), "the same seed"),
+        (Fault::MaskIgnored, |f| matches!(f, Finding::Mask(apart) if apart.env % 2 == 0), "a reset of other"),
+        (Fault::Neighbours, |f| matches!(f, Finding::Neighbours(apart) if apart.env == 0), "actions of another"),
+        (Fault::BeyondBounds, |f| matches!(f, Finding::Bounds(apart) if apart.what == "reward"), "beyond their bounds"),
+        (Fault::NeverBeginsAnew, |f| matches!(f, Finding::NoAutoReset { .. }), "no other began"),
+        (Fault::FinalIsZero, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
+        (Fault::NoReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
+        (Fault::Refuses, |f| matches!(f, Finding::Refused { what, .. } if what == "step 4"), "step 4"),
+        (Fault::TakesAnyMask, |f| matches!(f, Finding::Accepted { .. }), "mask"),
+    ];
+    for (fault, is_it, word) in cases {
+        let found = check(&mut Broken::new(fault), 7);
+        let said: Vec<String> = found.iter().map(ToString::to_string).collect();
+        let it = found.iter().position(is_it);
+        assert!(it.is_some_and(|k| said[k].contains(word)), "{fault:?}: {said:?}");
+    }
+}

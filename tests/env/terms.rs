@@ -1,0 +1,249 @@
+//! Terms of the library: what they say of states that are known.
+
+use super::tasks::{cfg, idle};
+use kinetoscope::env::terms::{self, RootRanges};
+use kinetoscope::env::{
+    CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm,
+};
+use kinetoscope::ndarray::{Array2, Axis, array};
+use kinetoscope::prelude::*;
+use std::f64::consts::FRAC_PI_2;
+
+/// A box of 2 kg that floats, with a lever on a hinge from -1 to 2 rad.
+const FLOATER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="trunk" pos="0 0 1"><freejoint name="float"/>
+    <geom type="box" size="0.2 0.1 0.05" mass="2"/>
+    <body name="lever" pos="0 0 0.3"><joint name="hinge" axis="0 1 0" range="-1 2"/><geom size="0.03" mass="0.1"/></body></body>
+  </worldbody></mujoco>"#;
+
+fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
+    let plain = cfg(num_envs, 1);
+    let ground = if ground { SimulationManagerCfg::default().ground } else { None };
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground, ..plain }).unwrap();
+    let robot = RobotCfg {
+        uid: "floater".into(),
+        mjcf: Some(MjcfFile::text(FLOATER)),
+        fix_base: false,
+        // From -0.1 to 1.1: the middle of its range and 0.4 of its half.
+        soft_limit_factor: 0.4,
+        drive: DriveCfg { drive_type: DriveType::None, ..Default::default() },
+        ..Default::default()
+    };
+    let robot = sim.add_robot(robot).unwrap();
+    (sim, robot)
+}
+
+fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
+    let height = ObservationTerm::new("z", ["z"], move |now| {
+        Ok(now.sim().robot(robot).get_root_pose().slice_move(kinetoscope::ndarray::s![.., 2..3]))
+    });
+    EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
+}
+
+/// One step in which nothing is done: why each environment ended, if it did.
+fn ends(env: &mut Env) -> Vec<Option<String>> {
+    let n = env.num_envs();
+    let step = env.step(&Array2::zeros((n, 1))).unwrap();
+    let mut ends = vec![None; n];
+    for ended in step.info.ended {
+        if let EndReason::Term(name) = ended.reason {
+            ends[ended.env.0] = Some(name);
+        }
+    }
+    ends
+}
+
+/// In which environments an episode ends whose roots begin at rows of poses.
+fn ended_at(term: impl FnOnce(&SimulationManager, RobotId) -> TerminationTerm, poses: &Array2<f64>) -> Vec<bool> {
+    let (sim, robot) = floater(poses.nrows(), false);
+    let term = term(&sim, robot);
+    let mut env = task(sim, robot).termination(term).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    env.sim_mut().robot_mut(robot).write_root_pose(poses, None).unwrap();
+    ends(&mut env).iter().map(Option::is_some).collect()
+}
+
+#[test]
+fn episodes_end_where_roots_are_low_or_lie_down() {
+    // In a step of 0.01 s or less they fall by no more than g h² = 1 mm.
+    let poses = array![
+        [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.502, 1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.499, 1.0, 0.0, 0.0, 0.0],
+    ];
+    assert_eq!(ended_at(|_, robot| terms::base_below("low", robot, 0.5), &poses), [false, false, true]);
+    // Turned about x by 0.5, about y by 0.7, about z by 3 rad: only the first two lean, the second beyond 0.6.
+    let turned = |axis: usize, angle: f64| {
+        let mut row = vec![0.0, 0.0, 1.0, (0.5 * angle).cos(), 0.0, 0.0, 0.0];
+        row[4 + axis] = (0.5 * angle).sin();
+        row
+    };
+    let rows = [turned(0, 0.5), turned(1, 0.7), turned(2, 3.0), turned(0, 2.5)].concat();
+    let poses = Array2::from_shape_vec((4, 7), rows).unwrap();
+    let term = |_: &SimulationManager, robot| terms::bad_orientation("lies", robot, 0.6);
+    assert_eq!(ended_at(term, &poses), [false, true, false, true]);
+}
+
+#[test]
+fn episodes_end_after_their_time_and_where_joints_are_at_their_ends() {
+    let (sim, robot) = floater(3, false);
+    let limits = terms::joint_out_of_limits(&sim, "limits", robot, &["hinge"]).unwrap();
+    assert!(terms::joint_out_of_limits(&sim, "limits", robot, &["none"]).is_err());
+    let mut env = task(sim, robot).termination(limits).termination(terms::time_out("late", 4)).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    let places = array![[1.0], [1.2], [-0.2]];
+    env.sim_mut().robot_mut(robot).write_qpos(&places, None, None).unwrap();
+    assert_eq!(ends(&mut env), [None, Some("limits".into()), Some("limits".into())]);
+    for _ in 0..2 {
+        assert_eq!(ends(&mut env), [None, None, None]);
+    }
+    // The others began anew one step later.
+    let step = env.step(&Array2::zeros((3, 1))).unwrap();
+    assert_eq!((step.truncated.to_vec(), step.terminated.to_vec()), (vec![true, false, false], vec![false; 3]));
+}
+
+#[test]
+fn episodes_end_where_a_body_is_touched() {
+    let (mut sim, robot) = floater(2, true);
+    let sensor = sim.add_sensor("touch", ContactSensorCfg::of("floater/trunk")).unwrap();
+    let touched = terms::illegal_contact("touched", sensor, 5.0);
+    let mut env = task(sim, robot).termination(touched).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    // One stands on the ground to a tenth of a millimetre, which carries its 2.1 kg, one is a metre above it.
+    let poses = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0499, 1.0, 0.0, 0.0, 0.0]];
+    env.sim_mut().robot_mut(robot).write_root_pose(&poses, None).unwrap();
+    let mut all = [false; 2];
+    for _ in 0..20 {
+        for (k, end) in ends(&mut env).iter().enumerate() {
+            all[k] |= end.is_some();
+        }
+    }
+    assert_eq!(all, [false, true]);
+}
+
+/// Where roots and joints begin in many environments, with an event.
+fn begun(
+    event: EventTerm,
+    robot: RobotId,
+    sim: SimulationManager,
+) -> (Array2<f64>, Array2<f64>, Array2<f64>, Array2<f64>) {
+    let mut env = task(sim, robot).event(event).build().unwrap();
+    env.reset(None, Some(5)).unwrap();
+    let robot = env.sim().robot(robot);
+    (robot.get_root_pose(), robot.get_root_velocity(), robot.get_qpos(), robot.get_qvel())
+}
+
+#[test]
+fn roots_begin_in_their_ranges_and_fill_them() {
+    const N: usize = 400;
+    let ranges = RootRanges {
+        position: [[-0.5, 0.5], [1.0, 2.0], [0.1, 0.1]],
+        rpy: [[0.0; 2], [0.0; 2], [-FRAC_PI_2, FRAC_PI_2]],
+        linear: [[-1.0, 1.0], [0.0; 2], [0.0; 2]],
+        angular: [[0.0; 2], [0.0; 2], [2.0, 3.0]],
+    };
+    let (sim, robot) = floater(N, false);
+    let (poses, speeds, ..) = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let yaw = poses.rows().into_iter().map(|row| 2.0 * row[6].atan2(row[3])).collect::<Vec<f64>>();
+    let column = |table: &Array2<f64>, k: usize| table.column(k).to_vec();
+    for (name, values, [low, high]) in [
+        ("x", column(&poses, 0), [-0.5, 0.5]),
+        ("y", column(&poses, 1), [1.0, 2.0]),
+        ("yaw", yaw, [-FRAC_PI_2, FRAC_PI_2]),
+        ("vx", column(&speeds, 0), [-1.0, 1.0]),
+        ("wz", column(&speeds, 5), [2.0, 3.0]),
+    ] {
+        let round = 1e-12;
+        assert!(values.iter().all(|x| low - round <= *x && *x <= high + round), "{name}: {values:?}");
+        // The mean of N numbers is uniform's within five of its standard deviations, width / sqrt(12 N).
+        let mean = values.iter().sum::<f64>() / N as f64;
+        let deviation = (high - low) / (12.0 * N as f64).sqrt();
+        assert!((mean - 0.5 * (low + high)).abs() < 5.0 * deviation, "{name}: {mean}");
+        // None in the outer tenths has a chance of 0.9^N, below 1e-18.
+        let width = high - low;
+        assert!(
+            values.iter().any(|x| *x < low + 0.1 * width) && values.iter().any(|x| *x > high - 0.1 * width),
+            "{name}"
+        );
+    }
+    assert!(column(&poses, 2).iter().all(|z| (z - 1.1).abs() < 1e-12));
+    assert!(speeds.column(1).iter().chain(speeds.column(4)).all(|v| *v == 0.0));
+}
+
+#[test]
+fn joints_begin_beside_their_start_and_within_their_limits() {
+    const N: usize = 300;
+    let (sim, robot) = floater(N, false);
+    let event = terms::reset_joints_by_offset(&sim, "start", robot, &["hinge"], [-3.0, 0.5], [1.0, 1.5]).unwrap();
+    let (_, _, places, speeds) = begun(event, robot, sim);
+    // From -3 to 0.5 about the start at 0; what is below the limit of -1 is there: 2 of 3.5 of them.
+    let at_limit = places.iter().filter(|x| **x == -1.0).count() as f64 / N as f64;
+    // Five standard deviations of a share p of N, sqrt(p (1 - p) / N).
+    let share: f64 = 2.0 / 3.5;
+    assert!((at_limit - share).abs() < 5.0 * (share * (1.0 - share) / N as f64).sqrt(), "{at_limit}");
+    assert!(places.iter().all(|x| (-1.0..=0.5).contains(x)));
+    assert!(speeds.iter().all(|v| (1.0..=1.5).contains(v)));
+}
+
+#[test]
+fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
+    let (sim, robot) = floater(2, false);
+    let upright = terms::flat_orientation("flat", 1.0, robot);
+    let fast = terms::track_lin_vel("fast", 2.0, robot, "speed", 0.5);
+    let builder = |reward: RewardTerm, sim, robot| {
+        task(sim, robot)
+            .command(CommandTerm::new("speed", ["x", "y"], |_| [0.3, 0.0]))
+            .observation(terms::base_lin_vel("v", robot))
+            .observation(terms::base_ang_vel("w", robot))
+            .observation(terms::projected_gravity("down", robot))
+            .reward(reward)
+    };
+    let mut env = builder(upright, sim, robot).reward(fast).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    // The second lies on its side: a quarter turn about x. Both go along the world's x and turn about it.
+    let half = 0.5f64.sqrt();
+    let poses = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, half, half, 0.0, 0.0]];
+    env.sim_mut().robot_mut(robot).write_root_pose(&poses, None).unwrap();
+    env.sim_mut().robot_mut(robot).write_root_velocity(&array![[0.3, 0.2, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
+    let step = env.step(&Array2::zeros((2, 1))).unwrap();
+    let (seen, dt) = (&step.final_observations, env.step_dt());
+    // z, v, w, down: of the second y is the world's z and z the world's minus y. Gravity adds g dt to what falls; the lever, a
+    // twentieth of the mass on its own hinge, moves them by less than a hundredth of that.
+    let fall = 9.81 * dt;
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.02 * fall, "{found} {expected}");
+    let expected = [[0.3, 0.2, -fall], [0.3, -fall, -0.2]];
+    for (env, row) in expected.into_iter().enumerate() {
+        row.into_iter().enumerate().for_each(|(k, v)| near(seen[(env, 1 + k)], v));
+    }
+    for (env, down) in [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]].into_iter().enumerate() {
+        down.into_iter().enumerate().for_each(|(k, x)| near(seen[(env, 7 + k)], x));
+    }
+    // 1 of being there, then the two; what is off is 0.2 m/s of 0.5 for the first and what it falls for the second.
+    let rewards = &step.info.reward_terms;
+    near(rewards[(0, 1)], 0.0);
+    near(rewards[(1, 1)], 1.0);
+    near(rewards[(0, 2)], 2.0 * (-(0.2f64 / 0.5).powi(2)).exp());
+    near(rewards[(1, 2)], 2.0 * (-(fall / 0.5).powi(2)).exp());
+    let (sim, robot) = floater(2, false);
+    let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
+    let mut env = builder(wrong, sim, robot).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    let error = env.step(&Array2::zeros((2, 1))).unwrap_err().to_string();
+    assert!(error.contains("nothing") && error.contains("speed"), "{error}");
+}
+
+#[test]
+fn efforts_of_drives_are_summed_as_squares() {
+    let (mut sim, _) = floater(1, false);
+    let cart =
+        RobotCfg { uid: "cart".into(), mjcf: Some(MjcfFile::text(super::tasks::cart(true))), ..Default::default() };
+    let cart = sim.add_robot(RobotCfg { drive: DriveCfg::default(), ..cart }).unwrap();
+    let squares = terms::joint_effort_squares(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
+    let mut env = task(sim, cart).reward(squares).build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    env.sim_mut().robot_mut(cart).set_qpos(&array![[0.1, -0.2]], None, None).unwrap();
+    let step = env.step(&Array2::zeros((1, 1))).unwrap();
+    let efforts = env.sim().robot(cart).get_qf();
+    let expected = -0.5 * efforts.index_axis(Axis(0), 0).iter().map(|x| x * x).sum::<f64>();
+    assert!(expected < 0.0, "they drive: {efforts}");
+    assert_eq!(step.info.reward_terms[(0, 1)], expected);
+}
