@@ -239,10 +239,14 @@ impl SensorList {
     /// After somebody wrote to the state of `env_ids`.
     pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         self.note_written(env_ids);
+        // Whoever reads makes up for a forward pass, for which there is no need without sensors.
+        if self.entries.is_empty() {
+            return;
+        }
         // One that is put aside keeps what was measured last.
         let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
         let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
-        if self.entries.is_empty() || running.is_empty() {
+        if running.is_empty() {
             return;
         }
         self.renew(simulation, &running);

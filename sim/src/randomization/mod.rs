@@ -211,8 +211,14 @@ impl SimulationManager {
     pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
         let resolved = randomization.resolve(&self.properties(EnvId(0))?)?;
         let keys = self.keys();
+        // One text for all: there is a key for each environment, property and name.
+        let mut what = String::new();
         self.draw(env_ids, |env, properties| {
-            resolved.draw(properties, |property, name| keys(env, &format!("/{}/{name}", property.name())));
+            resolved.draw(properties, |property, name| {
+                what.clear();
+                what.extend(["/", property.name(), "/", name]);
+                keys(env, &what)
+            });
             Ok(())
         })
     }

@@ -123,10 +123,13 @@ impl Property {
     pub fn width(self) -> usize {
         match self {
             Self::CenterOfMass | Self::Inertia | Self::Gravity | Self::Size | Self::Position => 3,
-            Self::Color | Self::Rotation => 4,
+            Self::Color | Self::Rotation => Self::WIDEST,
             _ => 1,
         }
     }
+
+    /// No property has more numbers.
+    pub(super) const WIDEST: usize = 4;
 
     /// Whose property it is, as messages say it.
     pub(super) fn owner(self) -> &'static str {

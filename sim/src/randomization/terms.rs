@@ -100,42 +100,58 @@ impl Randomization {
             let names = properties.names_to_draw(property);
             let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.owner())
                 .map_err(|error| RandomizationError::Pattern { property: property.name(), error: Box::new(error) })?;
-            let chosen = names.iter().zip(draws).filter_map(|(name, draw)| Some((name.to_string(), draw?)));
+            let elements_of = |wanted: &str| {
+                let all = properties.tables.get(property).names.iter().enumerate();
+                all.filter(|(_, name)| *name == wanted).map(|(element, _)| element).collect()
+            };
+            let chosen = names.iter().zip(draws).filter_map(|(name, draw)| {
+                Some(ResolvedDraw { name: name.to_string(), elements: elements_of(name), draw: draw? })
+            });
             resolved.push((property, chosen.collect()));
         }
         Ok(Resolved(resolved))
     }
 }
 
-/// A randomisation of a scene: the draws of each property by name.
-pub(super) struct Resolved(Vec<(Property, BTreeMap<String, Draw>)>);
+/// A randomisation of a scene: what is drawn, property by property.
+pub(super) struct Resolved(Vec<(Property, Vec<ResolvedDraw>)>);
+
+/// What is drawn for a name: once, for all elements of that name.
+struct ResolvedDraw {
+    name: String,
+    elements: Vec<usize>,
+    draw: Draw,
+}
 
 impl Resolved {
     /// Draws for an environment. `random` makes the generator of a property and a name.
-    pub(super) fn draw(&self, properties: &mut Properties, random: impl Fn(Property, &str) -> Random) {
+    pub(super) fn draw(&self, properties: &mut Properties, mut random: impl FnMut(Property, &str) -> Random) {
         let tables = std::sync::Arc::clone(&properties.tables);
         for (property, draws) in &self.0 {
             let (table, width) = (tables.get(*property), property.width());
-            for (element, name) in table.names.iter().enumerate() {
-                let Some(draw) = draws.get(name) else { continue };
-                let mut value = table.nominal[element * width..(element + 1) * width].to_vec();
-                if *property == Property::Inertia {
-                    value.copy_from_slice(&properties.proportional_moments(element));
-                }
+            // Opacity is set, not drawn: a factor of a colour is none of it.
+            let drawn = if *property == Property::Color { 3 } else { width };
+            for ResolvedDraw { name, elements, draw } in draws {
                 let mut random = random(*property, name);
-                // Opacity is set, not drawn: a factor of a colour is none of it.
-                let drawn = if *property == Property::Color { 3 } else { width };
                 let [low, high] = draw.range();
-                let mut next = || low + (high - low) * random.uniform();
-                match draw {
-                    Draw::Scale(_) => {
-                        let factor = next();
-                        value[..drawn].iter_mut().for_each(|number| *number *= factor);
+                let mut numbers = [0.0; Property::WIDEST];
+                let count = if matches!(draw, Draw::Scale(_)) { 1 } else { drawn };
+                numbers[..count].fill_with(|| low + (high - low) * random.uniform());
+                for &element in elements {
+                    let mut value = [0.0; Property::WIDEST];
+                    let value = &mut value[..width];
+                    value.copy_from_slice(&table.nominal[element * width..(element + 1) * width]);
+                    if *property == Property::Inertia {
+                        value.copy_from_slice(&properties.proportional_moments(element));
                     }
-                    Draw::Add(_) => value[..drawn].iter_mut().for_each(|number| *number += next()),
-                    Draw::Set(_) => value[..drawn].iter_mut().for_each(|number| *number = next()),
+                    let (drawn, numbers) = (value[..drawn].iter_mut(), numbers.iter());
+                    match draw {
+                        Draw::Scale(_) => drawn.for_each(|number| *number *= numbers.as_slice()[0]),
+                        Draw::Add(_) => drawn.zip(numbers).for_each(|(number, more)| *number += more),
+                        Draw::Set(_) => drawn.zip(numbers).for_each(|(number, new)| *number = *new),
+                    }
+                    properties.set_element(*property, element, value);
                 }
-                properties.set_element(*property, element, &value);
             }
         }
     }
