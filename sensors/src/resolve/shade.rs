@@ -150,9 +150,11 @@ struct Gloss {
 }
 
 impl Gloss {
+    /// A metal mirrors lamps as it does everything, whatever `specular` says of what is not metal.
     fn of(material: &Material) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
-        Self { strength: material.specular, exponent, faint: FAINT_ROOT[exponent as usize] }
+        let strength = if material.metallic > 0.0 { 1.0 } else { material.specular };
+        Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
     /// Whether it shines in a light of this colour.
@@ -278,19 +280,27 @@ pub(crate) fn shade<S: Simd>(
             }
         }
     }
-    let mut color =
-        V3 { x: base.x * diffuse[0] + gloss[0], y: base.y * diffuse[1] + gloss[1], z: base.z * diffuse[2] + gloss[2] };
-    if material.metallic > 0.0 {
-        // What it mirrors, in its colour; of a scene without a mirror, the sky.
+    let plain = {
+        #[inline(always)]
+        |gloss: [F<S>; 3]| V3 {
+            x: base.x * diffuse[0] + gloss[0],
+            y: base.y * diffuse[1] + gloss[1],
+            z: base.z * diffuse[2] + gloss[2],
+        }
+    };
+    let mut color = if material.metallic > 0.0 {
+        // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)));
         let metal = V3 {
-            x: base.x * (mirrored.x + gloss[0]),
-            y: base.y * (mirrored.y + gloss[1]),
-            z: base.z * (mirrored.z + gloss[2]),
+            x: base.x * (mirrored.x + gloss[0] + material.emission),
+            y: base.y * (mirrored.y + gloss[1] + material.emission),
+            z: base.z * (mirrored.z + gloss[2] + material.emission),
         };
         let k = splat(s, material.metallic.min(1.0));
-        color = color.scale(1.0 - k).add(metal.scale(k));
-    }
+        plain(gloss.map(|light| light * material.specular)).scale(1.0 - k).add(metal.scale(k))
+    } else {
+        plain(gloss)
+    };
     if material.reflectance > 0.0 {
         let mirrored = view.sub(n.scale(n.dot(view) * 2.0));
         let k = splat(s, material.reflectance.clamp(0.0, 1.0));

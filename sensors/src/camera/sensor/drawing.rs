@@ -116,36 +116,43 @@ impl Camera {
     }
 }
 
-/// Draws jobs, and the markers of each into its colours and nothing else.
+/// Draws jobs, and the markers of each into its colours and nothing else: the colours with markers are jobs of their own. All
+/// are drawn together, so that one that fails costs no other, and none is counted twice.
 fn render_marked(
     rasterizer: &mut ParallelRasterizer,
     jobs: &mut [Job<'_>],
     takes: &[Take<'_>],
     markers: &[&[Marker]],
 ) -> Result<(), (usize, RenderError)> {
-    let mut stages = Vec::new();
-    for (index, ((shot, _), markers)) in jobs.iter().zip(markers).enumerate().filter(|(_, (_, m))| !m.is_empty()) {
-        stages.push((index, Stage::of(shot, &takes[index], markers).map_err(|error| (index, error))?));
-    }
-    // First everything without the colours that have markers in them, then these.
-    let mut colors: Vec<_> = stages.iter().map(|(index, _)| jobs[*index].1.color.take()).collect();
-    let mut result = rasterizer.render_takes(jobs, takes);
-    if result.is_ok() {
-        let frames = colors.iter_mut().map(|color| FrameMut { color: color.as_deref_mut(), ..FrameMut::default() });
-        let (mut marked, mut marked_takes) = (Vec::new(), Vec::new());
-        for ((index, Stage { scene, poses, opened }), frame) in stages.iter().zip(frames) {
-            let (shot, take) = (jobs[*index].0, takes[*index]);
-            marked.push((Shot { scene, poses, before: None, ..shot }, frame));
-            let opened = take.opened.zip(opened.as_deref()).map(|(opened, poses)| Opened { poses, ..opened });
-            marked_takes.push(Take { opened, ..take });
+    let (mut stages, mut failed) = (Vec::new(), None);
+    for (index, ((shot, frame), markers)) in jobs.iter().zip(markers).enumerate() {
+        if markers.is_empty() || frame.color.is_none() {
+            continue;
         }
-        let drawn = rasterizer.render_takes(&mut marked, &marked_takes);
-        result = drawn.map_err(|(place, error)| (stages[place].0, error));
+        match Stage::of(shot, &takes[index], markers) {
+            Ok(stage) => stages.push((index, Some(stage))),
+            Err(error) => {
+                failed = failed.or(Some((index, error)));
+                // Its colour stays as it was, and what else there is to it is drawn.
+                stages.push((index, None));
+            }
+        }
     }
-    for ((index, _), color) in stages.iter().zip(colors) {
-        jobs[*index].1.color = color;
+    let shots: Vec<Shot<'_>> = jobs.iter().map(|(shot, _)| *shot).collect();
+    let mut all: Vec<Job<'_>> = jobs.iter_mut().map(|(shot, frame)| (*shot, frame.reborrow())).collect();
+    let (mut all_takes, mut of) = (takes.to_vec(), (0..shots.len()).collect::<Vec<_>>());
+    for (index, stage) in &stages {
+        let frame = FrameMut { color: all[*index].1.color.take(), ..FrameMut::default() };
+        let Some(Stage { scene, poses, opened }) = stage else { continue };
+        let take = takes[*index];
+        all.push((Shot { scene, poses, before: None, ..shots[*index] }, frame));
+        let opened = take.opened.zip(opened.as_deref()).map(|(opened, poses)| Opened { poses, ..opened });
+        all_takes.push(Take { opened, ..take });
+        of.push(*index);
     }
-    result
+    let drawn = rasterizer.render_takes(&mut all, &all_takes).map_err(|(place, error)| (of[place], error));
+    let first = drawn.err().into_iter().chain(failed).min_by_key(|(index, _)| *index);
+    first.map_or(Ok(()), Err)
 }
 
 /// A scene with markers in it.

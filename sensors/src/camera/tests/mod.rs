@@ -13,6 +13,7 @@ mod golden;
 mod late;
 mod lens_pictures;
 mod lenses;
+mod metals;
 mod noisy;
 mod pictures;
 mod progress;

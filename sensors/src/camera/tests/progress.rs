@@ -5,8 +5,9 @@ use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, R
 use super::scenes::figure;
 use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
-use crate::sensor::Sensor;
+use crate::sensor::{Sensor, SensorCfg};
 use crate::visibility::{RenderError, View};
+use scene::Marker;
 use std::time::{Duration, Instant};
 
 fn paths(samples: u32) -> Renderer {
@@ -174,4 +175,27 @@ fn copies_have_their_own_progress() {
     let copy = single.clone();
     single.progress.cancel();
     assert!(!copy.progress.is_cancelled() && copy.renderer == single.renderer);
+}
+
+/// Of two environments one has something to show in its picture, which is drawn twice then: without its colour, which takes no
+/// paths, and its colour with the markers. Root cause once: these were counted after the others had been, from 0 again.
+#[test]
+fn pictures_with_markers_count_once() {
+    let channels = Channels { mask: true, color: true, ..Channels::default() };
+    let of = |draw_markers| CameraCfg { renderer: paths(2), draw_markers, channels, ..cfg() };
+    let (context, mut shown) = (context(2), state(&[0, 0]));
+    shown.markers = Some(vec![vec![Marker::sphere([0.0, 0.0, 0.9], 0.2, [0.0, 1.0, 0.0, 1.0])], Vec::new()]);
+    let look = |draw_markers| {
+        let mut camera = of(draw_markers).build(&context).unwrap();
+        camera.reset(&[0, 1], &shown).unwrap();
+        let pictures = (camera.color().unwrap().to_owned(), camera.mask().unwrap().to_owned());
+        let total = 2 * 2 * (cfg().width * cfg().height) as u64;
+        assert_eq!((camera.progress().samples(), camera.progress().total()), (total, total));
+        pictures
+    };
+    let ((color, mask), (plain, plain_mask)) = (look(true), look(false));
+    let envs = ndarray::Axis(0);
+    assert_ne!(color.index_axis(envs, 0), plain.index_axis(envs, 0), "the marker is seen");
+    assert_eq!(color.index_axis(envs, 1), plain.index_axis(envs, 1));
+    assert_eq!(mask, plain_mask, "and measured nowhere");
 }
