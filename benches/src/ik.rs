@@ -272,7 +272,10 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
     let times = measure(plan, &mut [&mut ours, &mut bare])?;
     let (many, its_robot) = simulation(ENVS, &urdf)?;
-    let targets = task.targets.chunks_exact(ENVS).map(<[Pose]>::to_vec).collect();
+    // All of them; the last round is filled up with the first ones.
+    let rounds = task.targets.len().div_ceil(ENVS);
+    let filled: Vec<Pose> = task.targets.iter().copied().cycle().take(rounds * ENVS).collect();
+    let targets = filled.chunks_exact(ENVS).map(<[Pose]>::to_vec).collect();
     let mut batched = Batched { task: &task, sim: many, robot: its_robot, targets, next: 0 };
     (bare.each, bare.next) = (ENVS, 0);
     let together = measure(plan, &mut [&mut batched, &mut bare])?;

@@ -41,12 +41,12 @@ impl DelayedPd {
     }
 
     /// The delay of a drive with this memory \[steps\].
-    pub fn delay_of(memory: &[f64]) -> u32 {
+    pub(crate) fn delay_of(memory: &[f64]) -> u32 {
         memory[DELAY] as u32
     }
 
     /// Changes the delay of a drive with this memory; the targets in it stay as they are.
-    pub fn set_delay(memory: &mut [f64], steps: u32) {
+    pub(crate) fn set_delay(memory: &mut [f64], steps: u32) {
         memory[DELAY] = f64::from(steps);
     }
 }
