@@ -469,6 +469,7 @@ fn table_gaps(examples: &[String]) -> Vec<String> {
         .map(|name| format!("the example `{name}` has no row"))
         .collect();
     let mut rows: Vec<&str> = TABLE.iter().map(|row| row.example).collect();
+    rows.sort_unstable();
     rows.dedup();
     rows.retain(|name| !examples.iter().any(|example| example == name));
     findings.extend(rows.iter().map(|name| format!("there are rows for `{name}`, but no such example")));
