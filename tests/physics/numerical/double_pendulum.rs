@@ -12,11 +12,11 @@
 
 use super::convergence::{self, START, TIME};
 use crate::lab::G;
-use nalgebra::{Matrix2, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// How a step is made.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Steps {
+pub(crate) enum Steps {
     Euler,
     Implicit,
     RungeKutta,
@@ -31,34 +31,100 @@ fn accelerations(q: Vector2<f64>, v: Vector2<f64>, h: f64) -> Vector2<f64> {
     (mass - h * by_velocity).try_inverse().unwrap() * force
 }
 
-/// Angles of the joints after [`TIME`], in steps of `h`.
-pub(super) fn angles(steps: Steps, h: f64) -> Vec<f64> {
-    let velocity = |x: Vector4<f64>| Vector2::new(x.z, x.w);
-    let rate = |x: Vector4<f64>| {
-        let a = accelerations(x.xy(), velocity(x), 0.0);
-        Vector4::new(x.z, x.w, a.x, a.y)
-    };
-    // From the angles of the joints to those of the rods.
-    let ([q, r], [v, w]) = START;
-    let mut x = Vector4::new(q, q + r, v, v + w);
-    for _ in 0..(TIME / h).round() as u32 {
-        match steps {
+/// A state: the angles of the rods \[rad\], and their velocities \[rad/s\].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rods(Vector4<f64>);
+
+impl Rods {
+    /// From the angles of the joints \[rad\] and their velocities \[rad/s\].
+    pub(crate) fn of_joints([q, r]: [f64; 2], [v, w]: [f64; 2]) -> Self {
+        Self(Vector4::new(q, q + r, v, v + w))
+    }
+
+    /// The angles of the joints, and their velocities.
+    pub(crate) fn joints(self) -> ([f64; 2], [f64; 2]) {
+        let x = self.0;
+        ([x.x, x.y - x.x], [x.z, x.w - x.z])
+    }
+
+    /// A step of `h` \[s\] later, or earlier.
+    pub(crate) fn after(self, steps: Steps, h: f64) -> Self {
+        let x = self.0;
+        let velocity = |x: Vector4<f64>| Vector2::new(x.z, x.w);
+        let rate = |x: Vector4<f64>| {
+            let a = accelerations(x.xy(), velocity(x), 0.0);
+            Vector4::new(x.z, x.w, a.x, a.y)
+        };
+        Self(match steps {
             Steps::RungeKutta => {
                 let a = rate(x);
                 let b = rate(x + 0.5 * h * a);
                 let c = rate(x + 0.5 * h * b);
                 let d = rate(x + h * c);
-                x += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+                x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
             }
             Steps::Euler | Steps::Implicit => {
                 let by_velocity = if matches!(steps, Steps::Implicit) { h } else { 0.0 };
                 let v = velocity(x) + h * accelerations(x.xy(), velocity(x), by_velocity);
                 let q = x.xy() + h * v;
-                x = Vector4::new(q.x, q.y, v.x, v.y);
+                Vector4::new(q.x, q.y, v.x, v.y)
             }
-        }
+        })
     }
-    vec![x.x, x.y - x.x]
+
+    /// Kinetic and potential energy \[J\], 0 at rest in the height of the upper joint:
+    /// 2/3 a'² + 1/6 b'² + c/2 a' b' - g (3/2 cos a + 1/2 cos b).
+    pub(crate) fn energy(self) -> f64 {
+        let [a, b, v, w] = self.0.into();
+        let kinetic = 2.0 / 3.0 * v * v + w * w / 6.0 + 0.5 * (a - b).cos() * v * w;
+        kinetic - G * (1.5 * a.cos() + 0.5 * b.cos())
+    }
+
+    /// What half a digit of each number of the state changes the energy by at most \[J\].
+    pub(crate) fn rounding_of_energy(self) -> f64 {
+        let [a, b, v, w] = self.0.into();
+        let (s, c) = (a - b).sin_cos();
+        let by = [1.5 * G * a.sin() - 0.5 * s * v * w, 0.5 * G * b.sin() + 0.5 * s * v * w]
+            .into_iter()
+            .chain([4.0 / 3.0 * v + 0.5 * c * w, w / 3.0 + 0.5 * c * v]);
+        by.zip([a, b, v, w]).map(|(slope, x)| (slope * x).abs() * f64::EPSILON / 2.0).sum()
+    }
+
+    /// How a step changes small differences of states.
+    fn growth(self, steps: Steps, h: f64) -> Matrix4<f64> {
+        // A third of the digits: the best central difference of numbers that are exact to all of them.
+        let small = f64::EPSILON.cbrt();
+        let column = |i: usize| {
+            let by = Vector4::ith(i, small);
+            let [up, down] = [self.0 + by, self.0 - by].map(|x| Self(x).after(steps, h).0);
+            (up - down) / (2.0 * small)
+        };
+        Matrix4::from_columns(&[0, 1, 2, 3].map(column))
+    }
+}
+
+/// Where steps of `sizes` \[s\] lead (below 0: back), and what rounding may change that by: half a digit of each number of
+/// each state, grown from there to the end; angles \[rad\] and velocities \[rad/s\] of joints, the larger of the two each.
+pub(crate) fn swing(start: Rods, steps: Steps, sizes: &[f64]) -> (Rods, [f64; 2]) {
+    let mut way = vec![start];
+    for (k, &h) in sizes.iter().enumerate() {
+        way.push(way[k].after(steps, h));
+    }
+    let mut grown = Matrix4::<f64>::identity();
+    let mut rounding = Vector4::zeros();
+    for (pair, &h) in way.windows(2).zip(sizes).rev() {
+        rounding += grown.abs() * pair[1].0.abs() * (f64::EPSILON / 2.0);
+        grown *= pair[0].growth(steps, h);
+    }
+    // The angle of the lower joint is the difference of those of two rods.
+    let [a, b, v, w] = rounding.into();
+    (way[sizes.len()], [a + b, v + w])
+}
+
+/// Angles of the joints after [`TIME`], in steps of `h`.
+pub(super) fn angles(steps: Steps, h: f64) -> Vec<f64> {
+    let count = (TIME / h).round() as u32;
+    (0..count).fold(Rods::of_joints(START.0, START.1), |rods, _| rods.after(steps, h)).joints().0.to_vec()
 }
 
 /// Errors at these steps, by the equations above.

@@ -1,7 +1,7 @@
 //! What integrators and batches promise.
 
 mod convergence;
-mod double_pendulum;
+pub(crate) mod double_pendulum;
 mod free_rotation;
 mod scenes;
 
