@@ -8,6 +8,7 @@ use crate::capture::Capture;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
 use crate::mj::{EngineError, Model};
+use ndarray::{Array2, Array3, Axis, aview1};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -375,6 +376,42 @@ impl Batch {
                 read(c * self.shared.chunk_size + i, env);
             }
         }
+    }
+
+    /// What is read of each environment: shape (N, K).
+    pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&Env) -> [f64; K]) -> Array2<f64> {
+        let mut rows = Vec::with_capacity(self.num_envs);
+        self.for_each(|_, env| rows.push(read(env)));
+        rows.into()
+    }
+
+    /// What is read of each environment and each of `items`: shape (N, items).
+    pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&Env, &I) -> T) -> Array2<T>
+    where
+        T: Copy + Default,
+    {
+        let mut values = Array2::default((self.num_envs, items.len()));
+        self.for_each(|env_id, env| {
+            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
+                *value = read(env, item);
+            }
+        });
+        values
+    }
+
+    /// What is read of each environment and each of `items`, K numbers: shape (N, items, K).
+    pub(crate) fn gather_rows_of<I, const K: usize>(
+        &self,
+        items: &[I],
+        read: impl Fn(&Env, &I) -> [f64; K],
+    ) -> Array3<f64> {
+        let mut values = Array3::zeros((self.num_envs, items.len(), K));
+        self.for_each(|env_id, env| {
+            for (mut row, item) in values.index_axis_mut(Axis(0), env_id).rows_mut().into_iter().zip(items) {
+                row.assign(&aview1(&read(env, item)));
+            }
+        });
+        values
     }
 
     /// Writes to environment `index`.

@@ -45,11 +45,7 @@ impl FreeBody<'_> {
     }
 
     fn rows<const K: usize>(&self, read: impl Fn(&Env) -> [f64; K]) -> Array2<f64> {
-        let n = self.simulation.batch.num_envs();
-        let mut values = Vec::with_capacity(n * K);
-        self.simulation.batch.for_each(|_, env| values.extend(read(env)));
-        // K values for each environment were pushed.
-        Array2::from_shape_vec((n, K), values).unwrap_or_default()
+        self.simulation.batch.gather_rows(read)
     }
 }
 

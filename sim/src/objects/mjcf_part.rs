@@ -435,11 +435,7 @@ impl<'a> MjcfPart<'a> {
     }
 
     fn rows(&self, places: &[usize], read: impl Fn(&Env, usize) -> f64) -> Array2<f64> {
-        let n = self.simulation.batch.num_envs();
-        let mut values = Vec::with_capacity(n * places.len());
-        self.simulation.batch.for_each(|_, env| values.extend(places.iter().map(|&place| read(env, place))));
-        // One value for each environment and place was pushed.
-        Array2::from_shape_vec((n, places.len()), values).unwrap_or_default()
+        self.simulation.batch.gather(places, |env, &place| read(env, place))
     }
 
     /// Pose of a body in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).

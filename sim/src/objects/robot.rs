@@ -498,22 +498,11 @@ impl<'a> Robot<'a> {
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
         let (body, body_from_link) = self.indexing().links[link.0];
-        let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
-        self.simulation.batch.for_each(|i, env| {
-            let world_from_link = body_pose(env.data(), body) * body_from_link;
-            for (k, value) in ::scene::pose::to_row(&world_from_link).into_iter().enumerate() {
-                poses[(i, k)] = value;
-            }
-        });
-        Ok(poses)
+        Ok(self.simulation.batch.gather_rows(|env| to_row(&(body_pose(env.data(), body) * body_from_link))))
     }
 
     pub(super) fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {
-        let joints = &self.indexing().joints;
-        let mut values = Vec::with_capacity(self.simulation.batch.num_envs() * joints.len());
-        self.simulation.batch.for_each(|_, env| values.extend(joints.iter().map(|joint| read(env, joint))));
-        // One value for each environment and joint was pushed.
-        Array2::from_shape_vec((self.simulation.batch.num_envs(), joints.len()), values).unwrap_or_default()
+        self.simulation.batch.gather(&self.indexing().joints, read)
     }
 }
 

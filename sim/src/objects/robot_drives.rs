@@ -4,11 +4,9 @@
 //! that do not. Friction and rotor inertia are in the model: see [`set_friction`](RobotMut::set_friction) and
 //! [`set_armature`](RobotMut::set_armature).
 
-use crate::compile::JointIndexing;
 use crate::drive::plan::{PlanError, effective_inertias};
 use crate::drive::table::{DriveActuator, DriveState, Realization};
 use crate::drive::{ActuatorModel, DelayedPd, DriveType};
-use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
@@ -31,15 +29,9 @@ impl Robot<'_> {
 
     /// What stiffness and damping of each drive mean, shape (N, dof); `None` for joints without a drive.
     pub fn get_drive_types(&self) -> Array2<DriveType> {
-        let joints = &self.indexing().joints;
-        let of = |env: &Env, joint: &JointIndexing| {
+        self.simulation.batch.gather(&self.indexing().joints, |env, joint| {
             joint.drive.map_or(DriveType::None, |drive| env.drives.settings[drive].drive_type)
-        };
-        let n = self.simulation.batch.num_envs();
-        let mut types = Vec::with_capacity(n * joints.len());
-        self.simulation.batch.for_each(|_, env| types.extend(joints.iter().map(|joint| of(env, joint))));
-        // One value for each environment and joint was pushed.
-        Array2::from_shape_vec((n, joints.len()), types).unwrap_or_default()
+        })
     }
 
     /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints that [`DelayedPd`] does not drive.

@@ -51,16 +51,10 @@ impl Robot<'_> {
 
     /// Two numbers made of each joint's range.
     fn ends(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
-        let joints = &self.indexing().joints;
-        let n = self.simulation.batch.num_envs();
-        let mut ends = Vec::with_capacity(n * joints.len() * 2);
-        self.simulation.batch.for_each(|_, env| {
-            for (joint, plan) in joints.iter().zip(self.data.plans()) {
-                ends.extend(of(joint.drive.map_or(plan.usable, |drive| env.drives.ranges[drive])));
-            }
-        });
-        // Two values for each environment and joint were pushed.
-        Array3::from_shape_vec((n, joints.len(), 2), ends).unwrap_or_default()
+        let joints: Vec<_> = self.indexing().joints.iter().zip(self.data.plans()).collect();
+        self.simulation.batch.gather_rows_of(&joints, |env, (joint, plan)| {
+            of(joint.drive.map_or(plan.usable, |drive| env.drives.ranges[drive]))
+        })
     }
 }
 

@@ -186,11 +186,7 @@ impl Robot<'_> {
     }
 
     fn rows<const K: usize>(&self, read: impl Fn(&Env, &RobotIndex) -> [f64; K]) -> Array2<f64> {
-        let n = self.simulation.batch.num_envs();
-        let mut values = Vec::with_capacity(n * K);
-        self.simulation.batch.for_each(|_, env| values.extend(read(env, self.indexing())));
-        // K values for each environment were pushed.
-        Array2::from_shape_vec((n, K), values).unwrap_or_default()
+        self.simulation.batch.gather_rows(|env| read(env, self.indexing()))
     }
 }
 
@@ -219,11 +215,7 @@ impl Robot<'_> {
     }
 
     fn of_links<const K: usize>(&self, read: impl Fn(&Env, &(usize, Pose)) -> [f64; K]) -> Array3<f64> {
-        let (n, links) = (self.simulation.batch.num_envs(), &self.indexing().links);
-        let mut values = Vec::with_capacity(n * links.len() * K);
-        self.simulation.batch.for_each(|_, env| values.extend(links.iter().flat_map(|link| read(env, link))));
-        // K values for each environment and link were pushed.
-        Array3::from_shape_vec((n, links.len(), K), values).unwrap_or_default()
+        self.simulation.batch.gather_rows_of(&self.indexing().links, read)
     }
 }
 
