@@ -274,9 +274,9 @@ fn a_chain_as_deep_as_allowed_works() {
     let dir = tempfile::tempdir().unwrap();
     let mut sim =
         SimulationManager::new(SimulationManagerCfg { gravity: nalgebra::Vector3::zeros(), ..cfg(1) }).unwrap();
-    let id = sim.add_robot(robot(dir.path(), "chain", &chain(kinetoscope::sim::mjcf::robot::MAX_BODY_DEPTH))).unwrap();
+    let id = sim.add_robot(robot(dir.path(), "chain", &chain(kinetoscope::sim::mjcf::MAX_BODY_DEPTH))).unwrap();
     sim.update(2);
-    assert_eq!(sim.robot(id).dof(), kinetoscope::sim::mjcf::robot::MAX_BODY_DEPTH - 1);
+    assert_eq!(sim.robot(id).dof(), kinetoscope::sim::mjcf::MAX_BODY_DEPTH - 1);
     assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
     // Fixed links count nothing.
     let fixed = chain(3000).replace("continuous", "fixed");

@@ -149,8 +149,16 @@ fn what_is_shown_can_be_switched_while_it_runs() {
     assert_eq!(sim.markers(), []);
     sim.set_debug_vis(off, true).unwrap();
     assert_eq!(sim.markers(), of_on, "the same, of a sensor that was built without");
-    sim.set_debug_vis(off, false).unwrap();
+    // What all but one show: without itself where it shows anything, all of them where it does not.
+    assert_eq!(sim.markers_beside(off), []);
+    assert_eq!(sim.markers_beside(load), of_on);
     sim.set_debug_vis(load, true).unwrap();
+    let (of_load, all) = (sim.markers_beside(off), sim.markers());
+    assert!(!of_load.is_empty() && all.len() == of_on.len() + of_load.len());
+    assert!(of_load.iter().all(|marker| all.contains(marker) && !of_on.contains(marker)));
+    assert_eq!(sim.markers_beside(load), of_on);
+    sim.set_debug_vis(off, false).unwrap();
+    assert_eq!(sim.markers(), of_load);
     let (first, marker) = &sim.markers()[0];
     assert_eq!(*first, EnvId(0));
     near(arrow(marker), [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);

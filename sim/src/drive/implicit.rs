@@ -73,7 +73,7 @@ pub(super) fn apply_damping(table: &DriveTable, coefficients: &[f64], data: &mut
 
 /// Edits a compiled model so that the drives of `dofs` are rows: their actuators' gain and bias become zero (`ctrl`
 /// still holds the target) and every degree of freedom in `dofs` gets a friction row.
-pub fn prepare(compiled: &mut mj::Compiled, dofs: &[usize], actuators: &[usize]) {
+pub(crate) fn prepare(compiled: &mut mj::Compiled, dofs: &[usize], actuators: &[usize]) {
     for &dof in dofs {
         // Any positive value makes MuJoCo build the row; `apply` writes the limit.
         compiled.dof_frictionloss_mut()[dof] = 1.0;

@@ -290,7 +290,7 @@ pub struct StartInertia {
 ///
 /// # Errors
 /// The description's dynamics cannot be computed.
-pub fn mass_matrix_at_start(
+pub(crate) fn mass_matrix_at_start(
     description: &RobotDescription,
     plans: &[JointPlan],
     floating_base: bool,

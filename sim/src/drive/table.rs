@@ -100,7 +100,7 @@ pub struct DriveActuator {
 
 impl DriveTable {
     /// Gives a drive an explicit model.
-    pub fn push_model(&mut self, drive: usize, model: ActuatorModel) {
+    pub(crate) fn push_model(&mut self, drive: usize, model: ActuatorModel) {
         let first = self.models.last().map_or(0, |last| last.memory.end);
         let memory = first..first + model.law().memory().len();
         self.drives[drive].realization = Realization::Explicit { model: self.models.len() };
@@ -116,7 +116,7 @@ impl DriveTable {
     }
 
     /// The explicit model of a drive.
-    pub fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
+    pub(crate) fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
         match self.drives[drive].realization {
             Realization::Explicit { model } => Some(&self.models[model]),
             Realization::Row | Realization::Actuator => None,
@@ -288,12 +288,12 @@ impl DriveState {
     }
 
     /// Changes the limits of a drive.
-    pub fn set_limits(&mut self, drive: usize, change: impl FnOnce(Gains) -> Gains) {
+    pub(crate) fn set_limits(&mut self, drive: usize, change: impl FnOnce(Gains) -> Gains) {
         self.gains.put(drive, change(self.gains[drive]));
     }
 
     /// Changes the positions that targets of a drive may have; the present target is clamped to them.
-    pub fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
+    pub(crate) fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
         self.ranges.put(drive, [low, high]);
         self.position[drive] = self.position[drive].clamp(low, high);
     }

@@ -15,8 +15,8 @@ use scene::mesh::TriMesh;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// MuJoCo's XML reader refuses documents nested deeper than this many bodies: its limit is 100 elements on 2.2.2 and 500
-/// on 4.x.
+/// The most moving bodies one below the other: MuJoCo's XML reader refuses documents nested deeper than 100 elements on 2.2.2
+/// and 500 on 4.x.
 pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
     crate::mj::Target::V2 => 96,
     crate::mj::Target::V4 => 480,
@@ -24,7 +24,7 @@ pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
 
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Purpose<'a> {
+pub(crate) enum Purpose<'a> {
     /// To be stepped by us: each visual that is a mesh becomes a proxy geom that only has a pose; where `friction_tendons`, dry
     /// friction of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to
     /// us.
@@ -38,14 +38,14 @@ pub enum Purpose<'a> {
 
 /// Visual meshes written next to an exported document: parts by file and scale.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct VisualAssets {
+pub(crate) struct VisualAssets {
     /// The parts of each mesh.
     pub parts: BTreeMap<MeshKey, Vec<VisualPart>>,
 }
 
 /// One part of a visual mesh with one look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct VisualPart {
+pub(crate) struct VisualPart {
     /// Name of the mesh asset.
     pub mesh: String,
     /// Name of the material asset, where the mesh file gives one.
@@ -54,7 +54,7 @@ pub struct VisualPart {
 
 /// A mesh file at a scale.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct MeshKey {
+pub(crate) struct MeshKey {
     /// The file.
     pub path: PathBuf,
     /// Bits of the scale.
@@ -63,19 +63,19 @@ pub struct MeshKey {
 
 impl MeshKey {
     /// The key of `path` at `scale`.
-    pub fn new(path: &Path, scale: &Vector3<f64>) -> Self {
+    pub(crate) fn new(path: &Path, scale: &Vector3<f64>) -> Self {
         Self { path: path.to_path_buf(), scale: [scale.x.to_bits(), scale.y.to_bits(), scale.z.to_bits()] }
     }
 
     /// The scale.
-    pub fn scale(&self) -> [f64; 3] {
+    pub(crate) fn scale(&self) -> [f64; 3] {
         self.scale.map(f64::from_bits)
     }
 }
 
 /// How a robot enters the document.
 #[derive(Clone, Debug)]
-pub struct RobotCfg<'a> {
+pub(crate) struct RobotCfg<'a> {
     /// Prefix of all names: `uid/link`.
     pub uid: &'a str,
     /// Contact bits of all its geoms.
@@ -96,7 +96,7 @@ pub struct RobotCfg<'a> {
 
 /// Where the robot's parts are in the document.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RobotLayout {
+pub(crate) struct RobotLayout {
     /// For every link (fused ones included): the body it is part of, and its frame there.
     pub links: Vec<LinkFrame>,
     /// The joint that leaves the root link free; `None` where it is fixed.
@@ -111,7 +111,7 @@ pub struct RobotLayout {
 
 /// Whose shape a geom is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GeomOwner {
+pub(crate) struct GeomOwner {
     /// Name of the geom.
     pub geom: String,
     /// The link, fused or not.
@@ -122,7 +122,7 @@ pub struct GeomOwner {
 
 /// A joint whose viscous damping was left out of the document; its armature holds the implicit half.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DampedJoint {
+pub(crate) struct DampedJoint {
     /// Name of the joint.
     pub joint: String,
     /// Number of its degrees of freedom.
@@ -135,7 +135,7 @@ pub struct DampedJoint {
 
 /// A link's frame in its body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LinkFrame {
+pub(crate) struct LinkFrame {
     /// Name of the body.
     pub body: String,
     /// Pose of the link in the body.
@@ -165,7 +165,7 @@ pub enum EmitError {
 ///
 /// # Errors
 /// The tree is deeper than MuJoCo can read.
-pub fn add(
+pub(crate) fn add(
     description: &RobotDescription,
     cfg: &RobotCfg<'_>,
     mjcf: &mut Mjcf,
@@ -581,7 +581,7 @@ fn primitive_shape(geometry: &Geometry) -> Shape {
 
 impl VisualAssets {
     /// Adds a mesh part and its material to the document.
-    pub fn declare(mjcf: &mut Mjcf, mesh: MeshAsset, material: Option<MaterialAsset>) -> VisualPart {
+    pub(crate) fn declare(mjcf: &mut Mjcf, mesh: MeshAsset, material: Option<MaterialAsset>) -> VisualPart {
         let part = VisualPart { mesh: mesh.name.clone(), material: material.as_ref().map(|m| m.name.clone()) };
         mjcf.meshes.push(mesh);
         if let Some(material) = material

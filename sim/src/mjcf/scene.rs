@@ -13,25 +13,26 @@ use nalgebra::Vector3;
 use scene::Pose;
 
 /// Contact bit of the ground and of objects.
-pub const WORLD_BIT: i32 = 1;
+pub(crate) const WORLD_BIT: i32 = 1;
 /// Bits that can be used: MuJoCo's are signed 32-bit numbers.
 const ALL_BITS: i32 = i32::MAX;
 /// How many robots can have a bit of their own.
-pub const MAX_ROBOTS: usize = 30;
+pub(crate) const MAX_ROBOTS: usize = 30;
 
 /// Contact bits of the ground and of objects: they collide with everything.
-pub const WORLD_CONTACT: GeomRole = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: true };
+pub(crate) const WORLD_CONTACT: GeomRole =
+    GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: true };
 
 /// Contact bits of robot number `index`: it collides with the world and with other robots, and with itself where
 /// `self_collision`.
-pub fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
+pub(crate) fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
     let bit = 1 << (index + 1).min(MAX_ROBOTS);
     let conaffinity = if self_collision { ALL_BITS } else { ALL_BITS & !bit };
     GeomRole::Collision { contype: bit, conaffinity, seen: false }
 }
 
 /// Adds a ground plane at z = 0 \[m\].
-pub fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
+pub(crate) fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
     mjcf.bodies[0].geoms.push(Geom {
         name: Some("ground".into()),
         shape: Shape::Plane([half_size, half_size]),
@@ -164,7 +165,7 @@ fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
 const PROXY: f64 = 1e-3;
 
 /// Adds a light from above.
-pub fn add_light(mjcf: &mut Mjcf, name: &str, direction: Vector3<f64>, color: [f64; 3]) {
+pub(crate) fn add_light(mjcf: &mut Mjcf, name: &str, direction: Vector3<f64>, color: [f64; 3]) {
     // MuJoCo takes a short direction for none.
     let direction = direction.normalize();
     mjcf.lights.push(Light { name: name.into(), position: Vector3::new(0.0, 0.0, 4.0), direction, diffuse: color });

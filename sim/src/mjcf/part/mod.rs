@@ -14,8 +14,8 @@ mod rig;
 mod sensors;
 mod settings;
 
-pub use names::PartNames;
-pub use rig::{Base, Passive, Rig};
+pub(crate) use names::PartNames;
+pub(crate) use rig::{Base, Passive, Rig};
 pub(crate) use sensors::left_out as sensors_left_out;
 pub(crate) use settings::compare;
 

@@ -1,5 +1,5 @@
 //! MJCF files as robots: MuJoCo compiles the file, what it made of it is described ([`RobotDescription`]), and written into
-//! the scene as MJCF parts are ([`super::part`]), with drives in the place of its actuators.
+//! the scene as MJCF parts are (`super::part`), with drives in the place of its actuators.
 //!
 //! Why a part and not bodies of our own: docs/decisions/0012.
 
