@@ -41,8 +41,7 @@ enum Choice {
 }
 
 impl Ready {
-    /// Cargo in the repository's root, with the chosen MuJoCo. Each line has a target folder of its own, so that the two
-    /// do not evict each other's builds.
+    /// Cargo in the repository's root, with the chosen MuJoCo.
     pub(crate) fn cargo(&self) -> Cmd {
         let cmd = Cmd::new("cargo").current_dir(&self.root);
         match &self.choice {
@@ -62,7 +61,7 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     let choice = match wanted.line {
         None if mujoco_dir_set => Choice::Environment,
         None | Some(Line::Debian) => Choice::Debian,
-        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new(), target: repo.target.join("mujoco4") },
+        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new(), target: target_of_wheel(repo, in_ci()) },
     };
     let machine = Machine::this();
     let mut needs = vec![Need::Compiler, Need::Libclang];
@@ -91,6 +90,12 @@ pub(crate) fn try_to_have(need: Need) {
     if let Err(failure) = install(&Machine::this(), &[need]) {
         eprintln!("note: {}", failure.message);
     }
+}
+
+/// A developer goes to and fro between the lines: each has a folder of its own, so that they do not evict each other's
+/// builds. CI goes once from one to the other, and builds crates that know nothing of MuJoCo once.
+fn target_of_wheel(repo: &Repo, in_ci: bool) -> PathBuf {
+    if in_ci { repo.target.clone() } else { repo.target.join("mujoco4") }
 }
 
 /// Something the machine must have.

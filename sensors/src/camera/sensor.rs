@@ -589,6 +589,11 @@ impl Camera {
         }
     }
 
+    /// Whether straight lines are bent in the picture.
+    pub(super) fn bends_lines(&self) -> bool {
+        !self.rays.lens().is_pinhole()
+    }
+
     /// Refuses what is only known of pictures without a lens.
     pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
         let lens = self.rays.lens();

@@ -1,5 +1,6 @@
 //! Boxes in the picture.
 
+use super::alone::Alone;
 use super::outline::outline;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
@@ -28,7 +29,8 @@ pub struct Box2d {
     /// Around all of it that is in the frustum (between the near and the far plane, within the edges of the picture),
     /// whatever hides it: of shapes and the triangles of meshes, not of pixels; level of detail is not looked at. Exact for
     /// what is wholly in the frustum; what is round and cut is a polyhedron with 256 edges around, inside by 7.5e-5 of its
-    /// radius at most. `None` where all of it is outside.
+    /// radius at most. Behind a lens that bends lines: around the pixels that would see it if it were alone, as
+    /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts them. `None` where all of it is outside.
     pub loose: Option<PixelBox>,
     /// How many pixels see it.
     pub visible_pixels: usize,
@@ -38,17 +40,30 @@ impl Segmentation {
     /// Where the segments of a level are in the picture of environment `env`, those that are in it at all (one of the two
     /// boxes is there), in the order of [`segments`](Self::segments).
     ///
+    /// Behind a lens that bends lines each segment is drawn once more, alone, for its loose box: see
+    /// [`occlusions`](Self::occlusions).
+    ///
     /// # Errors
     ///
     /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; [`PinholeOnly`](crate::CameraError::PinholeOnly).
+    /// an environment that the camera does not see; behind a lens [`Draw`](crate::CameraError::Draw) where a segment cannot be
+    /// drawn.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
-        camera.must_be_pinhole("boxes in the picture")?;
         let mask = camera.mask()?;
         let mut boxes = Boxes::new(self, level);
         for ((v, u), &id) in mask.index_axis(Axis(0), row).indexed_iter() {
             boxes.see(id, [u, v]);
+        }
+        if camera.bends_lines() {
+            let mut alone = Alone::new(camera, row, env);
+            for segment in self.segments(level) {
+                for ([u, v], id) in alone.pixels(segment)? {
+                    let [left, top] = [u, v].map(|x| x as f64);
+                    boxes.reach(id, [[left, left + 1.0], [top, top + 1.0]]);
+                }
+            }
+            return Ok(boxes.finish());
         }
         camera.shot_of(row, |rasterizer, shot| {
             for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {

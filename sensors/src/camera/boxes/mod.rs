@@ -1,5 +1,6 @@
 //! Boxes around things: in the picture, and in the environment.
 
+mod alone;
 mod flat;
 mod occlusion;
 mod outline;

@@ -1,11 +1,10 @@
 //! How much of a thing is hidden.
 
-use crate::camera::channel::{Channels, Frame};
-use crate::camera::error::CameraError;
-use crate::camera::segmentation::{Segment, SegmentLevel, Segmentation};
+use super::alone::Alone;
+use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
-use scene::RenderScene;
+use ndarray::Axis;
 
 /// How much of a segment other things hide in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,37 +34,21 @@ impl Segmentation {
     ///
     /// # Errors
     ///
-    /// As [`boxes_2d`](Self::boxes_2d).
+    /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
+    /// an environment that the camera does not see; [`Draw`](crate::CameraError::Draw) where a segment cannot be drawn.
     pub fn occlusions(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Occlusion>, SensorError> {
-        let boxes = self.boxes_2d(level, camera, env)?;
         let row = camera.row(env)?;
-        let (height, width) = camera.image_shape();
-        let mut frame = Frame::new(width, height, Channels { mask: true, ..Channels::default() });
+        let mask = camera.mask()?;
+        let mask = mask.index_axis(Axis(0), row);
+        let mut alone = Alone::new(camera, row, env);
         let mut found = Vec::new();
-        for known in &boxes {
-            let Some(segment) = self.segments(level).iter().find(|segment| segment.id == known.id) else { continue };
-            camera
-                .shot_of(row, |rasterizer, shot| {
-                    let scene = alone(shot.scene, segment);
-                    let mut job = [(crate::camera::Shot { scene: &scene, ..shot }, frame.as_mut())];
-                    rasterizer.render(&mut job)
-                })
-                .map_err(|(_, error)| CameraError::Draw { env, error })?;
-            let alone_pixels = frame.mask.iter().flatten().filter(|&&id| id != 0).count();
+        for segment in self.segments(level) {
+            let alone_pixels = alone.pixels(segment)?.count();
             if alone_pixels > 0 {
-                found.push(Occlusion { id: known.id, visible_pixels: known.visible_pixels, alone_pixels });
+                let visible_pixels = mask.iter().filter(|id| segment.mask_ids.contains(id)).count();
+                found.push(Occlusion { id: segment.id, visible_pixels, alone_pixels });
             }
         }
         Ok(found)
     }
-}
-
-/// The scene with everything but a segment hidden; poses stay those of the scene.
-fn alone(scene: &RenderScene, segment: &Segment) -> RenderScene {
-    let mut instances = scene.instances().to_vec();
-    for instance in &mut instances {
-        instance.visible &= segment.mask_ids.contains(&instance.mask_id);
-    }
-    // Every instance was in a scene already.
-    scene.with_instances(instances).unwrap_or_else(|_| RenderScene::empty())
 }

@@ -1,12 +1,12 @@
 //! Boxes around things, held against brute force over pictures and against closed forms.
 
 use super::super::{
-    Box2d, Camera, CameraCfg, CameraError, Channels, Extrinsics, Frame, Intrinsics, Placement, RasterCfg, Rasterizer,
-    SegmentLevel, Segmentation, SegmentationCfg, Thing,
+    Box2d, Camera, CameraCfg, CameraError, Channels, Extrinsics, Frame, Intrinsics, Lens, PixelBox, Placement,
+    RasterCfg, Rasterizer, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Thing,
 };
 use super::scenes::{Random, every_shape, random};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::{Array2, Axis};
 use scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
 use scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
@@ -16,6 +16,16 @@ const SIZE: [usize; 2] = [96, 72];
 
 /// A camera of the mask and positions at `eye` that looks at `target` in a scene with these poses, meshes as they are.
 fn seen(scene: RenderScene, poses: &[PoseF32], eye: [f64; 3], target: [f64; 3]) -> Camera {
+    seen_by(CameraCfg::default(), scene, poses, eye, target)
+}
+
+/// The same through a lens under which pixels are as many radians from the axis as they are focal lengths: by rays.
+fn seen_through_a_lens(scene: RenderScene, poses: &[PoseF32], eye: [f64; 3], target: [f64; 3]) -> Camera {
+    let lens = Lens::from_name("equidistant").unwrap();
+    seen_by(CameraCfg { lens, renderer: Renderer::FastRayTraced, ..Default::default() }, scene, poses, eye, target)
+}
+
+fn seen_by(rest: CameraCfg, scene: RenderScene, poses: &[PoseF32], eye: [f64; 3], target: [f64; 3]) -> Camera {
     let lights = scene.lights.len();
     let context =
         SensorContext { num_envs: 1, dt: 0.01, scene: Some(Arc::new(scene)), threads: 1, ..SensorContext::default() };
@@ -29,7 +39,7 @@ fn seen(scene: RenderScene, poses: &[PoseF32], eye: [f64; 3], target: [f64; 3]) 
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
         channels: Channels { mask: true, position: true, ..Channels::default() },
         raster: RasterCfg { lod: false, ..RasterCfg::of_cameras() },
-        ..CameraCfg::default()
+        ..rest
     };
     let mut camera = cfg.build(&context).unwrap();
     let state = SceneState {
@@ -155,6 +165,84 @@ fn half_of_a_wall_behind_a_screen_is_hidden() {
     }
     assert_eq!((tight.min, tight.max), ([(48.0 - u).round(), (36.0 - v).round()], [48.0, (36.0 + v).round()]));
     assert_eq!(boxes[1].loose.map(|b| b.max), Some([96.0, 72.0]), "clipped to the picture");
+}
+
+/// A ball on the axis of a lens, 2 m away, and one 20 degrees to the left, with screens before the right half of each: what the
+/// lens shows of a ball of radius r at distance d is as wide as the cone around it, 2 f asin(r / d).
+#[test]
+fn boxes_behind_a_lens_are_those_of_cones() {
+    let ball = |id| Instance::new(Sphere { radius: 0.3 }, Material::default(), id);
+    let screen = |id| Instance::new(Box { half: [0.01, 0.08, 1.0] }, Material::default(), id);
+    let scene = RenderScene::new(vec![ball(1), ball(2), screen(3), screen(4)]).unwrap();
+    // y points left. A screen from the axis to the right, and the same turned with the second ball.
+    let (aside, right) =
+        (-20f64.to_radians(), |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -angle));
+    let at = |angle: f64, place: [f64; 3]| {
+        let turned = right(angle) * Vector3::from(place);
+        PoseF32::from(&Pose::from_parts(turned.into(), right(angle)))
+    };
+    let poses = [
+        at(0.0, [2.0, 0.0, 0.0]),
+        at(aside, [2.0, 0.0, 0.0]),
+        at(0.0, [1.0, -0.08, 0.0]),
+        at(aside, [1.0, -0.08, 0.0]),
+    ];
+    let camera = seen_through_a_lens(scene.clone(), &poses, [0.0; 3], [1.0, 0.0, 0.0]);
+    let segmentation = table(&scene);
+    let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
+    let cone = (0.3f64 / 2.0).asin();
+    for (found, middle) in boxes.iter().zip([0.0, aside]) {
+        let Box2d { tight: Some(tight), loose: Some(loose), visible_pixels, .. } = *found else { panic!("{found:?}") };
+        // Edges are those of whole pixels: of those whose middle is inside, in the rows whose middle is half a pixel from the
+        // axis, where the cone is narrower by (1/2)²/(2 f sin(cone)) pixels, 0.01.
+        let edges = [48.0 + 80.0 * (middle - cone), 48.0 + 80.0 * (middle + cone)];
+        assert!(
+            (loose.min[0] - edges[0]).abs() < 0.52 && (loose.max[0] - edges[1]).abs() < 0.52,
+            "{loose:?} {edges:?}"
+        );
+        assert!((tight.max[0] - (48.0 + 80.0 * middle)).abs() < 0.52, "{tight:?}");
+        assert_eq!((tight.min, tight.max[1]), (loose.min, loose.max[1]));
+        if middle == 0.0 {
+            assert!((loose.min[1] - (36.0 - 84.0 * cone)).abs() < 0.52, "{loose:?}");
+            let occlusion = segmentation.occlusions(SegmentLevel::Instance, &camera, 0).unwrap()[0];
+            assert_eq!((occlusion.visible_pixels, occlusion.alone_pixels), (visible_pixels, 2 * visible_pixels));
+        }
+    }
+}
+
+/// Through a lens, too, all three levels: against the pictures of cameras in scenes that hold nothing else.
+#[test]
+fn boxes_behind_a_lens_are_those_of_brute_force() {
+    let (mut looses, mut hidden) = (0, 0);
+    for seed in 1..=3 {
+        let (scene, poses) = random(&mut Random(seed), 1.0);
+        let eye = [2.4, 0.5 * seed as f64 - 1.5, 0.7];
+        let camera = seen_through_a_lens(scene.clone(), &poses, eye, [0.0; 3]);
+        let segmentation = table(&scene);
+        let mask: Vec<i32> = camera.mask().unwrap().iter().copied().collect();
+        for level in [SegmentLevel::Instance, SegmentLevel::Link, SegmentLevel::Semantic] {
+            let boxes = segmentation.boxes_2d(level, &camera, 0).unwrap();
+            let occlusions = segmentation.occlusions(level, &camera, 0).unwrap();
+            for segment in segmentation.segments(level) {
+                let is = |id: i32| segment.mask_ids.contains(&id);
+                let (instances, poses): (Vec<Instance>, Vec<PoseF32>) =
+                    scene.instances().iter().cloned().zip(&poses).filter(|(instance, _)| is(instance.mask_id)).unzip();
+                let other = seen_through_a_lens(RenderScene::new(instances).unwrap(), &poses, eye, [0.0; 3]);
+                let by_itself: Vec<i32> = other.mask().unwrap().iter().copied().collect();
+                let (tight, loose) = (around(&mask, SIZE[0], is), around(&by_itself, SIZE[0], is));
+                let found = boxes.iter().find(|found| found.id == segment.id);
+                let edges = |b: PixelBox| [b.min[0], b.min[1], b.max[0], b.max[1]];
+                assert_eq!(found.and_then(|b| b.tight).map(edges), tight.map(|(edges, _)| edges), "{segment:?}");
+                assert_eq!(found.and_then(|b| b.loose).map(edges), loose.map(|(edges, _)| edges), "{segment:?}");
+                let occlusion = occlusions.iter().find(|o| o.id == segment.id);
+                let expected = loose.map(|(_, alone)| (tight.map_or(0, |(_, pixels)| pixels), alone));
+                assert_eq!(occlusion.map(|o| (o.visible_pixels, o.alone_pixels)), expected, "{segment:?}");
+                looses += usize::from(loose.is_some());
+                hidden += usize::from(occlusion.is_some_and(|o| o.ratio() > 0.1));
+            }
+        }
+    }
+    assert!(looses > 60 && hidden > 10, "{looses} {hidden}");
 }
 
 /// Two cubes of one class, the second wholly beside the picture and higher: the class ends where the first cube does.
