@@ -138,7 +138,7 @@ fn show(args: &Args, mut film: Film, mut sim: SimulationManager) -> Result<()> {
             let window = sim.open_window_with(WindowCfg { title, ..WindowCfg::default() })?;
             println!("A window shows {}: closing it, or Ctrl+C here, ends it.", args.file.display());
             sim.play(&mut film, &mut || window.is_open() && goes_on())?;
-            if let Some(Closed::DisplayLost(reason)) = window.closed() {
+            if let Some(reason) = window.closed().as_ref().and_then(Closed::fault) {
                 return Err(format!("the window is gone: {reason}").into());
             }
             window.close();

@@ -88,7 +88,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     for recorded in recorded.map_err(|error| format!("--record {error}"))? {
         println!("Recorded to {recorded}");
     }
-    if let Some(Closed::DisplayLost(reason)) = closed() {
+    if let Some(reason) = closed().as_ref().and_then(Closed::fault) {
         return Err(format!("the window is gone after {step} steps: {reason}").into());
     }
     let diverged = sim.diverged();

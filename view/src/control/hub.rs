@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 /// Commands that wait, at most: a viewer that sends more is told.
 const WAITING: usize = 4096;
+/// Why a command that was [sent](Viewer::send) is not done.
+pub(crate) const TAKES_NONE: &str = "the simulation takes no commands: the program does not step it";
 
 /// The place where they meet. Locks are held to move a pointer or a command, never to draw or to step.
 #[derive(Debug, Default)]

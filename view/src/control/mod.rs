@@ -9,6 +9,7 @@ mod spring;
 mod tests;
 
 pub use conductor::{Conductor, Film, Play, PlayError};
+pub(crate) use hub::TAKES_NONE;
 pub use hub::Viewer;
 pub use recording::{RecordButton, Recording, RecordingState};
 

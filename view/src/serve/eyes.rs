@@ -4,7 +4,7 @@ use super::ServeCfg;
 use super::command::Command;
 use super::show::{Eyes, Picture, Show};
 use super::state;
-use crate::control::{self, Speed, Viewer, Wants};
+use crate::control::{self, Speed, TAKES_NONE, Viewer, Wants};
 use crate::stage::{
     Canvas, Eye, Look, Names, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted,
 };
@@ -25,9 +25,6 @@ const MOST_PIXELS: usize = 1920 * 1080;
 const PANEL_EVERY: Duration = Duration::from_millis(100);
 /// Width of each of the four pictures of a camera, at most \[pixels\].
 const PANEL_WIDTH: usize = 320;
-
-/// Why a command is not done.
-const TAKES_NONE: &str = "the simulation takes no commands: the program does not step it";
 
 /// Gives viewers their eyes.
 pub(super) struct Theatre {

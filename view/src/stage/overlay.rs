@@ -230,6 +230,52 @@ mod tests {
         assert!(bright([f64::NAN; 3]).0.is_empty());
     }
 
+    /// From the end of each axis of a frame back to its origin lies its colour, and from end to end of a joint's axis its own.
+    #[test]
+    fn axes_lie_where_they_point() {
+        let mut sample = crate::sample::sample(2);
+        let viewer = crate::control::Viewing::viewer(&mut sample.sim, crate::control::Wants::default());
+        let snapshot = viewer.newest().expect("a snapshot");
+        // From near by, where axes that begin in one point have parted after a third of their length.
+        let target = in_overview(&snapshot.envs[1], [0.5, 0.0, 0.3]);
+        let eye = [target[0] + 0.7, target[1] + 1.3, target[2] + 0.9];
+        let view = super::super::Eye::looking(eye, target).expect("two points").view(1600, 1200);
+        let colors_at = |overlays: Overlays, from: Vector3<f64>, to: Vector3<f64>, rgba: [f32; 4]| {
+            let mut canvas = Canvas::new(1600, 1200);
+            overlays.draw_over(&snapshot, Shown::One(1), &view, &mut canvas);
+            let at = |part: f64| project(&view, in_overview(&snapshot.envs[1], (from + (to - from) * part).into()));
+            // Within a pixel: lines are rounded to whole ones.
+            (4..10).all(|k| {
+                let Some([x, y]) = at(f64::from(k) / 10.0) else { return false };
+                let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy)));
+                around.into_iter().any(|(dx, dy)| {
+                    let [x, y] = [x as i32 + dx, y as i32 + dy].map(|n| n.max(0) as usize);
+                    canvas.pixel(x, y) == Some(color::bytes(rgba))
+                })
+            })
+        };
+        let none = Overlays { sensors: false, ..Overlays::default() };
+        let look = &snapshot.envs[1].look;
+        let frames = Overlays { frames: true, ..none };
+        let axes = [(Vector3::x(), color::X), (Vector3::y(), color::Y), (Vector3::z(), color::Z)];
+        let pose = look.bodies[snapshot.names.bodies.iter().position(|name| name.contains("cube")).expect("a cube")];
+        let origin = pose.translation.vector;
+        for (k, (axis, rgba)) in axes.iter().enumerate() {
+            let end = origin + pose.rotation * axis * f64::from(FRAME);
+            assert!(colors_at(frames, origin, end, *rgba), "axis {k}");
+            assert!(!colors_at(frames, origin, end, axes[(k + 1) % 3].1), "axis {k} has another colour");
+            assert!(!colors_at(none, origin, end, *rgba));
+        }
+        let joints = Overlays { joints: true, ..none };
+        assert!(!look.joints.is_empty());
+        for joint in &look.joints {
+            let (anchor, half) = (Vector3::from(joint.anchor), Vector3::from(joint.axis) * (0.5 * AXIS));
+            let rgba = if joint.slides { color::SLIDE } else { color::HINGE };
+            assert!(colors_at(joints, anchor - half, anchor + half, rgba), "{joint:?}");
+            assert!(!colors_at(none, anchor - half, anchor + half, rgba));
+        }
+    }
+
     #[test]
     fn groups_are_those_of_the_shapes() {
         let all = Overlays { collisions: true, ..Overlays::default() };

@@ -4,7 +4,7 @@ use super::desks::Desks;
 use super::fineness::Fineness;
 use super::keys::{Action, Key, action};
 use super::{hud, timeline};
-use crate::control::{Command, Speed, Wants};
+use crate::control::{Command, Speed, TAKES_NONE, Wants};
 use crate::stage::{
     Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
 };
@@ -104,6 +104,8 @@ pub struct App {
     sliders: Option<usize>,
     help: bool,
     commands: Vec<Command>,
+    /// The last command came to nobody.
+    unheard: bool,
     drawn: Vec<Instant>,
     flown: Instant,
     desks: Desks,
@@ -153,6 +155,7 @@ impl App {
             sliders: None,
             help: false,
             commands: Vec::new(),
+            unheard: false,
             drawn: Vec::new(),
             flown: Instant::now(),
             desks: Desks::new(threads),
@@ -181,6 +184,11 @@ impl App {
         self.pull();
     }
 
+    /// Whether the simulation could be told what the user wants: if not, the picture says so.
+    pub fn was_heard(&mut self, heard: bool) {
+        self.unheard = !heard;
+    }
+
     /// Looks from somewhere else.
     pub fn look_from(&mut self, eye: Eye) {
         self.eye = Some(eye);
@@ -189,6 +197,11 @@ impl App {
     /// Where it looks from, where it looks freely.
     pub fn eye(&self) -> Eye {
         self.eye.unwrap_or_default()
+    }
+
+    /// What is drawn beside what is there.
+    pub fn overlays(&self) -> Overlays {
+        self.overlays
     }
 
     /// What was clicked on last.
@@ -510,7 +523,8 @@ impl App {
             fineness.drew(self.painter.samples(), start.elapsed());
         }
         let name = self.caption(&snapshot);
-        hud::status(canvas, &snapshot, shown, &name, self.drawn.len() as f64);
+        let refused = if self.unheard { Some(TAKES_NONE) } else { snapshot.run.refused.as_deref() };
+        hud::status(canvas, &snapshot, shown, &name, self.drawn.len() as f64, refused);
         if let Some(picked) = &self.picked {
             let mut lines = describe(picked, &snapshot);
             lines.extend(self.follow.map(|_| "followed".into()));

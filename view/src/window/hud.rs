@@ -28,8 +28,15 @@ fn int(n: usize) -> i32 {
     i32::try_from(n).unwrap_or(i32::MAX)
 }
 
-/// Time, speed, what is shown, in the upper left corner.
-pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, view: &str, frames_per_second: f64) {
+/// Time, speed, what is shown, and why the last command was refused, in the upper left corner.
+pub(super) fn status(
+    canvas: &mut Canvas,
+    snapshot: &Snapshot,
+    shown: Shown,
+    view: &str,
+    frames_per_second: f64,
+    refused: Option<&str>,
+) {
     let env = match shown {
         Shown::All => 0,
         Shown::One(env) => env,
@@ -58,7 +65,7 @@ pub(super) fn status(canvas: &mut Canvas, snapshot: &Snapshot, shown: Shown, vie
         canvas.text(&format!("{diverged} {which} diverged"), [8, below], FONT, YELLOW);
         below += 18;
     }
-    if let Some(refused) = &run.refused {
+    if let Some(refused) = refused {
         canvas.text(&format!("not done: {refused}"), [8, below], SMALL, YELLOW);
     }
 }

@@ -18,7 +18,7 @@ pub use keys::Key;
 use crate::control::{Command, RecordButton, Speed, Viewer, Viewing, Wants};
 use crate::stage::Canvas;
 use sim::SimulationManager;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 use x11::{Failure, Happened, Screened};
@@ -85,6 +85,21 @@ pub enum Closed {
     WithSimulation,
     /// The display was lost; the simulation went on.
     DisplayLost(String),
+    /// A mistake of ours ended its thread; what it was stands in the program's error output. The simulation went on.
+    Crashed,
+}
+
+impl Closed {
+    /// What went wrong, where it was not meant to end.
+    pub fn fault(&self) -> Option<&str> {
+        match self {
+            Self::ByUser | Self::WithSimulation => None,
+            Self::DisplayLost(reason) => Some(reason),
+            Self::Crashed => {
+                Some("its thread panicked, which is a mistake in Kinetoscope: please report what stands above")
+            }
+        }
+    }
 }
 
 /// A handle of an open window. Dropping it closes nothing: the window stays until the user closes it, the simulation is
@@ -98,6 +113,7 @@ pub struct Window {
 struct Shared {
     close: AtomicBool,
     number: AtomicU32,
+    pictures: AtomicU64,
     closed: Mutex<Option<Closed>>,
     ended: Condvar,
 }
@@ -118,6 +134,11 @@ impl Window {
         self.shared.number.load(Ordering::Acquire)
     }
 
+    /// How many pictures it has handed to its display so far.
+    pub fn pictures(&self) -> u64 {
+        self.shared.pictures.load(Ordering::Acquire)
+    }
+
     /// Asks it to close, and does not wait.
     pub fn close(&self) {
         self.shared.close.store(true, Ordering::Release);
@@ -129,6 +150,22 @@ impl Window {
         let open = |closed: &mut Option<Closed>| closed.is_none();
         let waited = self.shared.ended.wait_timeout_while(closed, timeout, open);
         waited.unwrap_or_else(PoisonError::into_inner).0.clone()
+    }
+}
+
+/// The end of a window's thread: whatever it comes from, whoever waits hears of it.
+struct Ending(Arc<Shared>);
+
+impl Ending {
+    fn tell(&self, how: Closed) {
+        self.0.closed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(how);
+        self.0.ended.notify_all();
+    }
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.tell(Closed::Crashed);
     }
 }
 
@@ -160,6 +197,9 @@ impl OpenWindow for SimulationManager {
         let window = Window { shared: Arc::clone(&shared) };
         let viewer = self.viewer(Wants::default());
         let run = move || {
+            let ending = Ending(Arc::clone(&shared));
+            // Dropped before the ending: the simulation is free before anybody hears of the end.
+            let viewer = viewer;
             let screen = match Screened::open(&cfg.title, cfg.size, cfg.display.as_deref()) {
                 Ok(screen) => screen,
                 Err(failure) => return drop(opened.send(Err(no_display(&failure)))),
@@ -176,10 +216,8 @@ impl OpenWindow for SimulationManager {
                 Ok(closed) => closed,
                 Err(failure) => Closed::DisplayLost(failure.to_string()),
             };
-            // The simulation is free before anybody hears of the end.
             drop(viewer);
-            *shared.closed.lock().unwrap_or_else(PoisonError::into_inner) = Some(closed);
-            shared.ended.notify_all();
+            ending.tell(closed);
         };
         let thread = std::thread::Builder::new().name("kinetoscope-window".into());
         thread.spawn(run).map_err(|error| WindowError::Thread(error.to_string()))?;
@@ -239,7 +277,8 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
             viewer.set_wants(wants);
         }
         for command in app.take_commands() {
-            viewer.send(command);
+            app.was_heard(viewer.send(command));
+            outdated = true;
         }
         if let Some(snapshot) = viewer.wait(last, LOOK) {
             last = snapshot.number;
@@ -249,6 +288,7 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
         if outdated || app.moves(Instant::now()) {
             app.draw(&mut canvas, Instant::now());
             screen.present(&canvas)?;
+            shared.pictures.fetch_add(1, Ordering::AcqRel);
             outdated = false;
         }
     }

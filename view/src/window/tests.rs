@@ -5,7 +5,8 @@ use super::keys::{Action, TABLE};
 use super::*;
 use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample};
-use crate::stage::{Eye, Look, Painter, Shown, Snapshot};
+use crate::stage::{Eye, Look, Overlays, Painter, Panel, Shown, Snapshot};
+use nalgebra::Vector3;
 use sensors::visibility::View;
 use sim::EnvId;
 
@@ -62,6 +63,96 @@ fn every_key_does_something() {
         assert!(format!("{app:?}") != before || !commands.is_empty(), "{binding:?}");
         assert!(!drawn(&mut app).bytes().is_empty());
     }
+}
+
+/// Each key of an overlay turns that one, and no other, and back again.
+#[test]
+fn keys_of_overlays_turn_what_they_say() {
+    let begin = Overlays::default();
+    let keys = [
+        ('o', Overlays { sensors: !begin.sensors, ..begin }),
+        ('c', Overlays { contacts: !begin.contacts, ..begin }),
+        ('f', Overlays { frames: !begin.frames, ..begin }),
+        ('j', Overlays { joints: !begin.joints, ..begin }),
+        ('m', Overlays { masses: !begin.masses, ..begin }),
+        ('t', Overlays { names: !begin.names, ..begin }),
+        ('l', Overlays { trails: !begin.trails, ..begin }),
+        ('k', Overlays { collisions: !begin.collisions, ..begin }),
+        ('u', Overlays { visuals: !begin.visuals, ..begin }),
+    ];
+    for (key, expected) in keys {
+        let (_sample, _viewer, mut app) = app(1);
+        press(&mut app, Key::Char(key));
+        assert_eq!(app.overlays(), expected, "{key}");
+        press(&mut app, Key::Char(key));
+        assert_eq!(app.overlays(), begin, "{key}");
+    }
+}
+
+/// The panel of keys I and page down: in its corner are the four pictures that a panel of that camera and that environment draws.
+#[test]
+fn the_panel_is_of_the_chosen_environment() {
+    let (mut sample, viewer, mut app) = app(3);
+    // What is seen in an environment is its own: the cube is elsewhere in each.
+    let cube = sample.sim.rigid_object_id("cube").unwrap();
+    let poses = ndarray::Array2::from_shape_fn((3, 7), |(env, k)| [0.0, 0.1 * env as f64, HALF, 1.0, 0.0, 0.0, 0.0][k]);
+    sample.sim.rigid_object_mut(cube).write_pose(&poses, None).unwrap();
+    drop(viewer);
+    let viewer = sample.sim.viewer(Wants::default());
+    let snapshot = viewer.newest().unwrap();
+    app.show(Arc::clone(&snapshot));
+    press(&mut app, Key::PageDown);
+    press(&mut app, Key::Char('i'));
+    let [mut expected, mut other] = [Canvas::default(), Canvas::default()];
+    let mut panel = Panel::new(1);
+    assert!(panel.draw(&snapshot, 0, 0, 160, &mut other) && panel.draw(&snapshot, 0, 1, 160, &mut expected));
+    assert!(expected != other, "environments look alike");
+    let canvas = drawn(&mut app);
+    let ([width, height], [w, h]) = (canvas.dimensions(), expected.dimensions());
+    let corner = |panel: &Canvas| {
+        let at = |x: usize, y: usize| canvas.pixel(width - w - 6 + x, height - h - 6 + y);
+        (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).all(|(x, y)| at(x, y) == panel.pixel(x, y))
+    };
+    assert!(corner(&expected) && !corner(&other));
+    press(&mut app, Key::Char('i'));
+    let canvas = drawn(&mut app);
+    assert!(canvas.pixel(width - 10, height - 10) != expected.pixel(w - 4, h - 4), "it goes again");
+}
+
+/// Where nobody steps the simulation commands wait, and when thousands do no more are taken: the picture says so.
+#[test]
+fn what_nobody_hears_is_told() {
+    let (_sample, viewer, mut app) = app(1);
+    let mut sent = 0;
+    while viewer.send(Command::TogglePause) {
+        sent += 1;
+        assert!(sent < 100_000, "it is taken for ever");
+    }
+    let plain = drawn(&mut app);
+    app.was_heard(viewer.send(Command::TogglePause));
+    let told = drawn(&mut app);
+    // Below the lines of the status, where it says what was refused.
+    let shining = |canvas: &Canvas| {
+        let pixels = (8..400).flat_map(|x| (50..70).map(move |y| (x, y)));
+        pixels.filter(|&(x, y)| canvas.pixel(x, y) == Some([255, 210, 60])).count()
+    };
+    assert!(shining(&told) > shining(&plain) + 300, "{} {}", shining(&told), shining(&plain));
+    app.was_heard(true);
+    assert_eq!(shining(&drawn(&mut app)), shining(&plain));
+}
+
+/// Whoever waits for a window hears of its end, even where its thread panics.
+#[test]
+fn a_window_that_crashes_is_closed() {
+    let shared = Arc::new(Shared::default());
+    let window = Window { shared: Arc::clone(&shared) };
+    let crashing = std::thread::spawn(move || {
+        let _ending = Ending(shared);
+        panic!("as a mistake would");
+    });
+    assert_eq!(window.wait(Duration::from_secs(30)), Some(Closed::Crashed));
+    assert!(!window.is_open() && crashing.join().is_err());
+    assert!(Closed::Crashed.fault().is_some() && Closed::ByUser.fault().is_none());
 }
 
 /// A key that is held turns nothing to and fro: it pauses once, and begins one recording.
@@ -436,6 +527,36 @@ fn held_keys_fly_and_are_let_go() {
     assert!(way >= 0.029 * before.distance && way <= 0.101 * before.distance, "{way}");
     app.handle(Input::FocusLost);
     assert!(!app.moves(Instant::now()));
+}
+
+/// Each key of flight goes where it says, and nowhere else: ahead along the view, right of it, and up in the world.
+#[test]
+fn keys_of_flight_go_where_they_say() {
+    let keys = [
+        (Key::Char('w'), [1.0, 0.0, 0.0]),
+        (Key::Char('s'), [-1.0, 0.0, 0.0]),
+        (Key::Char('a'), [0.0, -1.0, 0.0]),
+        (Key::Char('d'), [0.0, 1.0, 0.0]),
+        (Key::Char('e'), [0.0, 0.0, 1.0]),
+        (Key::Char('q'), [0.0, 0.0, -1.0]),
+        (Key::Up, [1.0, 0.0, 0.0]),
+        (Key::Down, [-1.0, 0.0, 0.0]),
+        (Key::Left, [0.0, -1.0, 0.0]),
+        (Key::Right, [0.0, 1.0, 0.0]),
+    ];
+    for (key, [ahead, right, up]) in keys {
+        let (_sample, _viewer, mut app) = app(1);
+        let before = app.eye();
+        app.handle(Input::Press(key));
+        std::thread::sleep(Duration::from_millis(10));
+        drawn(&mut app);
+        let after = app.eye();
+        let way = Vector3::from([0, 1, 2].map(|k| after.target[k] - before.target[k]));
+        let forward = Vector3::from(before.forward());
+        let to_right = forward.cross(&Vector3::z()).normalize();
+        let wanted = forward * ahead + to_right * right + Vector3::z() * up;
+        assert!((way.normalize() - wanted).norm() < 1e-9, "{key:?}: {way}, not along {wanted}");
+    }
 }
 
 /// A recording that is what it is set to.

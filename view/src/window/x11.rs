@@ -5,6 +5,7 @@ use super::enlarge::{self, Enlarged};
 use super::keys::Key;
 use super::watch::{PATIENCE, Watch};
 use crate::stage::Canvas;
+use sensors::visibility::View;
 use std::os::fd::AsFd as _;
 use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::errors::{ConnectionError, ReplyError, ReplyOrIdError};
@@ -152,7 +153,7 @@ impl Screened {
 
     /// How many pixels of the window a pixel of the picture covers, along each side.
     fn coarseness(&self) -> usize {
-        (1..).find(|k| (self.size[0] / k).max(1) * (self.size[1] / k).max(1) <= MOST_PIXELS).unwrap_or(1)
+        coarseness(self.size)
     }
 
     /// Size of the picture that is to be drawn.
@@ -324,6 +325,16 @@ impl Drop for Screened {
     }
 }
 
+/// How many pixels of a window of this size a pixel of its picture covers, along each side: few enough pixels, in rows and
+/// columns that can be drawn.
+fn coarseness(size: [usize; 2]) -> usize {
+    let fits = |k: &usize| {
+        let [width, height] = size.map(|n| n.div_ceil(*k));
+        (size[0] / k).max(1) * (size[1] / k).max(1) <= MOST_PIXELS && width.max(height) <= View::MAX_SIDE
+    };
+    (1..).find(fits).unwrap_or(1)
+}
+
 /// Whether a key was not let go and pressed again but is held: the server then says both, of the same moment.
 fn repeats(released: &KeyReleaseEvent, next: &KeyPressEvent) -> bool {
     (released.detail, released.time) == (next.detail, next.time)
@@ -415,5 +426,18 @@ mod tests {
         assert_eq!(keys.get(9, false), Some(Key::Char(' ')));
         let one = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
         assert_eq!(one.get(8, false), None, "there is no other alphabet");
+    }
+
+    /// A window may be up to 65 535 pixels wide, a picture 8192: its last column was repeated.
+    #[test]
+    fn pictures_cover_windows_of_every_size() {
+        for (size, k) in [([1, 1], 1), ([960, 540], 1), ([1920, 1200], 1), ([3840, 2160], 2), ([8192, 50], 1)] {
+            assert_eq!(coarseness(size), k, "{size:?}");
+        }
+        for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535]] {
+            let k = coarseness(size);
+            let picture = size.map(|n| n.div_ceil(k));
+            assert!(picture.iter().all(|n| *n <= View::MAX_SIDE) && picture[0] * k >= size[0], "{size:?}: {k}");
+        }
     }
 }
