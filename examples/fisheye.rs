@@ -15,7 +15,7 @@ use kinetoscope::sensors::camera::lens::{Domain, Equidistant, Equisolid, FTheta,
 use kinetoscope::sensors::camera::lens::{Orthographic, Stereographic};
 use kinetoscope::sensors::camera::{CameraInfo, Lens, PointFrame};
 use launcher::panel::tile;
-use launcher::{Launcher, PathFlags, Renderer, picture, still};
+use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -58,7 +58,6 @@ fn run(args: &Args) -> launcher::Result {
         other => other,
     };
     let renderer = renderer.of_cameras(args.paths)?;
-    still::refuse(args.launcher.serve.is_some(), args.launcher.record.is_some())?;
     let views = views(args)?;
     let mut sim = SimulationManager::new(args.launcher.simulation_drawn_anyhow()?)?;
     let robot = sim.add_robot(launcher::arm::bundled()?)?;
@@ -76,7 +75,20 @@ fn run(args: &Args) -> launcher::Result {
     let arm = sim.robot(robot).get_joint_ids("arm")?;
     let target = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0];
     sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
-    sim.update(u32::try_from(args.launcher.steps.unwrap_or(100))?);
+    args.launcher.serve(&mut sim)?;
+    let recording = args.launcher.start_recording(&mut sim)?;
+    // Pictures are what it is for: it ends with them, unless somebody watches.
+    let mut launcher = args.launcher.clone();
+    launcher.steps = launcher.steps.or(launcher.serve.is_none().then_some(100));
+    let progress = Progress::new(&launcher, 100);
+    let mut step = 0;
+    while !progress.stop(step) {
+        sim.update(1);
+        step += 1;
+        progress.advance(step);
+    }
+    let rate = progress.env_steps_per_second(step, sim.num_envs());
+    recording.finish(&mut sim)?;
 
     let (mut pictures, mut lenses) = (Vec::new(), Vec::new());
     for ((name, _), camera) in views.iter().zip(cameras) {
@@ -93,6 +105,8 @@ fn run(args: &Args) -> launcher::Result {
         "num_envs": sim.num_envs(),
         "threads": sim.threads(),
         "renderer": renderer,
+        "steps": step,
+        "env_steps_per_second": rate,
         "lenses": lenses,
         "warnings": sim.warning_counts(),
     }))

@@ -5,11 +5,12 @@
 //! cargo run --release --example inspect_robot -- quadruped/quadruped.xml --floating-base
 //! ```
 
+mod launcher;
+
 use clap::Parser;
-use kinetoscope::assets;
-use kinetoscope::prelude::MjcfFile;
+use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::urdf::UrdfCfg;
+use launcher::still::StillFlags;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,6 +35,11 @@ struct Args {
     /// Write the report to a file as JSON; `-` writes JSON to the terminal instead of the tables
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Folder for a picture of the robot, robot.png
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    live: StillFlags,
 }
 
 const HELP: &str = "\
@@ -47,7 +53,7 @@ the frame of the joint. `mass_matrix` and `gravity_torque` have one row per join
 with --floating-base first base.vx .. base.wz (velocity of the root in world axes, angular velocity in its own axes),
 and last those of floating and planar joints. An MJCF file's armature is in `mass_matrix`. null where there is no value.
 
-Nothing moves here, so there is no --serve and no --record: `kinetoscope view FILE` has them.
+--serve and --record let the robot move, after the report, without drives: it hangs or falls.
 
 Exit code: 0 loaded, 1 loaded with warnings (something was repaired, ignored or missing), 2 refused.";
 
@@ -69,8 +75,13 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>, out: &mut dyn Write,
             return if error.use_stderr() { REFUSED } else { LOADED };
         }
     };
-    let report = cfg(&args).and_then(|cfg| inspect(&cfg).map_err(|e| e.to_string()));
-    match report.and_then(|report| print(&report, args.json.as_deref(), out).map(|()| report)) {
+    let report = cfg(&args).and_then(|cfg| {
+        let report = inspect(&cfg).map_err(|e| e.to_string())?;
+        print(&report, args.json.as_deref(), out)?;
+        show(&args, cfg).map_err(|e| e.to_string())?;
+        Ok(report)
+    });
+    match report {
         Ok(report) if report.warnings.is_empty() => LOADED,
         Ok(_) => REPAIRED,
         Err(message) => {
@@ -91,6 +102,29 @@ fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<()
     }
     let _ = write!(out, "{report}");
     Ok(())
+}
+
+/// Draws the robot, and shows it as it moves, where flags ask for it.
+fn show(args: &Args, cfg: InspectCfg) -> launcher::Result {
+    if args.out.is_none() && !args.live.wants_motion() {
+        return Ok(());
+    }
+    let InspectCfg { urdf, mjcf, floating_base, qpos, .. } = cfg;
+    let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+    let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
+    let id = sim.add_robot(RobotCfg { urdf, mjcf, drive, fix_base: !floating_base, ..Default::default() })?;
+    let mut positions = sim.robot(id).get_qpos();
+    for (name, value) in &qpos {
+        if let Some(joint) = sim.robot(id).joint_names().iter().position(|joint| joint == name) {
+            positions[(0, joint)] = *value;
+        }
+    }
+    sim.robot_mut(id).write_qpos(&positions, None, None)?;
+    if let Some(out) = &args.out {
+        launcher::make_folder(out)?;
+        sim.screenshot(out.join("robot.png"))?;
+    }
+    if args.live.wants_motion() { args.live.show(&mut sim) } else { Ok(()) }
 }
 
 fn cfg(args: &Args) -> Result<InspectCfg, String> {

@@ -109,7 +109,6 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    args.live.check()?;
     let renderer = args.renderer.of_cameras(args.paths)?;
     let still = load(args)?;
     for left_out in still.visible().left_out() {
@@ -185,22 +184,37 @@ fn run(args: &Args) -> launcher::Result {
     std::fs::write(&path, serde_json::to_string_pretty(&meta)? + "\n")
         .map_err(|e| format!("{}: {e}", path.display()))?;
     println!("{images} images, {rate:.3} per second; written to {}", args.out.display());
+    if args.live.wants_motion() {
+        args.live.show(&mut simulation(args)?)?;
+    }
     Ok(())
+}
+
+fn is_urdf(args: &Args) -> bool {
+    args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"))
+}
+
+/// The model in a simulation.
+fn simulation(args: &Args) -> launcher::Result<SimulationManager> {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
+    let row = args.qpos.as_ref().map(|qpos| Array2::from_shape_vec((1, qpos.len()), qpos.clone())).transpose()?;
+    if is_urdf(args) {
+        let urdf = UrdfCfg::single(launcher::user_or_asset(&args.file)?);
+        let robot = sim.add_robot(RobotCfg { urdf, ..Default::default() })?;
+        row.map(|row| sim.robot_mut(robot).write_qpos(&row, None, None)).transpose()?;
+    } else {
+        let part = sim.add_mjcf(MjcfCfg::file("model", &args.file))?;
+        row.map(|row| sim.mjcf_part_mut(part).write_qpos(&row, None)).transpose()?;
+    }
+    Ok(sim)
 }
 
 /// A URDF goes through the whole pipeline, anything else is for MuJoCo to read.
 fn load(args: &Args) -> launcher::Result<Still> {
-    let is_urdf = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"));
-    if !is_urdf {
+    if !is_urdf(args) {
         return Ok(Still::of_mjcf(&args.file, args.qpos.as_deref())?);
     }
-    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
-    let urdf = UrdfCfg::single(launcher::user_or_asset(&args.file)?);
-    let robot = sim.add_robot(RobotCfg { urdf, ..Default::default() })?;
-    if let Some(qpos) = &args.qpos {
-        let row = Array2::from_shape_vec((1, qpos.len()), qpos.clone())?;
-        sim.robot_mut(robot).write_qpos(&row, None, None)?;
-    }
+    let mut sim = simulation(args)?;
     let still = Still::of_env(&mut sim, EnvId(0))?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");

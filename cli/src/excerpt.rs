@@ -79,11 +79,24 @@ fn place(message: &str) -> Option<Place<'_>> {
 }
 
 /// What of a line is meant: the first thing that the message quotes and that stands there, else all that is written. MuJoCo
-/// quotes with single marks.
+/// quotes with single marks. Where it stands there more than once, as the value of an attribute that the message names, else as
+/// a whole value, else first.
 fn marked(text: &str, message: &str) -> Range<usize> {
     let of = |mark: char| message.split(mark).skip(1).step_by(2).filter(|quoted| !quoted.trim().is_empty());
-    let quoted = of('"').chain(of('\''));
-    let found = quoted.filter_map(|quoted| text.find(quoted).map(|at| at..at + quoted.len())).next();
+    let mut quoted = of('"').chain(of('\''));
+    let words = |word: &str| message.split(|c: char| !c.is_alphanumeric() && c != '_').any(|said| said == word);
+    let likely = |quoted: &str, at: usize| {
+        let before = text[..at].strip_suffix(['"', '\'']);
+        let whole = before.is_some() && text[at + quoted.len()..].starts_with(['"', '\'']);
+        let attribute = before.and_then(|before| before.trim_end().strip_suffix('=')).map(str::trim_end);
+        let named = attribute.and_then(|before| before.rsplit(char::is_whitespace).next()).is_some_and(words);
+        (named, whole)
+    };
+    let found = quoted.find_map(|quoted| {
+        // Of equals the last is the largest: from behind, that is the first.
+        let places = text.rmatch_indices(quoted).map(|(at, _)| at);
+        places.max_by_key(|&at| likely(quoted, at)).map(|at| at..at + quoted.len())
+    });
     found.unwrap_or_else(|| text.len() - text.trim_start().len()..text.len())
 }
 
@@ -119,6 +132,17 @@ mod tests {
         let line = "  <geom type=\"box\" sise=\"1\"/>";
         let said = "robot \"arm\": MuJoCo refuses the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
         assert_eq!(&line[marked(line, said)], "sise");
+    }
+
+    #[test]
+    fn of_equal_words_the_one_that_is_meant_is_underlined() {
+        let at = |line: &str, message: &str| marked(line, message).start;
+        let line = "<joint name=\"arm\" parent=\"arm\"/>";
+        assert_eq!(at(line, "joint \"arm\": no link"), line.find("arm").unwrap());
+        assert_eq!(at(line, "parent \"arm\" is no link"), line.rfind("arm").unwrap());
+        let line = "<box size=\"0.5 0 0.25\" rgba=\"0\"/>";
+        assert_eq!(at(line, "\"0\" is no colour"), line.rfind('0').unwrap(), "a whole value, not a digit of another");
+        assert_eq!(at("<a b='0.5'/>", "\"5\": x"), "<a b='0.".len());
     }
 
     #[test]

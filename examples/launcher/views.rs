@@ -51,7 +51,7 @@ mod shown {
         /// The file cannot be written.
         pub(crate) fn screenshot(&self, sim: &mut SimulationManager, name: &str) -> Result {
             let Some(out) = &self.out else { return Ok(()) };
-            crate::launcher::make_folder(out)?;
+            super::super::make_folder(out)?;
             let path = out.join(name);
             sim.screenshot(&path)?;
             println!("Drawn to {}", path.display());

@@ -17,7 +17,7 @@ const CAMERAS: &[Module] = &[
     Module { name: "pybullet", packages: &["pybullet==3.2.7"] },
 ];
 
-const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv];
+const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv, Need::Xvfb];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct BenchArgs {

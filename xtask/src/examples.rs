@@ -1,5 +1,6 @@
 //! The table of how CI runs every example, and the check that every example stands in it.
 
+use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::Ready;
 use serde_json::Value;
@@ -227,15 +228,22 @@ const TABLE: &[Run] = &[
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --camera nobody"),
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --msaa 3"),
     run_of("render_model", &[0], "assets/sr5/SR5.urdf --headless --width 64 --height 48 --out {out}/small"),
-    run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --serve"),
-    run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --record {out}/none.mcap"),
+    run_of("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/served --serve 127.0.0.1:0 --steps 20"),
+    run_of(
+        "render_model",
+        &[0],
+        "assets/quadruped/quadruped.xml --out {out}/served --record {out}/falls.mcap --steps 20",
+    ),
+    run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --serve nowhere"),
+    run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --record {out}/none.no_such_format"),
     run_of("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --eye 1,1,1 --target 1,1,1"),
     run_of("fisheye", &[0], "--headless --out {out}/fisheye --report {out}/fisheye.json"),
     run_of("fisheye", &[0], "--headless --lens panorama --lens ftheta --width 200 --height 100 --out {out}/panorama"),
     run_of("fisheye", &[0], "--headless --camera-info {out}/fisheye/opencv.yaml --out {out}/twin"),
     run_of("fisheye", &[2], "--headless --lens no_such_lens --out {out}/none"),
-    run_of("fisheye", &[2], "--headless --serve 127.0.0.1:0 --out {out}/none"),
-    run_of("fisheye", &[2], "--headless --record {out}/none.mcap --out {out}/none"),
+    run_of("fisheye", &[0], "--headless --lens panorama --serve 127.0.0.1:0 --steps 20 --out {out}/served"),
+    run_of("fisheye", &[0], "--headless --lens ftheta --steps 20 --record {out}/fisheye.mcap --out {out}/served"),
+    run_of("fisheye", &[2], "--headless --serve nowhere --out {out}/none"),
     run_of("fisheye", &[2], "--headless --lens opencv --renderer raster --out {out}/none"),
     run_of("fisheye", &[2], "--headless --camera-info {out}/malformed.urdf --out {out}/none"),
     run_of("fisheye", &[2], "--headless --camera-info {out}/there_is_no_such_file.yaml --out {out}/none"),
@@ -244,8 +252,13 @@ const TABLE: &[Run] = &[
     run_of("inspect_robot", &[0, 1], "assets/quadruped/quadruped.xml --floating-base --qpos LF_HFE=0.4"),
     run_of("inspect_robot", &[2], "assets/quadruped/quadruped.xml assets/sr5/SR5.urdf"),
     run_of("inspect_robot", &[2], "{out}/malformed.urdf"),
-    run_of("inspect_robot", &[2], "assets/sr5/SR5.urdf --serve"),
-    run_of("inspect_robot", &[2], "assets/sr5/SR5.urdf --record {out}/none.mcap"),
+    run_of(
+        "inspect_robot",
+        &[0, 1],
+        "assets/sr5/SR5.urdf --headless --out {out}/inspected --serve 127.0.0.1:0 --steps 20",
+    ),
+    run_of("inspect_robot", &[0, 1], "assets/sr5/SR5.urdf --record {out}/inspected.mcap --steps 20"),
+    run_of("inspect_robot", &[2], "assets/sr5/SR5.urdf --serve nowhere"),
     run_of("inspect_robot", &[2], "{out}/there_is_no_such_file.urdf"),
 ];
 
@@ -261,7 +274,9 @@ pub(crate) fn run(repo: &Repo, ready: &Ready) -> Outcome {
         .and_then(|()| fs::write(out.join("malformed.urdf"), "<robot name=\"torn\">\n  <link name=\"base\">\n"))
         .map_err(|e| Failure::new(format!("{}: {e}", out.display())))?;
     let has_robots = repo.root.join(ROBOTS).is_dir();
+    let mut progress = Progress::of(TABLE.len());
     for row in TABLE {
+        progress.begin(row.example);
         if row.args.contains("{robots}") && !has_robots {
             println!("skipped, {ROBOTS} is not there: {} {}", row.example, row.args);
             continue;

@@ -164,11 +164,13 @@ fn the_page_shows_the_simulation_and_acts_on_it() {
     tab.choose("environment", "1");
     tab.choose("environment", "all");
     let all = now_shown(&mut tab);
-    let frames = "document.querySelector('#overlays input[value=frames]')";
-    tab.click(frames);
-    tab.wait_until("frames", &format!("{PICTURE} !== {all}"));
-    tab.click(frames);
-    tab.wait_until("no frames", &format!("{PICTURE} === {all}"));
+    for overlay in ["contacts", "frames", "joints", "masses", "names", "collisions", "visuals"] {
+        let tick = format!("document.querySelector('#overlays input[value={overlay}]')");
+        tab.click(&tick);
+        tab.wait_until(overlay, &format!("{PICTURE} !== {all}"));
+        tab.click(&tick);
+        tab.wait_until(&format!("{overlay} gone"), &format!("{PICTURE} === {all}"));
+    }
     let red = format!("{LOOK}.red");
     let of_two = tab.evaluate(&red).as_f64().unwrap();
     tab.choose("environment", "1");
