@@ -70,7 +70,8 @@ impl Role {
         matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
     }
 
-    /// Whether it is observed: then what it is when the action was done is told too.
+    /// Of formats that tell more than one row of a frame: whether it is observed. Then what it is when the action was done is told too.
+    #[cfg(feature = "hdf5")]
     pub(crate) fn is_observed(&self) -> bool {
         !self.is_action() && *self != Self::EngineState
     }
