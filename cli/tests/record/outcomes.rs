@@ -7,7 +7,7 @@ use kinetoscope::env::{
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Format, Recording, Wanted};
-use kinetoscope::sim::{JointIndex, MjcfFile};
+use kinetoscope::sim::{JointIndex, MjcfFile, Outcome};
 use std::path::Path;
 
 const ENVS: usize = 3;
@@ -210,4 +210,33 @@ fn without_a_task_nothing_is_made_up() {
     sim.update(3);
     sim.finish_recording(recorder).unwrap();
     assert!(Recording::open(&path).unwrap().topic("task", None).is_err());
+}
+
+/// A task that is no `Env` tells by itself.
+#[test]
+fn whoever_has_a_task_tells_what_comes_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let mut sim = task().into_sim();
+    assert_eq!(sim.outcome(), None);
+    sim.begin_task();
+    assert_eq!(sim.outcome().map(|outcome| outcome.rewards.to_vec()), Some(vec![0.0; ENVS]));
+    let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::Outcomes])).unwrap();
+    let outcome = |reward: f64, count: usize| {
+        let ends = kinetoscope::ndarray::Array1::from_elem(ENVS, false);
+        let rewards = (0..count).map(|env| reward + env as f64).collect();
+        Outcome { rewards, terminated: ends.clone(), truncated: ends }
+    };
+    for step in 0..4 {
+        sim.update(2);
+        sim.judge(outcome(f64::from(step), ENVS)).unwrap();
+        // One number too few is told to nobody.
+        let error = sim.judge(outcome(100.0, ENVS - 1)).unwrap_err().to_string();
+        assert!(error.contains("rewards"), "{error}");
+        assert_eq!(sim.outcome(), Some(&outcome(f64::from(step), ENVS)));
+    }
+    sim.finish_recording(recorder).unwrap();
+    let wanted = [Wanted::new("/env_2/task", "reward[0]")];
+    let samples = Recording::open(&path).unwrap().samples(&wanted).unwrap();
+    assert_eq!(samples[0].values, [2.0, 3.0, 4.0, 5.0]);
 }
