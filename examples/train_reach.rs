@@ -347,3 +347,51 @@ fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     let drawn = curve::draw("share of targets reached while trying changes, by iteration", &reached);
     picture::write_png(&out.join("curve.png"), &drawn)
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use kinetoscope::env::{EnvError, Finding, Info, Space, Step, check};
+
+    /// Says that nobody knows what was earned.
+    struct Unsure(Env);
+
+    impl VectorEnv for Unsure {
+        type Error = EnvError;
+        type Info = Info;
+
+        fn num_envs(&self) -> usize {
+            self.0.num_envs()
+        }
+
+        fn observation_space(&self) -> &Space {
+            self.0.observation_space()
+        }
+
+        fn action_space(&self) -> &Space {
+            self.0.action_space()
+        }
+
+        fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
+            self.0.reset(mask, seed)
+        }
+
+        fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step, EnvError> {
+            let mut step = self.0.step(actions)?;
+            step.rewards.fill(f64::NAN);
+            Ok(step)
+        }
+    }
+
+    #[test]
+    fn the_task_keeps_what_tasks_promise() {
+        let args = Args::parse_from(["train_reach", "--headless", "--num-envs", "16"]);
+        let mut env = task(&args, Arc::new(AtomicUsize::new(TARGETS))).unwrap();
+        let findings = check(&mut env, 7);
+        assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
+        // The control.
+        let findings = check(&mut Unsure(env), 7);
+        assert!(findings.iter().any(|finding| matches!(finding, Finding::Reward { .. })), "{findings:?}");
+    }
+}

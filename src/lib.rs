@@ -1,6 +1,11 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+/// The programs of the page are compiled as those of the README are.
+#[cfg(all(doctest, feature = "record"))]
+#[doc = include_str!("../docs/recording.md")]
+struct PageOfRecordings;
+
 pub mod assets;
 #[cfg(all(feature = "record", feature = "view"))]
 mod record_button;

@@ -16,7 +16,7 @@ use std::sync::atomic::Ordering;
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// A recording, .mcap or .npz; to be verified it is .npz
+    /// A recording, .mcap or .npz
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// The scene file that was recorded, where the recording does not hold its scene, or for --verify
@@ -49,7 +49,7 @@ const HELP: &str = "\
 Examples:
   kinetoscope replay run.mcap                     in a window; --serve: in a browser
   kinetoscope replay run.mcap --out pictures --at 0,1.5,3
-  kinetoscope replay run.npz --verify --scene scene.toml
+  kinetoscope replay run.mcap --verify --scene scene.toml
 
 Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
 recording or of the scene was left out), or --verify found a difference; 2 refused, or the display was lost.";

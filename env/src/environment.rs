@@ -11,7 +11,7 @@ use crate::step::{EndReason, Ended, Info, Step};
 use crate::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 use scene::Random;
-use sim::{EnvId, ObserverId, SimulationManager};
+use sim::{EnvId, ObserverId, Outcome, SimulationManager};
 
 /// Environments with a task: reset, then stepped.
 ///
@@ -20,7 +20,7 @@ use sim::{EnvId, ObserverId, SimulationManager};
 ///
 /// 1. actions are put between their bounds and applied, and [`EnvCfg::decimation`] physics steps are done;
 /// 2. episodes are one step longer; terms say which of them end, and why;
-/// 3. rewards are computed;
+/// 3. rewards are computed, and observers of the simulation are told of them and of the ends ([`SimulationManager::outcome`]);
 /// 4. events of [`When::Interval`] happen where they are due and the episode goes on;
 /// 5. observations are made: the final ones of episodes that ended are among them;
 /// 6. environments whose episode ended go back to the initial state, get new commands, events of [`When::Reset`] happen, and they
@@ -79,6 +79,7 @@ impl Env {
     /// The simulation, as the last step left it.
     pub fn into_sim(self) -> SimulationManager {
         let (mut sim, (_, id)) = (self.present.sim, self.watch);
+        sim.end_task();
         // It may be another simulation than at first: then there is nothing to take away.
         if sim.has_observer(id) {
             let _ = sim.remove_observer(id);
@@ -142,6 +143,7 @@ impl Env {
         let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
         let previous = actions.clone();
         let watch = Watch::new(n);
+        sim.begin_task();
         let mut env = Self {
             watch: (watch.clone(), sim.add_observer(watch)),
             rows: (0..n).map(row).collect(),
@@ -236,6 +238,11 @@ impl Env {
         let (terminated, truncated, reasons) = self.ends()?;
         let reward_terms = self.rewards()?;
         self.reward_sums += &reward_terms;
+        // In the order of the terms.
+        let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
+        let outcome =
+            Outcome { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
+        self.present.sim.judge(outcome)?;
         let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
         self.happen_at_intervals(&going_on)?;
         let all: Vec<usize> = (0..self.num_envs()).collect();
@@ -256,8 +263,7 @@ impl Env {
         Ok(Step {
             observations: self.observations.clone(),
             final_observations,
-            // In the order of the terms.
-            rewards: reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward)),
+            rewards,
             terminated,
             truncated,
             info: Info { reward_terms, ended },

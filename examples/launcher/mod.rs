@@ -71,10 +71,14 @@ pub(crate) struct Launcher {
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
     /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset, .hdf5 for
-    /// robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera; a folder for PNG files of all
-    /// cameras; from the start, where without it the record button of window and browser begins a recording.mcap
+    /// robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or the stage where there is none; a
+    /// folder for PNG files of all cameras; from the start, where without it the record button of window and browser begins a recording.mcap
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
+    /// What a film of --record shows: `stage` for all environments side by side, or the name of a camera (of environment 0). Other
+    /// files have every camera, and the stage too where it is named
+    #[arg(long, alias = "record_view", value_name = "NAME", requires = "record")]
+    pub(crate) record_view: Option<String>,
     /// Replace the file of --record, and what a recording that was killed has left
     #[arg(long, requires = "record")]
     pub(crate) overwrite: bool,

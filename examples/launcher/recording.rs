@@ -6,6 +6,7 @@ use kinetoscope::prelude::*;
 #[cfg(all(feature = "record", feature = "view"))]
 mod recorded {
     use super::*;
+    use kinetoscope::record::Format;
     use kinetoscope::sim::{Moment, Observer};
     use std::sync::{Arc, Mutex, PoisonError};
     use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ mod recorded {
                 let path = self.record.clone().unwrap_or_else(folder);
                 let (every, rates) = (self.record_every, self.record_rate.clone());
                 let cfg = RecorderCfg { overwrite: self.overwrite, every, rates, ..RecorderCfg::new(path) };
+                let cfg = self.record_view.as_ref().map_or_else(|| cfg.clone(), |view| showing(cfg.clone(), view));
                 Arc::new(Mutex::new(FileRecording::new(cfg)))
             })
         }
@@ -35,6 +37,20 @@ mod recorded {
                 sim.add_observer(Watch { files: Arc::clone(files), looked: Instant::now(), told: false });
             }
             Ok(Recording { files: Arc::clone(files) })
+        }
+    }
+
+    /// The same, of what `--record-view` names.
+    fn showing(cfg: RecorderCfg, view: &str) -> RecorderCfg {
+        let film = Format::of_path(&cfg.path).is_ok_and(Format::is_animation);
+        match (view, film) {
+            ("stage", true) => cfg.with_topics([Topic::Stage]),
+            ("stage", false) => cfg.with_topics([Topic::Everything, Topic::Stage]),
+            // A camera that there is not is an error, which names those there are.
+            (camera, true) => {
+                RecorderCfg { envs: Some(vec![EnvId(0)]), ..cfg }.with_topics([Topic::channel(camera, "color")])
+            }
+            (camera, false) => cfg.with_topics([Topic::Everything, Topic::channel(camera, "color")]),
         }
     }
 

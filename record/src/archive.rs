@@ -1,70 +1,134 @@
 //! NumPy archives of a recorder, read again.
 
 use crate::error::{RecordError, Result};
+use crate::format::Format;
 use crate::npy;
 use crate::npz::{ABOUT, START};
+use crate::read::{Rows, rows};
 use crate::source::Source;
-use crate::zip;
+use crate::zip::{Reader, Source as From};
 use ndarray::{ArrayView2, ArrayView3};
 use serde_json::Value;
 use sim::{EnvId, Snapshot};
 use std::collections::BTreeMap;
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Kinds of events after which an environment has another state: resets, and what somebody wrote.
 const CHANGES: [f64; 2] = [0.0, 1.0];
 
-/// An archive that was read, without its pictures.
+/// An archive whose directory was read; the numbers of an array are read when somebody asks for them, pictures never.
 #[derive(Debug)]
 pub(crate) struct Archive {
     pub(crate) path: PathBuf,
     /// What `recording.json` says.
     pub(crate) about: Value,
-    start: Vec<u8>,
-    /// Shapes and numbers, by name.
-    pub(crate) arrays: BTreeMap<String, (Vec<usize>, Vec<f64>)>,
+    content: Content,
+    /// By name.
+    arrays: BTreeMap<String, Array>,
 }
 
+/// Where what is not read yet comes from.
+#[derive(Debug)]
+enum Content {
+    Npz(Mutex<Reader<'static>>),
+    /// All arrays of an MCAP file were read; this is the state at its beginning.
+    Mcap(Vec<u8>),
+}
+
+/// An array of an archive.
+#[derive(Debug)]
+struct Array {
+    shape: Vec<usize>,
+    numbers: OnceLock<Vec<f64>>,
+}
+
+/// Heads of arrays are no longer, whatever their shape \[bytes\].
+const LONGEST_HEAD: u64 = 1024;
+
 impl Archive {
-    pub(crate) fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|error| RecordError::file(path, error))?;
-        let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
-        let members =
-            zip::parse(&bytes).ok_or_else(|| malformed("this is no NumPy archive of a recorder, or is damaged"))?;
-        let member = |name: &str| members.iter().find(|(known, _)| *known == name).map(|(_, data)| *data);
-        let about = member(ABOUT).and_then(|about| serde_json::from_slice(about).ok());
-        let about: Value = about.ok_or_else(|| malformed("it does not say what is in it (recording.json)"))?;
-        let start = member(START).ok_or_else(|| malformed("it has no state to begin with (start.snapshot)"))?;
-        let start = start.to_vec();
-        let mut arrays = BTreeMap::new();
-        for (name, data) in &members {
-            let Some(name) = name.strip_suffix(".npy") else { continue };
-            // Pictures are not compared.
-            let Some(("<f8" | "<i4" | "|u1", ..)) = npy::parse(data) else { continue };
-            let wanted = name.starts_with("events/") || npy::parse(data).is_some_and(|(descr, ..)| descr == "<f8");
-            let Some((descr, shape, data)) = npy::parse(data).filter(|_| wanted) else { continue };
-            let numbers: Vec<f64> = match descr {
-                "<f8" => data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect(),
-                "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect(),
-                _ => data.iter().map(|byte| f64::from(*byte)).collect(),
-            };
-            let product = |shape: &[usize]| shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis));
-            // Also where an axis is empty, the others have a product.
-            let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
-            if product(&shape) != Some(numbers.len()) || product(&filled).is_none() {
-                return Err(malformed(&format!("{name} has not as many numbers as its shape says")));
-            }
-            arrays.insert(name.to_string(), (shape, numbers));
+    /// What actions are done again from: a NumPy archive, or the rows of an MCAP file as one.
+    pub(crate) fn of_any(path: &Path) -> Result<Self> {
+        if !matches!(Format::of_path(path), Ok(Format::Mcap)) {
+            return Self::read(path);
         }
-        Ok(Self { path: path.into(), about, start, arrays })
+        let Rows { about, start, arrays } = rows(path)?;
+        let array = |(name, (shape, numbers))| (name, Array { shape, numbers: OnceLock::from(numbers) });
+        let arrays = arrays.into_iter().map(array).collect();
+        Ok(Self { path: path.into(), about, content: Content::Mcap(start), arrays })
+    }
+
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|error| RecordError::file(path, error))?;
+        Self::of(path, file)
+    }
+
+    /// An archive that is read from somewhere; `path` is what it is called in errors.
+    pub(crate) fn of(path: &Path, from: impl From + 'static) -> Result<Self> {
+        let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
+        let none = "this is no NumPy archive of a recorder, or is damaged";
+        let mut file = Reader::open(from).map_err(|error| wrong(path, none, error))?;
+        let about = file.read(ABOUT).map_err(|error| wrong(path, none, error))?;
+        let about = about.and_then(|about| serde_json::from_slice(&about).ok());
+        let about: Value = about.ok_or_else(|| malformed("it does not say what is in it (recording.json)"))?;
+        if !file.names().any(|name| name == START) {
+            return Err(malformed("it has no state to begin with (start.snapshot)"));
+        }
+        let names: Vec<String> = file.names().filter_map(|name| name.strip_suffix(".npy")).map(String::from).collect();
+        let mut arrays = BTreeMap::new();
+        for name in names {
+            let head = file.first(&format!("{name}.npy"), LONGEST_HEAD).map_err(|error| wrong(path, none, error))?;
+            let Some((descr, shape, _)) = head.as_deref().and_then(npy::parse) else { continue };
+            // Pictures are not compared.
+            if descr == "<f8" || (name.starts_with("events/") && ["<i4", "|u1"].contains(&descr)) {
+                arrays.insert(name, Array { shape, numbers: OnceLock::new() });
+            }
+        }
+        Ok(Self { path: path.into(), about, content: Content::Npz(Mutex::new(file)), arrays })
+    }
+
+    /// A file of the archive.
+    pub(crate) fn member(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        let file = match &self.content {
+            Content::Npz(file) => file,
+            Content::Mcap(start) => return Ok((name == START).then(|| start.clone())),
+        };
+        let read = file.lock().unwrap_or_else(PoisonError::into_inner).read(name);
+        read.map_err(|error| wrong(&self.path, &error.to_string(), error))
+    }
+
+    /// The shape of an array, if there is one.
+    pub(crate) fn shape(&self, name: &str) -> Option<&[usize]> {
+        self.arrays.get(name).map(|array| array.shape.as_slice())
+    }
+
+    fn numbers(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
+        let data = self.member(&format!("{name}.npy"))?;
+        let Some((descr, _, data)) = data.as_deref().and_then(npy::parse) else {
+            return Err(self.malformed(format!("{name} is no array")));
+        };
+        let numbers: Vec<f64> = match descr {
+            "<f8" => data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect(),
+            "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect(),
+            _ => data.iter().map(|byte| f64::from(*byte)).collect(),
+        };
+        let product = |shape: &[usize]| shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis));
+        // Also where an axis is empty, the others have a product.
+        let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
+        if product(shape) != Some(numbers.len()) || product(&filled).is_none() {
+            return Err(self.malformed(format!("{name} has not as many numbers as its shape says")));
+        }
+        Ok(numbers)
     }
 
     /// The state in which the recording begins.
     pub(crate) fn start(&self) -> Result<Snapshot> {
         let failed = |error| RecordError::file(&self.path, error);
+        let start = self.member(START)?.unwrap_or_default();
         let mut file = tempfile::NamedTempFile::new().map_err(failed)?;
-        file.write_all(&self.start).and_then(|()| file.flush()).map_err(failed)?;
+        file.write_all(&start).and_then(|()| file.flush()).map_err(failed)?;
         Ok(Snapshot::load(file.path())?)
     }
 
@@ -72,12 +136,18 @@ impl Archive {
         RecordError::Malformed { path: self.path.clone(), what }
     }
 
-    pub(crate) fn array(&self, name: &str) -> Result<&(Vec<usize>, Vec<f64>)> {
-        self.arrays.get(name).ok_or_else(|| self.malformed(format!("there is no array {name}")))
+    /// The shape and the numbers of an array.
+    pub(crate) fn array(&self, name: &str) -> Result<(&[usize], &[f64])> {
+        let array = self.arrays.get(name).ok_or_else(|| self.malformed(format!("there is no array {name}")))?;
+        if array.numbers.get().is_none() {
+            // Somebody else may have read it meanwhile: the same numbers.
+            let _ = array.numbers.set(self.numbers(name, &array.shape)?);
+        }
+        Ok((&array.shape, array.numbers.get().map_or(&[], Vec::as_slice)))
     }
 
     pub(crate) fn steps(&self, stream: &str) -> Result<&[f64]> {
-        Ok(&self.array(&format!("{stream}/step"))?.1)
+        Ok(self.array(&format!("{stream}/step"))?.1)
     }
 
     /// Checks that the arrays of a stream have the shapes that they have in this simulation.
@@ -85,7 +155,7 @@ impl Archive {
         for part in &source.stream.parts {
             let name = crate::npz::member(&source.stream, &part.name);
             let shape = [&[rows, source.stream.env_ids.len()][..], &part.shape].concat();
-            let found = &self.array(&name)?.0;
+            let found = self.array(&name)?.0;
             if *found != shape {
                 return Err(self.malformed(format!("{name} has shape {found:?}; here it would be {shape:?}")));
             }
@@ -107,7 +177,7 @@ impl Archive {
 
     /// What happened to an environment: steps, and the simulation time afterwards \[s\], in order.
     pub(crate) fn happened(&self, env: usize) -> Result<Vec<(f64, f64)>> {
-        let of = |name: &str| Ok::<_, RecordError>(&self.array(&format!("events/{name}"))?.1);
+        let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, times) = (of("step")?, of("env")?, of("time")?);
         let kinds = of("kind")?;
         let of_env = steps.iter().zip(envs).zip(times.iter().zip(kinds));
@@ -118,7 +188,7 @@ impl Archive {
 
     /// The environments that were reset, and those that were written to, at a step.
     pub(crate) fn events(&self, step: f64) -> Result<(Vec<EnvId>, Vec<EnvId>)> {
-        let of = |name: &str| Ok::<_, RecordError>(&self.array(&format!("events/{name}"))?.1);
+        let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, kinds) = (of("step")?, of("env")?, of("kind")?);
         let (mut reset, mut written) = (Vec::new(), Vec::new());
         for ((at, env), kind) in steps.iter().zip(envs).zip(kinds) {
@@ -131,5 +201,117 @@ impl Archive {
         reset.sort_unstable();
         reset.dedup();
         Ok((reset, written))
+    }
+}
+
+/// What is wrong with an archive that cannot be read: `what` where it is damaged.
+fn wrong(path: &Path, what: &str, error: io::Error) -> RecordError {
+    match error.kind() {
+        io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            RecordError::Malformed { path: path.into(), what: what.into() }
+        }
+        _ => RecordError::file(path, error),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use crate::cfg::RecorderCfg;
+    use crate::recorder::Record;
+    use crate::recorder::tests::BALL;
+    use sensors::camera::{CameraCfg, Channels};
+    use sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
+    use std::io::{Read, Seek, SeekFrom};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// Counts the bytes that are read.
+    struct Counted {
+        file: File,
+        bytes: Arc<AtomicU64>,
+    }
+
+    impl Read for Counted {
+        fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+            let count = self.file.read(to)?;
+            self.bytes.fetch_add(count as u64, Ordering::Relaxed);
+            Ok(count)
+        }
+    }
+
+    impl Seek for Counted {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.file.seek(to)
+        }
+    }
+
+    /// Root cause: the whole file was brought into memory, pictures and all, to give a few numbers of it.
+    #[test]
+    fn no_more_is_read_than_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.npz");
+        let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+        sim.add_mjcf(MjcfCfg::text("ball", BALL)).unwrap();
+        let camera = CameraCfg {
+            width: 128,
+            height: 96,
+            channels: Channels { depth: true, ..Channels::NONE },
+            ..CameraCfg::default()
+        };
+        sim.add_sensor("camera", camera).unwrap();
+        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+        sim.update(40);
+        let whole = sim.finish_recording(recorder).unwrap().bytes;
+        // 40 pictures of 128 x 96 f32 in two environments.
+        assert!(whole > 40 * 2 * 4 * 128 * 96, "{whole}");
+        let bytes = Arc::new(AtomicU64::new(0));
+        let counted = Counted { file: File::open(&path).unwrap(), bytes: Arc::clone(&bytes) };
+        let archive = Archive::of(&path, counted).unwrap();
+        let opened = bytes.load(Ordering::Relaxed);
+        let Content::Npz(file) = &archive.content else { panic!("{archive:?}") };
+        let members = file.lock().unwrap().names().count() as u64;
+        let about = archive.member(ABOUT).unwrap().unwrap().len() as u64;
+        // Of each file its line in the directory (46 + 28 bytes and a name of at most 64), what stands before it (30) and the head of
+        // the array; the end of the archive (42 + 56), and what says what is in it.
+        let most = members * (46 + 28 + 64 + 30 + LONGEST_HEAD) + 98 + 30 + about;
+        assert!(opened <= most && most < whole / 10, "{opened} bytes, at most {most} of {whole}");
+        // An array is its numbers: 41 rows of two environments, of seven positions, its head, and what stands before it.
+        let before = bytes.load(Ordering::Relaxed);
+        let (shape, numbers) = archive.array("ball/state/positions").unwrap();
+        assert_eq!((shape, numbers.len()), (&[41, 2, 7][..], 41 * 2 * 7));
+        let after = bytes.load(Ordering::Relaxed);
+        assert_eq!(after - before, 30 + 8 * 41 * 2 * 7 + 128);
+        // Once.
+        archive.array("ball/state/positions").unwrap();
+        assert_eq!(bytes.load(Ordering::Relaxed), after);
+        // The control: a picture, which nobody asks for, would be seen.
+        assert!(archive.member("camera/depth.npy").unwrap().unwrap().len() > 1_000_000);
+        assert!(bytes.load(Ordering::Relaxed) > whole / 2);
+    }
+
+    #[test]
+    fn damage_is_found_where_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.npz");
+        let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+        sim.add_mjcf(MjcfCfg::text("ball", BALL)).unwrap();
+        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+        sim.update(20);
+        sim.finish_recording(recorder).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let name = b"ball/state/velocities.npy";
+        let place = bytes.windows(name.len()).position(|part| part == name).unwrap();
+        bytes[place + name.len() + 20 + 128 + 9] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        let archive = Archive::read(&path).unwrap();
+        assert!(archive.array("ball/state/positions").is_ok());
+        let error = archive.array("ball/state/velocities").unwrap_err().to_string();
+        assert!(error.contains("velocities.npy is damaged"), "{error}");
+        for end in [0, 10, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..end]).unwrap();
+            assert!(matches!(Archive::read(&path), Err(RecordError::Malformed { .. })), "{end}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! What a recorder is, before it exists.
 
 use crate::format::Format;
+use crate::stage::StageCfg;
 use crate::topic::Topic;
 use sim::EnvId;
 use std::path::PathBuf;
@@ -28,9 +29,14 @@ pub struct RecorderCfg {
     /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
     /// written, the simulation waits too. All together may take 16 GiB.
     pub packets: usize,
-    /// Whether the scene is put into the file, as MJCF with its meshes, so that the file is enough to show the recording
-    /// (`kinetoscope replay`). Of MCAP files and NumPy archives; it is taken once, when the recording begins.
+    /// Whether the scene is put into the file. As MJCF with its meshes, so that the file is enough to show the recording
+    /// (`kinetoscope replay`): of MCAP files and NumPy archives, taken once, when the recording begins. And in MCAP files for viewers
+    /// (Foxglove): what cameras draw by default, in the frames whose poses are recorded, and again whenever it looks otherwise or
+    /// something is added. What moves and has no recorded pose is left out there; so are environments for which the 64 MiB of all
+    /// such messages do not suffice. Both are told ([`Recorded::left_out`](crate::Recorded::left_out)).
     pub scene: bool,
+    /// How the stage is drawn, where that is recorded ([`Topic::Stage`]).
+    pub stage: StageCfg,
     /// What is being done, in words: the task of all episodes of a LeRobot dataset. Other formats do not say it.
     pub task: String,
     /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
@@ -61,6 +67,7 @@ impl Default for RecorderCfg {
             rates: Vec::new(),
             packets: 8,
             scene: true,
+            stage: StageCfg::default(),
             task: String::new(),
             overwrite: false,
         }

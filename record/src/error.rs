@@ -62,6 +62,20 @@ pub enum RecordError {
         /// What has no place in it.
         topic: String,
     },
+    /// Nobody tells what comes of steps.
+    #[error(
+        "{path}: no task runs in this simulation, so there are no rewards: record the simulation of an Env (Env::sim_mut)"
+    )]
+    NoTask {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The stage cannot be drawn.
+    #[error("the picture of the stage: {what}")]
+    Stage {
+        /// Why, or which number is wrong.
+        what: String,
+    },
     /// There is nothing to record.
     #[error("{path}: there is nothing to record for {}", .format.name())]
     Nothing {

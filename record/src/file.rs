@@ -4,11 +4,42 @@ use crate::error::{RecordError, Result};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a file is written to.
-pub(crate) trait Storage: Write + Seek + Send {}
+pub(crate) trait Storage: Write + Seek + Send {
+    /// Brings what was written to the disk.
+    fn sync(&self) -> io::Result<()>;
+}
 
-impl<S: Write + Seek + Send> Storage for S {}
+impl Storage for File {
+    fn sync(&self) -> io::Result<()> {
+        self.sync_all()
+    }
+}
+
+/// What files are written through.
+type Through = dyn Fn(File) -> Box<dyn Storage> + Send + Sync;
+
+/// Where the files of a recording are: tests put something between them and the disk.
+#[derive(Clone, Default)]
+pub(crate) struct Disk(Option<Arc<Through>>);
+
+impl std::fmt::Debug for Disk {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Disk")
+    }
+}
+
+impl Disk {
+    /// What a file is written to.
+    pub(crate) fn storage(&self, file: File) -> Box<dyn Storage> {
+        match &self.0 {
+            Some(through) => through(file),
+            None => Box::new(file),
+        }
+    }
+}
 
 /// A file on its way: called `NAME.part` until it is whole. Dropped before, it is taken away, unless somebody can read what
 /// there is of it.
@@ -164,21 +195,37 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 pub(crate) mod tests {
     use super::*;
     use std::io::SeekFrom;
+    use std::sync::Mutex;
 
-    /// A disk that is full after some bytes.
+    /// A file on a disk that is full after some bytes, of all its files together.
     #[derive(Debug)]
-    pub(crate) struct FullDisk {
-        pub(crate) file: File,
-        pub(crate) left: usize,
+    struct OnFullDisk {
+        file: File,
+        left: Arc<Mutex<usize>>,
     }
 
-    impl Write for FullDisk {
+    impl Disk {
+        /// One that takes so many bytes, of all its files together.
+        pub(crate) fn full_after(bytes: usize) -> Self {
+            let left = Arc::new(Mutex::new(bytes));
+            Self(Some(Arc::new(move |file| Box::new(OnFullDisk { file, left: Arc::clone(&left) }))))
+        }
+    }
+
+    impl Storage for OnFullDisk {
+        fn sync(&self) -> io::Result<()> {
+            self.file.sync_all()
+        }
+    }
+
+    impl Write for OnFullDisk {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            if self.left == 0 {
+            let mut left = self.left.lock().unwrap();
+            if *left == 0 && !bytes.is_empty() {
                 return Err(io::Error::new(io::ErrorKind::StorageFull, "no space left on this disk"));
             }
-            let done = self.file.write(&bytes[..bytes.len().min(self.left)])?;
-            self.left -= done;
+            let done = self.file.write(&bytes[..bytes.len().min(*left)])?;
+            *left -= done;
             Ok(done)
         }
 
@@ -187,7 +234,7 @@ pub(crate) mod tests {
         }
     }
 
-    impl Seek for FullDisk {
+    impl Seek for OnFullDisk {
         fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
             self.file.seek(to)
         }

@@ -203,7 +203,11 @@ fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7]
         // The stream of an object, whose name may have a stroke, or that of a robot's links.
         let object = format!("{frame}/pose");
         let is_object = recording.topics().iter().any(|topic| topic.name == format!("/env_{env}/{object}"));
-        let links = frame.split_once('/').map(|(uid, _)| format!("{uid}/link_poses"));
+        // Of a robot or of an MJCF part.
+        let part = frame.split_once('/').map(|(uid, _)| format!("{uid}/body_poses"));
+        let part =
+            part.filter(|part| recording.topics().iter().any(|topic| topic.name == format!("/env_{env}/{part}")));
+        let links = part.or_else(|| frame.split_once('/').map(|(uid, _)| format!("{uid}/link_poses")));
         let stream = links.filter(|_| !is_object).unwrap_or(object);
         return ["x", "y", "z", "qw", "qx", "qy", "qz"]
             .map(|number| (format!("/env_{env}/{stream}"), format!("pose[{frame}].{number}")));

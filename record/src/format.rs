@@ -48,12 +48,16 @@ const ALL: [Known; 9] = [
     Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
     Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
     Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds: episodes::holds },
-    Known { format: Format::Hdf5, end: "hdf5", name: "an HDF5 file (robomimic)", holds: episodes::holds },
+    Known { format: Format::Hdf5, end: "hdf5", name: "an HDF5 file (robomimic)", holds: is_of_robomimic },
     Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
     Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
     Known { format: Format::Webp, end: "webp", name: "an animated WebP", holds: is_color },
     Known { format: Format::Mp4, end: "mp4", name: "an MP4 file", holds: is_color },
 ];
+
+fn is_of_robomimic(stream: &Stream) -> bool {
+    stream.kind == Kind::EngineState || episodes::holds(stream)
+}
 
 fn is_color(stream: &Stream) -> bool {
     matches!(&stream.kind, Kind::Picture { channel, .. } if channel == "color")

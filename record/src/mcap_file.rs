@@ -19,7 +19,11 @@
 //! | resets, writes, divergence, notes | `/events` | `rcl_interfaces/msg/Log` |
 //! | names of mask ids | metadata `mask_ids`, `mask_classes` | from the number to the thing and its class |
 //! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
+//! | MJCF parts: poses of bodies | `/env_0/tf` | frames `env_0/part/body` |
+//! | what comes of steps of a task | `/env_0/task/reward`, `/env_0/task/terminated`, `/env_0/task/truncated` | `std_msgs/msg/Float64MultiArray` |
+//! | what it looks like | `/env_0/scene` | `foxglove_msgs/msg/SceneUpdate`: all of it at the beginning and whenever it looks otherwise |
 //! | the scene | attachment `scene.zip` | MJCF with meshes: see `scene_file.rs` |
+//! | what is recorded, the state at the beginning | attachments `recording.json`, `start.snapshot` | as in NumPy archives |
 //!
 //! Messages have the time of capture, on the clock of the recording (`clock.rs`): forces, efforts and accelerations of sensors
 //! that of the beginning of the step. The message of joint states of a robot has one time, that of its positions; its efforts
@@ -29,7 +33,7 @@ use crate::file::{PartFile, Storage};
 use crate::packet::{Block, Event, Packet, Values};
 use crate::picture::Png;
 use crate::ros::{self, Cdr, Hits, Schema, Stamp};
-use crate::scene_file::SCENE;
+use crate::scene_update::SceneUpdate;
 use crate::stream::{Element, Kind, Stream};
 use crate::writer::{Sink, Written};
 use mcap::records::{MessageHeader, Metadata};
@@ -42,6 +46,8 @@ use std::path::PathBuf;
 
 /// Messages that are compressed together \[bytes\].
 const CHUNK: u64 = 1 << 20;
+/// The topic of what an environment looks like, behind the environment.
+const SCENE_TOPIC: &str = "scene";
 const PROFILE: &str = "ros2";
 const ENCODING: &str = "cdr";
 const SCHEMA_ENCODING: &str = "ros2msg";
@@ -134,8 +140,8 @@ pub(crate) fn options() -> WriteOptions {
 }
 
 impl McapFile {
-    /// Begins a file; `origins` are the places of all environments in the world \[m\], (N, 3), and `start` is the time at which
-    /// the recording begins \[s\].
+    /// Begins a file; `origins` are the places of all environments in the world \[m\], (N, 3), `start` is the time at which the
+    /// recording begins \[s\], and `held` are files that it holds: names, kinds, bytes.
     pub(crate) fn create(
         mut part: PartFile,
         storage: Box<dyn Storage>,
@@ -143,12 +149,12 @@ impl McapFile {
         origins: &Array2<f64>,
         masks: &[MaskId],
         start: f64,
-        scene: Option<&[u8]>,
+        held: &[(&str, &str, Vec<u8>)],
     ) -> io::Result<Self> {
         let to = BufWriter::with_capacity(1 << 16, storage);
         let mut writer = options().create(to).map_err(io_error)?;
-        if let Some(scene) = scene {
-            let (name, media_type, data) = (SCENE.into(), "application/zip".into(), scene.into());
+        for (name, media_type, data) in held {
+            let (name, media_type, data) = ((*name).into(), (*media_type).into(), data.into());
             let at = nanos(start);
             writer.attach(&Attachment { log_time: at, create_time: at, name, media_type, data }).map_err(io_error)?;
         }
@@ -202,6 +208,18 @@ impl McapFile {
             self.channels.write(writer, self.events, at, self.cdr.bytes())?;
         }
         Ok(())
+    }
+
+    fn write_scene(&mut self, update: &SceneUpdate) -> io::Result<()> {
+        let (at, home) = (nanos(update.at), format!("env_{}", update.env));
+        let writer = self.writer.as_mut().ok_or_else(finished)?;
+        let channel =
+            self.channels.add(writer, format!("/{home}/{SCENE_TOPIC}"), Schema::SceneUpdate, &BTreeMap::new())?;
+        // It is large: its memory is not kept for those that come.
+        let mut cdr = Cdr::default();
+        cdr.begin();
+        ros::scene_update(&mut cdr, Stamp { nanos: at, frame: &home }, update);
+        self.channels.write(writer, channel, at, cdr.bytes())
     }
 
     fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> Written {
@@ -281,7 +299,7 @@ impl McapFile {
                 let hits = Hits { points: part("hits"), distances, normals: part("normals"), ids: part("ids") };
                 ros::points(cdr, in_env, hits);
             }
-            Kind::Numbers { .. } => {
+            Kind::Numbers { .. } | Kind::EngineState | Kind::Outcome => {
                 let mut rest = states;
                 for (part, channel) in stream.parts.iter().zip(&channels) {
                     let (mine, after) = rest.split_at(part.width().min(rest.len()));
@@ -311,8 +329,10 @@ fn about(stream: &Stream) -> BTreeMap<String, String> {
 }
 
 /// A topic that streams would share whose messages are of different types: one of them would be read as the other.
-pub(crate) fn taken(streams: &[&Stream]) -> Option<String> {
-    let mut known: BTreeMap<String, Schema> = BTreeMap::new();
+/// `scenes`: whether viewers are told how environments look.
+pub(crate) fn taken(streams: &[&Stream], scenes: bool) -> Option<String> {
+    let scene = scenes.then(|| (SCENE_TOPIC.to_string(), Schema::SceneUpdate));
+    let mut known: BTreeMap<String, Schema> = scene.into_iter().collect();
     streams.iter().flat_map(|stream| topics(stream)).find_map(|(topic, schema)| match known.get(&topic) {
         Some(other) => (*other != schema).then_some(topic),
         None => {
@@ -347,8 +367,9 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
             transforms(),
             (format!("{name}/distances"), Schema::Float64MultiArray),
         ],
-        Kind::Numbers { .. } => {
-            let topic = |part: &crate::stream::Part| (format!("{name}/{}", part.name), Schema::Float64MultiArray);
+        Kind::Numbers { .. } | Kind::EngineState | Kind::Outcome => {
+            let called = |part: &str| if part.is_empty() { name.clone() } else { format!("{name}/{part}") };
+            let topic = |part: &crate::stream::Part| (called(&part.name), Schema::Float64MultiArray);
             stream.parts.iter().map(topic).collect()
         }
     }
@@ -359,6 +380,7 @@ impl Sink for McapFile {
         if let Some(event) = &packet.event {
             self.write_event(event)?;
         }
+        packet.scenes.iter().try_for_each(|update| self.write_scene(update))?;
         for (index, (stream, block)) in streams.iter().zip(&packet.blocks).enumerate().filter(|(_, (_, b))| b.used) {
             for row in (0..stream.env_ids.len()).filter(|row| block.fresh[*row]) {
                 self.write_row(stream, block, index, row)?;

@@ -82,18 +82,23 @@ impl NpzFile {
     ) -> io::Result<Self> {
         let folder = folder_of(part.path());
         let spools = streams.iter().map(|_| Spool::create(folder)).collect::<io::Result<_>>()?;
-        // A snapshot is written as a file; this one goes into the archive.
-        let scratch = tempfile::tempdir_in(folder)?;
-        let path = scratch.path().join(START);
-        start.save(&path).map_err(io::Error::other)?;
-        let (start, events) = (std::fs::read(path)?, Spool::create(folder)?);
+        let (start, events) = (snapshot_bytes(start, folder)?, Spool::create(folder)?);
         let scene = scene.map(<[u8]>::to_vec);
         let (about, notes) = (about(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
         Ok(Self { part, storage: Some(storage), about, start, scene, spools, events, notes })
     }
 }
 
-fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
+/// A snapshot as it is in a file.
+pub(crate) fn snapshot_bytes(start: &Snapshot, folder: &Path) -> io::Result<Vec<u8>> {
+    let scratch = tempfile::tempdir_in(folder)?;
+    let path = scratch.path().join(START);
+    start.save(&path).map_err(io::Error::other)?;
+    std::fs::read(path)
+}
+
+/// What a recording holds, as JSON.
+pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     let stream = |stream: &Stream| {
         let names = Some(stream.kind.names()).filter(|names| !names.is_empty());
         let filters = match &stream.kind {

@@ -1,5 +1,6 @@
 //! What travels from the simulation to the thread of the file.
 
+use crate::scene_update::SceneUpdate;
 use crate::stream::{Element, Part, Stream};
 
 /// Something that happened to environments.
@@ -65,6 +66,8 @@ pub(crate) struct Packet {
     /// Physics steps of the simulation since the recording began.
     pub(crate) step: u64,
     pub(crate) event: Option<Event>,
+    /// What environments look like from now on, where that is another look than before.
+    pub(crate) scenes: Vec<SceneUpdate>,
     /// One for each stream.
     pub(crate) blocks: Vec<Block>,
 }
@@ -99,7 +102,7 @@ pub(crate) enum Values {
 impl Packet {
     /// Empty, with room for the streams.
     pub(crate) fn new(streams: &[Stream]) -> Self {
-        Self { step: 0, event: None, blocks: streams.iter().map(Block::new).collect() }
+        Self { step: 0, event: None, scenes: Vec::new(), blocks: streams.iter().map(Block::new).collect() }
     }
 
     /// What the row of a stream takes \[bytes\].
@@ -112,6 +115,7 @@ impl Packet {
     /// Forgets what is in it, and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.event = None;
+        self.scenes.clear();
         self.blocks.iter_mut().for_each(Block::clear);
     }
 }

@@ -1,13 +1,14 @@
 //! Folders of pictures.
 
 use crate::error::{RecordError, Result};
+use crate::file::{Disk, Storage, part_of};
 use crate::folder::PartFolder;
 use crate::packet::Packet;
 use crate::picture::Png;
 use crate::stream::{Kind, Stream};
 use crate::writer::{Sink, Written};
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// The file with the times of all pictures. A folder that has one is that of a recorder.
@@ -15,12 +16,14 @@ const TIMES: &str = "times.csv";
 
 /// A folder of PNG files: `camera/color/env_0/000000.png`, and `times.csv` with the physics step since the recording began, the
 /// simulation time of capture and the same on the clock of the recording \[s\] of each. It is called `NAME.part` until it is
-/// whole; in a folder that was left, all pictures but perhaps the last are whole.
-#[derive(Debug)]
+/// whole; in a folder that was left, what is called `.png` is a whole picture, and the last rows of the list may be missing.
 pub(crate) struct PictureFolder {
     folder: PartFolder,
     png: Png,
-    times: BufWriter<File>,
+    /// The list, locked.
+    _lock: File,
+    times: BufWriter<Box<dyn Storage>>,
+    disk: Disk,
     /// Pictures of every row of every stream.
     counts: Vec<Vec<usize>>,
     bytes: u64,
@@ -28,12 +31,27 @@ pub(crate) struct PictureFolder {
 
 impl PictureFolder {
     /// Makes the folder, which must be new or empty, or may be replaced: only a folder of a recorder is.
-    pub(crate) fn create(path: &Path, overwrite: bool) -> Result<Self> {
-        let (folder, mut times) = PartFolder::create(path, overwrite, TIMES)?;
-        let head = times.write_all(b"picture,step,time,recorded_time\n");
-        head.map_err(|error| RecordError::file(folder.part(), error))?;
-        Ok(Self { folder, png: Png::default(), times: BufWriter::new(times), counts: Vec::new(), bytes: 0 })
+    pub(crate) fn create(path: &Path, overwrite: bool, disk: &Disk) -> Result<Self> {
+        let (folder, lock) = PartFolder::create(path, overwrite, TIMES)?;
+        let failed = |error| RecordError::file(folder.part(), error);
+        let mut times = disk.storage(lock.try_clone().map_err(failed)?);
+        times.write_all(b"picture,step,time,recorded_time\n").map_err(failed)?;
+        let (times, disk) = (BufWriter::new(times), disk.clone());
+        Ok(Self { folder, png: Png::default(), _lock: lock, times, disk, counts: Vec::new(), bytes: 0 })
     }
+}
+
+/// Writes a file that has its name when it is whole.
+fn write_whole(disk: &Disk, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let part = part_of(path);
+    let write = || {
+        disk.storage(File::create(&part)?).write_all(bytes)?;
+        fs::rename(&part, path)
+    };
+    write().inspect_err(|_| {
+        // The error is told; that the rest of it cannot be taken away changes nothing of it.
+        let _ = fs::remove_file(&part);
+    })
 }
 
 impl Sink for PictureFolder {
@@ -53,7 +71,7 @@ impl Sink for PictureFolder {
                 if let Some(folder) = path.parent().filter(|_| counts[row] == 0) {
                     fs::create_dir_all(folder)?;
                 }
-                fs::write(path, file)?;
+                write_whole(&self.disk, &path, file)?;
                 let quoted = name.replace('"', "\"\"");
                 writeln!(self.times, "\"{quoted}\",{},{},{}", packet.step, block.times[row], block.stamps[row])?;
                 counts[row] += 1;
@@ -69,7 +87,7 @@ impl Sink for PictureFolder {
 
     fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
         self.times.flush()?;
-        self.times.get_ref().sync_all()?;
+        self.times.get_ref().sync()?;
         self.folder.commit()?;
         Ok(self.bytes)
     }

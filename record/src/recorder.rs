@@ -1,24 +1,21 @@
 //! The observer that records.
 
-use crate::animation::{self, Animation};
+mod resolve;
+
 use crate::cfg::RecorderCfg;
 use crate::clock::Clock;
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, Storage, part_of};
+use crate::file::{Disk, part_of};
 use crate::format::Format;
-use crate::lerobot;
-use crate::mcap_file::{self, McapFile};
-use crate::npz::{self, NpzFile};
 use crate::packet::{Event, EventKind, Packet};
-use crate::picture_folder::PictureFolder;
-use crate::scene_file;
+use crate::scene_update::Scenes;
 use crate::source::Source;
-use crate::stream::{Kind, Stream};
+use crate::stream::Stream;
 use crate::topic::Topic;
 use crate::writer::{self, Failure, Fault, Sink};
+use resolve::{open, packed_scene, resolve};
 use sim::{EnvId, Moment, Observer, ObserverId, SimulationManager};
 use std::fmt;
-use std::fs::File;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel, sync_channel};
@@ -63,7 +60,7 @@ pub trait Record {
 
 impl Record for SimulationManager {
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId> {
-        let recorder = Recorder::start(self, cfg, &mut |file| Box::new(file))?;
+        let recorder = Recorder::start(self, cfg, &Disk::default())?;
         Ok(self.add_observer(recorder))
     }
 
@@ -138,6 +135,19 @@ pub struct Recorder {
     format: Format,
     /// Environments that are recorded and were said to have diverged.
     diverged: Vec<usize>,
+    /// What viewers were told of how environments look; `None` where the file tells them nothing.
+    scenes: Option<Scenes>,
+    /// Environments that may look otherwise than viewers were told.
+    restyled: Vec<usize>,
+}
+
+/// What is recorded of a moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Due {
+    /// What is there at steps.
+    Steps,
+    /// What came of a step of a task.
+    Outcome,
 }
 
 impl fmt::Debug for Recorder {
@@ -152,11 +162,8 @@ const MAX_POOL: u64 = 1 << 34;
 /// What a packet takes beside its numbers, about \[bytes\].
 const PACKET: u64 = 256;
 
-/// Puts something between a recording and its file.
-pub(crate) type Wrap<'w> = &'w mut dyn FnMut(File) -> Box<dyn Storage>;
-
 impl Recorder {
-    pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, wrap: Wrap<'_>) -> Result<Self> {
+    pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, disk: &Disk) -> Result<Self> {
         let format = cfg.format.map_or_else(|| Format::of_path(&cfg.path), Ok)?;
         if let Some(feature) = format.feature() {
             return Err(RecordError::NotBuilt { path: cfg.path, format, feature });
@@ -177,13 +184,13 @@ impl Recorder {
             _ => (None, Vec::new()),
         };
         let left_out = [left_out, not_in_it].concat();
-        let sink = open(sim, &cfg, format, &streams, scene.as_deref(), wrap)?;
+        let sink = open(sim, &cfg, format, &streams, scene.as_deref(), disk)?;
         Self::begin(sim, cfg, format, sources, left_out, sink)
     }
 
     /// Begins to record into `sink`.
     fn begin(
-        sim: &SimulationManager,
+        sim: &mut SimulationManager,
         cfg: RecorderCfg,
         format: Format,
         sources: Vec<Source>,
@@ -191,6 +198,7 @@ impl Recorder {
         sink: Box<dyn Sink>,
     ) -> Result<Self> {
         let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
+        let scenes = (format == Format::Mcap && cfg.scene).then(|| Scenes::new(&streams));
         let (full, filled) = sync_channel(cfg.packets);
         let (empty, free) = channel();
         for _ in 0..cfg.packets {
@@ -219,9 +227,11 @@ impl Recorder {
             recorded,
             format,
             diverged: Vec::new(),
+            scenes,
+            restyled: (0..sim.num_envs()).collect(),
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
-        recorder.take(sim, None, &all);
+        recorder.take(sim, None, &all, Due::Steps);
         if recorder.failure.is_some() {
             recorder.end()?;
         }
@@ -276,6 +286,9 @@ impl Recorder {
 
     fn end(&mut self) -> Result<Recorded> {
         self.full = None;
+        if let Some(scenes) = self.scenes.take() {
+            self.recorded.left_out.extend(scenes.left_out());
+        }
         let Some(thread) = self.thread.take() else { return Ok(self.recorded.clone()) };
         let path = self.cfg.path.clone();
         let written = thread.join().unwrap_or_else(|_| {
@@ -308,36 +321,48 @@ impl Recorder {
     }
 
     /// Records what is due, and everything that is there at any time in environments `renewed`.
-    fn take(&mut self, sim: &SimulationManager, event: Option<Event>, renewed: &[usize]) {
+    fn take(&mut self, sim: &mut SimulationManager, event: Option<Event>, renewed: &[usize], what: Due) {
         if self.has_failed() {
             return;
         }
         let Some(mut packet) = self.packet() else { return };
         let steps = sim.steps();
         let times = sim.time();
-        let mut used = event.is_some();
         packet.step = self.clock.step(steps);
         packet.event = event;
+        let now = self.clock.now(steps);
+        if let Some(scenes) = &mut self.scenes {
+            match scenes.changed(sim, &std::mem::take(&mut self.restyled), now) {
+                Ok(changed) => packet.scenes = changed,
+                Err(error) => return self.give_up(packet, error),
+            }
+        }
+        let mut used = packet.event.is_some() || !packet.scenes.is_empty();
         for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
+            if source.is_outcome() != (what == Due::Outcome) {
+                continue;
+            }
             let due = source.due_at <= steps;
-            if !due && (source.sensor.is_some() || renewed.is_empty()) {
+            if !due && (source.sensor.is_some() || source.is_stage() || renewed.is_empty()) {
                 continue;
             }
             if let Err(error) = source.read(sim, &times, renewed, due, block) {
-                // Whoever waits for all packets waits for this one too.
-                packet.clear();
-                self.spare.push(packet);
-                return self.fail(error);
+                return self.give_up(packet, error);
             }
             if let Some(every) = source.every.filter(|_| due) {
                 source.due_at = steps.saturating_add(every);
             }
-            let (clock, envs) = (&self.clock, &source.stream.env_ids);
-            let stamps = |times: &[f64], to: &mut Vec<f64>| {
-                to.extend(envs.iter().zip(times).map(|(env, time)| clock.stamp(*env, *time)));
-            };
-            stamps(&block.times, &mut block.stamps);
-            stamps(&block.force_times, &mut block.force_stamps);
+            if source.is_stage() {
+                // It shows several environments: its time is that of the recording.
+                block.stamps.push(now);
+            } else {
+                let (clock, envs) = (&self.clock, &source.stream.env_ids);
+                let stamps = |times: &[f64], to: &mut Vec<f64>| {
+                    to.extend(envs.iter().zip(times).map(|(env, time)| clock.stamp(*env, *time)));
+                };
+                stamps(&block.times, &mut block.stamps);
+                stamps(&block.force_times, &mut block.force_stamps);
+            }
             used |= block.used;
         }
         if !used {
@@ -350,6 +375,13 @@ impl Recorder {
             // There is room for all packets. Where the thread is gone, `end` says why.
             let _ = full.send(packet);
         }
+    }
+
+    /// Breaks the recording off with a packet in hand: whoever waits for all packets waits for this one too.
+    fn give_up(&mut self, mut packet: Packet, error: RecordError) {
+        packet.clear();
+        self.spare.push(packet);
+        self.fail(error);
     }
 
     /// An empty packet, as soon as there is one.
@@ -371,7 +403,7 @@ impl Recorder {
     }
 
     /// Something happened to environments.
-    fn happened(&mut self, sim: &SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
+    fn happened(&mut self, sim: &mut SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
         let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
         let (steps, times) = (sim.steps(), sim.time());
         self.clock.restarted(&envs, &times, steps);
@@ -383,7 +415,8 @@ impl Recorder {
         let times = of.iter().map(|env| times[*env]).collect();
         let (step, at) = (self.clock.step(steps), self.clock.now(steps));
         let text = String::new();
-        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of);
+        self.restyled.extend_from_slice(&of);
+        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of, Due::Steps);
     }
 
     fn records(&self, env: usize) -> bool {
@@ -452,7 +485,7 @@ impl Recorder {
     }
 
     /// The scene was compiled anew: what is recorded must still be there.
-    fn compiled(&mut self, sim: &SimulationManager) {
+    fn compiled(&mut self, sim: &mut SimulationManager) {
         let format = self.cfg.format.map_or_else(|| Format::of_path(&self.cfg.path), Ok);
         match format.and_then(|format| resolve(sim, &self.cfg, format)) {
             Ok((now, _)) => {
@@ -465,6 +498,11 @@ impl Recorder {
             Err(error) => return self.fail(error),
         }
         self.recount(sim, &(0..sim.num_envs()).collect::<Vec<_>>());
+        if self.scenes.is_some() {
+            self.restyled = (0..sim.num_envs()).collect();
+            // Nothing else is due: this was recorded after the last step.
+            self.take(sim, None, &[], Due::Steps);
+        }
     }
 }
 
@@ -494,7 +532,13 @@ impl Observer for Recorder {
         match moment {
             Moment::Stepped => {
                 self.look_for_divergence(sim);
-                self.take(sim, None, &[]);
+                self.take(sim, None, &[], Due::Steps);
+            }
+            Moment::Judged => {
+                let all: Vec<usize> = (0..sim.num_envs()).collect();
+                if self.sources.iter().any(Source::is_outcome) {
+                    self.take(sim, None, &all, Due::Outcome);
+                }
             }
             Moment::Reset { env_ids } => self.happened(sim, EventKind::Reset, env_ids),
             Moment::Written { env_ids } => self.happened(sim, EventKind::Written, env_ids),
@@ -504,225 +548,6 @@ impl Observer for Recorder {
     }
 }
 
-/// What the topics of a configuration mean in a simulation, and the sensors that were left out.
-fn resolve(sim: &SimulationManager, cfg: &RecorderCfg, format: Format) -> Result<(Vec<Source>, Vec<String>)> {
-    let count = sim.num_envs();
-    let mut envs: Vec<usize> = match &cfg.envs {
-        Some(envs) => envs.iter().map(|env| env.0).collect(),
-        None => (0..count).collect(),
-    };
-    if envs.is_empty() {
-        return Err(RecordError::OutOfRange { field: "the number of envs", value: 0, least: 1 });
-    }
-    envs.sort_unstable();
-    let twice = envs.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
-    if let Some(env) = twice.or_else(|| envs.iter().copied().find(|env| *env >= count)) {
-        return Err(RecordError::Env { env, count });
-    }
-    let (mut sources, mut left_out): (Vec<Source>, _) = (Vec::new(), Vec::new());
-    for topic in &cfg.topics {
-        let found = match topic {
-            Topic::Everything => everything(sim, &envs, format, &mut left_out)?,
-            Topic::JointStates(uid) => vec![Source::joint_states(sim, uid, &envs)?],
-            Topic::Targets(uid) => vec![Source::targets(sim, uid, &envs)?],
-            Topic::LinkPoses(uid) => vec![Source::link_poses(sim, uid, &envs)?],
-            Topic::ObjectPose(uid) => vec![Source::object_pose(sim, uid, &envs)?],
-            Topic::MjcfState(uid) => vec![Source::mjcf_state(sim, uid, &envs)?],
-            Topic::Sensor(uid) => Source::sensor(sim, uid, &envs)?,
-            Topic::Channel { sensor, channel } => vec![Source::picture(sim, sensor, channel, &envs)?],
-            Topic::Events if !format.has_events() => {
-                return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
-            }
-            Topic::Events => Vec::new(),
-        };
-        let any = !found.is_empty();
-        let (held, without): (Vec<_>, Vec<_>) = found.into_iter().partition(|source| format.holds(&source.stream));
-        if any && held.is_empty() {
-            return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
-        }
-        let no_place = |source: &Source| format!("{} ({} has no place for it)", source.stream.name, format.name());
-        left_out.extend(without.iter().map(no_place));
-        for source in held {
-            match sources.iter().find(|known| known.stream.name == source.stream.name) {
-                None => sources.push(source),
-                // Asked for twice.
-                Some(known) if known.is(&source) => {}
-                Some(_) => return Err(RecordError::SameName { path: cfg.path.clone(), name: source.stream.name }),
-            }
-        }
-    }
-    if format == Format::Npz {
-        let mut names: Vec<String> = sources.iter().flat_map(|source| npz::members(&source.stream)).collect();
-        names.sort_unstable();
-        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(RecordError::SameName { path: cfg.path.clone(), name: pair[0].clone() });
-        }
-    }
-    if format == Format::Mcap
-        && let Some(name) = mcap_file::taken(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>())
-    {
-        return Err(RecordError::SameName { path: cfg.path.clone(), name });
-    }
-    if format == Format::Mcap {
-        let unspoken = sources.iter().filter_map(|source| match &source.stream.kind {
-            Kind::Lens { camera, distortion: None, .. } => {
-                Some(format!("{camera}/camera_info (ROS has no words for its lens)"))
-            }
-            _ => None,
-        });
-        left_out.extend(unspoken);
-    }
-    set_rates(&mut sources, cfg, format)?;
-    if sources.is_empty() && !cfg.topics.contains(&Topic::Events) {
-        return Err(RecordError::Nothing { path: cfg.path.clone(), format });
-    }
-    let pictures: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
-    if format.is_animation() && pictures != 1 {
-        let names: Vec<String> = sources
-            .iter()
-            .map(|Source { stream, .. }| format!("{} in {} environments", stream.name, stream.env_ids.len()))
-            .collect();
-        return Err(RecordError::TooMany { path: cfg.path.clone(), found: names.join(", ") });
-    }
-    if let (true, Some(size)) = (format.is_animation(), sources.iter().find_map(|source| picture_size(&source.stream)))
-    {
-        animation::check(&cfg.path, format, size)?;
-    }
-    Ok((sources, left_out))
-}
-
-/// Says of everything how many steps are between its rows.
-fn set_rates(sources: &mut [Source], cfg: &RecorderCfg, format: Format) -> Result<()> {
-    for source in sources.iter_mut().filter(|source| source.sensor.is_none()) {
-        source.every = Some(cfg.every);
-    }
-    for (name, every) in &cfg.rates {
-        if *every == 0 {
-            return Err(RecordError::OutOfRange { field: "a number of steps in rates", value: 0, least: 1 });
-        }
-        if matches!(format, Format::LeRobot | Format::Hdf5) {
-            let topic = format!("a rate of its own for {name:?}: frames have one, `every`");
-            return Err(RecordError::NoPlace { path: cfg.path.clone(), format, topic });
-        }
-        let is_of = |source: &&mut Source| {
-            let rest = source.stream.name.strip_prefix(name.as_str());
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-        };
-        let mut found = false;
-        for source in sources.iter_mut().filter(is_of) {
-            source.every = Some(*every);
-            found = true;
-        }
-        if !found {
-            let candidates = sources.iter().map(|source| source.stream.name.clone()).collect();
-            return Err(RecordError::UnknownName { what: "recorded topic", name: name.clone(), candidates });
-        }
-    }
-    Ok(())
-}
-
-/// Everything that there is and the format has a place for.
-fn everything(
-    sim: &SimulationManager,
-    envs: &[usize],
-    format: Format,
-    left_out: &mut Vec<String>,
-) -> Result<Vec<Source>> {
-    let mut sources = Vec::new();
-    for uid in sim.jointed_uids() {
-        for of in [Source::joint_states, Source::targets, Source::link_poses] {
-            sources.push(of(sim, uid, envs)?);
-        }
-    }
-    for uid in sim.rigid_object_uids() {
-        sources.push(Source::object_pose(sim, uid, envs)?);
-    }
-    for uid in sim.mjcf_uids() {
-        sources.push(Source::mjcf_state(sim, uid, envs)?);
-    }
-    for uid in sim.sensor_uids() {
-        match Source::sensor(sim, uid, envs) {
-            Ok(found) => sources.extend(found),
-            Err(error @ (RecordError::Unreadable { .. } | RecordError::Elsewhere { .. })) => {
-                left_out.push(format!("{uid} ({error})"));
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    sources.retain(|source| format.holds(&source.stream) && source.stream.width() > 0);
-    if format.is_animation() {
-        // The first camera, in the first environment that it looks into.
-        sources.truncate(1);
-        sources.iter_mut().for_each(Source::keep_first);
-    }
-    Ok(sources)
-}
-
-/// The scene, and what of it is left out: a scene that cannot be written is no reason not to record.
-fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<String>) {
-    match scene_file::pack(sim) {
-        Ok((scene, left_out)) => (Some(scene), left_out.iter().map(|what| format!("of the scene: {what}")).collect()),
-        Err(error) => (None, vec![format!("the scene ({error})")]),
-    }
-}
-
-/// The file of a format.
-fn open(
-    sim: &SimulationManager,
-    cfg: &RecorderCfg,
-    format: Format,
-    streams: &[Stream],
-    scene: Option<&[u8]>,
-    wrap: Wrap<'_>,
-) -> Result<Box<dyn Sink>> {
-    if format == Format::Pictures {
-        return Ok(Box::new(PictureFolder::create(&cfg.path, cfg.overwrite)?));
-    }
-    if format == Format::LeRobot {
-        return lerobot::create(cfg, streams, sim.cfg().physics_dt);
-    }
-    #[cfg(feature = "hdf5")]
-    if format == Format::Hdf5 {
-        return crate::robomimic::create(cfg, streams, sim.cfg().physics_dt);
-    }
-    let (part, file) = PartFile::create(&cfg.path, cfg.overwrite, format == Format::Mcap)?;
-    let storage = wrap(file);
-    let sink: Result<Box<dyn Sink>> = match format {
-        Format::Mcap => {
-            let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
-            let file = McapFile::create(part, storage, streams, &sim.env_origins(), sim.mask_ids(), start, scene);
-            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
-        }
-        Format::Npz => {
-            let file = NpzFile::create(
-                part,
-                storage,
-                streams,
-                sim.mask_ids(),
-                sim.cfg().physics_dt,
-                &sim.snapshot(None)?,
-                scene,
-            );
-            file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
-        }
-        _ => {
-            let size = streams.iter().find_map(picture_size);
-            // `resolve` has seen to it that there is a picture.
-            let size = size.ok_or_else(|| RecordError::Nothing { path: cfg.path.clone(), format })?;
-            Ok(Box::new(Animation::create(part, storage, format, size)?))
-        }
-    };
-    sink
-}
-
-/// Width and height of a stream of pictures.
-fn picture_size(stream: &Stream) -> Option<[usize; 2]> {
-    match stream.kind {
-        Kind::Picture { height, width, .. } => Some([width, height]),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-mod tests;
+pub(crate) mod tests;

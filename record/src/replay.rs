@@ -85,8 +85,8 @@ const TARGETS: &str = "/targets";
 
 type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 
-/// Puts `sim`, which must be built as the recorded one, into the state in which a NumPy archive begins, does the recorded
-/// actions again, and compares the states after every step with the recorded ones. Resets are done again too. The archive
+/// Puts `sim`, which must be built as the recorded one, into the state in which a NumPy archive or an MCAP file begins, does the recorded
+/// actions again, and compares the states after every step with the recorded ones. Resets are done again too. The file
 /// must hold the targets of every robot and the controls of every MJCF part that move something, at every step
 /// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1).
 ///
@@ -96,9 +96,9 @@ type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 /// says when they mattered.
 ///
 /// # Errors
-/// The file is no such archive, or not whole; it is of another scene, another MuJoCo or another time step.
+/// The file is none of a recorder, or not whole; it is of another scene, another MuJoCo or another time step.
 pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Verdict> {
-    let archive = Archive::read(path.as_ref())?;
+    let archive = Archive::of_any(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
     if archive.about["physics_dt"].as_f64() != Some(dt) {
         let recorded = &archive.about["physics_dt"];
@@ -154,12 +154,12 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
     Repetition { archive, states, targets, steps }.run(sim)
 }
 
-/// How many environments a NumPy archive was recorded of.
+/// How many environments a NumPy archive or an MCAP file was recorded of.
 ///
 /// # Errors
 /// The file is no such archive, or not whole.
 pub fn num_envs(path: impl AsRef<Path>) -> Result<usize> {
-    Ok(Archive::read(path.as_ref())?.start()?.len())
+    Ok(Archive::of_any(path.as_ref())?.start()?.len())
 }
 
 /// Everything that a repetition needs.
@@ -227,7 +227,7 @@ impl Repetition {
     /// Compares all states with those of a row; gives whether they are the same.
     fn compare(
         &mut self,
-        sim: &SimulationManager,
+        sim: &mut SimulationManager,
         row: usize,
         written: &[EnvId],
         verdict: &mut Verdict,

@@ -4,9 +4,10 @@ mod camera;
 
 use crate::error::{RecordError, Result};
 use crate::packet::{Block, Values};
+use crate::stage::{Painter, StageCfg};
 use crate::stream::{Element, Kind, Part, Stream};
 use camera::{DISPARITY, Eye, timed};
-use ndarray::{ArrayBase, ArrayView2, Axis, Data, Dimension};
+use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use sensors::{
     ActuatorState, ContactSensor, FrameTransformer, Imu, JointState, JointWrench, MujocoSensor, RayCaster, Sampled,
     Sensor, StereoCamera,
@@ -31,6 +32,8 @@ pub(crate) struct Source {
     pub(crate) due_at: u64,
     /// Steps from one row to the next; `None` for a sensor that is recorded whenever it measures.
     pub(crate) every: Option<u64>,
+    /// What draws the stage.
+    painter: Option<Painter>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -44,13 +47,71 @@ enum What {
     Lens(String, Eye),
     Numbers(String),
     Points(String),
+    BodyPoses(MjcfId),
+    EngineStates,
+    Outcomes,
+    Stage(StageCfg),
 }
 
 impl Source {
     fn new(name: String, kind: Kind, element: Element, parts: Vec<Part>, envs: &[usize], what: What) -> Self {
         let stream = Stream { name, kind, element, parts, env_ids: envs.to_vec() };
         let (rows, n) = (envs.to_vec(), envs.len());
-        Self { stream, what, sensor: None, rows, counts: vec![0; n], last: vec![f64::NAN; n], due_at: 0, every: None }
+        Self {
+            stream,
+            what,
+            sensor: None,
+            rows,
+            counts: vec![0; n],
+            last: vec![f64::NAN; n],
+            due_at: 0,
+            every: None,
+            painter: None,
+        }
+    }
+
+    /// Whether it is told by a task.
+    pub(crate) fn is_outcome(&self) -> bool {
+        self.what == What::Outcomes
+    }
+
+    /// Whether it is a picture of all environments.
+    pub(crate) fn is_stage(&self) -> bool {
+        matches!(self.what, What::Stage(_))
+    }
+
+    pub(crate) fn body_poses(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
+        let id = sim.mjcf_id(uid)?;
+        let frames: Vec<String> = sim.mjcf_part(id).body_names().iter().map(|body| format!("{uid}/{body}")).collect();
+        let parts = vec![Part::new("", [frames.len(), 7])];
+        let (name, kind) = (format!("{uid}/body_poses"), Kind::Poses { frames });
+        Ok(Self::new(name, kind, Element::F64, parts, envs, What::BodyPoses(id)))
+    }
+
+    pub(crate) fn engine_states(sim: &SimulationManager, envs: &[usize]) -> Self {
+        let [positions, velocities] = sim.engine_states().map(|table| table.ncols());
+        let parts =
+            [("clock", 1), ("qpos", positions), ("qvel", velocities)].map(|(part, width)| Part::new(part, [width]));
+        Self::new("engine_state".into(), Kind::EngineState, Element::F64, parts.to_vec(), envs, What::EngineStates)
+    }
+
+    pub(crate) fn outcomes(envs: &[usize]) -> Self {
+        let parts = ["reward", "terminated", "truncated"].map(|part| Part::new(part, [])).to_vec();
+        // Never due by steps.
+        let due_at = u64::MAX;
+        Self { due_at, ..Self::new("task".into(), Kind::Outcome, Element::F64, parts, envs, What::Outcomes) }
+    }
+
+    /// All environments in one picture, which is told as that of the first of `envs`.
+    pub(crate) fn stage(sim: &mut SimulationManager, cfg: &StageCfg, envs: &[usize]) -> Result<Self> {
+        let painter = Painter::new(sim, cfg)?;
+        let [width, height] = cfg.size;
+        let kind = Kind::Picture { camera: "stage".into(), channel: "color".into(), height, width };
+        let (parts, what) = (vec![Part::new("", [height, width, 4])], What::Stage(cfg.clone()));
+        let every = Some(cfg.every(sim.cfg().physics_dt));
+        let first = envs.get(..1).unwrap_or_default();
+        let source = Self::new("stage/color".into(), kind, Element::U8, parts, first, what);
+        Ok(Self { every, painter: Some(painter), ..source })
     }
 
     pub(crate) fn joint_states(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
@@ -249,7 +310,7 @@ impl Source {
     /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`.
     pub(crate) fn read(
         &mut self,
-        sim: &SimulationManager,
+        sim: &mut SimulationManager,
         times: &[f64],
         renewed: &[usize],
         due: bool,
@@ -276,7 +337,7 @@ impl Source {
             block.times.extend(now);
             for ((env, last), now) in self.stream.env_ids.iter().zip(&mut self.last).zip(&block.times) {
                 // One that is put aside stands still.
-                let fresh = (due && *last != *now) || renewed.binary_search(env).is_ok();
+                let fresh = (due && (*last != *now || self.painter.is_some())) || renewed.binary_search(env).is_ok();
                 if fresh {
                     *last = *now;
                 }
@@ -286,7 +347,10 @@ impl Source {
                 return Ok(());
             }
         }
-        self.copy(sim, &mut block.values)?;
+        match (&mut self.painter, &mut block.values) {
+            (Some(painter), Values::U8(pixels)) => painter.draw(sim, pixels)?,
+            _ => self.copy(sim, &mut block.values)?,
+        }
         let wanted = self.rows.len() * self.stream.width();
         if block.values.len() != wanted {
             return Err(self.changed());
@@ -316,6 +380,29 @@ impl Source {
                 let part = sim.mjcf_part(*id);
                 self.join(values, &[part.get_qpos().view(), part.get_qvel().view(), part.get_ctrl().view()]);
             }
+            What::BodyPoses(id) => {
+                let part = sim.mjcf_part(*id);
+                let poses: Vec<Array2<f64>> =
+                    part.body_names().iter().map(|body| part.body_pose(body)).collect::<sim::Result<_>>()?;
+                self.join(values, &poses.iter().map(|poses| poses.view()).collect::<Vec<_>>());
+            }
+            What::EngineStates => {
+                let [positions, velocities] = sim.engine_states();
+                let times = Array2::from_shape_vec((sim.num_envs(), 1), sim.time()).map_err(|_| self.changed())?;
+                self.join(values, &[times.view(), positions.view(), velocities.view()]);
+            }
+            What::Outcomes => {
+                let Some(outcome) = sim.outcome() else { return Ok(()) };
+                let number = |is: bool| f64::from(u8::from(is));
+                if let Values::F64(values) = values {
+                    for &row in self.rows.iter().filter(|row| **row < outcome.rewards.len()) {
+                        let ends = [outcome.terminated[row], outcome.truncated[row]].map(number);
+                        values.extend([outcome.rewards[row], ends[0], ends[1]]);
+                    }
+                }
+            }
+            // It is drawn instead.
+            What::Stage(_) => {}
             What::Picture { uid, eye, channel } => self.copy_picture(sim.sensor_called(uid)?, *eye, channel, values)?,
             What::Lens(uid, eye) => {
                 let (intrinsics, poses) = eye.lenses(sim.sensor_called(uid)?).ok_or_else(|| self.changed())?;

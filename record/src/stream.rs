@@ -120,6 +120,10 @@ pub enum Kind {
     /// What rays hit, the quantities called as the channels of a ray caster: points in the environment \[m\] and distances
     /// \[m\], infinite for a miss, normals and mask ids, 0 for a miss, and the pose of the body that the sensor hangs on.
     Points,
+    /// Simulation time, positions and velocities of all joints as MuJoCo has them: `clock`, `qpos`, `qvel`.
+    EngineState,
+    /// What came of a step of a task: `reward`, and 1 for an episode that was `terminated` or `truncated`, else 0.
+    Outcome,
     /// Numbers of a sensor.
     Numbers {
         /// What they are of, in order: bodies, links, joints, actuators, frames; empty where they have no names.

@@ -16,6 +16,18 @@ pub enum Topic {
     ObjectPose(String),
     /// Positions, velocities and controls of the MJCF part of this name.
     MjcfState(String),
+    /// Poses of the bodies of the MJCF part of this name.
+    BodyPoses(String),
+    /// Simulation time, positions and velocities of all joints of the scene as MuJoCo has them
+    /// ([`SimulationManager::engine_states`](sim::SimulationManager::engine_states)), called `clock`, `qpos` and `qvel`.
+    /// [`Everything`](Self::Everything) has them in HDF5 files only.
+    EngineStates,
+    /// Rewards and ends of the task that runs in the simulation, told after each of its steps
+    /// ([`SimulationManager::outcome`](sim::SimulationManager::outcome)): those of an `Env`, which tells them by itself.
+    Outcomes,
+    /// All environments in one picture, as `RecorderCfg::stage` says; it is called as a camera `stage` of the first environment that is
+    /// recorded. [`Everything`](Self::Everything) has it only where the file shows pictures and there is no camera.
+    Stage,
     /// All channels of the sensor of this name, whenever a measurement arrives: with a latency as it was captured, with that
     /// stamp, also what was on its way when somebody wrote to the state, which the sensor itself does not show any more. Of cameras
     /// and ray casters that draw pictures also the lens and the pose.

@@ -149,43 +149,145 @@ impl<W: Write + Seek> Archive<W> {
     }
 }
 
-/// A file in an archive, as it is there.
-struct Found<'b> {
-    name: &'b str,
+/// What an archive is read from.
+pub(crate) trait Source: Read + Seek + Send {}
+
+impl<S: Read + Seek + Send> Source for S {}
+
+/// A file in an archive, as the directory says.
+#[derive(Clone, Debug)]
+struct Found {
+    name: String,
     method: u16,
-    data: &'b [u8],
+    /// Where it begins: what stands before its bytes.
+    offset: u64,
+    /// In the archive.
+    size: u64,
     unpacked: u64,
     crc: u64,
 }
 
-/// The files of an archive that [`Archive`] has written, by name, without those that are packed; `None` where it is none.
-pub(crate) fn parse(bytes: &[u8]) -> Option<Vec<(&str, &[u8])>> {
-    let stored = find(bytes)?.into_iter().filter(|found| found.method == STORED);
-    stored.map(|found| (crc_of(found.data) == found.crc).then_some((found.name, found.data))).collect()
+/// Reads an archive that [`Archive`] has written: first its directory, then the files that are asked for, and nothing else.
+pub(crate) struct Reader<'s> {
+    from: Box<dyn Source + 's>,
+    files: Vec<Found>,
 }
 
-/// All of them, unpacked.
-pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
-    let unpacked = |found: Found<'_>| {
-        let data = match found.method {
-            STORED => found.data.to_vec(),
-            DEFLATED => {
-                let mut data = Vec::new();
-                // One more than there should be tells what lies about its size.
-                DeflateDecoder::new(found.data).take(found.unpacked + 1).read_to_end(&mut data).ok()?;
-                data
-            }
-            _ => return None,
+impl std::fmt::Debug for Reader<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Reader").field("files", &self.files).finish_non_exhaustive()
+    }
+}
+
+/// The archive is none, or is damaged.
+fn damaged(what: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what.to_string())
+}
+
+/// What stands at the end of an archive: the directory's place, then the end as it was before 64 bits.
+const TAIL: u64 = 20 + 22;
+/// What stands before the name of a file.
+const HEAD: usize = 30;
+
+fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
+    let mut all = [0; 8];
+    all[..count].copy_from_slice(bytes.get(at..at.checked_add(count)?)?);
+    Some(u64::from_le_bytes(all))
+}
+
+impl<'s> Reader<'s> {
+    /// Reads the directory.
+    ///
+    /// # Errors
+    /// It cannot be read; `InvalidData` where this is no such archive, or not whole.
+    pub(crate) fn open(from: impl Source + 's) -> io::Result<Self> {
+        let mut reader = Self { from: Box::new(from), files: Vec::new() };
+        let length = reader.from.seek(SeekFrom::End(0))?;
+        let none = || damaged("this is no such archive, or it is not whole");
+        let tail = reader.bytes(length.checked_sub(TAIL).ok_or_else(none)?, TAIL, length)?;
+        let is_end = number(&tail, 20, 4) == Some(END.into()) && number(&tail, 0, 4) == Some(LOCATOR_64.into());
+        let end = number(&tail, 8, 8).filter(|_| is_end).ok_or_else(none)?;
+        let end = reader.bytes(end, 56, length)?;
+        let [count, size, start] = [32, 40, 48].map(|at| number(&end, at, 8));
+        let (Some(count), Some(size), Some(start)) = (count, size, start) else { return Err(none()) };
+        let directory = reader.bytes(start, size, length)?;
+        reader.files = entries(&directory, count, length).ok_or_else(none)?;
+        Ok(reader)
+    }
+
+    /// So many bytes from a place on.
+    fn bytes(&mut self, at: u64, count: u64, length: u64) -> io::Result<Vec<u8>> {
+        if at.checked_add(count).is_none_or(|end| end > length) {
+            return Err(damaged("its directory leads out of it"));
+        }
+        let mut bytes = vec![0; usize::try_from(count).map_err(|_| damaged("it is larger than memory"))?];
+        self.from.seek(SeekFrom::Start(at))?;
+        self.from.read_exact(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The names of all files, in their order.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(|file| file.name.as_str())
+    }
+
+    fn find(&self, name: &str) -> Option<Found> {
+        self.files.iter().find(|file| file.name == name).cloned()
+    }
+
+    /// Where the bytes of a file begin.
+    fn begin(&mut self, file: &Found) -> io::Result<u64> {
+        self.from.seek(SeekFrom::Start(file.offset))?;
+        let mut head = [0; HEAD];
+        self.from.read_exact(&mut head)?;
+        let [name, extension] = [26, 28].map(|at| number(&head, at, 2).unwrap_or(0));
+        Ok(file.offset + HEAD as u64 + name + extension)
+    }
+
+    /// The first bytes of a file that is stored as it is, no more than `count`, unchecked; `None` where there is none, or a packed one.
+    pub(crate) fn first(&mut self, name: &str, count: u64) -> io::Result<Option<Vec<u8>>> {
+        let Some(file) = self.find(name).filter(|file| file.method == STORED) else { return Ok(None) };
+        let begin = self.begin(&file)?;
+        let mut bytes = Vec::new();
+        self.from.seek(SeekFrom::Start(begin))?;
+        self.from.by_ref().take(count.min(file.size)).read_to_end(&mut bytes)?;
+        Ok(Some(bytes))
+    }
+
+    /// A file, unpacked and compared with its checksum; `None` where there is none.
+    ///
+    /// # Errors
+    /// It cannot be read; `InvalidData` where it is damaged.
+    pub(crate) fn read(&mut self, name: &str) -> io::Result<Option<Vec<u8>>> {
+        let Some(file) = self.find(name) else { return Ok(None) };
+        self.read_file(&file).map(Some)
+    }
+
+    fn read_file(&mut self, file: &Found) -> io::Result<Vec<u8>> {
+        let begin = self.begin(file)?;
+        self.from.seek(SeekFrom::Start(begin))?;
+        let packed = self.from.by_ref().take(file.size);
+        let mut data = Vec::new();
+        match file.method {
+            STORED => packed.take(file.unpacked).read_to_end(&mut data)?,
+            // One more than there should be tells what lies about its size.
+            DEFLATED => DeflateDecoder::new(packed).take(file.unpacked.saturating_add(1)).read_to_end(&mut data)?,
+            _ => return Err(damaged("it is packed otherwise than recorders do")),
         };
-        let whole = data.len() as u64 == found.unpacked && crc_of(&data) == found.crc;
-        whole.then(|| (found.name.to_string(), data))
-    };
-    let files = find(bytes)?;
+        let whole = data.len() as u64 == file.unpacked && crc_of(&data) == file.crc;
+        if whole { Ok(data) } else { Err(damaged(&format!("{} is damaged", file.name))) }
+    }
+}
+
+/// All files of an archive, unpacked; `None` where it is none, or is damaged, or they are too large together.
+pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;
+    let files = reader.files.clone();
     let all = files.iter().try_fold(0_u64, |all, file| all.checked_add(file.unpacked));
     if all.is_none_or(|all| all > LARGEST) {
         return None;
     }
-    files.into_iter().map(unpacked).collect()
+    files.into_iter().map(|file| Some((file.name.clone(), reader.read_file(&file).ok()?))).collect()
 }
 
 fn crc_of(data: &[u8]) -> u64 {
@@ -194,38 +296,37 @@ fn crc_of(data: &[u8]) -> u64 {
     crc.finalize().into()
 }
 
-fn find(bytes: &[u8]) -> Option<Vec<Found<'_>>> {
-    fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
-        let mut all = [0; 8];
-        all[..count].copy_from_slice(bytes.get(at..at.checked_add(count)?)?);
-        Some(u64::from_le_bytes(all))
-    }
-    let place = |at: usize, count| usize::try_from(number(bytes, at, count)?).ok();
-    let end = bytes.len().checked_sub(22)?;
-    let locator = end.checked_sub(20)?;
-    if number(bytes, end, 4)? != u64::from(END) || number(bytes, locator, 4)? != u64::from(LOCATOR_64) {
-        return None;
-    }
-    let end_64 = place(locator + 8, 8)?;
-    let (count, mut at) = (place(end_64.checked_add(32)?, 8)?, place(end_64.checked_add(48)?, 8)?);
-    let (mut files, mut sum) = (Vec::new(), 0_usize);
+/// The files of a directory, of an archive of so many bytes.
+fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
+    let (mut files, mut sum, mut at) = (Vec::new(), 0_u64, 0_usize);
     for _ in 0..count {
-        bytes.get(at..)?;
-        let name_length = place(at.checked_add(28)?, 2)?;
-        let name = std::str::from_utf8(bytes.get(at + 46..at + 46 + name_length)?).ok()?;
+        directory.get(at..)?;
+        let name_length = usize::try_from(number(directory, at.checked_add(28)?, 2)?).ok()?;
+        let name = std::str::from_utf8(directory.get(at + 46..at + 46 + name_length)?).ok()?;
         let extension = at + 46 + name_length + 4;
-        let (unpacked, size) = (number(bytes, extension, 8)?, place(extension.checked_add(8)?, 8)?);
-        let offset = place(extension.checked_add(16)?, 8)?;
-        bytes.get(offset..)?;
-        let begin = offset.checked_add(30 + place(offset.checked_add(26)?, 2)? + place(offset.checked_add(28)?, 2)?)?;
-        let data = bytes.get(begin..begin.checked_add(size)?)?;
-        let method = u16::try_from(place(at + 10, 2)?).ok()?;
+        let [unpacked, size, offset] = [0, 8, 16].map(|k| number(directory, extension + k, 8));
+        let (unpacked, size, offset) = (unpacked?, size?, offset?);
+        let inside = offset.checked_add(HEAD as u64 + size).is_some_and(|end| end <= length);
         // Each has its own bytes of the archive: several that share some would be read again and again.
-        sum = sum.checked_add(size).filter(|sum| *sum <= bytes.len())?;
-        files.push(Found { name, method, data, unpacked, crc: number(bytes, at + 16, 4)? });
+        sum = sum.checked_add(size).filter(|sum| inside && *sum <= length)?;
+        let method = u16::try_from(number(directory, at + 10, 2)?).ok()?;
+        // What is stored as it is has one size: no more memory is asked for than there are bytes.
+        if method == STORED && unpacked != size {
+            return None;
+        }
+        let crc = number(directory, at + 16, 4)?;
+        files.push(Found { name: name.into(), method, offset, size, unpacked, crc });
         at = extension + 24;
     }
     Some(files)
+}
+
+/// The files of an archive that are stored as they are; `None` where it is none or is damaged.
+#[cfg(test)]
+pub(crate) fn parse(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;
+    let stored: Vec<Found> = reader.files.iter().filter(|file| file.method == STORED).cloned().collect();
+    stored.into_iter().map(|file| Some((file.name.clone(), reader.read_file(&file).ok()?))).collect()
 }
 
 #[cfg(test)]
@@ -251,7 +352,11 @@ mod tests {
         );
         assert!(all[2].1 == meshes && all[3].1 == b"x" && all[0].1 == b"head and data");
         let stored = [("a.npy", &b"head and data"[..]), ("empty", &b""[..]), ("behind", &b"x"[..])];
-        assert_eq!(parse(&bytes).unwrap(), stored);
+        assert_eq!(parse(&bytes).unwrap(), stored.map(|(name, data)| (name.to_string(), data.to_vec())));
+        let mut reader = Reader::open(Cursor::new(bytes.clone())).unwrap();
+        assert!(reader.names().eq(["a.npy", "empty", "meshes/a.obj", "behind"]));
+        assert_eq!(reader.first("a.npy", 4).unwrap(), Some(b"head".to_vec()));
+        assert_eq!((reader.read("nothing").unwrap(), reader.read("behind").unwrap()), (None, Some(b"x".to_vec())));
         assert_eq!(parse(&bytes[..bytes.len() - 1]), None);
         let place = bytes.windows(4).position(|four| four == b"head").unwrap();
         bytes[place] ^= 1;

@@ -1,6 +1,7 @@
 //! Poses as the renderer uses them: a rotation matrix and a translation in single precision.
 
 use crate::Pose;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`. Named as algebra: `world_from_instance`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +15,17 @@ pub struct PoseF32 {
 impl Default for PoseF32 {
     fn default() -> Self {
         Self::IDENTITY
+    }
+}
+
+impl From<&PoseF32> for Pose {
+    fn from(pose: &PoseF32) -> Self {
+        let rows = pose.rotation.map(|row| row.map(f64::from));
+        let rotation = Matrix3::from_fn(|row, column| rows[row][column]);
+        let translation = Vector3::from(pose.translation.map(f64::from));
+        // Of length 1 to double precision, though its numbers are single.
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Self::from_parts(translation.into(), UnitQuaternion::new_normalize(rotation.into_inner()))
     }
 }
 
@@ -94,7 +106,7 @@ impl PoseF32 {
 mod tests {
     use super::*;
     use crate::pose::from_xyz_rpy;
-    use nalgebra::{Point3, Vector3};
+    use nalgebra::Point3;
 
     /// The same maps in double precision judge; numbers of size 5 rounded to 6e-8 of themselves, a few times.
     #[test]
@@ -111,6 +123,19 @@ mod tests {
         near(own.apply(v), (pose * Point3::from(vector)).coords);
         near(own.apply_inverse(v), pose.inverse_transform_point(&Point3::from(vector)).coords);
         assert!((own.rotate(v)[0] - own.rotate_inverse(v)[0]).abs() > 0.1, "the control: the two differ");
+    }
+
+    #[test]
+    fn it_becomes_a_pose_again() {
+        // Half turns too, which have no trace to take a root of.
+        for turn in [[0.3, -1.1, 2.0], [std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, std::f64::consts::PI], [0.0; 3]] {
+            let pose = from_xyz_rpy([2.0, -3.0, 0.5], turn);
+            let again = Pose::from(&PoseF32::from(&pose));
+            // Single precision: nine numbers of at most 1, each to 6e-8.
+            assert!(again.rotation.angle_to(&pose.rotation) < 5e-7, "{again}, was {pose}");
+            assert!((again.translation.vector - pose.translation.vector).norm() < 5e-7);
+            assert!((again.rotation.quaternion().norm() - 1.0).abs() < 1e-15);
+        }
     }
 
     /// Two poses 100 km out and 2 m apart: one number in f32 there is 8 mm wide, their difference is exact.

@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use crate::mj::{self, Data};
 use ::scene::state::Contact;
-use ::scene::{Light, OwnScene, Pose, PoseF32};
+use ::scene::{Light, OwnScene, Pose, PoseF32, RenderScene};
 use nalgebra::Vector3;
+use ndarray::Array2;
 use sensors::Requires;
 use std::sync::Arc;
 
@@ -93,6 +94,31 @@ impl SimulationManager {
             look.joints.extend(axes(data));
         });
         Ok(())
+    }
+
+    /// What is drawn of an environment, in the order of [`Look::instances`]: the same value for all whose sizes and colours are not
+    /// their own, until something is added.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn scene_of(&mut self, env: EnvId) -> Result<Arc<RenderScene>> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        let visible = self.visible();
+        Ok(self.own_scene(env).0.clone().unwrap_or_else(|| Arc::clone(visible.scene())))
+    }
+
+    /// Positions and velocities of all joints of the scene as MuJoCo has them (`qpos`, `qvel`), one row for each environment: shapes
+    /// (N, nq) and (N, nv).
+    pub fn engine_states(&self) -> [Array2<f64>; 2] {
+        let model = self.simulation.batch.model();
+        let mut states = [Array2::zeros((self.num_envs(), model.nq())), Array2::zeros((self.num_envs(), model.nv()))];
+        self.simulation.batch.for_each(|index, env| {
+            let data = env.data();
+            for (table, numbers) in states.iter_mut().zip([data.qpos(), data.qvel()]) {
+                table.row_mut(index).iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
+            }
+        });
+        states
     }
 
     /// The contacts of environments as they are now, with the forces that the engine solves for this instant: a list for each

@@ -14,6 +14,7 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData,
 use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::observer::{Moment, Observers};
+use crate::outcome::Outcome;
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::visible::{MaskId, Visible, VisualCache};
@@ -78,6 +79,8 @@ pub struct SimulationManager {
     pub(crate) observers: Observers,
     /// How often properties were drawn for each environment.
     pub(crate) draws: Vec<u64>,
+    /// What came of the last step of the task that runs here.
+    pub(crate) outcome: Option<Outcome>,
 }
 
 impl SimulationManager {
@@ -110,6 +113,7 @@ impl SimulationManager {
             sensors,
             observers: Observers::default(),
             draws,
+            outcome: None,
         })
     }
 

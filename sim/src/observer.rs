@@ -38,6 +38,8 @@ pub enum Moment {
     },
     /// Something was added to the simulation: the model and its arrays are other ones.
     Compiled,
+    /// A task has told what came of a step: [`SimulationManager::outcome`].
+    Judged,
 }
 
 /// Handle of an observer; valid for the manager that made it.

@@ -12,6 +12,10 @@ use std::time::Duration;
 const ROBOTS: &str = "../shared/robots";
 /// No example runs that long with the arguments of the table; one that does hangs.
 const TIME_LIMIT: Duration = Duration::from_secs(600);
+/// Examples of feedback are there to be run and watched: each run of theirs ends within a minute, learning included.
+/// Their time is what it would be without other programs on the machine.
+const QUICK: [&str; 3] = ["balance", "train_reach", "visual_servo"];
+const QUICK_LIMIT: Duration = Duration::from_secs(60);
 
 /// One run. In the arguments, `{out}` is an empty scratch folder and `{robots}` the folder of the vendor robots.
 #[derive(Debug)]
@@ -64,7 +68,13 @@ const TABLE: &[Run] = &[
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
     // Examples are built without the feature that writes it.
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.hdf5"),
-    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.apng"),
+    // Without a camera, and with one that does not exist: the stage, and an error.
+    run_of("create_robot", &[0], "--headless --num-envs 2 --steps 50 --record {out}/create_robot.apng"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.mp4 --record-view nobody"),
+    run_of("create_robot", &[2], "--headless --steps 1 --record-view stage"),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 60 --record {out}/stage.mp4 --record-view stage"),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 60 --record {out}/camera.webp --record-view camera"),
+    run_of("run_camera", &[0], "--headless --num-envs 2 --steps 60 --record {out}/stage.mcap --record-view stage"),
     run_of("create_robot", &[2], "--headless --steps 1 --device cuda"),
     run_of("create_robot", &[2], "--headless --steps 1 --num-envs 0"),
     run_of(
@@ -294,7 +304,11 @@ fn run_row(ready: &Ready, row: &Run, out: &Path) -> Outcome {
         .args(&args);
     let line = cmd.to_string();
     let failure = |message: String| Failure { again: Some(line.clone()), ..Failure::new(message) };
-    let code = cmd.exit_code_within(TIME_LIMIT)?;
+    let (code, took) = cmd.exit_code_within(TIME_LIMIT)?;
+    if QUICK.contains(&row.example) && took > QUICK_LIMIT {
+        let (took, limit) = (took.as_secs_f64(), QUICK_LIMIT.as_secs());
+        return Err(failure(format!("`{}` ran for {took:.1} s, where it is to end within {limit} s", row.example)));
+    }
     if !row.exits.contains(&code) {
         let expected: Vec<String> = row.exits.iter().map(i32::to_string).collect();
         let expected = expected.join(" or ");
@@ -521,6 +535,13 @@ mod tests {
             fs::write(path, "").expect("writable");
         }
         assert_eq!(examples(dir.path()), ["a", "b"]);
+    }
+
+    #[test]
+    fn examples_of_feedback_are_in_the_table() {
+        for quick in QUICK {
+            assert!(TABLE.iter().any(|row| row.example == quick), "{quick} is no example");
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod docs_check;
 mod examples;
 mod mutate;
 mod mutations;
+mod own_time;
 mod physics_page;
 mod physics_report;
 mod plot;

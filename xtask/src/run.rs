@@ -1,5 +1,6 @@
 //! Child processes, the repository, and the one failure type of all commands.
 
+use crate::own_time::OwnTime;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -176,15 +177,18 @@ impl Cmd {
         Ok((output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned()))
     }
 
-    /// The exit code, or a failure if it still runs after `limit` (it is killed then) or a signal ended it.
-    pub(crate) fn exit_code_within(mut self, limit: Duration) -> Outcome<i32> {
+    /// The exit code, and how long it would have run alone; or a failure if it still runs after `limit` (it is killed then) or a
+    /// signal ended it.
+    pub(crate) fn exit_code_within(mut self, limit: Duration) -> Outcome<(i32, Duration)> {
         eprintln!("$ {self}");
         let mut child = self.inner.spawn().map_err(|e| self.not_started(&e))?;
         let start = Instant::now();
+        let mut own = OwnTime::of(child.id());
         loop {
+            own.look();
             if let Some(status) = child.try_wait().map_err(|e| self.not_started(&e))? {
                 return match status.code() {
-                    Some(code) => Ok(code),
+                    Some(code) => Ok((code, own.elapsed())),
                     None => Err(self.failure(format!("`{self}` was ended by a signal ({status})"), 1)),
                 };
             }

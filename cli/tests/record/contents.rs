@@ -178,6 +178,6 @@ fn topics_environments_and_rates_are_chosen() {
     all.iter().for_each(|message| *counts.entry(message.topic.as_str()).or_insert(0) += 1);
     assert_eq!(of(&all, "/tf_static")[0].time, start, "known from the beginning, and no earlier");
     // Every fourth step from 0 to 20; nothing happened to the environment.
-    let expected = [("/env_2/arm/targets", 6), ("/env_2/camera/color", 4), ("/tf_static", 1)];
+    let expected = [("/env_2/arm/targets", 6), ("/env_2/camera/color", 4), ("/env_2/scene", 1), ("/tf_static", 1)];
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);
 }

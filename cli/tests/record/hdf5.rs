@@ -69,8 +69,25 @@ fn h5py_reads_every_number_and_every_pixel() {
         assert!(frames.iter().all(|[row, next]| row.targets[0] != next.targets[0]), "an earlier action would be seen");
         let dones: Vec<u64> = (1..=frames.len()).map(|frame| u64::from(frame == frames.len())).collect();
         assert_eq!(numbers("dones"), json!(dones));
-        // What nobody has measured is not made up.
-        assert!(episode["numbers"].get("rewards").is_none() && episode["numbers"].get("states").is_none());
+        // What nobody has told is not made up.
+        assert!(episode["numbers"].get("rewards").is_none());
+        // An arm with a fixed base and a cube: angles and the pose of a free joint, which MuJoCo has in this order.
+        for (state, [row, _]) in numbers("states").as_array().unwrap().iter().zip(&frames) {
+            let state: Vec<f64> = state
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|text| f64::from_bits(text.as_str().unwrap().parse().unwrap()))
+                .collect();
+            let (joints, dof) = (row.positions.len(), row.velocities.len());
+            assert_eq!(state.len(), 1 + joints + 7 + dof + 6);
+            assert_eq!(state[1..=joints], row.positions);
+            assert_eq!(state[1 + joints..4 + joints], row.cube[..3]);
+            // The engine makes its quaternions of length 1 once more: a rounding of each number.
+            let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 2.0 * f64::EPSILON;
+            assert!(state[4 + joints..8 + joints].iter().zip(&row.cube[3..]).all(near), "{state:?} {row:?}");
+            assert_eq!(state[8 + joints..8 + joints + dof], row.velocities);
+        }
     }
     let about = &found["about"]["env_kwargs"];
     assert_eq!((&about["task"], &about["every"]), (&json!("wave at the cube"), &json!(1)));

@@ -57,6 +57,29 @@ fn a_folder_has_every_picture_to_the_last_bit_and_depth_to_the_millimetre() {
 }
 
 #[test]
+fn pillow_reads_every_picture() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pictures");
+    let (_, colors, depths) = recorded(RecorderCfg::new(&path));
+    let found = said(&python, "read_pictures.py", &path);
+    let weighed = |numbers: &mut dyn Iterator<Item = u64>| numbers.zip(1..).map(|(x, k)| x * k).sum::<u64>();
+    for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
+        let step = u64::from(PICTURE_EVERY) * (k as u64 + 1);
+        let sum = weighed(&mut color.iter().map(|byte| u64::from(*byte)));
+        let of = |channel: &str| &found[format!("camera/{channel}/env_1/{k:06}.png")];
+        assert_eq!(*of("color"), serde_json::json!(["RGB", [32, 24], sum, step]));
+        // A miss is 0; half a millimetre rounds away from it.
+        let mm = |depth: &f32| if depth.is_finite() { (depth * 1000.0).round() as u64 } else { 0 };
+        let sum = weighed(&mut depth.iter().map(mm));
+        let told = of("depth");
+        assert!(["I;16", "I"].contains(&told[0].as_str().unwrap()), "{told}");
+        assert_eq!((&told[1], &told[3]), (&serde_json::json!([32, 24]), &serde_json::json!(step)));
+        assert_eq!(told[2].as_u64(), Some(sum));
+    }
+}
+
+#[test]
 fn a_folder_is_whole_when_it_has_its_name_and_nothing_old_is_in_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pictures");

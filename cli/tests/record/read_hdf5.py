@@ -33,8 +33,8 @@ with h5py.File(sys.argv[1], "r", swmr=True, libver="latest") as file:
                 # One picture is read without the others.
                 assert dataset.chunks == (1, *values.shape[1:]) and dataset.compression == "gzip", path
                 images[path] = [picture.tobytes().hex() for picture in values]
-            elif path == "dones":
-                assert values.shape == (frames,)
+            elif path in ("dones", "rewards"):
+                assert values.shape == (frames,) and dataset.dtype == (np.int64 if path == "dones" else np.float64)
                 low[path] = values.tolist()
             else:
                 assert dataset.dtype == np.float64 and values.ndim == 2, path

@@ -29,6 +29,7 @@ def pixels(picture):
     return np.asarray(image)
 
 
+judged = "next.reward" in info["features"]
 rows, told = [], []
 for number, episode in enumerate(episodes):
     assert episode["episode_index"] == number and episode["tasks"] == [tasks.to_pydict()["__index_level_0__"][0]]
@@ -46,6 +47,13 @@ for number, episode in enumerate(episodes):
             assert list(value.shape) == feature["shape"], name
             assert feature["names"] is None or name in images or len(feature["names"]) == len(value)
         rows.append(frame)
+    if judged:
+        assert info["features"]["next.done"] == {"dtype": "bool", "shape": [1], "names": None}
+        told.append([{
+            "state": frame["observation.state"], "reward": float(frame["next.reward"]), "done": frame["next.done"],
+        } for frame in frames])
+        assert all(frame["done"] in (True, False) for frame in told[-1])
+        continue
     told.append([{
         "state": frame["observation.state"],
         "action": frame["action"],

@@ -205,7 +205,7 @@ fn sensed(path: &Path) -> serde_json::Value {
         "normal_shape": normal.shape(),
         "normal_sum": normal.iter().zip(1..).map(|(x, k)| u64::from(x.to_bits()) * k).sum::<u64>(),
         "upward": upward,
-        "attached": ["scene.zip"],
+        "attached": ["recording.json", "scene.zip", "start.snapshot"],
         "flow_sum": weighed(&mut flow.iter().map(|x| u64::from(x.to_bits()))),
         "albedo_sum": weighed(&mut albedo.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]].map(u64::from))),
         "disparity_sum": weighed(&mut disparity.iter().map(|x| u64::from(x.to_bits()))),

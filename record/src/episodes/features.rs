@@ -12,6 +12,8 @@ pub(crate) struct Features {
     pub(crate) pictures: Vec<Seen>,
     /// The stream whose rows are frames.
     pub(crate) base: usize,
+    /// The stream that tells what came of steps of a task.
+    pub(crate) outcome: Option<usize>,
 }
 
 /// Numbers of a frame.
@@ -47,6 +49,8 @@ pub(crate) enum Role {
     TargetEfforts,
     /// Poses of objects.
     Objects,
+    /// Time, positions and velocities as MuJoCo has them.
+    EngineState,
     /// A channel of a sensor.
     Sensor {
         stream: String,
@@ -65,15 +69,21 @@ impl Role {
     pub(crate) fn is_action(&self) -> bool {
         matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
     }
+
+    /// Of formats that tell more than one row of a frame: whether it is observed. Then what it is when the action was done is told too.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn is_observed(&self) -> bool {
+        !self.is_action() && *self != Self::EngineState
+    }
 }
 
 /// Whether a dataset has a place for a stream.
 pub(crate) fn holds(stream: &Stream) -> bool {
     match &stream.kind {
-        Kind::Joints { .. } | Kind::Imu | Kind::Numbers { .. } => true,
+        Kind::Joints { .. } | Kind::Imu | Kind::Numbers { .. } | Kind::Outcome => true,
         Kind::Poses { .. } => is_object(stream),
         Kind::Picture { channel, .. } => channel == "color",
-        Kind::Lens { .. } | Kind::Points => false,
+        Kind::Lens { .. } | Kind::Points | Kind::EngineState => false,
     }
 }
 
@@ -93,7 +103,7 @@ impl Features {
     /// # Errors
     /// There is nothing whose rows could be frames, or two things have the same name.
     pub(crate) fn of(path: &Path, format: Format, streams: &[Stream], name: fn(&Role) -> String) -> Result<Self> {
-        let mut all = Self { numbers: Vec::new(), pictures: Vec::new(), base: 0 };
+        let mut all = Self { numbers: Vec::new(), pictures: Vec::new(), base: 0, outcome: None };
         let mut base = None;
         for (s, stream) in streams.iter().enumerate() {
             let uid = stream.name.rsplit_once('/').map_or(stream.name.as_str(), |(uid, _)| uid);
@@ -108,6 +118,10 @@ impl Features {
                 all.pictures.push(Seen { stream: s, name, size: [*width, *height] });
                 continue;
             }
+            if stream.kind == Kind::Outcome {
+                all.outcome = Some(s);
+                continue;
+            }
             if roles.is_some() || is_object(stream) {
                 base.get_or_insert(s);
             }
@@ -120,11 +134,13 @@ impl Features {
                     Kind::Poses { frames } => ["x", "y", "z", "qw", "qx", "qy", "qz"]
                         .map(|number| format!("{}.{number}", frames.join("/")))
                         .into(),
+                    Kind::EngineState => (0..part.width()).map(|number| format!("{}[{number}]", part.name)).collect(),
                     _ => (0..part.width()).map(|number| format!("{}/{}[{number}]", stream.name, part.name)).collect(),
                 };
                 let role = match &roles {
                     Some(roles) => roles[k].clone(),
                     None if is_object(stream) => Role::Objects,
+                    None if stream.kind == Kind::EngineState => Role::EngineState,
                     None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
                 all.append(role, name, names, (s, range));

@@ -6,6 +6,7 @@ mod statistics;
 use crate::cfg::RecorderCfg;
 use crate::episodes::{self, Dataset, Episodes, Features, Frame, Role};
 use crate::error::{RecordError, Result};
+use crate::file::{Disk, Storage};
 use crate::folder::PartFolder;
 use crate::format::Format;
 use crate::picture::Png;
@@ -40,9 +41,14 @@ const COMMON: [(&str, &str); 5] = [
     ("task_index", "int64"),
 ];
 
+/// What came of the action of a frame, where a task told it.
+const REWARD: &str = "next.reward";
+const DONE: &str = "next.done";
+
 /// A dataset on its way.
 struct LeRobot {
     folder: PartFolder,
+    disk: Disk,
     /// The marker, locked.
     _lock: File,
     fps: u64,
@@ -112,22 +118,27 @@ fn name_of(role: &Role) -> String {
         Role::TargetVelocities => "target.velocity".into(),
         Role::TargetEfforts => "target.effort".into(),
         Role::Objects => "observation.environment_state".into(),
+        Role::EngineState => "observation.engine_state".into(),
         Role::Sensor { stream, channel } => format!("sensors.{}.{}", dotted(stream), dotted(channel)),
         Role::Picture(camera) => format!("observation.images.{}", dotted(camera)),
     }
 }
 
 /// Begins a dataset; `dt` is the time of a step \[s\].
-pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Box<dyn Sink>> {
+pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64, disk: &Disk) -> Result<Box<dyn Sink>> {
     let RecorderCfg { path, every, overwrite, task, .. } = cfg;
     let fps = rate(path, dt, *every)?;
     let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
     let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
-    let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3))).collect();
+    let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3)));
+    // Of rewards and ends.
+    let of_outcome = features.outcome.iter().flat_map(|_| [1, 1].map(Statistics::new));
+    let statistics = statistics.chain(of_outcome).collect();
     let envs = episodes::environments(path, streams)?;
     let (folder, lock) = PartFolder::create(path, *overwrite, MARKER)?;
     let dataset = LeRobot {
         folder,
+        disk: disk.clone(),
         _lock: lock,
         fps,
         task: task.clone(),
@@ -144,10 +155,13 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<B
 fn columns(features: &Features) -> Vec<(String, Kind)> {
     let numbers = features.numbers.iter().map(|feature| (feature.name.clone(), Kind::Float32(feature.names.len())));
     let pictures = features.pictures.iter().map(|picture| (picture.name.clone(), Kind::Picture));
+    let outcome = [(REWARD, Kind::Float32(1)), (DONE, Kind::Bool)];
+    let outcome =
+        outcome.into_iter().filter(|_| features.outcome.is_some()).map(|(name, kind)| (name.to_string(), kind));
     let common = COMMON
         .iter()
         .map(|(name, kind)| (name.to_string(), if *kind == "int64" { Kind::Int64 } else { Kind::Float32(1) }));
-    numbers.chain(pictures).chain(common).collect()
+    numbers.chain(pictures).chain(outcome).chain(common).collect()
 }
 
 /// The same, as `meta/info.json` has it.
@@ -160,7 +174,9 @@ fn described(features: &Features) -> Map<String, Value> {
         let (names, [width, height]) = (["height", "width", "channels"], picture.size);
         (picture.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
     });
-    numbers.chain(pictures).collect()
+    let outcome = [(REWARD, "float32"), (DONE, "bool")].into_iter().filter(|_| features.outcome.is_some());
+    let outcome = outcome.map(|(name, kind)| (name.to_string(), json!({ "dtype": kind, "shape": [1], "names": null })));
+    numbers.chain(pictures).chain(outcome).collect()
 }
 
 impl Dataset for LeRobot {
@@ -170,7 +186,7 @@ impl Dataset for LeRobot {
         Ok(Picture { file: self.png.rgb(rgba, size)?.to_vec(), about: OfPicture::new(rgba) })
     }
 
-    fn add(&mut self, env: usize, Frame { numbers, pictures }: &Frame<Picture>, _next: &Frame<Picture>) -> Written {
+    fn begin(&mut self, env: usize) {
         if self.running[env].is_none() {
             let episode = self.episodes.len();
             let file = self.folder.part().join(data_file(episode as u64));
@@ -179,6 +195,11 @@ impl Dataset for LeRobot {
             self.episodes.push(Episode { file: file.clone(), ..Episode::default() });
             self.running[env] = Some(Running { episode, table, file, rows: 0, frames: 0, values });
         }
+    }
+
+    fn add(&mut self, env: usize, frame: &Frame<Picture>, _next: &Frame<Picture>) -> Written {
+        let Frame { numbers, pictures, reward, done } = frame;
+        let judged = self.features.outcome.is_some();
         let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
         let Some(running) = &mut self.running[env] else { return Ok(()) };
         let mut leaves = running.values.iter_mut();
@@ -190,6 +211,10 @@ impl Dataset for LeRobot {
             let (Some(bytes), Some(path)) = (leaves.next(), leaves.next()) else { break };
             put_bytes(&picture.file, bytes)?;
             put_bytes(format!("frame-{:06}.png", running.frames).as_bytes(), path)?;
+        }
+        if judged && let (Some(rewards), Some(ends)) = (leaves.next(), leaves.next()) {
+            rewards.extend_from_slice(&(*reward as f32).to_le_bytes());
+            ends.push(u8::from(*done));
         }
         let time = (running.frames as f64 / self.fps as f64) as f32;
         // The place in the dataset is known at the end.
@@ -206,8 +231,11 @@ impl Dataset for LeRobot {
         self.statistics.iter_mut().zip(&numbers).for_each(|(statistics, values)| statistics.add(values));
         let of_pictures = self.statistics.iter_mut().skip(all).zip(pictures);
         of_pictures.for_each(|(statistics, picture)| statistics.add_picture(&picture.about));
+        let of_outcome = self.statistics.iter_mut().skip(all + pictures.len());
+        let outcome = [*reward as f32, f32::from(u8::from(*done))];
+        of_outcome.zip(outcome).for_each(|(statistics, value)| statistics.add(&[value]));
         if running.rows >= ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= BYTES {
-            running.write()?;
+            running.write(&self.disk)?;
         }
         Ok(())
     }
@@ -215,10 +243,10 @@ impl Dataset for LeRobot {
     /// The file of the episode is whole.
     fn end(&mut self, env: usize) -> Written {
         let Some(mut running) = self.running[env].take() else { return Ok(()) };
-        running.write()?;
-        let mut out = BufWriter::new(running.open()?);
+        running.write(&self.disk)?;
+        let mut out = BufWriter::new(running.open(&self.disk)?);
         running.table.finish(&mut out, &[])?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
         let index = running.table.places("index");
         let episode = &mut self.episodes[running.episode];
         (episode.frames, episode.index) = (running.frames, index);
@@ -233,14 +261,15 @@ impl Dataset for LeRobot {
         self.write_tasks()?;
         self.write_episodes()?;
         let mut out = self.file("meta/stats.json")?;
-        let of_all = self.features.names().zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
+        let names = self.features.names().chain([REWARD, DONE]);
+        let of_all = names.zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
         out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
         // The last one: a folder with it is a dataset.
         let info = format!("{:#}\n", self.info());
         let mut out = self.file(INFO)?;
         out.write_all(info.as_bytes())?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
         let bytes = size_of(self.folder.part())?;
         self.folder.commit()?;
         Ok(bytes)
@@ -252,10 +281,10 @@ impl Dataset for LeRobot {
 }
 
 impl LeRobot {
-    fn file(&self, name: &str) -> io::Result<BufWriter<File>> {
+    fn file(&self, name: &str) -> io::Result<BufWriter<Box<dyn Storage>>> {
         let path = self.folder.part().join(name);
         path.parent().map_or(Ok(()), fs::create_dir_all)?;
-        Ok(BufWriter::new(File::create(path)?))
+        Ok(BufWriter::new(self.disk.storage(File::create(path)?)))
     }
 
     /// The only task, which is the index of its table, as pandas has it.
@@ -277,7 +306,7 @@ impl LeRobot {
         let mut out = self.file("meta/tasks.parquet")?;
         table.write(&mut out, 1, &[0_i64.to_le_bytes().to_vec(), task])?;
         table.finish(&mut out, &[("pandas", &about.to_string())])?;
-        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?)
+        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?)
     }
 
     fn write_episodes(&self) -> Written {
@@ -310,7 +339,7 @@ impl LeRobot {
         let mut out = self.file("meta/episodes/chunk-000/file-000.parquet")?;
         table.write(&mut out, self.episodes.len(), &values)?;
         table.finish(&mut out, &[])?;
-        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?)
+        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?)
     }
 
     fn info(&self) -> Value {
@@ -340,14 +369,14 @@ impl LeRobot {
     fn number_frames(&self) -> io::Result<()> {
         let mut next = 0_u64;
         for episode in &self.episodes {
-            let mut file = OpenOptions::new().write(true).open(&episode.file)?;
+            let mut file = self.disk.storage(OpenOptions::new().write(true).open(&episode.file)?);
             for (at, rows) in &episode.index {
                 file.seek(SeekFrom::Start(*at))?;
                 let numbers: Vec<u8> = (next..next + rows).flat_map(u64::to_le_bytes).collect();
                 file.write_all(&numbers)?;
                 next += rows;
             }
-            file.sync_all()?;
+            file.sync()?;
         }
         Ok(())
     }
@@ -359,14 +388,14 @@ fn data_file(episode: u64) -> String {
 
 impl Running {
     /// Files are open only while they are written: there may be thousands.
-    fn open(&self) -> io::Result<File> {
+    fn open(&self, disk: &Disk) -> io::Result<Box<dyn Storage>> {
         self.file.parent().map_or(Ok(()), fs::create_dir_all)?;
-        OpenOptions::new().create(true).append(true).open(&self.file)
+        Ok(disk.storage(OpenOptions::new().create(true).append(true).open(&self.file)?))
     }
 
-    fn write(&mut self) -> Written {
+    fn write(&mut self, disk: &Disk) -> Written {
         if self.rows > 0 {
-            let mut out = BufWriter::new(self.open()?);
+            let mut out = BufWriter::new(self.open(disk)?);
             self.table.write(&mut out, self.rows, &self.values)?;
             out.flush()?;
             self.values.iter_mut().for_each(Vec::clear);

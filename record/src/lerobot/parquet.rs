@@ -9,6 +9,8 @@ use std::io::Write;
 pub(crate) enum Kind {
     /// Whole numbers.
     Int64,
+    /// Yes or no: a byte each, 1 or 0, which are packed when they are written.
+    Bool,
     /// As many numbers; one alone is no list.
     Float32(usize),
     /// A text.
@@ -22,7 +24,7 @@ pub(crate) enum Kind {
 /// A column that holds values: those of pictures have two.
 struct Leaf {
     path: Vec<String>,
-    /// The physical type: 2 INT64, 4 FLOAT, 6 BYTE_ARRAY.
+    /// The physical type: 0 BOOLEAN, 2 INT64, 4 FLOAT, 6 BYTE_ARRAY.
     physical: i64,
     /// Values in each row, where they are a list.
     list: Option<usize>,
@@ -45,6 +47,7 @@ struct Group {
 }
 
 const MAGIC: &[u8; 4] = b"PAR1";
+const BOOLEAN: i64 = 0;
 
 impl Table {
     pub(crate) fn new(columns: Vec<(String, Kind)>) -> Self {
@@ -56,6 +59,7 @@ impl Table {
             let listed = |physical, width| one(&["list", "element"], physical, Some(width));
             match *kind {
                 Kind::Int64 => vec![one(&[], 2, None)],
+                Kind::Bool => vec![one(&[], BOOLEAN, None)],
                 Kind::Float32(1) => vec![one(&[], 4, None)],
                 Kind::Float32(width) => vec![listed(4, width)],
                 Kind::Text => vec![one(&[], 6, None)],
@@ -81,6 +85,11 @@ impl Table {
         }
         let mut pages = Vec::new();
         for (leaf, values) in self.leaves.iter().zip(values) {
+            // Eight in a byte, the first in its lowest bit.
+            let bits = |eight: &[u8]| eight.iter().enumerate().fold(0, |byte, (k, one)| byte | (one & 1) << k);
+            let packed: Vec<u8> =
+                if leaf.physical == BOOLEAN { values.chunks(8).map(bits).collect() } else { Vec::new() };
+            let values = if leaf.physical == BOOLEAN { &packed } else { values };
             let count = rows * leaf.list.unwrap_or(1);
             let levels = leaf.list.map_or_else(Vec::new, |width| levels(rows, width));
             let size = levels.len() + values.len();
@@ -169,6 +178,7 @@ impl Table {
                 Kind::Texts => list(6, UTF8),
                 Kind::Float32(_) => elements.push((Some(4), Some(0), name.as_str(), None, None)),
                 Kind::Int64 => elements.push((Some(2), Some(0), name.as_str(), None, None)),
+                Kind::Bool => elements.push((Some(BOOLEAN), Some(0), name.as_str(), None, None)),
                 Kind::Text => elements.push((Some(6), Some(0), name.as_str(), None, UTF8)),
                 Kind::Picture => {
                     elements.push((None, Some(0), name.as_str(), Some(2), None));

@@ -2,7 +2,7 @@
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::error::{RecordError, Result};
-use crate::ros::{MessageType, Step};
+use crate::ros::{MessageType, SCENE_UPDATE, Step};
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError};
@@ -16,20 +16,20 @@ use std::sync::Arc;
 const LARGEST: usize = 1 << 30;
 
 /// A channel, and how its messages are read; `None` where nobody here knows.
-struct Channel {
-    topic: String,
+pub(super) struct Channel {
+    pub(super) topic: String,
     kind: String,
-    reads: Option<Arc<MessageType>>,
+    pub(super) reads: Option<Arc<MessageType>>,
 }
 
 /// What is told of a file.
-enum Told<'r> {
+pub(super) enum Told<'r> {
     Message { channel: &'r Channel, time: u64, data: &'r [u8] },
     Attachment(Attachment<'r>),
 }
 
 /// Reads a whole file, and tells what is in it.
-fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()> {
+pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()> {
     let failed = |error: std::io::Error| RecordError::file(path, error);
     let file = File::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
@@ -52,7 +52,9 @@ fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()>
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 match mcap::parse_record(opcode, data).map_err(|error| malformed(error.to_string()))? {
                     Record::Schema { header, data } => {
-                        let text = (header.encoding == "ros2msg").then(|| std::str::from_utf8(&data).ok()).flatten();
+                        // What things look like are no numbers over time.
+                        let numbers = header.encoding == "ros2msg" && header.name != SCENE_UPDATE;
+                        let text = numbers.then(|| std::str::from_utf8(&data).ok()).flatten();
                         let reads = text.and_then(MessageType::parse).map(Arc::new);
                         schemas.insert(header.id, (header.name, reads));
                     }

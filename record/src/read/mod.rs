@@ -12,6 +12,9 @@
 
 mod mcap;
 mod npz;
+mod rows;
+
+pub(crate) use rows::{Rows, rows};
 
 use crate::archive::Archive;
 use crate::error::{RecordError, Result};
@@ -185,7 +188,7 @@ impl Recording {
     pub(crate) fn attachment(&self, name: &str) -> Result<Option<Vec<u8>>> {
         match &self.content {
             Content::Mcap => mcap::attachment(&self.path, name),
-            Content::Npz(_) => npz::member(&self.path, name),
+            Content::Npz(archive) => archive.member(name),
         }
     }
 

@@ -2,10 +2,8 @@
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::archive::Archive;
-use crate::error::{RecordError, Result};
-use crate::zip;
+use crate::error::Result;
 use serde_json::Value;
-use std::path::Path;
 
 /// The numbers of a pose.
 const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
@@ -35,9 +33,9 @@ fn streams(archive: &Archive) -> Vec<Stream<'_>> {
         let envs = stream["env_ids"].as_array().into_iter().flatten().filter_map(Value::as_u64);
         let parts = stream["arrays"].as_array().into_iter().flatten().filter_map(|part| {
             // Pictures are none of the arrays that were read.
-            let array = part["name"].as_str().filter(|array| archive.arrays.contains_key(*array))?;
+            let array = part["name"].as_str().filter(|array| archive.shape(array).is_some())?;
             // What the array has, not what is said of it.
-            let shape = archive.arrays.get(array)?.0.get(2..)?;
+            let shape = archive.shape(array)?.get(2..)?;
             let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
             let of_forces = part["of_forces"].as_bool().unwrap_or(false);
             Some(Part { array, fields: fields(own, &columns, shape), of_forces })
@@ -70,7 +68,8 @@ fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
 pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
     let mut topics = Vec::new();
     for stream in streams(archive) {
-        let count = archive.steps(stream.name)?.len() as u64;
+        let count = archive.shape(&format!("{}/step", stream.name)).and_then(|shape| shape.first()).copied();
+        let count = count.ok_or_else(|| archive.malformed(format!("there is no array {}/step", stream.name)))? as u64;
         let fields: Vec<String> = stream.parts.iter().flat_map(|part| part.fields.iter().cloned()).collect();
         for env in &stream.env_ids {
             let kind = if fields.is_empty() { "pictures" } else { "numbers" };
@@ -109,8 +108,7 @@ pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Sample
 /// Times of the rows of a stream in an environment, on a clock that goes on over resets \[s\]; `None` where a row holds nothing new.
 fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) -> Result<Vec<Option<f64>>> {
     let forces = format!("{}/force_time", stream.name);
-    let array =
-        if of_forces && archive.arrays.contains_key(&forces) { forces } else { format!("{}/time", stream.name) };
+    let array = if of_forces && archive.shape(&forces).is_some() { forces } else { format!("{}/time", stream.name) };
     let steps = archive.steps(stream.name)?;
     let dt = archive.about["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
     let dt = dt.ok_or_else(|| archive.malformed("it does not say its time step".into()))?;
@@ -146,11 +144,4 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
         last = Some(time);
     }
     Ok(times)
-}
-
-/// A file of the archive.
-pub(super) fn member(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
-    let bytes = std::fs::read(path).map_err(|error| RecordError::file(path, error))?;
-    let members = zip::parse(&bytes).unwrap_or_default();
-    Ok(members.into_iter().find(|(known, _)| *known == name).map(|(_, data)| data.to_vec()))
 }

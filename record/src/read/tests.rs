@@ -140,7 +140,20 @@ fn what_is_no_whole_recording_is_refused() {
         let middle = whole.len() / 2;
         damaged[middle..middle + 16].iter_mut().for_each(|byte| *byte ^= 0x5a);
         std::fs::write(&path, &damaged).unwrap();
-        assert!(Recording::open(&path).is_err(), "{name}");
+        // Of an archive no more is read than is asked for: whoever asks for what is damaged is told.
+        let all = |recording: Recording| {
+            let fields =
+                recording.topics().iter().flat_map(|of| of.fields.iter().map(|field| Wanted::new(&of.name, field)));
+            recording.samples(&fields.collect::<Vec<_>>())?;
+            recording.attachment(crate::scene_file::SCENE)?;
+            crate::replay::num_envs(&path)
+        };
+        assert_eq!(Recording::open(&path).is_err(), name == "run.mcap");
+        assert!(matches!(Recording::open(&path).and_then(all), Err(RecordError::Malformed { .. })), "{name}");
+        // The control.
+        std::fs::write(&path, &whole).unwrap();
+        let all_of_it = Recording::open(&path).and_then(all);
+        assert!(all_of_it.is_ok() || name == "run.mcap", "{all_of_it:?}");
     }
     for (name, words) in [("none.mcap", "No such file"), ("a.mcap.part", "recover"), ("a.bag", ".mcap or .npz")] {
         let error = Recording::open(folder.path().join(name)).unwrap_err().to_string();

@@ -1,7 +1,6 @@
 mod events;
 
 use super::*;
-use crate::file::tests::FullDisk;
 use crate::npy;
 use crate::packet::Values;
 use crate::recover::recover;
@@ -58,11 +57,12 @@ impl Sink for Slow {
 
 fn recorded_slowly(packets: usize, steps: u32, pause: Duration) -> (Recorded, Vec<f64>) {
     let mut sim = falling(1);
-    let cfg = RecorderCfg { packets, ..RecorderCfg::new("nowhere.mcap") };
-    let (sources, left_out) = resolve(&sim, &cfg, Format::Mcap).unwrap();
+    let cfg = RecorderCfg { packets, scene: false, ..RecorderCfg::new("nowhere.mcap") };
+    let cfg = cfg.with_topics([Topic::MjcfState("ball".into())]);
+    let (sources, left_out) = resolve(&mut sim, &cfg, Format::Mcap).unwrap();
     let heights = Arc::new(Mutex::new(Vec::new()));
     let sink = Box::new(Slow { heights: Arc::clone(&heights), pause });
-    let recorder = Recorder::begin(&sim, cfg, Format::Mcap, sources, left_out, sink).unwrap();
+    let recorder = Recorder::begin(&mut sim, cfg, Format::Mcap, sources, left_out, sink).unwrap();
     let recorder = sim.add_observer(recorder);
     sim.update(steps);
     let recorded = sim.finish_recording(recorder).unwrap();
@@ -90,7 +90,7 @@ fn a_simulation_waits_for_a_slow_disk_says_so_and_loses_nothing() {
 fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
     // Without the scene, which would fill the disk alone.
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
-    let recorder = Recorder::start(sim, cfg, &mut |file| Box::new(FullDisk { file, left }))?;
+    let recorder = Recorder::start(sim, cfg, &Disk::full_after(left))?;
     let recorder = sim.add_observer(recorder);
     sim.update(if sim.sensor_uids().is_empty() { 3000 } else { 60 });
     sim.finish_recording(recorder)
@@ -115,6 +115,95 @@ fn an_animation_on_a_full_disk_is_an_error_and_leaves_nothing() {
             assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{end}");
             record_to_a_full_disk(&mut seen(), &folder.path().join(format!("whole.{end}")), usize::MAX).unwrap();
         }
+    }
+}
+
+/// All files below a folder, without the folder's name.
+fn files(folder: &Path) -> Vec<String> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            match path.is_dir() {
+                true => folders.push(path),
+                false => found.push(path.strip_prefix(folder).unwrap().display().to_string()),
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Something to see and something that moves, for folders.
+fn seen_and_moved() -> SimulationManager {
+    let mut sim = falling(2);
+    let ball = sim.mjcf_id("ball").unwrap();
+    assert_eq!(sim.mjcf_part(ball).get_qpos().ncols(), 7);
+    let camera = CameraCfg {
+        width: 32,
+        height: 24,
+        channels: Channels { color: true, depth: true, ..Channels::NONE },
+        ..CameraCfg::default()
+    };
+    sim.add_sensor("camera", CameraCfg { update_period: 0.02, ..camera }).unwrap();
+    sim
+}
+
+#[test]
+fn a_folder_of_pictures_on_a_full_disk_holds_whole_pictures_under_another_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    let bytes = record_to_a_full_disk(&mut seen_and_moved(), &whole, usize::MAX).unwrap().bytes;
+    let all = files(&whole);
+    assert!(all.len() > 20 && bytes > 5000, "{bytes} bytes in {}", all.len());
+    for left in [0, 10, 300, 1000, bytes as usize / 2] {
+        let path = folder.path().join(format!("left_{left}"));
+        let error = record_to_a_full_disk(&mut seen_and_moved(), &path, left).unwrap_err();
+        assert!(error.to_string().contains("no space left"), "{left}: {error}");
+        assert!(!path.exists(), "{left}");
+        let part = part_of(&path);
+        if left < 40 {
+            // Not even the head of the list found room: it was not begun.
+            continue;
+        }
+        assert!(matches!(&error, RecordError::File { kept: Some(kept), .. } if *kept == part), "{left}: {error:?}");
+        let names = files(&part);
+        assert!(names.len() < all.len(), "{left}: {names:?}");
+        for name in &names {
+            assert!(all.contains(name), "{left}: nothing is called otherwise than in a whole one: {name}");
+            let file = part.join(name);
+            if name.ends_with(".png") {
+                // Those that are there are those of a whole recording, to the last byte.
+                assert_eq!(std::fs::read(&file).unwrap(), std::fs::read(whole.join(name)).unwrap(), "{left}: {name}");
+            }
+        }
+        assert_eq!(names.iter().any(|name| name.ends_with(".png")), left >= 1000, "{left}: {names:?}");
+    }
+}
+
+#[test]
+fn a_dataset_on_a_full_disk_has_neither_its_name_nor_what_makes_it_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let actuated = || {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+        let text = r#"<mujoco><worldbody><body name="b" pos="0 0 1"><joint name="j" type="slide"/><geom size="0.1"/></body></worldbody>
+            <actuator><motor joint="j"/></actuator></mujoco>"#;
+        sim.add_mjcf(MjcfCfg::text("ball", text)).unwrap();
+        sim
+    };
+    let whole = folder.path().join("whole.lerobot");
+    let bytes = record_to_a_full_disk(&mut actuated(), &whole, usize::MAX).unwrap().bytes as usize;
+    assert!(whole.join("meta/info.json").is_file() && bytes > 10_000, "{bytes}");
+    // Nothing; in the rows; in the tables at the end; in the last file. Places of frames are written twice.
+    for left in [0, 1000, bytes / 2, bytes - 100] {
+        let path = folder.path().join(format!("left_{left}.lerobot"));
+        let error = record_to_a_full_disk(&mut actuated(), &path, left).unwrap_err();
+        assert!(error.to_string().contains("no space left"), "{left}: {error}");
+        assert!(!path.exists(), "{left}");
+        let part = part_of(&path);
+        assert!(matches!(&error, RecordError::File { kept: Some(kept), .. } if *kept == part), "{left}: {error:?}");
+        // A folder is a dataset when it says so.
+        assert!(!part.join("meta/info.json").exists(), "{left}: {:?}", files(&part));
     }
 }
 
@@ -208,8 +297,8 @@ fn after_an_error_nobody_waits_for_ever_and_what_was_written_is_named() {
     assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "flaky"), "{error}");
     assert!(also.is_none() && !path.exists());
     assert_eq!(kept, Some(part_of(&path)));
-    // Six rows of the ball with three quantities, five of the sensor, the place of the environment.
-    assert_eq!(recover(&path).unwrap().messages, 24);
+    // Six rows of the ball with three quantities and its pose, five of the sensor, the place of the environment and its look.
+    assert_eq!(recover(&path).unwrap().messages, 31);
 }
 
 #[test]
@@ -224,7 +313,7 @@ fn only_what_is_finished_has_its_name() {
         assert!(!path.exists(), "{name}");
         assert_eq!(part_of(&path).exists(), stays, "{name}");
     }
-    assert_eq!(recover(folder.path().join("run.mcap")).unwrap().messages, 19);
+    assert_eq!(recover(folder.path().join("run.mcap")).unwrap().messages, 26);
 }
 
 /// Panics at the third packet.
@@ -254,8 +343,8 @@ impl Sink for Panics {
 fn a_thread_that_panics_is_noticed() {
     let mut sim = falling(1);
     let cfg = RecorderCfg { packets: 2, ..RecorderCfg::new("nowhere.mcap") };
-    let (sources, left_out) = resolve(&sim, &cfg, Format::Mcap).unwrap();
-    let recorder = Recorder::begin(&sim, cfg, Format::Mcap, sources, left_out, Box::new(Panics(0))).unwrap();
+    let (sources, left_out) = resolve(&mut sim, &cfg, Format::Mcap).unwrap();
+    let recorder = Recorder::begin(&mut sim, cfg, Format::Mcap, sources, left_out, Box::new(Panics(0))).unwrap();
     let recorder = sim.add_observer(recorder);
     sim.update(20);
     sim.observer_mut(recorder).unwrap().catch_up();
@@ -359,7 +448,7 @@ fn late_pictures_and_points_are_recorded_as_they_were_taken_whatever_is_shown_me
     let bytes = std::fs::read(&path).unwrap();
     let members = zip::parse(&bytes).unwrap();
     let rows = |name: &str| -> (usize, Vec<u8>) {
-        let data = members.iter().find(|(known, _)| known == &format!("{name}.npy")).unwrap().1;
+        let data = &members.iter().find(|(known, _)| known == &format!("{name}.npy")).unwrap().1;
         let (_, shape, data) = npy::parse(data).unwrap();
         (shape[0], data.to_vec())
     };

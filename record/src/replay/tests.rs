@@ -48,46 +48,77 @@ fn recording(path: &Path, at_step: impl FnMut(&mut SimulationManager, u32)) {
 #[test]
 fn recorded_actions_give_the_recorded_states_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
-    recording(&path, |_, _| ());
+    for name in ["run.npz", "run.mcap"] {
+        let path = folder.path().join(name);
+        recording(&path, |_, _| ());
+        let mut sim = arms();
+        assert_eq!(num_envs(&path).unwrap(), 2);
+        let verdict = verify(&mut sim, &path).unwrap();
+        assert!(verdict.is_same(), "{name}: {verdict}");
+        // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's three.
+        let arm = sim.robot(sim.robot_id("arm").unwrap());
+        let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
+        assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)), "{name}");
+    }
+}
+
+/// What a recorder that was killed has left is verified as far as it goes.
+#[test]
+fn what_was_recovered_is_verified_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
     let mut sim = arms();
-    let verdict = verify(&mut sim, &path).unwrap();
-    assert!(verdict.is_same(), "{verdict}");
-    // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's three.
-    let arm = sim.robot(sim.robot_id("arm").unwrap());
-    let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
-    assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)));
+    sim.record(RecorderCfg::new(&path)).unwrap();
+    drive(&mut sim, |_, _| ());
+    drop(sim);
+    crate::recover::recover(&path).unwrap();
+    let verdict = verify(&mut arms(), &path).unwrap();
+    assert!(verdict.is_same() && verdict.steps == u64::from(STEPS), "{verdict}");
+    // The control: without what it begins with.
+    let whole = std::fs::read(&path).unwrap();
+    let other = folder.path().join("other.mcap");
+    let mut writer = mcap::Writer::new(File::create(&other).unwrap()).unwrap();
+    for message in mcap::MessageStream::new(&whole).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    let error = verify(&mut arms(), &other).unwrap_err().to_string();
+    assert!(error.contains("recording.json"), "{error}");
 }
 
 #[test]
 fn what_was_done_otherwise_is_found_at_its_step() {
     let folder = tempfile::tempdir().unwrap();
-    // A push that is no action, before step 12 of environment 1.
-    let path = folder.path().join("pushed.npz");
-    recording(&path, |sim, step| {
-        let arm = sim.robot_id("arm").unwrap();
-        let mut force = ndarray::Array3::zeros((1, 1, 3));
-        force[(0, 0, 0)] = if step == 12 { 5.0 } else { 0.0 };
-        let tip = LinkId(sim.robot(arm).link_names().len() - 1);
-        let (torque, env) = (ndarray::Array3::zeros((1, 1, 3)), [EnvId(1)]);
-        sim.robot_mut(arm).set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[tip]), Some(&env)).unwrap();
-    });
-    let verdict = verify(&mut arms(), &path).unwrap();
-    let difference = verdict.difference.unwrap();
-    assert_eq!((difference.step, difference.env, difference.written), (13, 1, false), "{difference:?}");
-
-    // A joint that somebody moved by hand before step 20.
-    let path = folder.path().join("written.npz");
-    recording(&path, |sim, step| {
-        if step == 20 {
+    for end in ["npz", "mcap"] {
+        // A push that is no action, before step 12 of environment 1.
+        let path = folder.path().join(format!("pushed.{end}"));
+        recording(&path, |sim, step| {
             let arm = sim.robot_id("arm").unwrap();
-            let row = sim.robot(arm).get_qpos().row(0).mapv(|q| q + 0.01);
-            let row = row.insert_axis(ndarray::Axis(0));
-            sim.robot_mut(arm).write_qpos(&row, None, Some(&[EnvId(0)])).unwrap();
-        }
-    });
-    let difference = verify(&mut arms(), &path).unwrap().difference.unwrap();
-    assert_eq!((difference.step, difference.env, difference.written), (20, 0, true), "{difference:?}");
+            let mut force = ndarray::Array3::zeros((1, 1, 3));
+            force[(0, 0, 0)] = if step == 12 { 5.0 } else { 0.0 };
+            let tip = LinkId(sim.robot(arm).link_names().len() - 1);
+            let (torque, env) = (ndarray::Array3::zeros((1, 1, 3)), [EnvId(1)]);
+            sim.robot_mut(arm)
+                .set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[tip]), Some(&env))
+                .unwrap();
+        });
+        let verdict = verify(&mut arms(), &path).unwrap();
+        let difference = verdict.difference.unwrap();
+        assert_eq!((difference.step, difference.env, difference.written), (13, 1, false), "{difference:?}");
+
+        // A joint that somebody moved by hand before step 20.
+        let path = folder.path().join(format!("written.{end}"));
+        recording(&path, |sim, step| {
+            if step == 20 {
+                let arm = sim.robot_id("arm").unwrap();
+                let row = sim.robot(arm).get_qpos().row(0).mapv(|q| q + 0.01);
+                let row = row.insert_axis(ndarray::Axis(0));
+                sim.robot_mut(arm).write_qpos(&row, None, Some(&[EnvId(0)])).unwrap();
+            }
+        });
+        let difference = verify(&mut arms(), &path).unwrap().difference.unwrap();
+        assert_eq!((difference.step, difference.env, difference.written), (20, 0, true), "{difference:?}");
+    }
 }
 
 /// The same archive with one recorded target changed.
@@ -104,7 +135,7 @@ fn with_another_target(path: &Path, row: usize, to: &Path) {
             data[at..at + 8].copy_from_slice(&(old + 1e-9).to_le_bytes());
             changed += 1;
         }
-        archive.add(name, b"", &mut &data[..]).unwrap();
+        archive.add(&name, b"", &mut &data[..]).unwrap();
     }
     archive.finish().unwrap();
     assert_eq!(changed, 1);
@@ -132,7 +163,7 @@ fn with_another_step(path: &Path, row: usize, step: f64, to: &Path) {
             let at = data.len() - npy::parse(&data).unwrap().2.len() + 8 * row;
             data[at..at + 8].copy_from_slice(&step.to_le_bytes());
         }
-        archive.add(name, b"", &mut &data[..]).unwrap();
+        archive.add(&name, b"", &mut &data[..]).unwrap();
     }
     archive.finish().unwrap();
 }

@@ -7,7 +7,9 @@
 //! | `data/demo_0`, attributes `num_samples`, `env_id` | | frames of the episode, and its environment |
 //! | `actions` | (T, A) | what joints were told: positions, or controls of MJCF files; f64, as all numbers |
 //! | `action_dict/joint_vel`, `action_dict/joint_effort` | (T, A) | the same of velocities and efforts |
-//! | `dones` | (T,) | 1 in the last frame, i64 |
+//! | `states` | (T, 1 + nq + nv) | time, positions and velocities of all joints of the scene, as MuJoCo has them |
+//! | `rewards` | (T,) | what the action earned, where a task told it |
+//! | `dones` | (T,) | 1 where a task said that the episode ended with the action; without a task, in the last frame; i64 |
 //! | `obs/joint_pos`, `obs/joint_vel`, `obs/joint_effort` | (T, J) | joints of all robots |
 //! | `obs/object` | (T, 7 K) | poses of objects in the environment, x, y, z, qw, qx, qy, qz |
 //! | `obs/SENSOR_CHANNEL` | (T, W) | numbers of other sensors |
@@ -70,6 +72,10 @@ struct Column {
 enum Kind {
     /// So many f64.
     Numbers(usize),
+    /// One f64, which is no list.
+    Number,
+    /// A whole number.
+    Whole,
     /// The place of a picture of this width and height.
     Picture([usize; 2]),
 }
@@ -98,6 +104,7 @@ fn name_of(role: &Role) -> String {
         Role::TargetVelocities => "action_dict/joint_vel".into(),
         Role::TargetEfforts => "action_dict/joint_effort".into(),
         Role::Objects => "object".into(),
+        Role::EngineState => "states".into(),
         Role::Sensor { stream, channel } => format!("{}_{}", flat(stream), flat(channel)),
         Role::Picture(camera) => format!("{}_image", flat(camera)),
     }
@@ -107,17 +114,14 @@ fn name_of(role: &Role) -> String {
 fn columns(features: &Features) -> (Vec<Column>, usize) {
     let (mut columns, mut at) = (Vec::new(), 0);
     let mut add = |path: String, kind: Kind| {
-        let bytes = match kind {
-            Kind::Numbers(width) => 8 * width,
-            Kind::Picture(_) => Place::BYTES,
-        };
+        let bytes = kind.bytes();
         columns.push(Column { path, at, kind });
         at += bytes;
     };
     for of in ["obs", "next_obs"] {
         for feature in &features.numbers {
             let width = feature.names.len();
-            match feature.role.is_action() {
+            match !feature.role.is_observed() {
                 false => add(format!("{of}/{}", feature.name), Kind::Numbers(width)),
                 true if of == "obs" => add(feature.name.clone(), Kind::Numbers(width)),
                 true => {}
@@ -126,6 +130,10 @@ fn columns(features: &Features) -> (Vec<Column>, usize) {
         for picture in &features.pictures {
             add(format!("{of}/{}", picture.name), Kind::Picture(picture.size));
         }
+    }
+    if features.outcome.is_some() {
+        add("rewards".into(), Kind::Number);
+        add("dones".into(), Kind::Whole);
     }
     (columns, at)
 }
@@ -184,20 +192,27 @@ impl Dataset for Robomimic {
         Ok(self.pictures.put(&packed.finish()?)?)
     }
 
-    fn add(&mut self, env: usize, frame: &Frame<Place>, next: &Frame<Place>) -> Written {
+    fn begin(&mut self, env: usize) {
         if self.running[env].is_none() {
             let episode = self.episodes.len();
             self.episodes.push(Episode { env: self.envs[env], frames: 0, blocks: Vec::new() });
             self.running[env] = Some(Running { episode, rows: Vec::new() });
         }
+    }
+
+    fn add(&mut self, env: usize, frame: &Frame<Place>, next: &Frame<Place>) -> Written {
         let Some(Running { episode, rows }) = &mut self.running[env] else { return Ok(()) };
         // In the order of the columns.
         for (of, actions) in [(frame, true), (next, false)] {
             let features = self.features.numbers.iter().zip(&of.numbers);
-            for (_, numbers) in features.filter(|(feature, _)| actions || !feature.role.is_action()) {
+            for (_, numbers) in features.filter(|(feature, _)| actions || feature.role.is_observed()) {
                 numbers.iter().for_each(|number| rows.extend_from_slice(&number.to_le_bytes()));
             }
             of.pictures.iter().for_each(|place| rows.extend_from_slice(&place.to_bytes()));
+        }
+        if self.features.outcome.is_some() {
+            rows.extend_from_slice(&frame.reward.to_le_bytes());
+            rows.extend_from_slice(&i64::from(frame.done).to_le_bytes());
         }
         let episode = &mut self.episodes[*episode];
         episode.frames += 1;
@@ -261,6 +276,8 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
         let group = groups.get(group).unwrap_or(demo);
         let dataset = match *kind {
             Kind::Numbers(width) => group.new_dataset::<f64>().shape([frames, width]).create(name),
+            Kind::Number => group.new_dataset::<f64>().shape([frames]).create(name),
+            Kind::Whole => group.new_dataset::<i64>().shape([frames]).create(name),
             Kind::Picture([width, height]) => group
                 .new_dataset::<u8>()
                 .shape([frames, height, width, 3])
@@ -270,7 +287,9 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
         };
         datasets.push(dataset.map_err(fault)?);
     }
-    let dones = demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(fault)?;
+    // Where no task says where episodes end.
+    let ends = !columns.iter().any(|column| column.path == "dones");
+    let dones = ends.then(|| demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(fault)).transpose()?;
     let record = columns.iter().map(Column::end).max().unwrap_or(0);
     let (mut block, mut picture, mut numbers, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for place in &episode.blocks {
@@ -284,6 +303,16 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
                     numbers.extend(cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| f64::from_le_bytes(*x)));
                     dataset.write_slice(&[first, 0], &[count, width], &numbers).map_err(fault)?;
                 }
+                Kind::Number => {
+                    numbers.clear();
+                    numbers.extend(cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| f64::from_le_bytes(*x)));
+                    dataset.write_slice(&[first], &[count], &numbers).map_err(fault)?;
+                }
+                Kind::Whole => {
+                    let all: Vec<i64> =
+                        cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| i64::from_le_bytes(*x)).collect();
+                    dataset.write_slice(&[first], &[count], &all).map_err(fault)?;
+                }
                 Kind::Picture(_) => {
                     for (frame, cell) in (first..).zip(cells()) {
                         pictures.take(Place::from_bytes(cell), &mut picture)?;
@@ -293,8 +322,10 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
                 }
             }
         }
-        let done: Vec<i64> = (first..first + count).map(|frame| i64::from(frame + 1 == frames)).collect();
-        dones.write_slice(&[first], &[count], &done).map_err(fault)?;
+        if let Some(dones) = &dones {
+            let done: Vec<i64> = (first..first + count).map(|frame| i64::from(frame + 1 == frames)).collect();
+            dones.write_slice(&[first], &[count], &done).map_err(fault)?;
+        }
         first += count;
     }
     Ok(())
@@ -303,11 +334,18 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
 impl Column {
     /// Where it ends in a record.
     fn end(&self) -> usize {
-        self.at
-            + match self.kind {
-                Kind::Numbers(width) => 8 * width,
-                Kind::Picture(_) => Place::BYTES,
-            }
+        self.at + self.kind.bytes()
+    }
+}
+
+impl Kind {
+    /// What it takes in the record of a frame \[bytes\].
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Numbers(width) => 8 * width,
+            Self::Number | Self::Whole => 8,
+            Self::Picture(_) => Place::BYTES,
+        }
     }
 }
 

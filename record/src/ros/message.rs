@@ -20,7 +20,7 @@ const WARN: u8 = 30;
 const FLOAT32: u8 = 7;
 const INT32: u8 = 5;
 
-fn time(to: &mut Cdr, nanos: u64) {
+pub(super) fn time(to: &mut Cdr, nanos: u64) {
     to.i32(i32::try_from(nanos / NANOS).unwrap_or(i32::MAX));
     to.u32((nanos % NANOS) as u32);
 }

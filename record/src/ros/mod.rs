@@ -1,16 +1,18 @@
 //! ROS 2 messages: what they are called and made of, and their bytes.
 //!
-//! The names and the order of the fields are those of the ROS packages `builtin_interfaces`, `geometry_msgs`, `rcl_interfaces`,
+//! The names and the order of the fields are those of the ROS packages `builtin_interfaces`, `foxglove_msgs`, `geometry_msgs`, `rcl_interfaces`,
 //! `sensor_msgs`, `std_msgs` and `tf2_msgs`; the bytes are little-endian CDR.
 
 mod cdr;
 mod message;
 mod read;
+mod scene;
 mod schema;
 
 pub(crate) use cdr::Cdr;
 pub(crate) use message::{
     Hits, Stamp, camera_info, compressed_image, image, imu, joint_state, log, motion, numbers, points, transforms,
 };
-pub(crate) use read::{MessageType, Step};
-pub(crate) use schema::Schema;
+pub(crate) use read::{MessageType, Step, Value};
+pub(crate) use scene::scene_update;
+pub(crate) use schema::{SCENE_UPDATE, Schema};

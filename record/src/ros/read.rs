@@ -264,7 +264,7 @@ impl Bytes<'_> {
 }
 
 impl Value {
-    fn field(&self, name: &str) -> Option<&Self> {
+    pub(crate) fn field(&self, name: &str) -> Option<&Self> {
         let Self::Struct(fields) = self else { return None };
         fields.iter().find(|(known, _)| **known == *name).map(|(_, value)| value)
     }

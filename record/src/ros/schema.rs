@@ -12,6 +12,7 @@ pub(crate) enum Schema {
     JointState,
     Log,
     PointCloud2,
+    SceneUpdate,
     TfMessage,
     TwistStamped,
 }
@@ -37,6 +38,69 @@ const POINT_FIELD: (&str, &str) =
 const LAYOUT: (&str, &str) = ("std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n");
 const DIMENSION: (&str, &str) = ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n");
 
+/// The type of what an environment looks like: no numbers over time.
+pub(crate) const SCENE_UPDATE: &str = "foxglove_msgs/msg/SceneUpdate";
+/// The types in it.
+const SCENE_TYPES: [(&str, &str); 18] = [
+    TIME,
+    VECTOR,
+    QUATERNION,
+    ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),
+    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
+    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
+    ("foxglove_msgs/Color", "float64 r\nfloat64 g\nfloat64 b\nfloat64 a\n"),
+    ("foxglove_msgs/KeyValuePair", "string key\nstring value\n"),
+    (
+        "foxglove_msgs/SceneEntityDeletion",
+        "uint8 MATCHING_ID=0\nuint8 ALL=1\nbuiltin_interfaces/Time timestamp\nuint8 type\nstring id\n",
+    ),
+    (
+        "foxglove_msgs/SceneEntity",
+        "builtin_interfaces/Time timestamp\nstring frame_id\nstring id\nbuiltin_interfaces/Duration lifetime\n\
+         bool frame_locked\nfoxglove_msgs/KeyValuePair[] metadata\nfoxglove_msgs/ArrowPrimitive[] arrows\n\
+         foxglove_msgs/CubePrimitive[] cubes\nfoxglove_msgs/SpherePrimitive[] spheres\n\
+         foxglove_msgs/CylinderPrimitive[] cylinders\nfoxglove_msgs/LinePrimitive[] lines\n\
+         foxglove_msgs/TriangleListPrimitive[] triangles\nfoxglove_msgs/TextPrimitive[] texts\n\
+         foxglove_msgs/ModelPrimitive[] models\n",
+    ),
+    (
+        "foxglove_msgs/ArrowPrimitive",
+        "geometry_msgs/Pose pose\nfloat64 shaft_length\nfloat64 shaft_diameter\nfloat64 head_length\n\
+         float64 head_diameter\nfoxglove_msgs/Color color\n",
+    ),
+    ("foxglove_msgs/CubePrimitive", "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 size\nfoxglove_msgs/Color color\n"),
+    (
+        "foxglove_msgs/SpherePrimitive",
+        "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 size\nfoxglove_msgs/Color color\n",
+    ),
+    (
+        "foxglove_msgs/CylinderPrimitive",
+        "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 size\nfloat64 bottom_scale\nfloat64 top_scale\n\
+         foxglove_msgs/Color color\n",
+    ),
+    (
+        "foxglove_msgs/LinePrimitive",
+        "uint8 LINE_STRIP=0\nuint8 LINE_LOOP=1\nuint8 LINE_LIST=2\nuint8 type\ngeometry_msgs/Pose pose\n\
+         float64 thickness\nbool scale_invariant\ngeometry_msgs/Point[] points\nfoxglove_msgs/Color color\n\
+         foxglove_msgs/Color[] colors\nuint32[] indices\n",
+    ),
+    (
+        "foxglove_msgs/TriangleListPrimitive",
+        "geometry_msgs/Pose pose\ngeometry_msgs/Point[] points\nfoxglove_msgs/Color color\n\
+         foxglove_msgs/Color[] colors\nuint32[] indices\n",
+    ),
+    (
+        "foxglove_msgs/TextPrimitive",
+        "geometry_msgs/Pose pose\nbool billboard\nfloat64 font_size\nbool scale_invariant\n\
+         foxglove_msgs/Color color\nstring text\n",
+    ),
+    (
+        "foxglove_msgs/ModelPrimitive",
+        "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nfoxglove_msgs/Color color\nbool override_color\n\
+         string url\nstring media_type\nuint8[] data\n",
+    ),
+];
+
 impl Schema {
     /// Its name.
     pub(crate) fn name(self) -> &'static str {
@@ -50,6 +114,7 @@ impl Schema {
             Self::JointState => "sensor_msgs/msg/JointState",
             Self::Log => "rcl_interfaces/msg/Log",
             Self::PointCloud2 => "sensor_msgs/msg/PointCloud2",
+            Self::SceneUpdate => SCENE_UPDATE,
             Self::TfMessage => "tf2_msgs/msg/TFMessage",
             Self::TwistStamped => "geometry_msgs/msg/TwistStamped",
         }
@@ -100,6 +165,9 @@ impl Schema {
                  bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
                 &[HEADER, TIME, POINT_FIELD],
             ),
+            Self::SceneUpdate => {
+                ("foxglove_msgs/SceneEntityDeletion[] deletions\nfoxglove_msgs/SceneEntity[] entities\n", &SCENE_TYPES)
+            }
             Self::TfMessage => (
                 "geometry_msgs/TransformStamped[] transforms\n",
                 &[TRANSFORM_STAMPED, HEADER, TIME, TRANSFORM, VECTOR, QUATERNION],

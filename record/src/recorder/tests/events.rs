@@ -138,7 +138,7 @@ fn what_has_a_rate_of_its_own_has_rows_at_its_steps() {
     assert!(matches!(error, RecordError::OutOfRange { .. }), "{error}");
     let error = recorded(&[("bal", 2)], &path).unwrap_err();
     let RecordError::UnknownName { candidates, .. } = &error else { panic!("{error}") };
-    assert_eq!(candidates, &["ball/state", "imu", "second"]);
+    assert_eq!(candidates, &["ball/state", "ball/body_poses", "imu", "second"]);
     let dataset = folder.path().join("run.lerobot");
     let error = recorded(&[("ball", 2)], &dataset).unwrap_err();
     assert!(matches!(error, RecordError::NoPlace { .. }), "{error}");
@@ -167,7 +167,7 @@ fn a_full_disk_is_told_before_the_end() {
     let path = folder.path().join("run.mcap");
     let mut sim = falling(4);
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(&path) };
-    let recorder = Recorder::start(&mut sim, cfg, &mut |file| Box::new(FullDisk { file, left: 20_000 })).unwrap();
+    let recorder = Recorder::start(&mut sim, cfg, &Disk::full_after(20_000)).unwrap();
     let recorder = sim.add_observer(recorder);
     assert_eq!(sim.observer(recorder).unwrap().failure(), None);
     let begun = Instant::now();

@@ -1,0 +1,242 @@
+//! Rows of an MCAP file of a recorder, as a NumPy archive would have them: what is needed to do recorded actions again.
+
+use super::mcap::{Told, walk};
+use crate::error::{RecordError, Result};
+use crate::npz::{ABOUT, START};
+use crate::packet::EventKind;
+use crate::ros::Value as Message;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Arrays by name: shapes and numbers.
+pub(crate) type Arrays = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
+
+/// What a file holds: what its streams are, the state at the beginning, the numbers.
+pub(crate) struct Rows {
+    pub(crate) about: Value,
+    pub(crate) start: Vec<u8>,
+    pub(crate) arrays: Arrays,
+}
+
+/// A stream on its way.
+struct Stream {
+    name: String,
+    envs: Vec<usize>,
+    /// Names, shapes and widths of its arrays.
+    parts: Vec<(String, Vec<usize>, usize)>,
+    /// Frames of poses.
+    frames: Vec<String>,
+    /// Steps of the rows that are whole.
+    steps: Vec<f64>,
+    /// The rows of each part.
+    rows: Vec<Vec<f64>>,
+    /// The row that is read now, of each part and environment, and its step; what nobody has told is as in the row before.
+    now: Vec<Vec<f64>>,
+    told: Vec<bool>,
+    step: f64,
+}
+
+/// Ends of the names of streams: poses, which are transforms, and joints, which are messages of their own.
+const POSES: [&str; 3] = ["/link_poses", "/body_poses", "/pose"];
+const JOINTS: [&str; 2] = ["/joint_states", "/targets"];
+
+impl Stream {
+    fn is_called(&self, ends: &[&str]) -> bool {
+        ends.iter().any(|end| self.name.ends_with(end))
+    }
+
+    fn of(stream: &Value) -> Option<Self> {
+        let texts = |values: &Value| -> Vec<String> {
+            values.as_array().into_iter().flatten().filter_map(|text| text.as_str().map(String::from)).collect()
+        };
+        let whole = |number: &Value| usize::try_from(number.as_u64()?).ok();
+        let envs: Vec<usize> = stream["env_ids"].as_array()?.iter().map(whole).collect::<Option<_>>()?;
+        let part = |part: &Value| {
+            let shape: Vec<usize> = part["shape"].as_array()?.iter().map(whole).collect::<Option<_>>()?;
+            let width = shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis))?;
+            Some((part["name"].as_str()?.to_string(), shape, width))
+        };
+        let parts: Vec<_> = stream["arrays"].as_array()?.iter().map(part).collect::<Option<_>>()?;
+        // No more memory is asked for than numbers come: rows are as wide as the messages turn out to be.
+        let (now, rows) = (vec![Vec::new(); parts.len() * envs.len()], vec![Vec::new(); parts.len()]);
+        let told = vec![false; parts.len() * envs.len()];
+        let (name, frames) = (stream["name"].as_str()?.to_string(), texts(&stream["columns"]));
+        Some(Self { name, envs, parts, frames, steps: Vec::new(), rows, now, told, step: 0.0 })
+    }
+
+    /// A part of an environment at a step; `None` where it has another width than is said.
+    fn put(&mut self, part: usize, env: usize, step: f64, numbers: Vec<f64>) -> Option<()> {
+        let row = self.envs.iter().position(|of| *of == env)?;
+        if self.parts.get(part)?.2 != numbers.len() {
+            return None;
+        }
+        let place = part * self.envs.len() + row;
+        if self.told[place] || (step != self.step && self.told.contains(&true)) {
+            self.end_row()?;
+        }
+        self.step = step;
+        self.told[place] = true;
+        self.now[place] = numbers;
+        Some(())
+    }
+
+    /// The row is whole; `None` where an environment has none yet.
+    fn end_row(&mut self) -> Option<()> {
+        if !self.told.contains(&true) {
+            return Some(());
+        }
+        for ((part, (_, _, width)), of_part) in self.parts.iter().enumerate().zip(&mut self.rows) {
+            for row in 0..self.envs.len() {
+                let numbers = &self.now[part * self.envs.len() + row];
+                if numbers.len() != *width {
+                    return None;
+                }
+                of_part.extend_from_slice(numbers);
+            }
+        }
+        self.steps.push(self.step);
+        self.told.fill(false);
+        Some(())
+    }
+}
+
+/// The numbers of a list of a message.
+fn numbers(message: &Message, field: &str) -> Vec<f64> {
+    match message.field(field) {
+        Some(Message::Numbers(numbers)) => numbers.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// Frames and poses of a message of transforms, `[x, y, z, qw, qx, qy, qz]` each.
+fn transforms(message: &Message) -> Vec<(String, [f64; 7])> {
+    let Some(Message::List(all)) = message.field("transforms") else { return Vec::new() };
+    let one = |one: &Message| {
+        let Some(Message::Text(frame)) = one.field("child_frame_id") else { return None };
+        let of = |part: &str, axis: &str| match one.field("transform")?.field(part)?.field(axis) {
+            Some(Message::Number(number)) => Some(*number),
+            _ => None,
+        };
+        let (place, turn) = (|axis| of("translation", axis), |axis| of("rotation", axis));
+        let pose = [place("x")?, place("y")?, place("z")?, turn("w")?, turn("x")?, turn("y")?, turn("z")?];
+        Some((frame.clone(), pose))
+    };
+    all.iter().filter_map(one).collect()
+}
+
+/// The environment of a topic or a name, and the rest: `/env_2/arm/targets`.
+fn of_env(name: &str) -> Option<(usize, &str)> {
+    let (env, rest) = name.trim_start_matches('/').strip_prefix("env_")?.split_once('/')?;
+    Some((env.parse().ok()?, rest))
+}
+
+/// What happened, of the text of a log: kind and step.
+fn happened(text: &str) -> Option<(EventKind, f64)> {
+    let (kind, rest) = text.split_once(" at step ")?;
+    let kinds = [EventKind::Reset, EventKind::Written, EventKind::Diverged, EventKind::Note];
+    let kind = kinds.into_iter().find(|known| known.name() == kind)?;
+    Some((kind, rest.split(',').next()?.parse().ok()?))
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// It is no MCAP file of a recorder, or not whole.
+pub(crate) fn rows(path: &Path) -> Result<Rows> {
+    let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
+    let (mut about, mut start) = (None, None);
+    let mut streams: Vec<Stream> = Vec::new();
+    let mut begun: BTreeMap<usize, u64> = BTreeMap::new();
+    let mut events: [Vec<f64>; 4] = Default::default();
+    let mut dt = 0.0;
+    walk(path, |told| {
+        let (channel, time, data) = match told {
+            Told::Attachment(attachment) => {
+                if attachment.name == START {
+                    start = Some(attachment.data.into_owned());
+                } else if attachment.name == ABOUT {
+                    let json: Option<Value> = serde_json::from_slice(&attachment.data).ok();
+                    let json = json.ok_or_else(|| malformed(format!("{ABOUT} is no JSON")))?;
+                    dt = json["physics_dt"].as_f64().filter(|dt| *dt > 0.0).unwrap_or_default();
+                    streams = json["streams"].as_array().into_iter().flatten().filter_map(Stream::of).collect();
+                    about = Some(json);
+                }
+                return Ok(());
+            }
+            Told::Message { channel, time, data } => (channel, time, data),
+        };
+        // What comes before is said: places of environments, which are no rows.
+        let Some(reads) = channel.reads.as_ref().filter(|_| dt > 0.0) else { return Ok(()) };
+        if channel.topic == "/events" {
+            let message = reads.read(data);
+            let text = |field: &str| match message.as_ref().and_then(|message| message.field(field)) {
+                Some(Message::Text(text)) => text.clone(),
+                _ => String::new(),
+            };
+            let env = text("name").strip_prefix("env_").and_then(|env| env.parse::<f64>().ok());
+            if let (Some(env), Some((kind, step))) = (env, happened(&text("msg"))) {
+                let row = [step, env, f64::from(kind.number()), f64::NAN];
+                events.iter_mut().zip(row).for_each(|(column, number)| column.push(number));
+            }
+            return Ok(());
+        }
+        let Some((env, name)) = of_env(&channel.topic) else { return Ok(()) };
+        let step = |begun: &mut BTreeMap<usize, u64>| {
+            let first = *begun.entry(env).or_insert(time);
+            (time.saturating_sub(first) as f64 / 1e9 / dt).round()
+        };
+        let broken = || malformed(format!("{} is not what {ABOUT} says of it", channel.topic));
+        if name == "tf" {
+            let Some(message) = reads.read(data) else { return Err(broken()) };
+            let poses = transforms(&message);
+            let Some((_, first)) = poses.first().and_then(|(frame, _)| of_env(frame)) else { return Ok(()) };
+            let has_it = |stream: &&mut Stream| {
+                stream.is_called(&POSES)
+                    && stream.parts.len() == 1
+                    && stream.frames.first().is_some_and(|frame| frame == first)
+            };
+            let stream = streams.iter_mut().find(has_it);
+            if let Some(stream) = stream {
+                let step = step(&mut begun);
+                stream.put(0, env, step, poses.iter().flat_map(|(_, pose)| *pose).collect()).ok_or_else(broken)?;
+            }
+            return Ok(());
+        }
+        let is_it = |stream: &&mut Stream| stream.name == name && stream.is_called(&JOINTS) && stream.parts.len() == 3;
+        if let Some(stream) = streams.iter_mut().find(is_it) {
+            let Some(message) = reads.read(data) else { return Err(broken()) };
+            let step = step(&mut begun);
+            for (part, field) in ["position", "velocity", "effort"].into_iter().enumerate() {
+                stream.put(part, env, step, numbers(&message, field)).ok_or_else(broken)?;
+            }
+        } else if let Some((stream, part)) = streams.iter_mut().find_map(|stream| {
+            let part = stream.parts.iter().position(|(array, ..)| array == name)?;
+            stream.name.ends_with("/state").then_some((stream, part))
+        }) {
+            let Some(message) = reads.read(data) else { return Err(broken()) };
+            let step = step(&mut begun);
+            stream.put(part, env, step, numbers(&message, "data")).ok_or_else(broken)?;
+        }
+        Ok(())
+    })?;
+    let missing =
+        |name: &str| malformed(format!("it has no {name}: it was not written by this recorder, or by an older one"));
+    let (about, start) = (about.ok_or_else(|| missing(ABOUT))?, start.ok_or_else(|| missing(START))?);
+    let mut arrays = Arrays::new();
+    for mut stream in streams {
+        stream.end_row().ok_or_else(|| malformed(format!("{} has not every environment", stream.name)))?;
+        let count = stream.steps.len();
+        if count == 0 {
+            continue;
+        }
+        for ((name, shape, _), numbers) in stream.parts.into_iter().zip(stream.rows) {
+            arrays.insert(name, ([&[count, stream.envs.len()][..], &shape].concat(), numbers));
+        }
+        arrays.insert(format!("{}/step", stream.name), (vec![count], stream.steps));
+    }
+    for (name, numbers) in ["step", "env", "kind", "time"].into_iter().zip(events) {
+        arrays.insert(format!("events/{name}"), (vec![numbers.len()], numbers));
+    }
+    Ok(Rows { about, start, arrays })
+}

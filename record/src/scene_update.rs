@@ -1,0 +1,252 @@
+//! What environments look like, for viewers that draw a file: shapes in the frames whose poses are recorded.
+
+use crate::error::Result;
+use crate::stream::{Kind, Stream};
+use scene::mesh::TriMesh;
+use scene::shape::RenderMesh;
+use scene::{Instance, Pose, RenderScene, Shape, Texture};
+use sensors::camera::RasterCfg;
+use sim::{EnvId, Look, SimulationManager};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What the messages of a file may take together, before they are packed \[bytes\].
+const MOST: u64 = 64 << 20;
+/// Edges around what is round and is drawn by triangles.
+const SEGMENTS: usize = 32;
+/// What a message says of an entity beside its shape, about \[bytes\].
+const ENTITY: u64 = 256;
+
+/// What an environment looks like from now on.
+#[derive(Debug)]
+pub(crate) struct SceneUpdate {
+    pub(crate) env: usize,
+    /// When, on the clock of the recording \[s\].
+    pub(crate) at: f64,
+    pub(crate) entities: Vec<Entity>,
+    /// What they look like.
+    pub(crate) drawn: Looks,
+}
+
+/// What is drawn of each instance of a scene; nothing where it is not.
+pub(crate) type Looks = Arc<Vec<Option<Drawn>>>;
+
+/// A thing in a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Entity {
+    /// Its number among all that is drawn.
+    pub(crate) instance: usize,
+    /// Whose it is.
+    pub(crate) name: Arc<str>,
+    /// What the mask channel of cameras says of it.
+    pub(crate) mask_id: i32,
+    /// Its frame, without the environment; `None` for that of the environment itself.
+    pub(crate) frame: Option<String>,
+    /// Where it is in its frame.
+    pub(crate) pose: Pose,
+}
+
+/// The look of a thing.
+#[derive(Debug)]
+pub(crate) struct Drawn {
+    pub(crate) form: Form,
+    /// In 0..=1, with the mean of its texture, if it has one.
+    pub(crate) rgba: [f64; 4],
+}
+
+/// The surface of a thing, in its own frame.
+#[derive(Debug)]
+pub(crate) enum Form {
+    /// Sides \[m\].
+    Cube([f64; 3]),
+    /// Diameters \[m\]: of a ball, or one that is stretched along its axes.
+    Ball([f64; 3]),
+    /// Diameters and length along z \[m\].
+    Cylinder([f64; 3]),
+    /// Triangles that are shared, and the colour of each vertex, where a texture says so.
+    Mesh(Arc<RenderMesh>, Vec<[f64; 4]>),
+    /// Triangles.
+    Triangles(TriMesh),
+}
+
+impl Form {
+    /// Vertices and triangles; none for what has a word of its own.
+    pub(crate) fn triangles(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
+        match self {
+            Self::Mesh(mesh, _) => (mesh.positions(), mesh.triangles()),
+            Self::Triangles(mesh) => (&mesh.positions, &mesh.triangles),
+            Self::Cube(_) | Self::Ball(_) | Self::Cylinder(_) => (&[], &[]),
+        }
+    }
+
+    /// What a message says of it, about \[bytes\].
+    fn bytes(&self) -> u64 {
+        let (vertices, triangles) = self.triangles();
+        let colors = if let Self::Mesh(_, colors) = self { colors.len() } else { 0 };
+        (24 * vertices.len() + 12 * triangles.len() + 32 * colors) as u64
+    }
+}
+
+impl Drawn {
+    fn of(instance: &Instance) -> Self {
+        let rgba = instance.material.rgba.map(f64::from);
+        let texture = instance.material.texture.as_deref();
+        let mean = texture.map_or([1.0; 3], mean_of);
+        let form = match &instance.shape {
+            Shape::Box(shape) => Form::Cube(shape.half.map(|half| 2.0 * f64::from(half))),
+            Shape::Sphere(shape) => Form::Ball([2.0 * f64::from(shape.radius); 3]),
+            Shape::Ellipsoid(shape) => Form::Ball(shape.radii.map(|radius| 2.0 * f64::from(radius))),
+            Shape::Cylinder(shape) => {
+                let [across, along] = [shape.radius, shape.half_length].map(|half| 2.0 * f64::from(half));
+                Form::Cylinder([across, across, along])
+            }
+            Shape::Mesh(shape) => {
+                let of_vertices = texture.zip(shape.mesh.uvs());
+                let colors = of_vertices.map_or_else(Vec::new, |(texture, uvs)| {
+                    let color = |uv: &[f32; 2]| {
+                        let [r, g, b] = color_at(texture, *uv);
+                        [r * rgba[0], g * rgba[1], b * rgba[2], rgba[3]]
+                    };
+                    uvs.iter().map(color).collect()
+                });
+                Form::Mesh(Arc::clone(&shape.mesh), colors)
+            }
+            other => Form::Triangles(other.tessellate(SEGMENTS)),
+        };
+        Self { form, rgba: [rgba[0] * mean[0], rgba[1] * mean[1], rgba[2] * mean[2], rgba[3]] }
+    }
+}
+
+/// The mean of a texture: of its smallest version.
+fn mean_of(texture: &Texture) -> [f64; 3] {
+    let Some(last) = texture.levels().last() else { return [1.0; 3] };
+    // Rows have one pixel more than the width.
+    let row = 4 * (last.width() as usize + 1);
+    let pixels = last.bytes().chunks_exact(row).take(last.height() as usize);
+    let pixels: Vec<&[u8]> = pixels.flat_map(|row| row[..row.len() - 4].chunks_exact(4)).collect();
+    let count = pixels.len().max(1) as f64;
+    [0, 1, 2].map(|k| pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / (255.0 * count))
+}
+
+/// The colour of a texture at texture coordinates, whose origin is at the lower left; the image repeats.
+fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
+    let Some(level) = texture.levels().first() else { return [1.0; 3] };
+    let place = |x: f32, count: u32| {
+        let part = f64::from(x).rem_euclid(1.0);
+        ((if part.is_finite() { part } else { 0.0 } * f64::from(count)) as usize).min(count as usize - 1)
+    };
+    let (column, row) = (place(u, level.width()), place(1.0 - v, level.height()));
+    let at = 4 * (row * (level.width() as usize + 1) + column);
+    [0, 1, 2].map(|k| level.bytes().get(at + k).map_or(1.0, |byte| f64::from(*byte) / 255.0))
+}
+
+/// What viewers were told of how environments look.
+#[derive(Debug)]
+pub(crate) struct Scenes {
+    /// Frames whose poses are recorded, without the environment.
+    frames: BTreeSet<String>,
+    /// What each recorded environment looked like when it was told last.
+    told: BTreeMap<usize, Option<Arc<RenderScene>>>,
+    /// How much may still be told \[bytes\].
+    left: u64,
+    /// Things that move, and nobody records where.
+    lost: BTreeSet<String>,
+    /// Environments that were not told of, because it would be too much.
+    omitted: BTreeSet<usize>,
+}
+
+impl Scenes {
+    pub(crate) fn new(streams: &[Stream]) -> Self {
+        let of = |stream: &Stream| match &stream.kind {
+            Kind::Poses { frames } => frames.clone(),
+            _ => Vec::new(),
+        };
+        let frames = streams.iter().flat_map(of).collect();
+        let told = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
+        Self { frames, told, left: MOST, lost: BTreeSet::new(), omitted: BTreeSet::new() }
+    }
+
+    /// What those of `envs` look like that are recorded and look otherwise than when they were told of last.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub(crate) fn changed(&mut self, sim: &mut SimulationManager, envs: &[usize], at: f64) -> Result<Vec<SceneUpdate>> {
+        let mut updates = Vec::new();
+        // Most look as another one does.
+        let mut known: Vec<(Arc<RenderScene>, Looks)> = Vec::new();
+        let groups = RasterCfg::of_cameras().groups;
+        for &env in envs {
+            let Some(told) = self.told.get_mut(&env) else { continue };
+            let scene = sim.scene_of(EnvId(env))?;
+            if told.as_ref().is_some_and(|told| Arc::ptr_eq(told, &scene)) {
+                continue;
+            }
+            *told = Some(Arc::clone(&scene));
+            let drawn = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
+                Some((_, drawn)) => Arc::clone(drawn),
+                None => {
+                    let is_drawn = |one: &&Instance| one.visible && groups >> one.group.min(31) & 1 == 1;
+                    let of = |one: &Instance| Some(one).filter(is_drawn).map(Drawn::of);
+                    let drawn: Looks = Arc::new(scene.instances().iter().map(of).collect());
+                    known.push((Arc::clone(&scene), Arc::clone(&drawn)));
+                    drawn
+                }
+            };
+            let entities = self.entities(sim, env, &scene, &drawn)?;
+            let of = |entity: &Entity| drawn[entity.instance].as_ref().map_or(0, |drawn| ENTITY + drawn.form.bytes());
+            let bytes: u64 = entities.iter().map(of).sum();
+            if bytes > self.left {
+                self.omitted.insert(env);
+                continue;
+            }
+            self.left -= bytes;
+            updates.push(SceneUpdate { env, at, entities, drawn });
+        }
+        Ok(updates)
+    }
+
+    /// Everything that is drawn of an environment, in its frame.
+    fn entities(
+        &mut self,
+        sim: &mut SimulationManager,
+        env: usize,
+        scene: &RenderScene,
+        drawn: &[Option<Drawn>],
+    ) -> Result<Vec<Entity>> {
+        let (mut look, bodies) = (Look::default(), sim.body_names());
+        sim.look(EnvId(env), &mut look)?;
+        let mut entities = Vec::new();
+        for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| drawn[*index].is_some()) {
+            let body = instance.body.and_then(|body| bodies.get(body as usize));
+            let frame = body.filter(|body| self.frames.contains(*body)).cloned();
+            let here = instance.body.and_then(|body| look.bodies.get(body as usize));
+            let pose = match (&frame, here, look.instances.get(index)) {
+                (Some(_), ..) => instance.frame_from_instance,
+                (None, Some(here), _) if instance.fixed => here * instance.frame_from_instance,
+                (None, None, Some(pose)) => Pose::from(pose),
+                _ => {
+                    let of = body.map_or(&*instance.name, |body| body.split('/').next().unwrap_or(body));
+                    self.lost.insert(of.into());
+                    continue;
+                }
+            };
+            let (name, mask_id) = (Arc::clone(&instance.name), instance.mask_id);
+            entities.push(Entity { instance: index, name, mask_id, frame, pose });
+        }
+        Ok(entities)
+    }
+
+    /// What viewers were not told of, and why.
+    pub(crate) fn left_out(&self) -> Vec<String> {
+        let list = |names: Vec<String>| names.join(", ");
+        let lost = (!self.lost.is_empty()).then(|| {
+            let names = list(self.lost.iter().cloned().collect());
+            format!("of the scene for viewers: {names} (poses that are not recorded)")
+        });
+        let omitted = (!self.omitted.is_empty()).then(|| {
+            let envs = list(self.omitted.iter().map(usize::to_string).collect());
+            format!("how environments {envs} look, for viewers (more than {} MiB in all)", MOST >> 20)
+        });
+        lost.into_iter().chain(omitted).collect()
+    }
+}

@@ -1,0 +1,113 @@
+//! Pictures of all environments side by side, as a viewer that stands still sees them.
+
+use crate::error::{RecordError, Result};
+use scene::PoseF32;
+use sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
+use sensors::visibility::View;
+use sim::{EnvId, SimulationManager, Still};
+
+/// How the stage is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageCfg {
+    /// Pixels per row, and rows.
+    pub size: [usize; 2],
+    /// Pictures in a second of simulation \[Hz\]; the nearest whole number of physics steps lies between two.
+    pub rate: f64,
+    /// From where \[m\], as environments stand side by side ([`SimulationManager::env_origins`]); `None` for a place from which all
+    /// that moves is in the picture when the recording begins.
+    pub eye: Option<[f64; 3]>,
+    /// What is in the middle of the picture \[m\]; `None` for the middle of all that moves when the recording begins.
+    pub target: Option<[f64; 3]>,
+}
+
+impl Default for StageCfg {
+    fn default() -> Self {
+        Self { size: [960, 540], rate: 30.0, eye: None, target: None }
+    }
+}
+
+impl StageCfg {
+    /// Physics steps of `dt` seconds from one picture to the next.
+    pub(crate) fn every(&self, dt: f64) -> u64 {
+        (1.0 / (self.rate * dt)).round().max(1.0) as u64
+    }
+}
+
+/// Vertical field of view \[rad\].
+const FOVY: f64 = std::f64::consts::FRAC_PI_4;
+/// Nearest and farthest that is seen \[m\].
+const CLIP: [f32; 2] = [0.05, 500.0];
+/// The way it looks where nobody says from where: along azimuth 2.4 rad and 0.45 rad down, as windows first do.
+const WAY: [f64; 2] = [2.4, -0.45];
+/// What is farther from its environment has flown away \[m\].
+const FAR: f64 = 20.0;
+
+/// Draws the stage.
+#[derive(Debug)]
+pub(crate) struct Painter {
+    view: View,
+    rasterizer: ParallelRasterizer,
+}
+
+impl Painter {
+    /// # Errors
+    /// A number of the configuration is none that can be drawn.
+    pub(crate) fn new(sim: &mut SimulationManager, cfg: &StageCfg) -> Result<Self> {
+        let wrong = |what: String| RecordError::Stage { what };
+        if !(cfg.rate.is_finite() && cfg.rate > 0.0) {
+            return Err(wrong(format!("its rate is {} Hz: it must be above 0", cfg.rate)));
+        }
+        let [width, height] = cfg.size;
+        if !(1..=View::MAX_SIDE).contains(&width) || !(1..=View::MAX_SIDE).contains(&height) {
+            return Err(wrong(format!("{width} x {height} pixels; both sides are 1 to {}", View::MAX_SIDE)));
+        }
+        let (middle, radius) = extent(sim)?;
+        let target = cfg.target.unwrap_or(middle);
+        let ([azimuth, elevation], distance) = (WAY, radius / (0.5 * FOVY).sin());
+        let forward = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
+        let eye = cfg.eye.unwrap_or([0, 1, 2].map(|k| target[k] - distance * forward[k]));
+        let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0])
+            .map_err(|error| wrong(format!("from {eye:?} to {target:?}: {error}")))?;
+        let pixels =
+            Intrinsics::Fovy { radians: FOVY }.to_pixels(width, height).map_err(|error| wrong(error.to_string()))?;
+        let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
+        let [near, far] = CLIP;
+        let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(&pose) };
+        let raster = RasterCfg { samples: 4, ..RasterCfg::of_cameras() };
+        Ok(Self { view, rasterizer: ParallelRasterizer::new(raster, sim.threads()) })
+    }
+
+    /// Draws it as it is now: red, green, blue and opacity, row by row from the top left.
+    ///
+    /// # Errors
+    /// There are more triangles than can be drawn.
+    pub(crate) fn draw(&mut self, sim: &mut SimulationManager, pixels: &mut Vec<u8>) -> Result<()> {
+        let stage = Still::overview(sim, None, &[])?;
+        let (width, height) = (self.view.width, self.view.height);
+        let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::NONE });
+        let mut job = [(stage.shot(&self.view), frame.as_mut())];
+        self.rasterizer.render(&mut job).map_err(|(_, error)| RecordError::Stage { what: error.to_string() })?;
+        pixels.extend(frame.color.unwrap_or_default());
+        Ok(())
+    }
+}
+
+/// The middle of all that moves, with the origins of environments, and the radius of a ball around it \[m\].
+fn extent(sim: &mut SimulationManager) -> Result<([f64; 3], f64)> {
+    let origins = sim.env_origins();
+    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+    let mut look = sim::Look::default();
+    for env in 0..sim.num_envs() {
+        sim.look(EnvId(env), &mut look)?;
+        let is_near = |at: &[f64; 3]| at.iter().all(|x| x.abs() < FAR);
+        let moving = look.masses.iter().map(|(at, _)| *at).filter(is_near);
+        for at in moving.chain([[0.0; 3]]) {
+            for k in 0..3 {
+                let x = at[k] + origins[(env, k)];
+                (low[k], high[k]) = (low[k].min(x), high[k].max(x));
+            }
+        }
+    }
+    let diagonal = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt();
+    Ok(([0, 1, 2].map(|k| 0.5 * (low[k] + high[k])), 0.5 * diagonal + 0.5))
+}

@@ -1,0 +1,112 @@
+//! How long a program would have run alone: what other programs took of the machine meanwhile is not its own.
+
+use std::fs;
+use std::time::{Duration, Instant};
+
+/// A second in the kernel's counts of processor time: `USER_HZ`, which is 100 on every architecture that Linux runs on here.
+const TICKS: f64 = 100.0;
+
+/// Watches a process from its beginning.
+#[derive(Debug)]
+pub(crate) struct OwnTime {
+    begun: Instant,
+    pid: u32,
+    /// Processor time of the machine when it began \[s\], and the number of its cores; `None` where the kernel does not tell.
+    machine: Option<(f64, f64)>,
+    /// Processor time of the process until it was looked at last \[s\].
+    own: f64,
+}
+
+impl OwnTime {
+    pub(crate) fn of(pid: u32) -> Self {
+        let machine = fs::read_to_string("/proc/stat").ok().and_then(|text| machine(&text));
+        Self { begun: Instant::now(), pid, machine, own: 0.0 }
+    }
+
+    /// Looks at the process, while it runs: afterwards nobody knows any more how much it took.
+    pub(crate) fn look(&mut self) {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.pid)).ok();
+        if let Some(own) = stat.and_then(|text| process(&text)) {
+            self.own = self.own.max(own);
+        }
+    }
+
+    /// Its time until now: that of the clock, without what others took of each core on average.
+    pub(crate) fn elapsed(&self) -> Duration {
+        let clock = self.begun.elapsed();
+        let now = fs::read_to_string("/proc/stat").ok().and_then(|text| machine(&text));
+        match (self.machine, now) {
+            (Some((before, cores)), Some((after, _))) => {
+                Duration::from_secs_f64(alone(clock.as_secs_f64(), after - before, self.own, cores))
+            }
+            _ => clock,
+        }
+    }
+}
+
+/// Seconds that a program would have run alone that ran for `clock` seconds, while the machine's cores worked for `busy` seconds, of
+/// which `own` were its own.
+fn alone(clock: f64, busy: f64, own: f64, cores: f64) -> f64 {
+    // It ran no less than its own work on all cores takes.
+    (clock - (busy - own).max(0.0) / cores).max(own / cores)
+}
+
+/// Processor time of all processes \[s\] and the number of cores, of `/proc/stat` as proc(5) describes it.
+fn machine(text: &str) -> Option<(f64, f64)> {
+    let numbers: Vec<f64> =
+        text.lines().next()?.strip_prefix("cpu ")?.split_whitespace().map_while(|x| x.parse().ok()).collect();
+    // User, nice, system; then idle and waiting for disks; interrupts, and what a host took.
+    let busy = |k: &usize| numbers.get(*k).copied().unwrap_or(0.0);
+    let all: f64 = [0, 1, 2, 5, 6, 7].iter().map(busy).sum();
+    let is_core =
+        |line: &&str| line.strip_prefix("cpu").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+    let cores = text.lines().filter(is_core).count();
+    (cores > 0).then_some((all / TICKS, cores as f64))
+}
+
+/// Processor time of a process \[s\], of its `stat`: the name in brackets may hold anything.
+fn process(text: &str) -> Option<f64> {
+    let numbers: Vec<&str> = text.rsplit_once(") ")?.1.split_whitespace().collect();
+    // Fields 14 and 15; the first behind the name is field 3.
+    let ticks = |field: usize| numbers.get(field - 3)?.parse::<f64>().ok();
+    Some((ticks(14)? + ticks(15)?) / TICKS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_others_took_is_not_its_own() {
+        // Alone, on one core of two and on both.
+        assert_eq!([alone(10.0, 10.0, 10.0, 2.0), alone(10.0, 20.0, 20.0, 2.0)], [10.0, 10.0]);
+        // It waited for others as long as it worked.
+        assert_eq!(alone(20.0, 40.0, 20.0, 2.0), 10.0);
+        // Counts are taken at other moments than the clock.
+        assert_eq!(alone(10.0, 19.0, 20.0, 2.0), 10.0);
+    }
+
+    #[test]
+    fn the_kernel_is_understood() {
+        let text = "cpu  100 20 30 9000 500 6 7 8 0 0\ncpu0 1 1 1\ncpu1 1 1 1\nintr 5\n";
+        let (busy, cores) = machine(text).unwrap_or_default();
+        assert!((busy - 1.71).abs() < 1e-9 && cores == 2.0, "{busy} {cores}");
+        assert_eq!(machine("nothing"), None);
+        let stat = "17 (a b) c) S 1 17 17 0 -1 4194304 10 0 0 0 250 50 0 0 20 0 3 0 5";
+        assert_eq!(process(stat), Some(3.0));
+        assert_eq!(process("17 (a) S 1"), None);
+    }
+
+    #[test]
+    fn this_process_works() {
+        let mut watch = OwnTime::of(std::process::id());
+        let begun = Instant::now();
+        let mut sum = 0_u64;
+        while begun.elapsed() < Duration::from_millis(300) {
+            sum = sum.wrapping_add(std::hint::black_box(1));
+        }
+        watch.look();
+        assert!(sum > 0 && watch.elapsed() <= begun.elapsed() + Duration::from_millis(50), "{watch:?}");
+        assert!(!cfg!(target_os = "linux") || watch.own > 0.0, "{watch:?}");
+    }
+}
