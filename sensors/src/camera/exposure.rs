@@ -152,6 +152,6 @@ fn show(crew: &Crew, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, f
     let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
     crew.share(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
         let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
-        develop(rasterizer.level, rasterizer.cfg.tone, pixels, guides, out);
+        develop(rasterizer.level, (plan.exposure, plan.tone), pixels, guides, out);
     });
 }

@@ -107,6 +107,13 @@ impl ParallelRasterizer {
         }
     }
 
+    /// How much light there is: stops, -20 to 20, see [`Rasterizer::stops`].
+    pub fn set_stops(&mut self, stops: f64) {
+        for rasterizer in &mut self.rasterizers {
+            rasterizer.stops = stops;
+        }
+    }
+
     /// How far the paths of the pictures are that are drawn.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress

@@ -124,6 +124,9 @@ pub struct Rasterizer {
     pub aperture: Option<Aperture>,
     /// When light falls on which row.
     pub shutter: Shutter,
+    /// Stops, -20 to 20: light is multiplied by 2 to this power before the tone curve, so that what is brighter than white in
+    /// one picture is told apart in a shorter one.
+    pub stops: f64,
     /// How far the paths of a picture are.
     pub progress: RenderProgress,
     pub(super) assets: RayAssets,
@@ -139,12 +142,14 @@ pub struct Rasterizer {
 /// Draws as the other does, and counts its own progress.
 impl Clone for Rasterizer {
     fn clone(&self) -> Self {
-        let Self { cfg, renderer, aperture, shutter, progress: _, assets, level, plan, brush, film, roll } = self;
+        let Self { cfg, renderer, aperture, shutter, stops, progress: _, assets, level, plan, brush, film, roll } =
+            self;
         Self {
             cfg: *cfg,
             renderer: *renderer,
             aperture: *aperture,
             shutter: *shutter,
+            stops: *stops,
             progress: RenderProgress::default(),
             assets: assets.clone(),
             level: *level,
@@ -174,6 +179,7 @@ impl Rasterizer {
             renderer: Renderer::default(),
             aperture: None,
             shutter: Shutter::default(),
+            stops: 0.0,
             progress: RenderProgress::default(),
             assets: RayAssets::default(),
             level,
@@ -186,8 +192,8 @@ impl Rasterizer {
 
     /// How shots are drawn.
     pub(super) fn style(&self) -> Style<'_> {
-        let Self { cfg, renderer, aperture, shutter, assets, .. } = self;
-        Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, assets }
+        let Self { cfg, renderer, aperture, shutter, stops, assets, .. } = self;
+        Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, stops: *stops, assets }
     }
 
     /// The instruction set in use.
@@ -245,9 +251,9 @@ impl Rasterizer {
             }
             return result;
         }
-        let Self { cfg, renderer, aperture, shutter, assets, level, plan, brush, .. } = self;
+        let Self { cfg, renderer, aperture, shutter, stops, assets, level, plan, brush, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        plan.prepare(Style { cfg: *cfg, renderer: *renderer, aperture, shutter, assets }, shot, frame)?;
+        plan.prepare(Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets }, shot, frame)?;
         for band in plan.shadow_bands() {
             brush.shadow(*level, shot.scene, band);
         }
@@ -263,9 +269,9 @@ impl Rasterizer {
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Self { cfg, renderer, aperture, shutter, assets, level, brush, roll, .. } = self;
+        let Self { cfg, renderer, aperture, shutter, stops, assets, level, brush, roll, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        let style = Style { cfg: *cfg, renderer: *renderer, aperture, shutter, assets };
+        let style = Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets };
         roll.draw((brush, style, *level), shot, when, y, row)
     }
 }

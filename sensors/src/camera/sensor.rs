@@ -256,6 +256,7 @@ impl Camera {
         let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_crew(context.crew.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.set_light(cfg.aperture, cfg.shutter);
+        rasterizer.set_stops(cfg.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));
         let progress = rasterizer.progress().clone();
         rasterizer.share_assets(&context.ray_assets);
         let canvas = Some(Canvas::new(pictures, rows));

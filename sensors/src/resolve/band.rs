@@ -178,16 +178,16 @@ impl Brush {
                 );
             }
         }
-        let curve = plan.tone;
+        let (curve, exposure) = (plan.tone, plan.exposure);
         for (block, row, at) in groups(tile, size) {
             s.vectorize(
                 #[inline(always)]
                 || {
                     let [r, g, b] = &colors[block * 4 + row];
                     // Spelled out: a closure that is called thrice is compiled without the instruction set.
-                    let r = encode(s, curve, load(s, r)).to_int();
-                    let g = encode(s, curve, load(s, g)).to_int() * (1 << 8);
-                    let b = encode(s, curve, load(s, b)).to_int() * (1 << 16);
+                    let r = encode(s, curve, load(s, r) * exposure).to_int();
+                    let g = encode(s, curve, load(s, g) * exposure).to_int() * (1 << 8);
+                    let b = encode(s, curve, load(s, b) * exposure).to_int() * (1 << 16);
                     let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
                     let rgba: [i32; LANES] = rgba.array();
                     for (to, from) in pixels.color.iter_mut().zip(rgba) {

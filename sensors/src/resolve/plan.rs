@@ -44,6 +44,8 @@ pub(crate) struct Plan {
     /// Rays for ambient occlusion.
     occlusion_rays: u16,
     pub(crate) tone: ToneCurve,
+    /// What light is multiplied by before the tone curve.
+    pub(crate) exposure: f32,
     /// The only row of each block that is wanted, if not all.
     pub(crate) only: Option<usize>,
 }
@@ -55,9 +57,13 @@ pub(crate) struct Style<'a> {
     pub(crate) renderer: Renderer,
     pub(crate) aperture: Option<&'a Aperture>,
     pub(crate) shutter: Shutter,
+    pub(crate) stops: f64,
     /// Where trees over meshes are kept.
     pub(crate) assets: &'a RayAssets,
 }
+
+/// The most stops by which pictures are lighter or darker.
+const STOPS: f64 = 20.0;
 
 impl Plan {
     pub(crate) fn bytes(&self) -> usize {
@@ -96,12 +102,15 @@ impl Plan {
     }
 
     fn prepare_part(&mut self, style: Style<'_>, shot: &Shot<'_>, frame: &FrameMut<'_>) -> Result<(), RenderError> {
-        let Style { cfg, renderer, aperture, shutter, assets } = style;
+        let Style { cfg, renderer, aperture, shutter, stops, assets } = style;
         (self.maps, self.only) = (0, None);
         let Shot { scene, poses, view, .. } = *shot;
         view.validate()?;
         if !matches!(cfg.samples, 1 | 4) {
             return Err(RenderError::Samples { samples: cfg.samples });
+        }
+        if !(-STOPS..=STOPS).contains(&stops) {
+            return Err(RenderError::Stops { stops: stops as f32 });
         }
         renderer.validate()?;
         check_occlusion(cfg, renderer)?;
@@ -126,7 +135,7 @@ impl Plan {
         let hybrid = wants_color && renderer == Renderer::Hybrid;
         self.shadow_rays = hybrid && cfg.shadows;
         self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
-        self.tone = cfg.tone;
+        (self.tone, self.exposure) = (cfg.tone, stops.exp2() as f32);
         let casts_rays = self.shadow_rays || self.occlusion_rays > 0;
         if wants_color && !renderer.follows_paths() {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);

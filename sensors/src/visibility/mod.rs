@@ -179,6 +179,12 @@ pub enum RenderError {
         /// Samples per pixel that they are for.
         found_samples: u8,
     },
+    /// An exposure that is none.
+    #[error("an exposure of {stops} stops; it must be -20 to 20")]
+    Stops {
+        /// The number.
+        stops: f32,
+    },
     /// A number of samples that is not offered.
     #[error("{samples} samples per pixel; 1 and 4 are possible")]
     Samples {

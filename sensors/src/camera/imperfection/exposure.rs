@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Longer or shorter exposure than that in which a white surface in full light is 1.
 ///
-/// It acts on the finished picture: what was white on the screen is known to be bright, and not how bright.
+/// The renderers multiply light by it before the tone curve ([`Rasterizer::stops`](crate::camera::Rasterizer::stops)): what is
+/// white on the screen at 0 stops is told apart at less. All other imperfections come after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {
@@ -19,8 +20,6 @@ impl OfLight for Exposure {
         within("stops of the exposure", self.stops, [-20.0, 20.0], "it must be -20 to 20")
     }
 
-    fn spoil(&self, light: &mut [f64; 3], _place: &Place<'_>) {
-        let factor = self.stops.exp2();
-        *light = light.map(|light| factor * light);
-    }
+    /// The light that comes here was multiplied already.
+    fn spoil(&self, _light: &mut [f64; 3], _place: &Place<'_>) {}
 }

@@ -2,7 +2,7 @@
 //!
 //! Those of light work on linear light, where 1 is a white surface in full light: colours are taken back through the tone curve
 //! and sRGB, spoilt, and brought to the screen again. So they see what the bytes still tell, 256 levels, and of what is white
-//! on the screen the least light that is. Those of depth work on the depth along the optical axis, from which distance
+//! on the screen the least light that is. Only the exposure is the renderers' own, before the tone curve. Those of depth work on the depth along the optical axis, from which distance
 //! follows. All other channels stay the truth.
 //!
 //! Motion blur is none of them: light that falls in while the shutter is open is of several instants, which a finished picture

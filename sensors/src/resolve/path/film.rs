@@ -112,11 +112,24 @@ impl Rows<'_> {
 }
 
 /// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
-pub(crate) fn develop(level: Level, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
-    at_level!(level, s => develop_lanes(s, curve, pixels, guides, out));
+/// Light is multiplied by `exposure` before the tone curve.
+pub(crate) fn develop(
+    level: Level,
+    (exposure, curve): (f32, ToneCurve),
+    pixels: &[Pixel],
+    guides: &[Guide],
+    out: &mut [u8],
+) {
+    at_level!(level, s => develop_lanes(s, (exposure, curve), pixels, guides, out));
 }
 
-fn develop_lanes<S: Simd>(s: S, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+fn develop_lanes<S: Simd>(
+    s: S,
+    (exposure, curve): (f32, ToneCurve),
+    pixels: &[Pixel],
+    guides: &[Guide],
+    out: &mut [u8],
+) {
     for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
         for c in 0..3 {
             let mut linear = [0.0f32; LANES];
@@ -127,7 +140,7 @@ fn develop_lanes<S: Simd>(s: S, curve: ToneCurve, pixels: &[Pixel], guides: &[Gu
             // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.
             s.vectorize(
                 #[inline(always)]
-                || bytes = encode(s, curve, load(s, &linear)).to_int().array(),
+                || bytes = encode(s, curve, load(s, &linear) * exposure).to_int().array(),
             );
             for (to, byte) in out.chunks_exact_mut(4).zip(bytes) {
                 (to[c], to[3]) = (byte as u8, 255);
