@@ -187,6 +187,7 @@ fn sensors_have_all_their_fields() {
             ..Default::default()
         },
         intrinsics_right: Some(Intrinsics::Fovy { radians: 0.9 }),
+        lens_right: None,
         channels_right: Some(Channels { mask: true, ..Default::default() }),
         left_to_right_pos: [0.1, 0.0, 0.0],
         left_to_right_rot: nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, 90f64.to_radians()),

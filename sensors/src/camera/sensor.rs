@@ -57,7 +57,7 @@ pub struct Camera {
     /// Index of the body it hangs on.
     parent: Option<usize>,
     pub(super) mounts: Mounts,
-    rays: RaysOfRows,
+    pub(super) rays: RaysOfRows,
     channels: Channels,
     /// Whether the markers of other sensors are drawn into colours.
     draws_markers: bool,

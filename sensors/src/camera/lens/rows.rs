@@ -91,6 +91,11 @@ impl RaysOfRows {
             let rays = self.known.iter().find(|rays| rays.optics().pixels() == pixels);
             self.rows[row] = rays.cloned();
         }
+        self.forget();
+    }
+
+    /// Frees the rays that no row has, and nobody else.
+    pub(crate) fn forget(&mut self) {
         // Nobody else has them: only these lists, twice where they are in use. The first are the configured ones.
         let mut number = 0;
         self.known.retain(|rays| {

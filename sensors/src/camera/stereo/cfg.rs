@@ -6,6 +6,7 @@ use crate::camera::channel::Channels;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Extrinsics, Placement, Poses};
 use crate::camera::intrinsics::Intrinsics;
+use crate::camera::lens::Lens;
 use crate::camera::renderer::Renderer;
 use crate::error::SensorError;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
@@ -42,8 +43,10 @@ pub struct StereoCameraCfg {
     /// The left eye, and everything that both have in common: size, range, rate, renderer... Its extrinsics place
     /// [`origin`](Self::origin).
     pub camera: CameraCfg,
-    /// The right eye's lens; `None` is the left one's.
+    /// Focal lengths and principal point of the right eye; `None` is the left one's.
     pub intrinsics_right: Option<Intrinsics>,
+    /// The right eye's lens, as [`CameraCfg::lens`]; `None` is the left one's.
+    pub lens_right: Option<Lens>,
     /// What the right eye measures; `None` is what the left one does.
     pub channels_right: Option<Channels>,
     /// Where the right eye is in the optical frame of the left one (x right, y down, z forward), whatever the convention of
@@ -62,6 +65,7 @@ impl Default for StereoCameraCfg {
         Self {
             camera: CameraCfg::default(),
             intrinsics_right: None,
+            lens_right: None,
             channels_right: None,
             left_to_right_pos: [0.05, 0.0, 0.0],
             left_to_right_rot: UnitQuaternion::identity(),
@@ -114,6 +118,7 @@ impl StereoCameraCfg {
         };
         let right = CameraCfg {
             intrinsics: self.intrinsics_right.unwrap_or(self.camera.intrinsics),
+            lens: self.lens_right.unwrap_or(self.camera.lens),
             channels: self.channels_right.unwrap_or(self.camera.channels),
             extrinsics: at(left * left_from_right),
             renderer: match self.camera.renderer {

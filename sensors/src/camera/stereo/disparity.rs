@@ -1,6 +1,7 @@
 //! How far apart the eyes of a pair see the same point.
 
 use super::sensor::StereoCamera;
+use crate::camera::calibration::CameraInfo;
 use crate::camera::channel::Depth;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
@@ -31,8 +32,8 @@ impl StereoCamera {
     /// # Errors
     ///
     /// [`CameraError::NotRectified`] where the eyes are not parallel and side by side, or their lenses differ;
-    /// [`CameraError::PinholeOnly`]; [`CameraError::ChannelOff`] where the left eye does not measure depth; what reading the
-    /// depth says.
+    /// [`CameraError::PinholeOnly`] where either has a lens that is no pinhole; [`CameraError::ChannelOff`] where the left eye
+    /// does not measure depth; what reading the depth says.
     pub fn disparity(&self) -> Result<ArrayView3<'_, f32>, SensorError> {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
@@ -62,11 +63,33 @@ impl StereoCamera {
         self.left().channels().depth && self.baseline().is_ok()
     }
 
-    /// Where the right eye is along x \[m\].
+    /// The calibrations of both eyes in environment `env`, left and right, called `name` and `/left` or `/right`. Rectified
+    /// pictures have the principal points and focal lengths of raw ones. P of the right eye is
+    /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b = `left_to_right_pos.x` \[m\]: it brings points of
+    /// the *left* eye's optical frame into the right eye's picture. Source: ROS, message `sensor_msgs/CameraInfo`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Camera::camera_info`](crate::Camera::camera_info), and [`CameraError::NotRectified`] where the eyes are not
+    /// parallel and side by side, or their intrinsics differ in more than cx.
+    pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
+        let left = self.left().camera_info(&format!("{name}/left"), env)?;
+        let mut right = self.right().camera_info(&format!("{name}/right"), env)?;
+        right.projection_matrix[(0, 3)] = -right.projection_matrix[(0, 0)] * self.side_by_side()?;
+        Ok([left, right])
+    }
+
+    /// Where the right eye is along x \[m\], if there is a disparity.
     fn baseline(&self) -> Result<f64, CameraError> {
+        self.left().must_be_pinhole("disparity")?;
+        self.right().must_be_pinhole("disparity")?;
+        self.side_by_side()
+    }
+
+    /// Where the right eye is along x \[m\], if rows of the pictures of both are the same.
+    fn side_by_side(&self) -> Result<f64, CameraError> {
         let t = self.rig.left_from_right.translation.vector;
         let angle = self.rig.left_from_right.rotation.angle();
-        self.left().must_be_pinhole("disparity")?;
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });
         if angle.abs() > ROUNDING {
             return wrong("the angle between the eyes [rad]", angle, "0".into());

@@ -185,10 +185,16 @@ impl StereoCamera {
         &mut self,
         change: impl FnOnce(&mut Camera, &mut Camera) -> Result<(), SensorError>,
     ) -> Result<(), SensorError> {
-        let before = (self.left.mounts.clone(), self.right.mounts.clone());
+        let eyes = [&self.left, &self.right];
+        let before = eyes.map(|eye| (eye.mounts.clone(), eye.rays.clone()));
         let result = change(&mut self.left, &mut self.right);
         if result.is_err() {
-            (self.left.mounts, self.right.mounts) = before;
+            [(self.left.mounts, self.left.rays), (self.right.mounts, self.right.rays)] = before;
+        } else {
+            // What was held for the case of failure is not needed any more.
+            drop(before);
+            self.left.rays.forget();
+            self.right.rays.forget();
         }
         self.outdate();
         result

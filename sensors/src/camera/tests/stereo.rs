@@ -1,10 +1,11 @@
 //! Pairs of eyes, held against cameras that stand alone and against the geometry of pairs.
 
 use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Placement, Renderer,
-    StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
+    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Lens, Placement,
+    Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, state, tip};
+use crate::camera::lens::OpenCvFisheye;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -320,4 +321,92 @@ fn what_has_no_disparity_is_said() {
     assert!(matches!(bad.build(&context), Err(SensorError::Camera(CameraError::Pose { .. }))));
     let bad = StereoCameraCfg { intrinsics_right: lens(0.0, 1.0, 1.0), ..pair() };
     assert!(matches!(bad.build(&context), Err(SensorError::Camera(CameraError::Lens { .. }))));
+}
+
+/// A fisheye lens, which needs rays.
+fn fisheye() -> Lens {
+    OpenCvFisheye { k1: 0.05, ..OpenCvFisheye::default() }.into()
+}
+
+#[test]
+fn eyes_have_lenses_of_their_own() {
+    let context = context(1);
+    let camera = CameraCfg { renderer: Renderer::FastRayTraced, ..cfg() };
+    let plain = StereoCameraCfg { camera: camera.clone(), ..pair() };
+    let cfg = StereoCameraCfg { lens_right: Some(fisheye()), ..plain.clone() };
+    let stereo = of(&cfg, &context);
+    assert_eq!((stereo.left().lens(), stereo.right().lens()), (Lens::default(), fisheye()));
+    let alone = built(&CameraCfg { lens: fisheye(), ..cfg.eyes().unwrap()[1].clone() }, &context);
+    assert_eq!(bits(stereo.right(), 0..1), bits(&alone, 0..1));
+    // The control: another picture than without it; the left eye's is the same.
+    let without = of(&plain, &context);
+    assert_ne!(bits(stereo.right(), 0..1), bits(without.right(), 0..1));
+    assert_eq!(bits(stereo.left(), 0..1), bits(without.left(), 0..1));
+    // Disparity is of two pinholes, whichever eye is none.
+    assert!(without.has_disparity() && !stereo.has_disparity());
+    let swapped = CameraCfg { lens: fisheye(), ..camera };
+    let swapped = StereoCameraCfg { camera: swapped, lens_right: Some(Lens::default()), ..pair() };
+    for stereo in [stereo, of(&swapped, &context)] {
+        let error = stereo.disparity().unwrap_err();
+        assert!(matches!(error, SensorError::Camera(CameraError::PinholeOnly { what: "disparity", .. })), "{error}");
+    }
+}
+
+/// Pictures through lenses are of tables of rays: a change that fails leaves those too.
+#[test]
+fn changes_that_fail_leave_the_rays_of_lenses() {
+    let context = context(2);
+    let camera = CameraCfg { renderer: Renderer::FastRayTraced, lens: fisheye(), ..cfg() };
+    let mut stereo = of(&StereoCameraCfg { camera, ..pair() }, &context);
+    let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
+    // What was set before is what stays, not what was configured.
+    stereo.set_intrinsics(&[lens(44.0)], None, Some(&[1])).unwrap();
+    let before = [bits(stereo.left(), 0..2), bits(stereo.right(), 0..2)];
+    let bytes = stereo.left().lens_bytes();
+    assert!(stereo.set_intrinsics(&[lens(30.0)], Some(&[lens(-1.0)]), None).is_err());
+    stereo.set_local_pose(&stereo.local_pose(CameraConvention::Ros), None, CameraConvention::Ros).unwrap();
+    // Not assert_eq: pictures are long.
+    assert!(
+        [bits(stereo.left(), 0..2), bits(stereo.right(), 0..2)] == before,
+        "another picture after a change that failed"
+    );
+    assert_eq!(stereo.left().lens_bytes(), bytes);
+    // The control: one that does not fail is seen, and tables that nobody needs are freed.
+    stereo.set_intrinsics(&[lens(30.0)], None, Some(&[1])).unwrap();
+    assert_ne!(bits(stereo.left(), 0..2), before[0]);
+    assert_eq!(stereo.left().lens_bytes(), bytes);
+}
+
+/// By the definition of P in ROS's `sensor_msgs/CameraInfo`: (u, v, w) = P (X, Y, Z, 1) of a point in the frame of the left eye,
+/// against where the right eye sees it from where it stands.
+#[test]
+fn calibrations_of_a_pair_project_points_of_the_left_eye() {
+    let context = context(2);
+    let shifted = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
+    let stereo = of(&StereoCameraCfg { intrinsics_right: Some(shifted), ..pair() }, &context);
+    let [left, right] = stereo.camera_info("head", 1).unwrap();
+    assert_eq!((left.name.as_str(), right.name.as_str()), ("head/left", "head/right"));
+    assert_eq!(left.projection_matrix.column(3).amax(), 0.0);
+    assert_eq!(right.projection_matrix[(0, 3)], -40.0 * BASELINE);
+    let eyes = [pose_of(stereo.left(), 1), pose_of(stereo.right(), 1)];
+    let (lefts, rights) = (stereo.left().intrinsic_matrices(), stereo.right().intrinsic_matrices());
+    for point in [Point3::new(0.3, -0.2, 1.5), Point3::new(-0.7, 0.4, 4.0), Point3::new(0.0, 0.0, 0.5)] {
+        for (info, pose, k) in [(&left, eyes[0], &lefts), (&right, eyes[1], &rights)] {
+            let local = pose.inverse() * (eyes[0] * point);
+            let seen = [0, 1].map(|i| k[(1, i, i)] * local[i] / local.z + k[(1, i, 2)]);
+            let p = info.projection_matrix * point.to_homogeneous();
+            // Some ulps of 100 pixels, and of poses.
+            assert!((p.x / p.z - seen[0]).abs() < 1e-10 && (p.y / p.z - seen[1]).abs() < 1e-10, "{p} {seen:?}");
+        }
+        // The control: without the fourth column it is 40 * 0.2 / z pixels off, at least 2.
+        let alone = stereo.right().camera_info("head", 1).unwrap();
+        let apart = (alone.projection_matrix - right.projection_matrix) * point.to_homogeneous() / point.z;
+        assert!(apart.x >= 1.999);
+    }
+    let again = crate::camera::CameraInfo::parse(&right.to_yaml(), "right.yaml").unwrap();
+    assert_eq!(again, right);
+    let tilted = StereoCameraCfg { left_to_right_pos: [0.1, 0.01, 0.0], ..pair() };
+    let error = of(&tilted, &context).camera_info("head", 0).unwrap_err();
+    assert!(matches!(error, SensorError::Camera(CameraError::NotRectified { .. })), "{error}");
+    assert!(stereo.camera_info("head", 2).is_err());
 }
