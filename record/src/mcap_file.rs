@@ -259,7 +259,7 @@ impl McapFile {
                     }
                 }
             }
-            Kind::Lens { camera, height, width, distortion } => {
+            Kind::Lens { camera, height, width, distortion, baseline } => {
                 let (k, pose) = states.split_at(9.min(states.len()));
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), pose);
                 let Some(distortion) = distortion else {
@@ -268,7 +268,8 @@ impl McapFile {
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(camera);
-                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, (*height, *width), k, distortion);
+                let size = (*height, *width);
+                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, size, (k, *baseline), distortion);
             }
             Kind::Imu => {
                 let part = |name| stream.part(states, name);

@@ -170,7 +170,7 @@ impl Source {
                     sources.push(Self::of_eye(sim, uid, eye, channel, envs)?);
                 }
                 let ((height, width), distortion) = (eye.image_shape(any), eye.distortion(any));
-                let kind = Kind::Lens { camera: eye.name(uid), height, width, distortion };
+                let kind = Kind::Lens { camera: eye.name(uid), height, width, distortion, baseline: eye.baseline(any) };
                 let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
                 let name = format!("{}/lens", eye.name(uid));
                 let lens = Self::new(name, kind, Element::F64, parts, envs, What::Lens(uid.into(), eye));

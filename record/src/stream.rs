@@ -114,6 +114,9 @@ pub enum Kind {
         width: usize,
         /// What its lens does to them; `None` for a lens that ROS has no words for.
         distortion: Option<Distortion>,
+        /// How far to the right of the left eye the right one of a pair is, whose rows are the same \[m\]; 0 for all other
+        /// cameras.
+        baseline: f64,
     },
     /// An inertial measurement unit; the quantities are called as its channels.
     Imu,

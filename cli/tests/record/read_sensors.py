@@ -70,11 +70,14 @@ assert (normal.encoding, normal.is_bigendian, normal.step) == ("32FC3", 0, 12 * 
 assert len(normal.data) == normal.step * normal.height and normal.header.frame_id == "env_1/sensors/eye"
 numbers = bytes(normal.data)
 
+infos = [of(f"/env_1/pair/{eye}/camera_info", "sensor_msgs/msg/CameraInfo")[1] for eye in ("left", "right")]
+projections = [[round(x, 9) for x in info.p] for info in infos]
 _, fish = of("/env_1/fish/camera_info", "sensor_msgs/msg/CameraInfo")
 
 tell({
     "fish": [fish.distortion_model, list(fish.d), list(fish.k)],
     "infos": sorted(topic for topic in last if topic.startswith("/env_1") and topic.endswith("camera_info")),
+    "projections": projections,
     "round": "env_1/sensors/round" in frames,
     "points": points,
     "point_time": message.log_time,

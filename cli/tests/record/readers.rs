@@ -192,6 +192,12 @@ fn sensed(path: &Path) -> serde_json::Value {
         .map(|x| f64::from(x as f32))
         .collect();
     let infos = ["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info"));
+    // P of ROS: of the right eye it brings points of the left one, 6 cm beside it, into the picture.
+    let projections = [0.0, 0.06].map(|baseline| {
+        let k = sim.sensor(pair).unwrap().left().intrinsic_matrices();
+        let [fx, cx, fy, cy] = [k[(1, 0, 0)], k[(1, 0, 2)], k[(1, 1, 1)], k[(1, 1, 2)]];
+        [fx, 0.0, cx, 0.0 - fx * baseline, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| (x * 1e9).round() / 1e9)
+    });
     let scanner_pose = [scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat();
     let names: std::collections::BTreeMap<String, String> =
         sim.mask_ids().iter().map(|id| (id.id.to_string(), id.name())).collect();
@@ -219,6 +225,7 @@ fn sensed(path: &Path) -> serde_json::Value {
         "bodies": "cube",
         "fish": ["equidistant", [0.02, -0.003, 0.0005, -0.0001], matrix],
         "infos": infos,
+        "projections": projections,
         "round": true,
     });
     assert!(upward > 0 && upward < 24 * 16, "{upward}");

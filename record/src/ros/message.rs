@@ -82,12 +82,12 @@ pub(crate) fn image(
     to.blob_of(height * bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of its matrix.
+/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of its matrix, `baseline` \[m\] is that of the right eye of a pair.
 pub(crate) fn camera_info(
     to: &mut Cdr,
     stamp: Stamp<'_>,
     (height, width): (usize, usize),
-    k: &[f64],
+    (k, baseline): (&[f64], f64),
     distortion: &Distortion,
 ) {
     header(to, stamp);
@@ -97,9 +97,11 @@ pub(crate) fn camera_info(
     to.list(&distortion.coefficients);
     to.f64s(k);
     to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
-    for row in k.chunks_exact(3) {
+    // Points of the left eye, in the right eye's picture.
+    let fourth = [if baseline == 0.0 { 0.0 } else { -k.first().unwrap_or(&0.0) * baseline }, 0.0, 0.0];
+    for (row, fourth) in k.chunks_exact(3).zip(fourth) {
         to.f64s(row);
-        to.f64(0.0);
+        to.f64(fourth);
     }
     // Neither binned nor a part of a larger picture.
     (0..6).for_each(|_| to.u32(0));

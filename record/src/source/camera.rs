@@ -89,6 +89,13 @@ impl Eye {
         Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
     }
 
+    /// How far it is to the right of the left eye \[m\], for the right one of a pair whose rows are the same; else 0.
+    pub(super) fn baseline(self, sensor: &dyn Any) -> f64 {
+        let pair = sensor.downcast_ref::<StereoCamera>().filter(|_| self == Self::Right);
+        let infos = pair.and_then(|pair| pair.camera_info("", *pair.right().env_ids().first()?).ok());
+        infos.map_or(0.0, |[_, right]| -right.projection_matrix[(0, 3)] / right.projection_matrix[(0, 0)])
+    }
+
     /// Intrinsic matrices and poses, in the axes of ROS, of the pictures that arrived last.
     pub(super) fn lenses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
         if let Some(camera) = self.camera(sensor) {

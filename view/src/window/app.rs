@@ -14,7 +14,7 @@ use sim::EnvId;
 use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What happens to a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +111,8 @@ pub struct App {
     desks: Desks,
     /// Where pictures may have fewer samples to keep pace.
     fineness: Option<Fineness>,
+    /// How long it took to hand the last picture to the display.
+    handing: Duration,
     /// What the last picture showed: which snapshot, from where.
     showed: Option<(u64, View)>,
 }
@@ -160,6 +162,7 @@ impl App {
             flown: Instant::now(),
             desks: Desks::new(threads),
             fineness: None,
+            handing: Duration::ZERO,
             showed: None,
         }
     }
@@ -187,6 +190,11 @@ impl App {
     /// Whether the simulation could be told what the user wants: if not, the picture says so.
     pub fn was_heard(&mut self, heard: bool) {
         self.unheard = !heard;
+    }
+
+    /// How long it took to hand the last picture to the display: that, too, is time in which nothing is drawn.
+    pub fn handed_over(&mut self, took: Duration) {
+        self.handing = took;
     }
 
     /// Looks from somewhere else.
@@ -520,7 +528,8 @@ impl App {
         // Views of windows are good ones; one that is not leaves the last picture.
         let _ = self.painter.draw(&snapshot, &view, &look, canvas);
         if let Some(fineness) = &mut self.fineness {
-            fineness.drew(self.painter.samples(), start.elapsed());
+            // This picture is not handed over yet: that will take as long as the last one took.
+            fineness.drew(self.painter.samples(), start.elapsed() + self.handing);
         }
         let name = self.caption(&snapshot);
         let refused = if self.unheard { Some(TAKES_NONE) } else { snapshot.run.refused.as_deref() };

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 /// Samples per pixel of what rests, and of what moves where those take too long.
 const FINE: u8 = 4;
 const COARSE: u8 = 1;
-/// Drawing takes no longer than this where it can: 30 pictures in a second leave 3 ms to hand each of them over.
-const BUDGET: Duration = Duration::from_millis(30);
+/// Drawing a picture and handing it to the display take no longer than this where they can: 30 in a second.
+const BUDGET: Duration = Duration::from_millis(33);
 /// Slow pictures in a row before fewer samples are taken: one may be slow for another reason.
 const SLOW: u32 = 3;
 /// After so long what moves is tried with all samples again.
@@ -42,7 +42,7 @@ impl Fineness {
         samples
     }
 
-    /// A picture was drawn.
+    /// A picture was drawn, and handed to the display.
     pub(super) fn drew(&mut self, samples: u8, took: Duration) {
         self.last = Some(samples);
         if samples == FINE {

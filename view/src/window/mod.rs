@@ -287,7 +287,9 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
         }
         if outdated || app.moves(Instant::now()) {
             app.draw(&mut canvas, Instant::now());
+            let drawn = Instant::now();
             screen.present(&canvas)?;
+            app.handed_over(drawn.elapsed());
             shared.pictures.fetch_add(1, Ordering::AcqRel);
             outdated = false;
         }

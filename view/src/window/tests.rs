@@ -455,6 +455,33 @@ fn what_is_moved_in_a_pause_is_drawn_coarsely_until_it_rests() {
     assert_eq!([800, 900, 1000].map(|k| coarse_at(17, k)), [true, true, false], "a quarter of a second later it rests");
 }
 
+/// A small picture is drawn at once; a display that takes long to be handed one leaves no time for fine ones.
+#[test]
+fn what_a_slow_display_shows_is_coarse() {
+    let shown = |handing: Duration| {
+        let (_sample, viewer, mut app) = app(1);
+        let mut snapshot = Snapshot::clone(&viewer.newest().unwrap());
+        snapshot.run.paused = true;
+        app.keep_pace();
+        app.handle(Input::Resize([320, 200]));
+        let start = Instant::now();
+        let pictures = (0..8u64).map(|k| {
+            app.show(Arc::new(Snapshot { number: 10 + k, ..snapshot.clone() }));
+            let mut canvas = Canvas::default();
+            app.draw(&mut canvas, start + Duration::from_millis(100 * k));
+            app.handed_over(handing);
+            // Below the status.
+            canvas.bytes()[4 * 50 * 320..].to_vec()
+        });
+        let pictures: Vec<Vec<u8>> = pictures.collect();
+        pictures.iter().map(|picture| *picture != pictures[0]).collect::<Vec<bool>>()
+    };
+    let [f, t] = [false, true];
+    // The first picture does not know yet, and three tell.
+    assert_eq!(shown(Duration::from_millis(500)), [f, f, f, f, t, t, t, t]);
+    assert_eq!(shown(Duration::ZERO), [f; 8], "the control");
+}
+
 #[test]
 fn the_help_is_whole_in_a_narrow_window() {
     let lines = keys::help().len();
