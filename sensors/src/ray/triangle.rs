@@ -2,7 +2,7 @@
 
 use super::Ray;
 use super::packet::{ALL, Packet, WIDTH};
-use super::vector::{V3, cross, sub, to_f64, unit};
+use super::vector::{V3, cross, dot, sub, to_f64, unit};
 use crate::lanes::{D, D3, N, Simd, axes, dot_3};
 
 /// Corners of a triangle \[m\].
@@ -197,12 +197,17 @@ pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
     unit(across(triangle))
 }
 
-/// Whether a triangle has an area, and so a [`normal`].
+/// Whether a triangle has corners of finite numbers and an area, and so a [`normal`].
+#[inline(always)]
 pub(crate) fn has_area(triangle: &Triangle) -> bool {
-    let largest = across(triangle).iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    largest > 0.0 && largest.is_finite()
+    // Squares of products of two single precision numbers, 1e-180 to 1e157, are in the range; what is not finite makes
+    // something that is not.
+    let across = across(triangle);
+    let square = dot(across, across);
+    square > 0.0 && square < f64::INFINITY
 }
 
+#[inline(always)]
 fn across(triangle: &Triangle) -> V3 {
     let [a, b, c] = triangle.map(to_f64);
     cross(sub(b, a), sub(c, a))

@@ -184,8 +184,7 @@ impl FixedWorld {
             one_by_one.append(&mut in_tree);
             return Self { placed, tree: None, one_by_one };
         }
-        let boxes: Vec<_> = in_tree.iter().map(|&k| targets.world_box(&placed[k as usize])).collect();
-        let (bvh, order) = Bvh::build(&boxes);
+        let (bvh, order) = Bvh::build(in_tree.iter().map(|&k| targets.world_box(&placed[k as usize])));
         let order = order.into_iter().map(|i| in_tree[i as usize]).collect();
         Self { placed, tree: Some((bvh, order)), one_by_one }
     }

@@ -160,7 +160,7 @@ impl Bvh {
         }
         let mut deepest = beam.deepest(limits);
         stack.clear();
-        let mut index = 0;
+        let mut index = self.root as usize;
         loop {
             let node = &self.nodes[index];
             let (near, mut met) = beam.meets(node, deepest);

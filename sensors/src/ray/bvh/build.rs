@@ -1,24 +1,26 @@
-//! Builds the tree. Boxes are sorted along a Morton curve; those that lie together on it become groups. Above groups the
-//! surface area heuristic chooses from planes between bins, two children at a time, within them from the places between
-//! neighbours on the curve. Eight such children are a node.
+//! Builds the tree. Boxes are sorted along a Morton curve; those that lie together on it become groups. A group is one node:
+//! of all ways to cut it along the curve into eight leaves at most, the one that the surface area heuristic finds cheapest.
+//! Above groups the heuristic chooses from planes between bins along the longest side, two children at a time; eight such
+//! children are a node.
 //!
 //! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH construction
 //! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
+use crate::ray::vector::to_f64;
 
-/// Bins along an axis, of some groups and of many: with few, clearing and summing up bins takes longer than filling them.
+mod leaves;
+
+/// Bins, of some groups and of many: with few, clearing and summing up bins takes longer than filling them.
 const SOME_BINS: usize = 8;
 const MANY_BINS: usize = 16;
 const MANY: usize = 32;
-/// No more groups than these are cut between neighbours, as things are.
+/// No more groups than these are cut between neighbours on the curve.
 const FEW: usize = 8;
 /// Things of a group, at most.
-const GROUP: usize = 16;
-/// Things of a leaf, at most.
-const LEAF: usize = 4;
-/// What passing a node costs, in tests of one thing. A wide node is shared by several binary ones.
-const NODE_COST: f32 = 0.6;
+const GROUP: usize = 24;
+/// Groups of no more than these are leaves of the node above.
+const SINGLE_LEAF: usize = 3;
 /// Deeper than this, halves of equal number: things that are spread over many orders of magnitude.
 const MAX_DEPTH: u32 = 48;
 /// Bits of a coordinate on the curve.
@@ -110,27 +112,26 @@ impl<const N: usize> Cells<N> {
     }
 }
 
-/// Some things that belong together.
+/// Groups that belong together: a range of those.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     bounds: Bounds,
     start: u32,
     end: u32,
     depth: u32,
-    kind: Kind,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    /// Groups: a range of those.
-    Groups,
-    /// Things: a range of the order.
-    Things,
-    /// Things that stay together.
-    Leaf,
 }
 
 impl Part {
+    fn len(&self) -> usize {
+        (self.end - self.start) as usize
+    }
+
+    /// What opening it is worth: less than any area where there is nothing to open.
+    #[inline(always)]
+    fn worth(&self) -> f32 {
+        if self.len() > 1 { self.bounds.area() } else { -1.0 }
+    }
+
     /// Its first `count` and the rest.
     #[inline(always)]
     fn cut(&self, count: usize, [near, far]: [Bounds; 2]) -> [Self; 2] {
@@ -140,11 +141,9 @@ impl Part {
 }
 
 struct Builder {
-    /// Along the curve.
-    things: Vec<Item>,
     groups: Vec<Item>,
-    /// Where each group's things begin; and the end.
-    starts: Vec<u32>,
+    /// What each group is in a node above it: a node, or the first thing of a leaf and how many things those are.
+    children: Vec<(u32, u32)>,
     /// What a cut moves.
     aside: Vec<Item>,
     nodes: Vec<Node>,
@@ -153,44 +152,45 @@ struct Builder {
 
 impl Bvh {
     /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
-    pub(crate) fn build(boxes: &[Aabb]) -> (Self, Vec<u32>) {
-        if boxes.is_empty() {
-            return (Self { nodes: Vec::new(), bounds: [[0.0; 3]; 2] }, Vec::new());
+    pub(crate) fn build(boxes: impl IntoIterator<Item = Aabb>) -> (Self, Vec<u32>) {
+        let unsorted: Vec<Item> = (0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)).collect();
+        if unsorted.is_empty() {
+            return (Self { nodes: Vec::new(), root: 0, around: [[0.0; 3]; 2], bounds: [[0.0; 3]; 2] }, Vec::new());
         }
-        let unsorted: Vec<Item> = (0..).zip(boxes).map(|(k, [lo, hi])| Item::item(*lo, *hi, k, 1)).collect();
         let bounds = Bounds::around(&unsorted);
-        let mut keys = curve(&unsorted, 0..boxes.len() as u32, &bounds);
-        let mut starts = Vec::with_capacity(boxes.len() / 4 + 2);
+        let mut keys = curve(&unsorted, 0..unsorted.len() as u32, &bounds);
+        let mut starts = Vec::with_capacity(keys.len() / 8 + 2);
         group(&unsorted, &mut keys, 0, FIRST_BIT, &mut starts);
-        starts.push(boxes.len() as u32);
-        let things: Vec<Item> = keys.iter().map(|&key| unsorted[key as u32 as usize]).collect();
-        let groups: Vec<Item> = (0..)
-            .zip(starts.windows(2))
-            .map(|(k, range)| {
-                let around = Bounds::around(&things[range[0] as usize..range[1] as usize]);
-                let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
-                Item::item([a, b, c], [d, e, f], k, range[1] - range[0])
-            })
-            .collect();
-        let [lo, hi] = [bounds.lo, bounds.hi].map(|q| [0, 1, 2].map(|k| f64::from(q[k])));
+        starts.push(keys.len() as u32);
+        let around = [bounds.lo, bounds.hi].map(|q| [q[0], q[1], q[2]]);
+        let [lo, hi] = around.map(to_f64);
         let reach = lo.iter().chain(&hi).fold(0.0f64, |m, x| m.max(x.abs()));
         let pad = reach * PAD;
-        let nodes = Vec::with_capacity(boxes.len() / 4 + 1);
-        let aside = groups.clone();
-        let all = Part { bounds, start: 0, end: groups.len() as u32, depth: 0, kind: Kind::Groups };
-        // Rounding a side takes up to u R off a pad of 16 u R.
+        let count = starts.len() - 1;
         let mut builder = Builder {
-            things,
-            groups,
-            starts,
-            aside,
-            nodes,
+            groups: Vec::with_capacity(count),
+            children: Vec::with_capacity(count),
+            aside: Vec::new(),
+            nodes: Vec::with_capacity(count + count / 4 + 1),
+            // Rounding a side takes up to u R off a pad of 16 u R.
             pad: ((pad * (1.0 + 1.0 / 16.0)) as f32).max(f32::MIN_POSITIVE),
         };
-        builder.add([all; 2], 1);
-        let Builder { things, nodes, .. } = builder;
-        let order = things.iter().map(Item::number).collect();
-        (Self { nodes, bounds: [lo.map(|x| x - pad), hi.map(|x| x + pad)] }, order)
+        let order: Vec<u32> = keys.iter().map(|&key| key as u32).collect();
+        let mut things = Vec::with_capacity(GROUP);
+        for range in starts.windows(2) {
+            let [start, end] = [range[0], range[1]];
+            things.clear();
+            things.extend(order[start as usize..end as usize].iter().map(|&number| unsorted[number as usize]));
+            builder.add_group(&things, start, count == 1);
+        }
+        let root = if count == 1 {
+            0
+        } else {
+            builder.aside = builder.groups.clone();
+            builder.add([Part { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
+        };
+        let bounds = [lo.map(|x| x - pad), hi.map(|x| x + pad)];
+        (Self { nodes: builder.nodes, root, around, bounds }, order)
     }
 }
 
@@ -208,8 +208,8 @@ fn curve(items: &[Item], numbers: impl Iterator<Item = u32>, bounds: &Bounds) ->
         (x | x << 2) & 0x0924_9249
     };
     let key = |number: u32| {
-        let [x, y, z, _] = cells.at(items[number as usize].middle());
-        u64::from(spread(x) | spread(y) << 1 | spread(z) << 2) << 32 | u64::from(number)
+        let [x, y, z, _] = cells.at(items[number as usize].middle()).map(spread);
+        u64::from(x | y << 1 | z << 2) << 32 | u64::from(number)
     };
     let mut keys: Vec<u64> = numbers.map(key).collect();
     // Sorted digit by digit: a part of what comparing them takes.
@@ -238,8 +238,8 @@ fn curve(items: &[Item], numbers: impl Iterator<Item = u32>, bounds: &Bounds) ->
 }
 
 /// Where the groups of sorted keys begin: the largest cells of the curve, in halves by one bit after the other, that hold no
-/// more than a group may. What is more in one smallest cell is sorted along a curve of its own: details that lie close together,
-/// and something else far away.
+/// more than a group may. What is more than the bits that are left can tell apart is sorted along a curve of its own: details
+/// that lie close together, and something else far away.
 fn group(items: &[Item], keys: &mut [u64], first: u32, bit: u32, starts: &mut Vec<u32>) {
     if keys.len() <= GROUP {
         if !keys.is_empty() {
@@ -247,7 +247,10 @@ fn group(items: &[Item], keys: &mut [u64], first: u32, bit: u32, starts: &mut Ve
         }
         return;
     }
-    if bit == LAST_BIT {
+    // Of the eight parts of a cell a surface is in four: three bits tell four things apart.
+    let wanted = 3 * keys.len().ilog2() / 2;
+    let (mut at_one_place, mut next) = (bit < LAST_BIT, bit.saturating_sub(1));
+    if !at_one_place && bit - LAST_BIT < wanted && (bit + 3 <= FIRST_BIT || bit == LAST_BIT) {
         let numbers = || keys.iter().map(|&key| key as u32);
         let within = numbers().fold(NOTHING, |sum, number| {
             let middle = items[number as usize].middle();
@@ -258,194 +261,193 @@ fn group(items: &[Item], keys: &mut [u64], first: u32, bit: u32, starts: &mut Ve
             keys.copy_from_slice(&finer);
             return group(items, keys, first, FIRST_BIT, starts);
         }
+        (at_one_place, next) = (true, 0);
     }
-    // All at one place: halves of equal number.
-    let at = if bit <= LAST_BIT { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
+    // At one place: halves of equal number.
+    let at = if at_one_place { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
     let (low, high) = keys.split_at_mut(at);
-    let next = if bit <= LAST_BIT { 0 } else { bit - 1 };
     group(items, low, first, next, starts);
     group(items, high, first + at as u32, next, starts);
 }
 
 impl Builder {
-    /// Adds the wide node of the first `count` of two parts, and all below; returns its index.
+    /// Adds a group of things, of which the first is at `start`, and its node if it needs one.
+    #[inline(always)]
+    fn add_group(&mut self, things: &[Item], start: u32, alone: bool) {
+        let count = things.len() as u32;
+        let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
+            (Bounds::around(things), (start, count))
+        } else {
+            let index = self.empty_node();
+            let (ends, leaves) = leaves::ends(things);
+            let (mut around, mut first) = (NOTHING, 0);
+            for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
+                let leaf = Bounds::around(&things[first..end]);
+                self.set_child(index, k, &leaf, (start + first as u32, (end - first) as u32));
+                (around, first) = (around.with(&leaf), end);
+            }
+            (around, (index, 0))
+        };
+        let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
+        self.groups.push(Item::item([a, b, c], [d, e, f], self.children.len() as u32, count));
+        self.children.push(child);
+    }
+
+    fn empty_node(&mut self) -> u32 {
+        let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
+        self.nodes.push(Node { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] });
+        self.nodes.len() as u32 - 1
+    }
+
+    #[inline(always)]
+    fn set_child(&mut self, node: u32, k: usize, Bounds { lo, hi }: &Bounds, (child, count): (u32, u32)) {
+        let node = &mut self.nodes[node as usize];
+        for axis in 0..3 {
+            node.sides[axis][k] = lo[axis] - self.pad;
+            node.sides[axis + 3][k] = hi[axis] + self.pad;
+        }
+        (node.child[k], node.count[k]) = (child, count);
+    }
+
+    /// Adds the wide node of the first `count` of two parts, and all above groups that is below; returns its index.
     fn add(&mut self, seed: [Part; 2], mut count: usize) -> u32 {
         let mut parts = [seed[0]; WIDE];
         parts[1] = seed[1];
-        // Less than any where there is nothing to open.
-        let mut areas = [-1.0f32; WIDE];
-        for (area, part) in areas.iter_mut().zip(&parts).take(count) {
-            *area = part.bounds.area();
+        let mut worth = [-1.0f32; WIDE];
+        for (worth, part) in worth.iter_mut().zip(&parts).take(count) {
+            *worth = part.worth();
         }
         // Opens the largest until there are eight.
         while count < WIDE {
-            let (mut largest, mut area) = (0, areas[0]);
-            for (k, &other) in areas.iter().enumerate().skip(1) {
-                (largest, area) = if other > area { (k, other) } else { (largest, area) };
+            let (mut largest, mut most) = (0, worth[0]);
+            for (k, &other) in worth.iter().enumerate().skip(1) {
+                (largest, most) = if other > most { (k, other) } else { (largest, most) };
             }
-            if area < 0.0 {
+            if most < 0.0 {
                 break;
             }
-            match self.open(&mut parts[largest]) {
-                Some([first, second]) => {
-                    (areas[largest], areas[count]) = (first.bounds.area(), second.bounds.area());
-                    (parts[largest], parts[count]) = (first, second);
-                    count += 1;
-                }
-                None => areas[largest] = -1.0,
-            }
+            let [first, second] = self.open(&parts[largest]);
+            (worth[largest], worth[count]) = (first.worth(), second.worth());
+            (parts[largest], parts[count]) = (first, second);
+            count += 1;
         }
-        let index = self.nodes.len();
-        let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
-        let mut node = Node { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] };
-        for (k, Part { bounds: Bounds { lo, hi }, .. }) in parts.iter().enumerate().take(count) {
-            for axis in 0..3 {
-                node.sides[axis][k] = lo[axis] - self.pad;
-                node.sides[axis + 3][k] = hi[axis] + self.pad;
-            }
-        }
-        self.nodes.push(node);
-        for (k, part) in parts.iter_mut().enumerate().take(count) {
-            let small = part.kind == Kind::Things && part.end - part.start <= LEAF as u32
-                || part.kind == Kind::Groups && part.end - part.start == 1;
-            let halves = if part.kind != Kind::Leaf && small { self.open(part) } else { None };
-            let (child, count) = match (part.kind, halves) {
-                (Kind::Leaf, _) => (part.start, part.end - part.start),
-                (_, Some(halves)) => (self.add(halves, 2), 0),
-                (_, None) => (self.add([*part; 2], 1), 0),
+        let index = self.empty_node();
+        for (k, part) in parts.iter().enumerate().take(count) {
+            let child = if part.len() == 1 {
+                self.children[self.groups[part.start as usize].number() as usize]
+            } else {
+                let halves = self.open(part);
+                (self.add(halves, 2), 0)
             };
-            let node = &mut self.nodes[index];
-            (node.child[k], node.count[k]) = (child, count);
+            self.set_child(index, k, &part.bounds, child);
         }
-        index as u32
+        index
     }
 
-    /// The halves of a part; `None` where it is better left alone, and a leaf from now on.
+    /// The halves of a part of several groups.
     #[inline(always)]
-    fn open(&mut self, part: &mut Part) -> Option<[Part; 2]> {
-        if part.kind == Kind::Groups {
-            let groups = &mut self.groups[part.start as usize..part.end as usize];
-            if let [group] = groups {
-                let k = group.number() as usize;
-                (part.start, part.end, part.kind) = (self.starts[k], self.starts[k + 1], Kind::Things);
-            } else {
-                let best = if groups.len() <= FEW {
-                    // Cuts have kept the order along the curve.
-                    let (_, at, near, far) = between::<FEW>(groups);
-                    Some((at, near, far))
-                } else if part.depth >= MAX_DEPTH {
-                    None
-                } else if groups.len() <= MANY {
-                    halve::<SOME_BINS>(groups, &mut self.aside)
-                } else {
-                    halve::<MANY_BINS>(groups, &mut self.aside)
-                };
-                // All at one place.
-                let (at, near, far) = best.unwrap_or_else(|| {
-                    let at = groups.len() / 2;
-                    (at, Bounds::around(&groups[..at]), Bounds::around(&groups[at..]))
-                });
-                return Some(part.cut(at, [near, far]));
-            }
-        }
-        let things = &self.things[part.start as usize..part.end as usize];
-        if things.len() < 2 {
-            part.kind = Kind::Leaf;
-            return None;
-        }
-        let (cost, at, near, far) =
-            if things.len() <= LEAF { between::<LEAF>(things) } else { between::<GROUP>(things) };
-        let area = part.bounds.area();
-        // Sizes beyond the range have costs that are no numbers: those stay together.
-        let pays = cost + NODE_COST * area < things.len() as f32 * area;
-        if things.len() <= LEAF && !pays {
-            part.kind = Kind::Leaf;
-            return None;
-        }
-        Some(part.cut(at, [near, far]))
+    fn open(&mut self, part: &Part) -> [Part; 2] {
+        let groups = &mut self.groups[part.start as usize..part.end as usize];
+        let best = if groups.len() <= FEW {
+            // Cuts have kept the order along the curve.
+            Some(between(groups))
+        } else if part.depth >= MAX_DEPTH {
+            None
+        } else if groups.len() <= MANY {
+            halve::<SOME_BINS>(groups, &mut self.aside)
+        } else {
+            halve::<MANY_BINS>(groups, &mut self.aside)
+        };
+        let (at, sides) = best.unwrap_or_else(|| {
+            // All at one place, or too deep.
+            let at = groups.len() / 2;
+            (at, [Bounds::around(&groups[..at]), Bounds::around(&groups[at..])])
+        });
+        part.cut(at, sides)
     }
 }
 
-/// The best place to cut up to N things or groups along the curve: the cost, how many come before, and the boxes of both sides.
-fn between<const N: usize>(things: &[Item]) -> (f32, usize, Bounds, Bounds) {
-    let n = things.len().min(N);
-    let (mut first, mut rest) = ([NOTHING; N], [NOTHING; N]);
-    let mut costs = [0.0f32; N];
-    let mut sum = NOTHING;
-    let mut after = 0.0;
+/// The best place to cut up to [`FEW`] groups along the curve: how many come before, and the boxes of both sides.
+fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
+    let n = groups.len().min(FEW);
+    let mut rest = [NOTHING; FEW];
+    let mut costs = [0.0f32; FEW];
+    let (mut sum, mut after) = (NOTHING, 0.0);
     for k in (1..n).rev() {
-        sum = sum.with(&things[k]);
+        sum = sum.with(&groups[k]);
         rest[k] = sum;
-        after += things[k].hi[3];
+        after += groups[k].hi[3];
         costs[k] = after * sum.area();
     }
-    let mut sum = NOTHING;
-    let (mut best, mut cost, mut before) = (1, f32::INFINITY, 0.0);
+    let (mut sum, mut before) = (NOTHING, 0.0);
+    let (mut best, mut cost) = ((1, groups[0]), f32::INFINITY);
     for k in 1..n {
-        sum = sum.with(&things[k - 1]);
-        first[k] = sum;
-        before += things[k - 1].hi[3];
-        let sum = before * sum.area() + costs[k];
-        if sum < cost {
-            (best, cost) = (k, sum);
+        sum = sum.with(&groups[k - 1]);
+        before += groups[k - 1].hi[3];
+        let whole = before * sum.area() + costs[k];
+        if whole < cost {
+            (best, cost) = ((k, sum), whole);
         }
     }
-    (cost, best, first[best % N], rest[best % N])
+    let (at, near) = best;
+    (at, [near, rest[at % FEW]])
 }
 
-/// Sorts groups by the best plane between bins: how many come before, and the boxes of both sides; `None` if no plane has
-/// something on both.
-fn halve<const N: usize>(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, Bounds, Bounds)> {
+/// Sorts groups by the best plane between bins along the longest side of the box around their middles: how many come before,
+/// and the boxes of both sides; `None` where all are at one place.
+fn halve<const N: usize>(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
     let middles = groups.iter().fold(NOTHING, |all, group| {
         let middle = group.middle();
         all.with(&Bounds { lo: middle, hi: middle })
     });
     let cells = Cells::<N>::of(&middles);
-    let mut bins = [[(NOTHING, 0.0f32); N]; 3];
+    let [x, y, z, _] = quad(|k| middles.hi[k] - middles.lo[k]);
+    let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
+    let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % N;
+    // The last place holds how many things there are.
+    let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..NOTHING }; N];
     for group in &*groups {
-        let at = cells.at(group.middle());
-        for (bins, at) in bins.iter_mut().zip(at) {
-            let (bounds, count) = &mut bins[at as usize % N];
-            *bounds = bounds.with(group);
-            *count += group.hi[3];
+        let bin = &mut bins[cell(group)];
+        let count = bin.hi[3] + group.hi[3];
+        *bin = bin.with(group);
+        bin.hi[3] = count;
+    }
+    let mut costs = [0.0; N];
+    let mut rest = [NOTHING; N];
+    let (mut sum, mut after) = (NOTHING, 0.0);
+    for k in (1..N).rev() {
+        sum = sum.with(&bins[k]);
+        rest[k] = sum;
+        after += bins[k].hi[3];
+        costs[k] = after;
+    }
+    let mut best: Option<(f32, usize, Bounds)> = None;
+    let (mut sum, mut before) = (NOTHING, 0.0);
+    for k in 0..N - 1 {
+        sum = sum.with(&bins[k]);
+        before += bins[k].hi[3];
+        if before == 0.0 || costs[k + 1] == 0.0 {
+            continue;
+        }
+        let cost = before * sum.area() + costs[k + 1] * rest[k + 1].area();
+        // A cost that is no number comes from sizes beyond the range: any plane will do.
+        if best.is_none_or(|(least, ..)| cost < least) {
+            best = Some((cost, k, sum));
         }
     }
-    let total: f32 = groups.iter().map(|group| group.hi[3]).sum();
-    let mut best: Option<(f32, usize, usize, Bounds, Bounds)> = None;
-    for (axis, bins) in bins.iter().enumerate().filter(|&(axis, _)| cells.scale[axis] > 0.0) {
-        let mut after = [NOTHING; N];
-        let mut sum = NOTHING;
-        for k in (1..N).rev() {
-            sum = sum.with(&bins[k].0);
-            after[k] = sum;
-        }
-        let (mut before, mut count) = (NOTHING, 0.0);
-        for k in 0..N - 1 {
-            before = before.with(&bins[k].0);
-            count += bins[k].1;
-            if count == 0.0 || count == total {
-                continue;
-            }
-            let cost = count * before.area() + (total - count) * after[k + 1].area();
-            // A cost that is no number comes from sizes beyond the range: any plane will do.
-            if best.is_none_or(|(least, ..)| cost < least) {
-                best = Some((cost, axis, k, before, after[k + 1]));
-            }
-        }
-    }
-    let (_, axis, last, before, after) = best?;
+    let (_, last, near_bounds) = best?;
     let (mut near, mut far) = (0, 0);
     let aside = &mut aside[..groups.len()];
     for k in 0..groups.len() {
         let group = groups[k];
-        let first = cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize <= last;
+        let first = cell(&group) <= last;
         // To both places, without a branch: one of them is written over.
         (groups[near], aside[far]) = (group, group);
         near += usize::from(first);
         far += usize::from(!first);
     }
     groups[near..].copy_from_slice(&aside[..far]);
-    Some((near, before, after))
+    Some((near, [near_bounds, rest[last + 1]]))
 }
 
 #[cfg(test)]
@@ -457,7 +459,7 @@ mod tests {
 
     /// Things that a ray down into the unit square tests, on average.
     fn tested(boxes: &[Aabb]) -> f64 {
-        let (tree, order) = Bvh::build(boxes);
+        let (tree, order) = Bvh::build(boxes.iter().copied());
         let mut seen = order.clone();
         seen.sort_unstable();
         assert!(seen.into_iter().eq(0..boxes.len() as u32), "each thing is in one leaf");

@@ -26,7 +26,10 @@ pub(crate) type Aabb = [[f32; 3]; 2];
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh {
     nodes: Vec<Node>,
-    /// The padded box around everything.
+    /// Which node is above all others.
+    root: u32,
+    /// The box around everything, and the same padded.
+    around: Aabb,
     bounds: [V3; 2],
 }
 
@@ -72,6 +75,12 @@ struct ShortRay {
 }
 
 impl Bvh {
+    /// The box around everything; a point where there is nothing.
+    #[inline(always)]
+    pub(crate) fn around(&self) -> &Aabb {
+        &self.around
+    }
+
     /// Visits the leaves that `ray` may meet at distances from 0 to `limit`, the near ones first. `leaf` is given the
     /// things of a leaf, as positions in the order of the build, and the limit; it returns a new limit.
     #[inline(always)]
@@ -85,7 +94,7 @@ impl Bvh {
         let Some(short) = self.enter(ray, limit) else { return };
         let mut short_limit = short.limit(limit);
         stack.clear();
-        let mut entry = Entry { near: 0.0, child: 0, count: 0 };
+        let mut entry = Entry { near: 0.0, child: self.root, count: 0 };
         loop {
             if entry.near <= short_limit {
                 let first = entry.child as usize;

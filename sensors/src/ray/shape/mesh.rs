@@ -30,39 +30,39 @@ pub(crate) struct MeshTree {
     triangles: Vec<Triangle>,
     /// Which triangle of the mesh each of them is.
     numbers: Vec<u32>,
-    bounds: [V3; 2],
     /// Along each axis, made when the first steep rays come; none for some meshes.
     columns: [OnceLock<Option<Columns>>; 3],
 }
 
 impl MeshTree {
     pub(crate) fn new(mesh: &RenderMesh) -> Self {
-        let corners = |t: &[u32; 3]| t.map(|i| mesh.positions()[i as usize]);
-        let whole = |t: &Triangle| t.iter().flatten().all(|x| x.is_finite()) && has_area(t);
-        Self::of_numbered((0..).zip(mesh.triangles().iter().map(corners)).filter(|(_, t)| whole(t)).unzip())
+        let numbers = || 0..mesh.triangles().len() as u32;
+        let corners = |number: u32| mesh.triangles()[number as usize].map(|i| mesh.positions()[i as usize]);
+        let mut triangles = Vec::with_capacity(mesh.triangles().len());
+        triangles.extend(numbers().map(corners).filter(has_area));
+        let mut tree = Self::of_triangles(&triangles);
+        // Mostly there are no others.
+        if triangles.len() < mesh.triangles().len() {
+            let with_area: Vec<u32> = numbers().filter(|&number| has_area(&corners(number))).collect();
+            tree.numbers.iter_mut().for_each(|number| *number = with_area[*number as usize]);
+        }
+        tree
     }
 
     /// Of triangles that have an area.
-    #[cfg(test)]
-    pub(crate) fn of_triangles(triangles: Vec<Triangle>) -> Self {
-        Self::of_numbered((0..).zip(triangles).unzip())
-    }
-
-    fn of_numbered((numbers, triangles): (Vec<u32>, Vec<Triangle>)) -> Self {
-        let bounds = |t: &Triangle| {
-            let of = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|k| pick(pick(t[0][k], t[1][k]), t[2][k]));
-            [of(f32::min), of(f32::max)]
+    pub(crate) fn of_triangles(triangles: &[Triangle]) -> Self {
+        // Plain comparisons: those of the library look for what is no number.
+        let smaller = |a: f32, b: f32| if a < b { a } else { b };
+        let larger = |a: f32, b: f32| if a > b { a } else { b };
+        let around = |[a, b, c]: &Triangle| {
+            [
+                [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
+                [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
+            ]
         };
-        let boxes: Vec<_> = triangles.iter().map(bounds).collect();
-        let (bvh, order) = Bvh::build(&boxes);
-        let triangles: Vec<Triangle> = order.iter().map(|&i| triangles[i as usize]).collect();
-        let numbers = order.iter().map(|&i| numbers[i as usize]).collect();
-        let first = boxes.first().map_or([[0.0; 3]; 2], |b| b.map(to_f64));
-        let bounds = boxes.iter().fold(first, |all, b| {
-            let (lo, hi) = (to_f64(b[0]), to_f64(b[1]));
-            [[0, 1, 2].map(|k| all[0][k].min(lo[k])), [0, 1, 2].map(|k| all[1][k].max(hi[k]))]
-        });
-        Self { bvh, triangles, numbers, bounds, columns: Default::default() }
+        let (bvh, numbers) = Bvh::build(triangles.iter().map(around));
+        let triangles = numbers.iter().map(|&number| triangles[number as usize]).collect();
+        Self { bvh, triangles, numbers, columns: Default::default() }
     }
 }
 
@@ -90,7 +90,7 @@ impl MeshTree {
 
     #[inline(always)]
     pub(crate) fn columns(&self, axes: [usize; 3]) -> Option<&Columns> {
-        self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds, axes)).as_ref()
+        self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds(), axes)).as_ref()
     }
 
     /// The number that a triangle, given by its place in the tree, has in the mesh.
@@ -107,7 +107,7 @@ impl MeshTree {
 
     /// Smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [V3; 2] {
-        self.bounds
+        self.bvh.around().map(to_f64)
     }
 
     /// Whether some triangle is met at a distance from 0 to `limit`.
@@ -251,6 +251,6 @@ impl RayShape for Mesh {
     }
 
     fn bounds(&self) -> Option<[V3; 2]> {
-        Some(self.tree.bounds)
+        Some(self.tree.bounds())
     }
 }

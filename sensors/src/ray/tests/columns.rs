@@ -150,8 +150,8 @@ fn steep_rays_are_rays_one_by_one() {
         for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
             // The same with other axes above.
             let axes = [(last + 1) % 3, (last + 2) % 3, last];
-            let tree = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
-            let tree = Arc::new(MeshTree::of_triangles(tree));
+            let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
+            let tree = Arc::new(MeshTree::of_triangles(&tree));
             let rays: Vec<Ray> = steep(&mut dice, [at; 3])
                 .iter()
                 .map(|ray| Ray { origin: turned(ray.origin, axes), direction: turned(ray.direction, axes) })
@@ -176,7 +176,7 @@ fn rays_between_columns_are_not_lost() {
     let mut dice = Dice(52);
     let flat = sheet(&mut dice, 33, 0.0);
     let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
-    let tree = Arc::new(MeshTree::of_triangles(flat));
+    let tree = Arc::new(MeshTree::of_triangles(&flat));
     let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], ABOVE, [32, 32]).unwrap();
     let rays: Vec<Ray> = (0..12_000)
         .map(|k| {
@@ -202,7 +202,7 @@ fn rays_between_columns_are_not_lost() {
 #[test]
 fn rays_from_very_far_are_left_to_the_tree() {
     let mut dice = Dice(57);
-    let tree = Arc::new(MeshTree::of_triangles(sheet(&mut dice, 25, 0.0)));
+    let tree = Arc::new(MeshTree::of_triangles(&sheet(&mut dice, 25, 0.0)));
     let mut count = |sizes: f64| {
         let mut ray = |_| {
             let direction = unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), -1.0]).unwrap();
@@ -226,7 +226,7 @@ fn rays_from_very_far_are_left_to_the_tree() {
 fn some_meshes_have_no_columns() {
     let mut dice = Dice(53);
     let ground = sheet(&mut dice, 25, 0.0);
-    let columns = |triangles: &[Triangle]| MeshTree::of_triangles(triangles.to_vec()).columns(ABOVE).is_some();
+    let columns = |triangles: &[Triangle]| MeshTree::of_triangles(triangles).columns(ABOVE).is_some();
     assert!(columns(&ground));
     assert!(!columns(&ground[..100]), "few");
     assert!(!columns(&[]), "none");
@@ -244,7 +244,7 @@ fn crowds_are_left_to_the_tree() {
     let mut dice = Dice(54);
     let mut triangles = sheet(&mut dice, 33, 0.0);
     triangles.extend(soup(&mut dice, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
-    let tree = Arc::new(MeshTree::of_triangles(triangles));
+    let tree = Arc::new(MeshTree::of_triangles(&triangles));
     let rays = |x: f64| -> Vec<Ray> {
         let ray = |k: usize| [x + 0.01 * (k % 4) as f64, 0.01 * (k / 4) as f64, 2.0];
         (0..WIDTH).map(|k| Ray { origin: ray(k), direction: [0.0, 0.0, -1.0] }).collect()

@@ -115,7 +115,7 @@ fn triangles_in_packets_are_triangles_one_by_one() {
         ("two sheets", twice, 0.0),
         ("nothing", vec![], 0.0),
     ] {
-        let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(triangles)));
+        let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(&triangles)));
         for max_distance in [f64::INFINITY, 3.0, 0.5] {
             let rays = packets(&mut dice, [at; 3]);
             Compare { rays: &rays, max_distance, what, hits: &mut hits }.run(&mesh);
@@ -129,7 +129,7 @@ fn triangles_in_packets_are_triangles_one_by_one() {
 #[test]
 fn limits_are_the_same_in_packets() {
     let mut dice = Dice(32);
-    let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(sheet(&terrain(17, &mut dice)))));
+    let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(&sheet(&terrain(17, &mut dice)))));
     let (mut hits, mut lost) = (0, 0);
     for rays in packets(&mut dice, [0.0; 3]).chunks(WIDTH) {
         let Some(touch) = mesh.touch(&rays[0], f64::INFINITY, &mut Stack::default()) else { continue };
@@ -176,7 +176,7 @@ fn terrain_in_packets_is_terrain_one_by_one() {
 #[test]
 fn a_scan_walks_together() {
     let mut dice = Dice(34);
-    let tree = MeshTree::of_triangles(sheet(&terrain(65, &mut dice)));
+    let tree = MeshTree::of_triangles(&sheet(&terrain(65, &mut dice)));
     let rays: Vec<Ray> = (0..WIDTH)
         .map(|k| Ray {
             origin: [0.03 + 0.125 * (k % 4) as f64, 0.125 * (k / 4) as f64, 20.0],

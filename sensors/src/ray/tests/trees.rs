@@ -12,7 +12,7 @@ use scene::{RenderMesh, Shape};
 use std::sync::Arc;
 
 fn tree(triangles: &[Triangle]) -> Mesh {
-    Mesh::of_tree(Arc::new(MeshTree::of_triangles(triangles.to_vec())))
+    Mesh::of_tree(Arc::new(MeshTree::of_triangles(triangles)))
 }
 
 fn distance(mesh: &Mesh, ray: &Ray, limit: f64) -> Option<f64> {
@@ -105,7 +105,7 @@ fn the_same_boxes_give_the_same_tree() {
         .iter()
         .map(|t| [[0, 1, 2].map(|k| t[0][k].min(t[1][k])), [0, 1, 2].map(|k| t[0][k].max(t[1][k]))])
         .collect();
-    let (a, b) = (Bvh::build(&boxes), Bvh::build(&boxes));
+    let (a, b) = (Bvh::build(boxes.iter().copied()), Bvh::build(boxes.iter().copied()));
     assert_eq!(format!("{a:?}"), format!("{b:?}"));
     let mut order = a.1;
     order.sort_unstable();
