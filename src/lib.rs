@@ -50,12 +50,12 @@ pub mod prelude {
     pub use sim::{
         ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
         Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, ExclusionCfg,
-        GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LightCfg,
-        LinkId, MaskId, MeshCollision, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase, NameCaseCfg, ObjectId, ObjectShape,
-        Observer, ObserverId, PerJoint, Posture, Properties, Property, Randomization, RandomizationError, Result,
-        RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
-        SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, TerrainCfg, TerrainId, Tip, UrdfCfg,
-        WeldCfg, WeldId, WrenchFrame,
+        GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LampKind,
+        LightCfg, LinkId, MaskId, MeshCollision, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase, NameCaseCfg, ObjectId,
+        ObjectShape, Observer, ObserverId, PerJoint, Posture, Properties, Property, Randomization, RandomizationError,
+        Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
+        SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, SurfaceCfg, TerrainCfg, TerrainId,
+        Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
     };
     #[cfg(feature = "view")]
     pub use view::{

@@ -165,8 +165,8 @@ pub(crate) fn document(
     if let Some(ground) = &cfg.ground {
         scene::add_ground(&mut mjcf, ground.half_size, ground.color);
     }
-    for (i, light) in cfg.lights.iter().enumerate() {
-        scene::add_light(&mut mjcf, &format!("light{i}"), light.direction, light.color);
+    for (index, light) in cfg.lights.iter().enumerate() {
+        scene::add_light(&mut mjcf, index, light);
     }
     let mut diagnostics = Vec::new();
     let mut layouts = Vec::new();
@@ -590,8 +590,11 @@ impl Simulation {
                 replacements.insert(geom, cache.object_parts(object));
             }
         }
-        let visible = Visible::extract(self.batch.model(), &self.identities, &replacements, self.plan.bodies())
-            .with_own_headlight();
+        let model = self.batch.model();
+        let surfaces = contents.surfaces();
+        let visible = Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces)
+            .with_own_headlight()
+            .with_lamps_of(model, &cfg.lights);
         let visible = Arc::new(visible);
         self.visible = Some(Arc::clone(&visible));
         for (env, error) in self.look_anew() {

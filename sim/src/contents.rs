@@ -12,6 +12,7 @@ use crate::objects::robot::RobotData;
 use crate::objects::terrain::Terrain;
 use crate::objects::weld::WeldData;
 use crate::pattern;
+use crate::visible::Surfaces;
 use sensors::EngineSensor;
 use std::sync::Arc;
 
@@ -39,6 +40,24 @@ pub(crate) fn check_usable(uid: &str) -> Result<()> {
 pub(crate) const GROUND_MASK_ID: i32 = 1;
 
 impl Contents {
+    /// What is known of surfaces besides what the model says, by the names that instances have.
+    pub(crate) fn surfaces(&self) -> Surfaces {
+        let links = self.robots.iter().flat_map(|robot| {
+            let name = |link: usize| format!("{}/{}", robot.uid(), robot.description().links[link].name);
+            robot.surfaces().iter().map(move |(link, surface)| (name(*link), *surface))
+        });
+        let bodies = self.parts.iter().flat_map(|part| {
+            let name = |body: usize| match body {
+                0 => part.uid().to_string(),
+                _ => format!("{}/{}", part.uid(), part.names().bodies[body]),
+            };
+            part.surfaces().iter().map(move |(body, surface)| (name(*body), *surface))
+        });
+        let objects = self.objects.iter().map(|object| (object.uid().to_string(), object.cfg().surface));
+        let terrains = self.terrains.iter().map(|terrain| (terrain.uid().to_string(), terrain.cfg().surface));
+        links.chain(bodies).chain(objects).chain(terrains).collect()
+    }
+
     /// Checks that nothing is called `uid` yet.
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));

@@ -78,6 +78,15 @@ pub enum Error {
         #[source]
         error: Box<PatternError>,
     },
+    /// The patterns of surfaces are wrong.
+    #[error("{of}, surfaces: {error}")]
+    Surfaces {
+        /// The robot, the articulation or the MJCF file.
+        of: Named,
+        /// What is wrong.
+        #[source]
+        error: Box<PatternError>,
+    },
     /// Kinematics of a robot cannot be computed.
     #[error("{robot}: {error}")]
     Kinematics {

@@ -1,8 +1,10 @@
 //! Configuration of a simulation: sizes, physics, what every environment has.
 
 use crate::error::{Error, Result};
+use crate::light_cfg::LightCfg;
 use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::shard::Shard;
+use crate::surface_cfg::SurfaceCfg;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -55,28 +57,13 @@ pub struct GroundCfg {
     pub color: [f64; 3],
     /// Whether cameras see squares of half a metre, a little lighter and darker than the colour.
     pub checker: bool,
+    /// What else it looks like.
+    pub surface: SurfaceCfg,
 }
 
 impl Default for GroundCfg {
     fn default() -> Self {
-        Self { half_size: 50.0, color: [0.45, 0.47, 0.5], checker: true }
-    }
-}
-
-/// A directional light.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LightCfg {
-    /// Direction in which it shines.
-    #[serde(with = "scene::file_format::vector")]
-    pub direction: Vector3<f64>,
-    /// Colour, 0..=1.
-    pub color: [f64; 3],
-}
-
-impl Default for LightCfg {
-    fn default() -> Self {
-        Self { direction: Vector3::new(-0.3, 0.4, -1.0), color: [0.8, 0.8, 0.8] }
+        Self { half_size: 50.0, color: [0.45, 0.47, 0.5], checker: true, surface: SurfaceCfg::default() }
     }
 }
 
@@ -180,18 +167,8 @@ impl SimulationManagerCfg {
         {
             return fail("ground.color", &format!("{:?}", ground.color), "each component must be 0 to 1");
         }
-        for light in &self.lights {
-            if !(light.direction.iter().all(|x| x.is_finite()) && light.direction.norm() > 0.0) {
-                return fail(
-                    "lights.direction",
-                    &format!("{:?}", light.direction.as_slice()),
-                    "it must be a finite vector other than zero",
-                );
-            }
-            if !light.color.iter().all(|c| (0.0..=1.0).contains(c)) {
-                return fail("lights.color", &format!("{:?}", light.color), "each component must be 0 to 1");
-            }
-        }
+        self.ground.iter().try_for_each(|ground| ground.surface.validate())?;
+        self.lights.iter().try_for_each(LightCfg::validate)?;
         Ok(())
     }
 

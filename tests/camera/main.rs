@@ -14,3 +14,4 @@ mod renderers;
 mod schedule;
 mod segments;
 mod stereo;
+mod surfaces;

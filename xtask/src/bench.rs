@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::{fs, thread};
 
 const RESULTS: &str = "benches/RESULTS.md";
+/// What is measured against rivals of the cameras.
+const OF_CAMERAS: [&str; 2] = ["camera", "trace"];
 /// Rivals of the cameras. No other versions were tried.
 const CAMERAS: &[Module] = &[
     python::OPENGL,
@@ -49,7 +51,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     if python.is_none() {
         eprintln!("note: rivals in Python are left out");
     }
-    if args.name.as_deref().is_none_or(|name| name == "camera") {
+    if args.name.as_deref().is_none_or(|name| OF_CAMERAS.contains(&name)) {
         setup::try_to_have(Need::OsMesa);
         for module in CAMERAS {
             if python.as_ref().is_some_and(|python| !module.install(python)) {

@@ -120,6 +120,8 @@ pub struct LightValues {
     pub diffuse: [f32; 3],
     /// Colour of highlights.
     pub specular: [f32; 3],
+    /// Radius of the lamp \[m\] (4.x, 0.02 where the file says nothing); 0 where the model does not say.
+    pub radius: f32,
 }
 
 /// The light on every camera.
@@ -344,8 +346,13 @@ impl Model {
         #[cfg(not(mj4))]
         let kind =
             if is_set(array!(self, light_directional)[light]) { LightType::Directional } else { LightType::Spot };
+        #[cfg(mj4)]
+        let radius = array!(self, light_bulbradius)[light];
+        #[cfg(not(mj4))]
+        let radius = 0.0;
         LightValues {
             kind,
+            radius,
             active: is_set(array!(self, light_active)[light]),
             cast_shadow: is_set(array!(self, light_castshadow)[light]),
             attenuation: chunks(array!(self, light_attenuation))[light],

@@ -3,6 +3,7 @@
 //! Only what both MuJoCo lines have in common; [`super::write`](mod@super::write) knows the differences.
 
 use super::part::MjcfPart;
+use crate::light_cfg::LampKind;
 use crate::source::Source;
 use nalgebra::{UnitQuaternion, Vector3};
 use scene::Pose;
@@ -337,7 +338,7 @@ pub struct Site {
     pub pose: Pose,
 }
 
-/// `<light>`, directional.
+/// `<light>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     /// Unique name.
@@ -348,6 +349,14 @@ pub struct Light {
     pub direction: Vector3<f64>,
     /// Diffuse colour.
     pub diffuse: [f64; 3],
+    /// What kind of lamp it is.
+    pub kind: LampKind,
+    /// Constant, linear and quadratic attenuation.
+    pub attenuation: [f64; 3],
+    /// Radius of the lamp \[m\], which MuJoCo 2.2.2 does not know.
+    pub radius: f64,
+    /// Whether it casts shadows.
+    pub cast_shadow: bool,
 }
 
 /// `<equality><joint>`: `follower = offset + multiplier * driver`.

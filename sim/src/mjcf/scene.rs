@@ -5,11 +5,11 @@ use super::document::{
     Surface,
 };
 use super::robot::Purpose;
+use crate::light_cfg::LightCfg;
 use crate::objects::mass_properties::MassProperties;
 use crate::objects::restitution;
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
 use crate::objects::terrain::Terrain;
-use nalgebra::Vector3;
 use scene::Pose;
 
 /// Contact bit of the ground and of objects.
@@ -164,9 +164,22 @@ fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
 /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
 const PROXY: f64 = 1e-3;
 
-/// Adds a light from above.
-pub(crate) fn add_light(mjcf: &mut Mjcf, name: &str, direction: Vector3<f64>, color: [f64; 3]) {
-    // MuJoCo takes a short direction for none.
-    let direction = direction.normalize();
-    mjcf.lights.push(Light { name: name.into(), position: Vector3::new(0.0, 0.0, 4.0), direction, diffuse: color });
+/// Name of a lamp of the simulation.
+pub(crate) fn light_name(index: usize) -> String {
+    format!("light{index}")
+}
+
+/// Adds a lamp.
+pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {
+    mjcf.lights.push(Light {
+        name: light_name(index),
+        position: cfg.position,
+        // MuJoCo takes a short direction for none.
+        direction: cfg.direction.normalize(),
+        diffuse: cfg.color,
+        kind: cfg.kind,
+        attenuation: cfg.attenuation,
+        radius: cfg.radius,
+        cast_shadow: cfg.cast_shadow,
+    });
 }

@@ -7,6 +7,7 @@ use super::document::{
     Shape,
 };
 use super::part::PartLines;
+use crate::light_cfg::LampKind;
 use crate::mj::{CompileError, Target};
 use crate::source::Source;
 use scene::Pose;
@@ -309,15 +310,24 @@ impl Writer {
         }
         self.open(Element::new("worldbody"), None);
         for light in &mjcf.lights {
-            self.leaf(
-                Element::new("light")
-                    .attr("name", &light.name)
-                    .attr("directional", "true")
-                    .numbers("pos", light.position.as_slice())
-                    .numbers("dir", light.direction.as_slice())
-                    .numbers("diffuse", &light.diffuse),
-                None,
-            );
+            let element = Element::new("light").attr("name", &light.name);
+            let element = match (light.kind, self.target) {
+                (LampKind::Directional, _) => element.attr("directional", "true"),
+                (LampKind::Spot { cutoff_deg, exponent }, _) => {
+                    element.attr("directional", "false").attr("cutoff", cutoff_deg).attr("exponent", exponent)
+                }
+                (LampKind::Point, Target::V4) => element.attr("type", "point"),
+                // As OpenGL's: a cone all around.
+                (LampKind::Point, _) => element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0),
+            };
+            let element = element
+                .numbers("pos", light.position.as_slice())
+                .numbers("dir", light.direction.as_slice())
+                .numbers("diffuse", &light.diffuse)
+                .numbers("attenuation", &light.attenuation)
+                .attr("castshadow", light.cast_shadow);
+            let radius = (self.target == Target::V4).then_some(light.radius);
+            self.leaf(element.opt("bulbradius", radius), None);
         }
         self.body_content(&mjcf.bodies[0]);
         enum Visit {

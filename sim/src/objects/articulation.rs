@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::manager::{RobotId, SimulationManager};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
 use crate::objects::robot_file::MjcfFile;
+use crate::surface_cfg::SurfaceCfg;
 use crate::urdf::UrdfCfg;
 use ::scene::Pose;
 use ::scene::mesh::HullCfg;
@@ -42,6 +43,9 @@ pub struct ArticulationCfg {
     /// Rotor inertia \[kg m² or kg\]; where unset, that of `drive`, or else 0 for joints of a URDF and the
     /// MJCF file's own. It leaves joints passive.
     pub armature: Option<PerJoint>,
+    /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
+    #[serde(with = "scene::file_format::pairs")]
+    pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Whether its links collide with each other.
     pub self_collision: bool,
     /// How collision meshes become convex hulls.
@@ -63,6 +67,7 @@ impl Default for ArticulationCfg {
             drive: None,
             friction: None,
             armature: None,
+            surfaces: Vec::new(),
             self_collision: robot.self_collision,
             hull: robot.hull,
             semantic_class: None,
@@ -84,6 +89,7 @@ impl ArticulationCfg {
             init_pose: self.init_pose,
             init_qpos: self.init_qpos,
             drive: DriveCfg { friction, armature, ..drive },
+            surfaces: self.surfaces,
             self_collision: self.self_collision,
             hull: self.hull,
             ..RobotCfg::default()

@@ -8,16 +8,19 @@ use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::mj::{self, CompileError, LoadError, Model, words};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
+use crate::named::Named;
 use crate::objects::robot::check_pose;
 use crate::objects::rows::{Rows, Table, check_distinct, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::source::Source;
+use crate::surface_cfg::SurfaceCfg;
 use ::scene::Pose;
 use ::scene::pose::{from_row, to_row};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use sensors::EngineSensor;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -54,6 +57,10 @@ pub struct MjcfCfg {
     /// Pose of the file's world in the environment.
     #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
+    /// What surfaces of bodies look like besides what the file says, by pattern of their names; `world` is what stands in the
+    /// file's world. No body may be matched twice.
+    #[serde(with = "scene::file_format::pairs")]
+    pub surfaces: Vec<(String, SurfaceCfg)>,
     /// What kind of thing it is, for the table of mask ids; `mjcf` where `None`.
     pub semantic_class: Option<String>,
 }
@@ -61,7 +68,14 @@ pub struct MjcfCfg {
 impl Default for MjcfCfg {
     /// No file yet.
     fn default() -> Self {
-        Self { uid: "mjcf".into(), path: PathBuf::new(), text: None, init_pose: Pose::identity(), semantic_class: None }
+        Self {
+            uid: "mjcf".into(),
+            path: PathBuf::new(),
+            text: None,
+            init_pose: Pose::identity(),
+            surfaces: Vec::new(),
+            semantic_class: None,
+        }
     }
 }
 
@@ -106,9 +120,25 @@ pub struct MjcfData {
     sensors: Vec<EngineSensor>,
     sensor_names: Vec<String>,
     first_mask_id: i32,
+    /// What is known of the surfaces of some bodies besides.
+    surfaces: Vec<(usize, SurfaceCfg)>,
+}
+
+/// What the configuration says of the surfaces of bodies.
+fn surfaces(cfg: &MjcfCfg, names: &PartNames) -> Result<Vec<(usize, SurfaceCfg)>> {
+    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
+    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names.bodies, "body").map_err(|error| {
+        Error::Surfaces { of: Named { what: "part", uid: cfg.uid.clone() }, error: Box::new(error) }
+    })?;
+    Ok(surfaces.into_iter().enumerate().filter_map(|(body, surface)| Some((body, surface?))).collect())
 }
 
 impl MjcfData {
+    /// What is known of the surfaces of some bodies besides.
+    pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
+        &self.surfaces
+    }
+
     /// Reads and compiles the file, part number `index` of the simulation, whose model is `scene` so far.
     pub(crate) fn load(
         cfg: MjcfCfg,
@@ -125,6 +155,7 @@ impl MjcfData {
             error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
+        let surfaces = surfaces(&cfg, &names)?;
         let (stem, source) = (format!("part{index}_"), Source::new(&cfg.path, 1));
         let of = PartOf { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
         let document = PartDocument::new(&of, sensors_left_out(&model, &names), &source);
@@ -148,6 +179,7 @@ impl MjcfData {
             sensors,
             sensor_names,
             first_mask_id,
+            surfaces,
         })
     }
 

@@ -13,6 +13,7 @@ use crate::mjcf::robot::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::robot::check_pose;
 use crate::sensor_list::SensorList;
+use crate::surface_cfg::SurfaceCfg;
 use ::scene::Pose;
 use ndarray::{Array2, AsArray, Ix2};
 use serde::{Deserialize, Serialize};
@@ -81,6 +82,8 @@ pub struct RigidObjectCfg {
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1; of a mesh, where its file gives none.
     pub rgba: [f64; 4],
+    /// What else its surface looks like.
+    pub surface: SurfaceCfg,
     /// What kind of thing it is, for the table of mask ids; `object` where `None`.
     pub semantic_class: Option<String>,
 }
@@ -104,6 +107,7 @@ impl Default for RigidObjectCfg {
             contact_margin: 0.0,
             init_pose: Pose::identity(),
             rgba: [0.6, 0.6, 0.6, 1.0],
+            surface: SurfaceCfg::default(),
             semantic_class: None,
         }
     }
@@ -174,6 +178,7 @@ impl RigidObjectData {
         if !cfg.rgba.iter().all(|c| (0.0..=1.0).contains(c)) {
             return fail("rgba", &cfg.rgba, "each component must be 0 to 1");
         }
+        cfg.surface.validate()?;
         check_pose("init_pose", &cfg.init_pose)?;
         let mesh = ObjectMesh::of(&cfg, diagnostics)?;
         let mass_properties = MassProperties::of(&cfg, mesh.as_ref());

@@ -20,6 +20,7 @@ use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation_cfg::SimulationManagerCfg;
+use crate::surface_cfg::SurfaceCfg;
 use crate::urdf::assemble;
 use ::scene::Pose;
 use ::scene::mesh::{HullCache, HullCfg, TriMesh};
@@ -46,6 +47,8 @@ pub struct RobotData {
     file: Option<RobotFile>,
     first_mask_id: i32,
     role: Role,
+    /// What is known of the surfaces of some links besides.
+    surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
 /// What it was added as.
@@ -89,6 +92,7 @@ impl RobotData {
         }
         let (file, mut description, mut found) = described(&cfg, &role.named(&cfg.uid), index, Some(scene))?;
         load_up(&mut description, &cfg)?;
+        let surfaces = surfaces(&description, &cfg, &role)?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
         for (part, patterns) in &cfg.control_parts {
@@ -113,7 +117,7 @@ impl RobotData {
         }
         let hulls = collision_hulls(&description, &cfg.hull)?;
         diagnostics.append(&mut found);
-        Ok(Self { cfg, description, plans, joint_names, parts, hulls, file, first_mask_id, role })
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls, file, first_mask_id, role, surfaces })
     }
 
     /// Name of the robot.
@@ -124,6 +128,11 @@ impl RobotData {
     /// The configuration it was added with.
     pub fn cfg(&self) -> &RobotCfg {
         &self.cfg
+    }
+
+    /// What is known of the surfaces of some links besides.
+    pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
+        &self.surfaces
     }
 
     /// What kind of thing it is, for the table of mask ids.
@@ -253,6 +262,15 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// What the configuration says of the surfaces of links.
+fn surfaces(description: &RobotDescription, cfg: &RobotCfg, role: &Role) -> Result<Vec<(usize, SurfaceCfg)>> {
+    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
+    let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names, "link")
+        .map_err(|error| Error::Surfaces { of: role.named(&cfg.uid), error: Box::new(error) })?;
+    Ok(surfaces.into_iter().enumerate().filter_map(|(link, surface)| Some((link, surface?))).collect())
 }
 
 /// There is no such name; the nearest of those there are.

@@ -2,6 +2,7 @@
 
 use super::robot_file::MjcfFile;
 use crate::drive::DriveCfg;
+use crate::surface_cfg::SurfaceCfg;
 use crate::urdf::UrdfCfg;
 use ::scene::Pose;
 use ::scene::mesh::HullCfg;
@@ -87,6 +88,9 @@ pub struct RobotCfg {
     /// the density of water in the origin of a link without mass.
     #[serde(with = "scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
+    /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
+    #[serde(with = "scene::file_format::pairs")]
+    pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Share of the range of each joint that is left between its soft limits, 0 to 1: see
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).
     pub soft_limit_factor: f64,
@@ -108,6 +112,7 @@ impl Default for RobotCfg {
             init_pose: Pose::identity(),
             init_qpos: Vec::new(),
             payload: Vec::new(),
+            surfaces: Vec::new(),
             soft_limit_factor: 1.0,
             self_collision: false,
             hull: HullCfg::default(),

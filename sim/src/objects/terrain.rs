@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::objects::robot::check_pose;
 use crate::objects::terrain_file::{TerrainFile, rows};
+use crate::surface_cfg::SurfaceCfg;
 use ::scene::Pose;
 use ::scene::terrain::{MAX_POINTS, TerrainGenerator};
 use ndarray::Array2;
@@ -50,6 +51,8 @@ pub struct TerrainCfg {
     pub friction: Option<[f64; 3]>,
     /// Colour and opacity, 0..=1.
     pub rgba: [f64; 4],
+    /// What else its surface looks like.
+    pub surface: SurfaceCfg,
 }
 
 impl Default for TerrainCfg {
@@ -63,6 +66,7 @@ impl Default for TerrainCfg {
             init_pose: Pose::identity(),
             friction: None,
             rgba: [0.52, 0.47, 0.4, 1.0],
+            surface: SurfaceCfg::default(),
         }
     }
 }
@@ -94,6 +98,7 @@ impl Terrain {
         let fail = |field, value: &dyn std::fmt::Debug, expected| {
             Err(Error::Config { field, value: format!("{value:?}"), expected })
         };
+        cfg.surface.validate()?;
         let (rows, columns) = cfg.heights.dim();
         if rows < 2 || columns < 2 {
             return fail("heights", &[rows, columns], "there must be at least 2 rows and 2 columns");

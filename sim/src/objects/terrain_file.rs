@@ -1,6 +1,7 @@
 //! How a terrain stands in configuration files: with rows of heights, or with a generator of them.
 
 use super::terrain::TerrainCfg;
+use crate::surface_cfg::SurfaceCfg;
 use ::scene::Pose;
 use ::scene::terrain::TerrainGenerator;
 use ndarray::Array2;
@@ -21,6 +22,7 @@ pub(super) struct TerrainFile {
     init_pose: Pose,
     friction: Option<[f64; 3]>,
     rgba: [f64; 4],
+    surface: SurfaceCfg,
 }
 
 /// Heights, or what makes them.
@@ -31,8 +33,8 @@ enum Heights {
 
 impl Default for TerrainFile {
     fn default() -> Self {
-        let TerrainCfg { uid, heights, size: _, thickness, init_pose, friction, rgba } = TerrainCfg::default();
-        Self { uid, heights: Heights::Rows(heights), size: None, thickness, init_pose, friction, rgba }
+        let TerrainCfg { uid, heights, size: _, thickness, init_pose, friction, rgba, surface } = TerrainCfg::default();
+        Self { uid, heights: Heights::Rows(heights), size: None, thickness, init_pose, friction, rgba, surface }
     }
 }
 
@@ -40,7 +42,7 @@ impl TryFrom<TerrainFile> for TerrainCfg {
     type Error = String;
 
     fn try_from(file: TerrainFile) -> Result<Self, String> {
-        let TerrainFile { uid, heights, size, thickness, init_pose, friction, rgba } = file;
+        let TerrainFile { uid, heights, size, thickness, init_pose, friction, rgba, surface } = file;
         let (heights, size) = match heights {
             Heights::Rows(heights) => (heights, size.unwrap_or(Self::default().size)),
             Heights::Generated(generator) if size.is_none() => {
@@ -50,7 +52,7 @@ impl TryFrom<TerrainFile> for TerrainCfg {
                 return Err("heights of a generator have its size; leave out the `size` beside `heights`".into());
             }
         };
-        Ok(Self { uid, heights, size, thickness, init_pose, friction, rgba })
+        Ok(Self { uid, heights, size, thickness, init_pose, friction, rgba, surface })
     }
 }
 

@@ -25,7 +25,8 @@ pub(super) fn light(model: &Model, scene: &mut RenderScene) {
                 diffuse: linear(light.diffuse),
                 specular: linear(light.specular),
                 attenuation: light.attenuation,
-                radius: 0.0,
+                // That of a directional lamp is an angle here, a length there.
+                radius: if kind == LightKind::Directional { 0.0 } else { light.radius.max(0.0) },
                 cast_shadow: light.cast_shadow,
                 // An image around everything is no lamp.
                 active: light.active && light.kind != LightType::Image,

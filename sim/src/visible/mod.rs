@@ -20,12 +20,19 @@ pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
-use crate::mj::{Data, Model};
+use crate::light_cfg::LightCfg;
+use crate::mj::{Data, Model, ObjectKind};
+use crate::mjcf::scene::light_name;
 use crate::simulation_cfg::GroundCfg;
+use crate::surface_cfg::SurfaceCfg;
 use scene::pose::from_row;
 use scene::shape::Plane;
 use scene::{Headlight, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// What surfaces look like, by the name of what they are of: that of an instance.
+pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;
 
 /// What can be seen of a model.
 #[derive(Clone, Debug)]
@@ -65,27 +72,29 @@ pub(crate) fn ground(cfg: &GroundCfg) -> Part {
     let half = cfg.half_size as f32;
     let shape = Plane { half: [half, half] }.into();
     if !cfg.checker {
-        return Part { shape, material };
+        return Part { shape, material: cfg.surface.over(material) };
     }
     let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
     // Two by two squares of half a metre repeat once per metre. The texture brings the colour.
     let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
-    Part { shape, material: Material { rgba: [1.0; 4], texture, tex_uniform: true, ..material } }
+    let material = Material { rgba: [1.0; 4], texture, tex_uniform: true, ..material };
+    Part { shape, material: cfg.surface.over(material) }
 }
 
 impl Visible {
     /// What can be seen of `model`, as it is: each body one mask id, each geom of the world its own.
     pub fn of_model(model: &Model) -> Self {
-        Self::extract(model, &identity::by_body(model), &Replacements::new(), &[])
+        Self::extract(model, &identity::by_body(model), &Replacements::new(), &[], &Surfaces::new())
     }
 
     /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are MuJoCo's body of
-    /// everything on the body axis of sensors, and the frame of the link in it.
+    /// everything on the body axis of sensors, and the frame of the link in it; `painted` is what is known of surfaces besides.
     pub(crate) fn extract(
         model: &Model,
         identities: &Identities,
         replacements: &Replacements,
         frames: &[(usize, Pose)],
+        painted: &Surfaces,
     ) -> Self {
         let surfaces = surface::Surfaces::of(model);
         let mut shapes = geom::Shapes::of(model);
@@ -103,6 +112,8 @@ impl Visible {
                 let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
                 let visible = material.rgba[3] > 0.0;
                 let GeomIdentity { mask_id, name, body } = identities.of(geom).clone();
+                let material =
+                    painted.get(&*name).map_or_else(|| material.clone(), |surface| surface.over(material.clone()));
                 let fixed = model.is_fixed(model.geom_bodyid()[geom] as usize);
                 let frame_from_instance = frame_from_geom(model, geom, body.and_then(|body| frames.get(body as usize)));
                 let instance =
@@ -134,6 +145,18 @@ impl Visible {
     /// The headlight that goes with our ambient light, instead of the one MuJoCo gives to models that ask for none.
     pub(crate) fn with_own_headlight(mut self) -> Self {
         Arc::make_mut(&mut self.scene).headlight = Headlight::default();
+        self
+    }
+
+    /// With the sizes of lamps, by name, which not every MuJoCo knows.
+    pub(crate) fn with_lamps_of(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
+        let scene = Arc::make_mut(&mut self.scene);
+        for (index, lamp) in lamps.iter().enumerate() {
+            let light = model.id(ObjectKind::Light, &light_name(index)).and_then(|light| scene.lights.get_mut(light));
+            if let Some(light) = light {
+                light.radius = lamp.radius as f32;
+            }
+        }
         self
     }
 

@@ -304,7 +304,8 @@ impl Writing<'_> {
             .attr("exponent", values.exponent)
             .attr("ambient", singles(&values.ambient))
             .attr("diffuse", singles(&values.diffuse))
-            .attr("specular", singles(&values.specular));
+            .attr("specular", singles(&values.specular))
+            .opt("bulbradius", (self.target == Target::V4).then(|| singles(&[values.radius])));
         Ok(Some(element))
     }
 }

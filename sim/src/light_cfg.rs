@@ -1,0 +1,101 @@
+//! Lamps of a simulation.
+
+use crate::error::{Error, Result};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+
+/// What kind of lamp a light is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum LampKind {
+    /// Parallel rays along the direction, as of the sun.
+    #[default]
+    Directional,
+    /// In all directions from the position. The rasterizer draws no shadow of it.
+    Point,
+    /// A cone around the direction.
+    Spot {
+        /// Half angle of the cone \[deg\], above 0 and at most 90.
+        cutoff_deg: f64,
+        /// How fast the light falls off from the axis: cos(angle) to this power, at least 0.
+        exponent: f64,
+    },
+}
+
+/// A lamp. `Default` is white light from above, a little from the side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LightCfg {
+    /// What kind of lamp it is.
+    pub kind: LampKind,
+    /// Where it is in the environment \[m\]; directional lamps are everywhere.
+    #[serde(with = "scene::file_format::vector")]
+    pub position: Vector3<f64>,
+    /// Direction in which it shines.
+    #[serde(with = "scene::file_format::vector")]
+    pub direction: Vector3<f64>,
+    /// Colour, 0..=1.
+    pub color: [f64; 3],
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation: the intensity at distance d is 1 / (c + l d + q d²). Not of
+    /// directional lamps.
+    pub attenuation: [f64; 3],
+    /// How large it is, for soft shadows in ray-traced pictures: the radius of its disc \[m\]; of a directional lamp, at a distance
+    /// of 1 m (the tangent of its angular radius, 0.00465 for the sun). 0 is a point, whose shadows are sharp.
+    pub radius: f64,
+    /// Whether things in its light cast a shadow.
+    pub cast_shadow: bool,
+}
+
+impl Default for LightCfg {
+    fn default() -> Self {
+        Self {
+            kind: LampKind::Directional,
+            position: Vector3::new(0.0, 0.0, 4.0),
+            direction: Vector3::new(-0.3, 0.4, -1.0),
+            color: [0.8, 0.8, 0.8],
+            attenuation: [1.0, 0.0, 0.0],
+            radius: 0.0,
+            cast_shadow: true,
+        }
+    }
+}
+
+impl LightCfg {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first field that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let fail =
+            |field, value: &dyn Debug, expected| Err(Error::Config { field, value: format!("{value:?}"), expected });
+        if let LampKind::Spot { cutoff_deg, exponent } = self.kind {
+            if !(cutoff_deg > 0.0 && cutoff_deg <= 90.0) {
+                return fail("lights.kind.spot.cutoff_deg", &cutoff_deg, "it must be above 0 and at most 90 degrees");
+            }
+            if !(0.0..=1e3).contains(&exponent) {
+                return fail("lights.kind.spot.exponent", &exponent, "it must be 0 to 1000, such as 10");
+            }
+        }
+        if !self.position.iter().all(|x| x.abs() <= 1e6) {
+            let expected = "each coordinate must be within 1e6 metres";
+            return fail("lights.position", &self.position.as_slice(), expected);
+        }
+        if !(self.direction.iter().all(|x| x.is_finite()) && self.direction.norm() > 0.0) {
+            let expected = "it must be a finite vector other than zero";
+            return fail("lights.direction", &self.direction.as_slice(), expected);
+        }
+        if !self.color.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return fail("lights.color", &self.color, "each component must be 0 to 1");
+        }
+        let in_range = self.attenuation.iter().all(|x| (0.0..=1e6).contains(x));
+        if !(in_range && self.attenuation.iter().sum::<f64>() >= 1e-6) {
+            return fail("lights.attenuation", &self.attenuation, "each must be 0 to 1e6, and one of them above 0");
+        }
+        if !(0.0..=1e6).contains(&self.radius) {
+            return fail("lights.radius", &self.radius, "it must be 0 to 1e6");
+        }
+        Ok(())
+    }
+}
