@@ -61,7 +61,7 @@ fn run(args: &Args) -> launcher::Result {
         ..args.launcher.simulation()?
     };
     // A dome of even light, as in the tutorial: most of it is the sky's; the lamp from above casts soft shadows.
-    cfg.lights = vec![LightCfg { direction: [0.1, 0.2, -1.0].into(), color: [0.75; 3] }];
+    cfg.lights = vec![LightCfg { direction: [0.1, 0.2, -1.0].into(), color: [0.75; 3], ..LightCfg::default() }];
     let dt = cfg.physics_dt;
     let mut sim = SimulationManager::new(cfg)?;
     let robot = sim.add_robot(robot_cfg(args)?)?;

@@ -174,6 +174,20 @@ const TABLE: &[Run] = &[
     run_of("stereo", &[2], "--headless --steps 1 --baseline 0 --out {out}/none"),
     run_of("stereo", &[2], "--headless --steps 1 --toe-in-deg 3 --out {out}/none"),
     run_of("stereo", &[2], "--headless --steps 1 --camera-id 1 --out {out}/none"),
+    // The control of the run after it: other renderers draw glass as a white ball.
+    trial_of(
+        "surfaces",
+        &[0],
+        "--headless --width 160 --height 90 --out {out}/surfaces --report {out}/surfaces.json",
+        glass_is_brighter_than_clay,
+    ),
+    trial_of(
+        "surfaces",
+        &[0],
+        "--headless --width 160 --height 90 --renderer rt --rt-samples 16 --out {out}/surfaces_rt --report {out}/surfaces_rt.json",
+        light_goes_through_glass,
+    ),
+    run_of("surfaces", &[2], "--headless --lamp-radius=-1 --out {out}/none"),
     trial_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json", enough_succeeded),
     // Two cubes that are taken from another side than their first, and arrive turned.
     trial_of("grasp", &[0], "--headless --seed 5 --report {out}/grasp_turned.json", enough_succeeded),
@@ -360,6 +374,25 @@ fn disparity_leads_to_the_points(report: &Value) -> Result<(), String> {
         return Err(format!("the right eye's depth is {error} pixels from the disparity"));
     }
     Ok(())
+}
+
+/// The glass ball shows the ground behind it, which is darker than the clay in the lamp's light.
+fn light_goes_through_glass(report: &Value) -> Result<(), String> {
+    let [glass, clay] = glass_and_clay(report)?;
+    if glass < 0.8 * clay { Ok(()) } else { Err(format!("glass has a mean red of {glass}, clay of {clay}")) }
+}
+
+/// White glass that is drawn as a surface is brighter than clay in the same light.
+fn glass_is_brighter_than_clay(report: &Value) -> Result<(), String> {
+    let [glass, clay] = glass_and_clay(report)?;
+    if glass > clay { Ok(()) } else { Err(format!("glass has a mean red of {glass}, clay of {clay}")) }
+}
+
+/// The mean red of both balls.
+fn glass_and_clay(report: &Value) -> Result<[f64; 2], String> {
+    let colors = &report["mean_colors"];
+    let red = |ball: &str| colors[ball][0].as_f64().ok_or_else(|| format!("{ball} is not in {colors}"));
+    Ok([red("glass")?, red("clay")?])
 }
 
 /// How many environments the examples that count have where nobody says how many.
