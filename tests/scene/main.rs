@@ -8,3 +8,4 @@ mod parts;
 mod quadruped;
 mod round_trip;
 mod terrain;
+mod yaml;

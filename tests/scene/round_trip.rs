@@ -99,3 +99,46 @@ fn a_seed_that_toml_has_not_is_an_error() {
     let message = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
     assert!(message.contains("simulation"), "{message}");
 }
+
+/// A value of TOML as lines of YAML, tables and lists below their keys.
+fn yaml(value: &toml::Value, indent: usize, out: &mut String) {
+    use std::fmt::Write as _;
+    let space = " ".repeat(indent);
+    match value {
+        toml::Value::Table(table) if !table.is_empty() => {
+            for (key, value) in table {
+                write!(out, "\n{space}{key:?}:").unwrap();
+                yaml(value, indent + 2, out);
+            }
+        }
+        toml::Value::Array(list) if !list.is_empty() => {
+            for value in list {
+                write!(out, "\n{space}-").unwrap();
+                yaml(value, indent + 2, out);
+            }
+        }
+        toml::Value::Table(_) => out.push_str(" {}"),
+        toml::Value::Array(_) => out.push_str(" []"),
+        toml::Value::Float(x) if x.is_infinite() => out.push_str(" .inf"),
+        toml::Value::Float(x) => write!(out, " {x:?}").unwrap(),
+        toml::Value::Integer(x) => write!(out, " {x}").unwrap(),
+        toml::Value::Boolean(x) => write!(out, " {x}").unwrap(),
+        toml::Value::String(text) => write!(out, " {text:?}").unwrap(),
+        toml::Value::Datetime(_) => panic!("no scene has a date"),
+    }
+}
+
+/// The same scene in YAML's words is the same scene.
+#[test]
+fn scenes_are_read_from_yaml_too() {
+    let types = EntityTypes::default();
+    for cfg in [SceneCfg::default(), declared(), every_kind()] {
+        let text = cfg.to_toml(&types).unwrap();
+        let mut in_yaml = String::new();
+        yaml(&toml::Value::Table(text.parse().unwrap()), 0, &mut in_yaml);
+        let read =
+            SceneCfg::from_yaml(&in_yaml, "elsewhere/scene.yaml", &types).unwrap_or_else(|e| panic!("{e}\n{in_yaml}"));
+        let without_places = |cfg: SceneCfg| format!("{:#?}", SceneCfg { sources: Default::default(), ..cfg });
+        assert_eq!(without_places(read), without_places(again(&cfg)));
+    }
+}

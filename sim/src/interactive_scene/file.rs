@@ -1,8 +1,9 @@
-//! Scenes as TOML files, read strictly: a key that nobody knows is an error that names its line.
+//! Scenes as TOML or YAML files, read strictly: a key that nobody knows is an error that names its line.
 
 use super::entity::EntityCfg;
 use super::types::EntityTypes;
 use super::value::{Value, ValueError};
+use super::yaml::{self, Translation};
 use super::{ExclusionCfg, SceneCfg, in_every_env};
 use crate::error::{Error, Result};
 use crate::objects::robot_file::MjcfFile;
@@ -34,10 +35,10 @@ const PRESETS: [(&str, Preset); 3] = [
 ];
 
 impl SceneCfg {
-    /// Reads a scene file with the built-in kinds of entities.
+    /// Reads a scene file with the built-in kinds of entities: YAML where its name ends in `.yaml` or `.yml`, TOML otherwise.
     ///
     /// # Errors
-    /// As [`from_toml`](Self::from_toml), and where the file cannot be read.
+    /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml), and where the file cannot be read.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_file_with(path, &EntityTypes::default())
     }
@@ -49,7 +50,9 @@ impl SceneCfg {
     pub fn from_file_with(path: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let path = path.as_ref();
         let text = std::fs::read_to_string(path).map_err(|error| Error::File { path: path.into(), error })?;
-        Self::from_toml(&text, path, types)
+        let is_yaml =
+            path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
+        if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }
     }
 
     /// Reads the text of a scene file; paths in it are relative to the folder of `file`, which need not exist.
@@ -58,7 +61,18 @@ impl SceneCfg {
     /// [`Error::SceneFile`] with file and line: no TOML, a key or a type that nobody knows (with those there are), a value of
     /// another form, a terrain that its generator refuses. All other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
-        Reader { text, file: file.as_ref(), types }.scene()
+        Reader { text, file: file.as_ref(), types, translated: None }.scene()
+    }
+
+    /// As [`from_toml`](Self::from_toml), of YAML 1.2: the same tables and lists, in the same words.
+    ///
+    /// # Errors
+    /// As [`from_toml`](Self::from_toml); several documents, tags, and `null`, too.
+    pub fn from_yaml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
+        let file = file.as_ref();
+        let translated = yaml::translate(text)
+            .map_err(|error| Error::SceneFile { at: Source::new(file, error.line), reason: error.message })?;
+        Reader { text: &translated.toml, file, types, translated: Some(&translated) }.scene()
     }
 
     /// The text of a scene file that declares this scene, with the kinds of entities of `types`. Paths are written as they
@@ -105,9 +119,12 @@ fn has_name(entity: &EntityCfg, field: &str) -> bool {
 
 /// One file that is being read.
 struct Reader<'a> {
+    /// In words of TOML.
     text: &'a str,
     file: &'a Path,
     types: &'a EntityTypes,
+    /// Where the words are from, in a file of other words.
+    translated: Option<&'a Translation>,
 }
 
 impl<'a> Reader<'a> {
@@ -278,6 +295,9 @@ impl<'a> Reader<'a> {
 
     /// The line of a place, counted from 1.
     fn line(&self, span: Range<usize>) -> u32 {
+        if let Some(translated) = self.translated {
+            return translated.line(span.start);
+        }
         let before = self.text.as_bytes().iter().take(span.start);
         u32::try_from(1 + before.filter(|byte| **byte == b'\n').count()).unwrap_or(u32::MAX)
     }

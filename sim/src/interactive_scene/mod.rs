@@ -9,6 +9,7 @@ mod file;
 mod look_up;
 mod types;
 mod value;
+mod yaml;
 
 pub use entity::{EntityCfg, SensorEntity, SensorHandle};
 pub use exclusion::ExclusionCfg;

@@ -320,14 +320,17 @@ impl Writer {
                 // As OpenGL's: a cone all around.
                 (LampKind::Point, _) => element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0),
             };
+            // What is as MuJoCo has it anyway is not said. A directional lamp has an angle, not a radius.
+            let attenuation = light.attenuation.map(|x| x.to_string()).join(" ");
+            let radius = self.target == Target::V4 && light.kind != LampKind::Directional;
             let element = element
                 .numbers("pos", light.position.as_slice())
                 .numbers("dir", light.direction.as_slice())
                 .numbers("diffuse", &light.diffuse)
-                .numbers("attenuation", &light.attenuation)
-                .attr("castshadow", light.cast_shadow);
-            let radius = (self.target == Target::V4).then_some(light.radius);
-            self.leaf(element.opt("bulbradius", radius), None);
+                .opt("attenuation", (light.attenuation != [1.0, 0.0, 0.0]).then_some(attenuation))
+                .opt("castshadow", (!light.cast_shadow).then_some("false"))
+                .opt("bulbradius", radius.then_some(light.radius));
+            self.leaf(element, None);
         }
         self.body_content(&mjcf.bodies[0]);
         enum Visit {
