@@ -1,17 +1,18 @@
-//! Sixteen numbers at once, or eight of double precision: the only place that knows the SIMD library.
+//! Sixteen numbers at once, or eight of double precision, or fewer: the only place that knows the SIMD library.
 //!
 //! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare), and
 //! never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, always compiled.
 //! (The library has a scalar level of its own, but inlining sixteen-wide loops everywhere took over ten minutes to compile.)
 
 mod double;
+mod narrow;
 mod scalar;
 mod simd;
 
 pub(crate) use double::{D3, axes, dot_3, load_3};
 pub(crate) use fearless_simd::Level as SimdLevel;
 pub(crate) use scalar::Scalar;
-pub(crate) use simd::{D, F, I, M, N, Simd, U};
+pub(crate) use simd::{D, F, F4, F8, I, M, N, Simd, U};
 
 /// An instruction set that this machine has.
 #[derive(Clone, Copy, Debug)]

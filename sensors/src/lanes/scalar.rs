@@ -24,6 +24,8 @@ impl Simd for Scalar {
     type M = [bool; LANES];
     type D = [f64; DOUBLES];
     type N = [bool; DOUBLES];
+    type F4 = [f32; 4];
+    type F8 = [f32; 8];
 
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()
@@ -69,6 +71,24 @@ impl Simd for Scalar {
     }
     fn bits_n(m: Self::N) -> u64 {
         (0..DOUBLES).fold(0, |bits, k| bits | u64::from(m[k]) << k)
+    }
+    fn splat_4(self, x: f32) -> Self::F4 {
+        [x; 4]
+    }
+    fn splat_8(self, x: f32) -> Self::F8 {
+        [x; 8]
+    }
+    fn load_4(self, x: &[f32; 4]) -> Self::F4 {
+        *x
+    }
+    fn load_8(self, x: &[f32; 8]) -> Self::F8 {
+        *x
+    }
+    fn array_4(x: Self::F4) -> [f32; 4] {
+        x
+    }
+    fn array_8(x: Self::F8) -> [f32; 8] {
+        x
     }
     fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2] {
         [pairs.map(|x| x as i32), pairs.map(|x| (x >> 32) as i32)]
@@ -189,5 +209,32 @@ impl Simd for Scalar {
     }
     fn select_d(m: Self::N, a: Self::D, b: Self::D) -> Self::D {
         choose(&m, &a, &b)
+    }
+    fn add_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        pairs(&a, &b, |a, b| a + b)
+    }
+    fn sub_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        pairs(&a, &b, |a, b| a - b)
+    }
+    fn mul_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        pairs(&a, &b, |a, b| a * b)
+    }
+    fn min_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        pairs(&a, &b, |a, b| if a < b { a } else { b })
+    }
+    fn max_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        pairs(&a, &b, |a, b| if a > b { a } else { b })
+    }
+    fn slide_4(a: Self::F4, b: Self::F4) -> Self::F4 {
+        [a[3], b[0], b[1], b[2]]
+    }
+    fn add_8(a: Self::F8, b: Self::F8) -> Self::F8 {
+        pairs(&a, &b, |a, b| a + b)
+    }
+    fn min_8(a: Self::F8, b: Self::F8) -> Self::F8 {
+        pairs(&a, &b, |a, b| if a < b { a } else { b })
+    }
+    fn slide_8(a: Self::F8, b: Self::F8) -> Self::F8 {
+        [a[7], b[0], b[1], b[2], b[3], b[4], b[5], b[6]]
     }
 }

@@ -21,6 +21,10 @@ macro_rules! operations {
             type D: Copy;
             /// Eight conditions.
             type N: Copy;
+            /// Four numbers.
+            type F4: Copy;
+            /// Eight numbers.
+            type F8: Copy;
 
             /// Compiles what is inlined into `f` for this instruction set.
             fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
@@ -38,6 +42,12 @@ macro_rules! operations {
             fn load_d(self, x: &[f64; DOUBLES]) -> Self::D;
             fn array_d(x: Self::D) -> [f64; DOUBLES];
             fn bits_n(m: Self::N) -> u64;
+            fn splat_4(self, x: f32) -> Self::F4;
+            fn splat_8(self, x: f32) -> Self::F8;
+            fn load_4(self, x: &[f32; 4]) -> Self::F4;
+            fn load_8(self, x: &[f32; 8]) -> Self::F8;
+            fn array_4(x: Self::F4) -> [f32; 4];
+            fn array_8(x: Self::F8) -> [f32; 8];
             /// The lower and the upper halves of sixteen pairs.
             fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2];
             $(fn $name($($arg: Self::$A),*) -> Self::$R;)*
@@ -50,6 +60,8 @@ macro_rules! operations {
             type M = fearless_simd::mask32x16<T>;
             type D = fearless_simd::f64x8<T>;
             type N = fearless_simd::mask64x8<T>;
+            type F4 = fearless_simd::f32x4<T>;
+            type F8 = fearless_simd::f32x8<T>;
 
             #[inline(always)]
             fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
@@ -112,6 +124,30 @@ macro_rules! operations {
                 SimdMask::to_bitmask(m)
             }
             #[inline(always)]
+            fn splat_4(self, x: f32) -> Self::F4 {
+                SimdBase::splat(self, x)
+            }
+            #[inline(always)]
+            fn splat_8(self, x: f32) -> Self::F8 {
+                SimdBase::splat(self, x)
+            }
+            #[inline(always)]
+            fn load_4(self, x: &[f32; 4]) -> Self::F4 {
+                SimdBase::from_slice(self, x)
+            }
+            #[inline(always)]
+            fn load_8(self, x: &[f32; 8]) -> Self::F8 {
+                SimdBase::from_slice(self, x)
+            }
+            #[inline(always)]
+            fn array_4(x: Self::F4) -> [f32; 4] {
+                *x
+            }
+            #[inline(always)]
+            fn array_8(x: Self::F8) -> [f32; 8] {
+                *x
+            }
+            #[inline(always)]
             fn halves(self, pairs: &[u64; LANES]) -> [Self::I; 2] {
                 let (a, b) = pairs.split_at(LANES / 2);
                 let a: fearless_simd::u64x8<T> = SimdBase::from_slice(self, a);
@@ -169,6 +205,17 @@ operations! {
     or_n(a: N, b: N) -> N = a | b;
     not_n(a: N) -> N = !a;
     select_d(m: N, a: D, b: D) -> D = fearless_simd::Select::select(m, a, b);
+    add_4(a: F4, b: F4) -> F4 = a + b;
+    sub_4(a: F4, b: F4) -> F4 = a - b;
+    mul_4(a: F4, b: F4) -> F4 = a * b;
+    // Only of numbers that compare.
+    min_4(a: F4, b: F4) -> F4 = SimdBase::min(a, b);
+    max_4(a: F4, b: F4) -> F4 = SimdBase::max(a, b);
+    // The last of one, and before the last of the other.
+    slide_4(a: F4, b: F4) -> F4 = SimdBase::slide::<3>(a, b);
+    add_8(a: F8, b: F8) -> F8 = a + b;
+    min_8(a: F8, b: F8) -> F8 = SimdBase::min(a, b);
+    slide_8(a: F8, b: F8) -> F8 = SimdBase::slide::<7>(a, b);
 }
 
 /// Sixteen values with operators.
@@ -213,6 +260,14 @@ lanes! {
 lanes! {
     /// Eight conditions.
     N
+}
+lanes! {
+    /// Four numbers.
+    F4
+}
+lanes! {
+    /// Eight numbers.
+    F8
 }
 
 macro_rules! operators {

@@ -1,7 +1,7 @@
 //! What is built once for an asset: trees over meshes, pyramids over height fields.
 
 use super::shape::height_field::Field;
-use super::shape::mesh::MeshTree;
+use super::shape::mesh::{MeshBuilder, MeshTree};
 use scene::RenderMesh;
 use scene::shape::HeightField;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -14,7 +14,10 @@ pub struct RayAssets(Arc<Mutex<Assets>>);
 impl RayAssets {
     /// Does something with the assets; one after the other.
     pub(crate) fn with<R>(&self, f: impl FnOnce(&mut Assets) -> R) -> R {
-        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        let mut assets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let result = f(&mut assets);
+        assets.builder = MeshBuilder::default();
+        result
     }
 }
 
@@ -26,11 +29,13 @@ type Entry<T> = (Weak<RenderMesh>, Weak<T>);
 pub(crate) struct Assets {
     meshes: Vec<Entry<MeshTree>>,
     fields: Vec<Entry<Field>>,
+    /// For the meshes of one call.
+    builder: MeshBuilder,
 }
 
 impl Assets {
     pub(crate) fn mesh(&mut self, mesh: &Arc<RenderMesh>) -> Arc<MeshTree> {
-        find(&mut self.meshes, mesh, || MeshTree::new(mesh))
+        find(&mut self.meshes, mesh, || self.builder.build(mesh))
     }
 
     pub(super) fn height_field(&mut self, shape: &HeightField) -> Arc<Field> {

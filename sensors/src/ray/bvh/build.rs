@@ -7,27 +7,20 @@
 //! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
+use crate::lanes::{Level, Simd, at_level};
 use crate::ray::vector::to_f64;
+use curve::Curve;
 
+mod curve;
+mod cut;
 mod leaves;
 
-/// Bins, of some groups and of many: with few, clearing and summing up bins takes longer than filling them.
-const SOME_BINS: usize = 8;
-const MANY_BINS: usize = 16;
-const MANY: usize = 32;
-/// No more groups than these are cut between neighbours on the curve.
-const FEW: usize = 8;
 /// Things of a group, at most.
 const GROUP: usize = 24;
 /// Groups of no more than these are leaves of the node above.
 const SINGLE_LEAF: usize = 3;
 /// Deeper than this, halves of equal number: things that are spread over many orders of magnitude.
 const MAX_DEPTH: u32 = 48;
-/// Bits of a coordinate on the curve.
-const BITS: u32 = 10;
-/// Bits of a key from the first of its place on the curve to one below the last.
-const FIRST_BIT: u32 = 31 + 3 * BITS;
-const LAST_BIT: u32 = 31;
 /// What is added to a coordinate, between 0 and 2^22, has its whole number in the last bits: no instruction is needed to round.
 const TO_BITS: f32 = 12_582_912.0;
 
@@ -140,7 +133,14 @@ impl Part {
     }
 }
 
-struct Builder {
+/// Builds trees, one after the other: what building takes of memory is kept from one to the next.
+#[derive(Debug)]
+pub(crate) struct Builder {
+    level: Level,
+    unsorted: Vec<Item>,
+    curve: Curve,
+    /// Where each group begins on the curve, and where the last one ends.
+    starts: Vec<u32>,
     groups: Vec<Item>,
     /// What each group is in a node above it: a node, or the first thing of a leaf and how many things those are.
     children: Vec<(u32, u32)>,
@@ -153,133 +153,86 @@ struct Builder {
 impl Bvh {
     /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
     pub(crate) fn build(boxes: impl IntoIterator<Item = Aabb>) -> (Self, Vec<u32>) {
-        let unsorted: Vec<Item> = (0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)).collect();
-        if unsorted.is_empty() {
-            return (Self { nodes: Vec::new(), root: 0, around: [[0.0; 3]; 2], bounds: [[0.0; 3]; 2] }, Vec::new());
+        Builder::new(Level::best()).build(boxes)
+    }
+}
+
+impl Builder {
+    /// The trees are the same with every instruction set.
+    pub(crate) fn new(level: Level) -> Self {
+        Self {
+            level,
+            unsorted: Vec::new(),
+            curve: Curve::default(),
+            starts: Vec::new(),
+            groups: Vec::new(),
+            children: Vec::new(),
+            aside: Vec::new(),
+            nodes: Vec::new(),
+            pad: 0.0,
         }
-        let bounds = Bounds::around(&unsorted);
-        let mut keys = curve(&unsorted, 0..unsorted.len() as u32, &bounds);
-        let mut starts = Vec::with_capacity(keys.len() / 8 + 2);
-        group(&unsorted, &mut keys, 0, FIRST_BIT, &mut starts);
-        starts.push(keys.len() as u32);
+    }
+
+    /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
+    pub(crate) fn build(&mut self, boxes: impl IntoIterator<Item = Aabb>) -> (Bvh, Vec<u32>) {
+        self.unsorted.clear();
+        self.unsorted.extend((0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)));
+        let bounds = Bounds::around(&self.unsorted);
+        if self.unsorted.is_empty() {
+            return (Bvh { nodes: Vec::new(), root: 0, around: [[0.0; 3]; 2], bounds: [[0.0; 3]; 2] }, Vec::new());
+        }
+        let order: Vec<u32> =
+            self.curve.sort(&self.unsorted, &bounds, &mut self.starts).iter().map(|&key| key as u32).collect();
         let around = [bounds.lo, bounds.hi].map(|q| [q[0], q[1], q[2]]);
         let [lo, hi] = around.map(to_f64);
         let reach = lo.iter().chain(&hi).fold(0.0f64, |m, x| m.max(x.abs()));
         let pad = reach * PAD;
-        let count = starts.len() - 1;
-        let mut builder = Builder {
-            groups: Vec::with_capacity(count),
-            children: Vec::with_capacity(count),
-            aside: Vec::new(),
-            nodes: Vec::with_capacity(count + count / 4 + 1),
-            // Rounding a side takes up to u R off a pad of 16 u R.
-            pad: ((pad * (1.0 + 1.0 / 16.0)) as f32).max(f32::MIN_POSITIVE),
-        };
-        let order: Vec<u32> = keys.iter().map(|&key| key as u32).collect();
-        let mut things = Vec::with_capacity(GROUP);
-        for range in starts.windows(2) {
-            let [start, end] = [range[0], range[1]];
-            things.clear();
-            things.extend(order[start as usize..end as usize].iter().map(|&number| unsorted[number as usize]));
-            builder.add_group(&things, start, count == 1);
-        }
+        // Rounding a side takes up to u R off a pad of 16 u R.
+        self.pad = ((pad * (1.0 + 1.0 / 16.0)) as f32).max(f32::MIN_POSITIVE);
+        let count = self.starts.len() - 1;
+        self.groups.clear();
+        self.children.clear();
+        self.nodes = Vec::with_capacity(count + count / 4 + 1);
+        at_level!(self.level, s => s.vectorize(
+            #[inline(always)]
+            || self.add_groups(s, &order)
+        ));
         let root = if count == 1 {
             0
         } else {
-            builder.aside = builder.groups.clone();
-            builder.add([Part { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
+            self.aside.clone_from(&self.groups);
+            self.add([Part { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
         };
         let bounds = [lo.map(|x| x - pad), hi.map(|x| x + pad)];
-        (Self { nodes: builder.nodes, root, around, bounds }, order)
+        (Bvh { nodes: std::mem::take(&mut self.nodes), root, around, bounds }, order)
     }
-}
 
-/// Some of the items by their middles' places on the Morton curve through a box: places in the upper half of each number,
-/// indices in the lower.
-fn curve(items: &[Item], numbers: impl Iterator<Item = u32>, bounds: &Bounds) -> Vec<u64> {
-    let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
-    // Cells are cubes: what a flat thing has of thickness, rounding perhaps, is not cut as if it were as long as the rest.
-    let least = cells.scale.iter().take(3).filter(|&&scale| scale > 0.0).fold(f32::INFINITY, |least, &x| least.min(x));
-    cells.scale = [if least.is_finite() { least } else { 0.0 }; 4];
-    let spread = |x: u32| {
-        let x = (x | x << 16) & 0x0300_00ff;
-        let x = (x | x << 8) & 0x0300_f00f;
-        let x = (x | x << 4) & 0x030c_30c3;
-        (x | x << 2) & 0x0924_9249
-    };
-    let key = |number: u32| {
-        let [x, y, z, _] = cells.at(items[number as usize].middle()).map(spread);
-        u64::from(x | y << 1 | z << 2) << 32 | u64::from(number)
-    };
-    let mut keys: Vec<u64> = numbers.map(key).collect();
-    // Sorted digit by digit: a part of what comparing them takes.
-    const DIGITS: usize = 1 << BITS;
-    let digit = |key: u64, pass: u32| (key >> (32 + BITS * pass)) as usize % DIGITS;
-    let mut places = [[0u32; DIGITS]; 3];
-    for &key in &keys {
-        for (pass, places) in (0..).zip(&mut places) {
-            places[digit(key, pass)] += 1;
+    /// Adds all groups of things, which are in this order.
+    #[inline(always)]
+    fn add_groups<S: Simd>(&mut self, s: S, order: &[u32]) {
+        let mut things = [NOTHING; GROUP];
+        for k in 1..self.starts.len() {
+            let [start, end] = [self.starts[k - 1], self.starts[k]];
+            let order = &order[start as usize..end as usize];
+            for (thing, &number) in things.iter_mut().zip(order) {
+                *thing = self.unsorted[number as usize];
+            }
+            let alone = self.starts.len() == 2;
+            self.add_group(s, &things[..order.len().min(GROUP)], start, alone);
         }
     }
-    let mut sorted = vec![0; keys.len()];
-    for (pass, places) in (0..).zip(&mut places) {
-        let mut sum = 0;
-        for place in places.iter_mut() {
-            (*place, sum) = (sum, sum + *place);
-        }
-        for &key in &keys {
-            let place = &mut places[digit(key, pass)];
-            sorted[*place as usize] = key;
-            *place += 1;
-        }
-        std::mem::swap(&mut keys, &mut sorted);
-    }
-    keys
-}
-
-/// Where the groups of sorted keys begin: the largest cells of the curve, in halves by one bit after the other, that hold no
-/// more than a group may. What is more than the bits that are left can tell apart is sorted along a curve of its own: details
-/// that lie close together, and something else far away.
-fn group(items: &[Item], keys: &mut [u64], first: u32, bit: u32, starts: &mut Vec<u32>) {
-    if keys.len() <= GROUP {
-        if !keys.is_empty() {
-            starts.push(first);
-        }
-        return;
-    }
-    // Of the eight parts of a cell a surface is in four: three bits tell four things apart.
-    let wanted = 3 * keys.len().ilog2() / 2;
-    let (mut at_one_place, mut next) = (bit < LAST_BIT, bit.saturating_sub(1));
-    if !at_one_place && bit - LAST_BIT < wanted && (bit + 3 <= FIRST_BIT || bit == LAST_BIT) {
-        let numbers = || keys.iter().map(|&key| key as u32);
-        let within = numbers().fold(NOTHING, |sum, number| {
-            let middle = items[number as usize].middle();
-            sum.with(&Bounds { lo: middle, hi: middle })
-        });
-        let finer = curve(items, numbers(), &within);
-        if finer[0] >> 32 != finer[finer.len() - 1] >> 32 {
-            keys.copy_from_slice(&finer);
-            return group(items, keys, first, FIRST_BIT, starts);
-        }
-        (at_one_place, next) = (true, 0);
-    }
-    // At one place: halves of equal number.
-    let at = if at_one_place { keys.len() / 2 } else { keys.partition_point(|key| key >> bit & 1 == 0) };
-    let (low, high) = keys.split_at_mut(at);
-    group(items, low, first, next, starts);
-    group(items, high, first + at as u32, next, starts);
 }
 
 impl Builder {
     /// Adds a group of things, of which the first is at `start`, and its node if it needs one.
     #[inline(always)]
-    fn add_group(&mut self, things: &[Item], start: u32, alone: bool) {
+    fn add_group<S: Simd>(&mut self, s: S, things: &[Item], start: u32, alone: bool) {
         let count = things.len() as u32;
         let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
             (Bounds::around(things), (start, count))
         } else {
             let index = self.empty_node();
-            let (ends, leaves) = leaves::ends(things);
+            let (ends, leaves) = leaves::ends(s, things);
             let (mut around, mut first) = (NOTHING, 0);
             for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
                 let leaf = Bounds::around(&things[first..end]);
@@ -348,16 +301,7 @@ impl Builder {
     #[inline(always)]
     fn open(&mut self, part: &Part) -> [Part; 2] {
         let groups = &mut self.groups[part.start as usize..part.end as usize];
-        let best = if groups.len() <= FEW {
-            // Cuts have kept the order along the curve.
-            Some(between(groups))
-        } else if part.depth >= MAX_DEPTH {
-            None
-        } else if groups.len() <= MANY {
-            halve::<SOME_BINS>(groups, &mut self.aside)
-        } else {
-            halve::<MANY_BINS>(groups, &mut self.aside)
-        };
+        let best = if part.depth < MAX_DEPTH { cut::best(groups, &mut self.aside) } else { None };
         let (at, sides) = best.unwrap_or_else(|| {
             // All at one place, or too deep.
             let at = groups.len() / 2;
@@ -365,89 +309,6 @@ impl Builder {
         });
         part.cut(at, sides)
     }
-}
-
-/// The best place to cut up to [`FEW`] groups along the curve: how many come before, and the boxes of both sides.
-fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
-    let n = groups.len().min(FEW);
-    let mut rest = [NOTHING; FEW];
-    let mut costs = [0.0f32; FEW];
-    let (mut sum, mut after) = (NOTHING, 0.0);
-    for k in (1..n).rev() {
-        sum = sum.with(&groups[k]);
-        rest[k] = sum;
-        after += groups[k].hi[3];
-        costs[k] = after * sum.area();
-    }
-    let (mut sum, mut before) = (NOTHING, 0.0);
-    let (mut best, mut cost) = ((1, groups[0]), f32::INFINITY);
-    for k in 1..n {
-        sum = sum.with(&groups[k - 1]);
-        before += groups[k - 1].hi[3];
-        let whole = before * sum.area() + costs[k];
-        if whole < cost {
-            (best, cost) = ((k, sum), whole);
-        }
-    }
-    let (at, near) = best;
-    (at, [near, rest[at % FEW]])
-}
-
-/// Sorts groups by the best plane between bins along the longest side of the box around their middles: how many come before,
-/// and the boxes of both sides; `None` where all are at one place.
-fn halve<const N: usize>(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
-    let middles = groups.iter().fold(NOTHING, |all, group| {
-        let middle = group.middle();
-        all.with(&Bounds { lo: middle, hi: middle })
-    });
-    let cells = Cells::<N>::of(&middles);
-    let [x, y, z, _] = quad(|k| middles.hi[k] - middles.lo[k]);
-    let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
-    let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % N;
-    // The last place holds how many things there are.
-    let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..NOTHING }; N];
-    for group in &*groups {
-        let bin = &mut bins[cell(group)];
-        let count = bin.hi[3] + group.hi[3];
-        *bin = bin.with(group);
-        bin.hi[3] = count;
-    }
-    let mut costs = [0.0; N];
-    let mut rest = [NOTHING; N];
-    let (mut sum, mut after) = (NOTHING, 0.0);
-    for k in (1..N).rev() {
-        sum = sum.with(&bins[k]);
-        rest[k] = sum;
-        after += bins[k].hi[3];
-        costs[k] = after;
-    }
-    let mut best: Option<(f32, usize, Bounds)> = None;
-    let (mut sum, mut before) = (NOTHING, 0.0);
-    for k in 0..N - 1 {
-        sum = sum.with(&bins[k]);
-        before += bins[k].hi[3];
-        if before == 0.0 || costs[k + 1] == 0.0 {
-            continue;
-        }
-        let cost = before * sum.area() + costs[k + 1] * rest[k + 1].area();
-        // A cost that is no number comes from sizes beyond the range: any plane will do.
-        if best.is_none_or(|(least, ..)| cost < least) {
-            best = Some((cost, k, sum));
-        }
-    }
-    let (_, last, near_bounds) = best?;
-    let (mut near, mut far) = (0, 0);
-    let aside = &mut aside[..groups.len()];
-    for k in 0..groups.len() {
-        let group = groups[k];
-        let first = cell(&group) <= last;
-        // To both places, without a branch: one of them is written over.
-        (groups[near], aside[far]) = (group, group);
-        near += usize::from(first);
-        far += usize::from(!first);
-    }
-    groups[near..].copy_from_slice(&aside[..far]);
-    Some((near, [near_bounds, rest[last + 1]]))
 }
 
 #[cfg(test)]
@@ -496,7 +357,7 @@ mod tests {
         assert!(plain < 16.0, "{plain}");
         let noisy = tested(&floor(1e-8));
         assert!(noisy < 1.5 * plain, "{noisy}, not {plain}");
-        for far in [30.0f32, 3e3] {
+        for far in [30.0f32, 300.0, 3e3] {
             let mut boxes = floor(0.0);
             boxes.push([[far, far, 0.0], [far + 1.0, far + 1.0, 0.0]]);
             let outlying = tested(&boxes);

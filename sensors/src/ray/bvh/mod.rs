@@ -7,6 +7,7 @@ mod beam;
 mod build;
 
 pub(crate) use beam::{Beam, FAR, Walked};
+pub(crate) use build::Builder;
 
 use super::Ray;
 use super::vector::{V3, along};

@@ -3,8 +3,8 @@
 pub(crate) mod columns;
 
 use super::{RayShape, Touch, Touches, touch_each};
-use crate::lanes::{D, Simd};
-use crate::ray::bvh::{Beam, Bvh, Stack, Walked};
+use crate::lanes::{D, Level, Simd};
+use crate::ray::bvh::{Beam, Builder, Bvh, Stack, Walked};
 use crate::ray::packet::{Packet, WIDTH};
 use crate::ray::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
 use crate::ray::vector::{V3, to_f64};
@@ -34,23 +34,45 @@ pub(crate) struct MeshTree {
     columns: [OnceLock<Option<Columns>>; 3],
 }
 
-impl MeshTree {
-    pub(crate) fn new(mesh: &RenderMesh) -> Self {
-        let numbers = || 0..mesh.triangles().len() as u32;
-        let corners = |number: u32| mesh.triangles()[number as usize].map(|i| mesh.positions()[i as usize]);
-        let mut triangles = Vec::with_capacity(mesh.triangles().len());
-        triangles.extend(numbers().map(corners).filter(has_area));
-        let mut tree = Self::of_triangles(&triangles);
+/// Builds trees over meshes, one after the other: what building takes of memory is kept from one to the next. New memory would
+/// take a fifth of the time.
+#[derive(Debug)]
+pub(crate) struct MeshBuilder {
+    builder: Builder,
+    triangles: Vec<Triangle>,
+}
+
+impl Default for MeshBuilder {
+    fn default() -> Self {
+        Self { builder: Builder::new(Level::best()), triangles: Vec::new() }
+    }
+}
+
+impl MeshBuilder {
+    /// Over the triangles that have an area.
+    pub(crate) fn build(&mut self, mesh: &RenderMesh) -> MeshTree {
+        let (indices, positions) = (mesh.triangles(), mesh.positions());
+        let corners = |indices: &[u32; 3]| indices.map(|i| positions[i as usize]);
+        self.triangles.clear();
+        self.triangles.reserve(indices.len());
+        for indices in indices {
+            let triangle = corners(indices);
+            if has_area(&triangle) {
+                self.triangles.push(triangle);
+            }
+        }
+        let mut tree = self.tree();
         // Mostly there are no others.
-        if triangles.len() < mesh.triangles().len() {
-            let with_area: Vec<u32> = numbers().filter(|&number| has_area(&corners(number))).collect();
+        if tree.triangles.len() < indices.len() {
+            let with_area: Vec<u32> =
+                (0..).zip(indices).filter(|(_, indices)| has_area(&corners(indices))).map(|(k, _)| k).collect();
             tree.numbers.iter_mut().for_each(|number| *number = with_area[*number as usize]);
         }
         tree
     }
 
-    /// Of triangles that have an area.
-    pub(crate) fn of_triangles(triangles: &[Triangle]) -> Self {
+    /// Over its own triangles, of which each has an area.
+    fn tree(&mut self) -> MeshTree {
         // Plain comparisons: those of the library look for what is no number.
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         let larger = |a: f32, b: f32| if a > b { a } else { b };
@@ -60,9 +82,9 @@ impl MeshTree {
                 [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
             ]
         };
-        let (bvh, numbers) = Bvh::build(triangles.iter().map(around));
-        let triangles = numbers.iter().map(|&number| triangles[number as usize]).collect();
-        Self { bvh, triangles, numbers, columns: Default::default() }
+        let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
+        let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();
+        MeshTree { bvh, triangles, numbers, columns: Default::default() }
     }
 }
 
@@ -78,6 +100,11 @@ impl Mesh {
 }
 
 impl MeshTree {
+    #[cfg(test)]
+    pub(crate) fn of_triangles(triangles: &[Triangle]) -> Self {
+        MeshBuilder { triangles: triangles.to_vec(), ..Default::default() }.tree()
+    }
+
     #[cfg(test)]
     pub(crate) fn bvh(&self) -> &Bvh {
         &self.bvh

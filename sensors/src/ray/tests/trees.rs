@@ -2,10 +2,11 @@
 
 use super::Dice;
 use super::brute_force::{nearest, nearest_watertight, soup};
+use crate::lanes::levels;
 use crate::ray::Ray;
-use crate::ray::bvh::{Bvh, Stack};
+use crate::ray::bvh::{Builder, Bvh, Stack};
 use crate::ray::shape::RayShape;
-use crate::ray::shape::mesh::{Mesh, MeshTree};
+use crate::ray::shape::mesh::{Mesh, MeshBuilder, MeshTree};
 use crate::ray::triangle::{Triangle, normal};
 use scene::mesh::TriMesh;
 use scene::{RenderMesh, Shape};
@@ -84,7 +85,7 @@ fn odd_meshes_are_fine() {
     // Triangles without an area are left out; the others are hit.
     let flat = [[0u32, 0, 1], [0, 1, 1], [0, 1, 2]];
     let mesh = TriMesh::from_triangles(vec![[-1., -1., 0.], [1., -1., 0.], [0., 2., 0.]], flat.to_vec());
-    let built = Mesh::of_tree(Arc::new(MeshTree::new(&RenderMesh::new(&mesh, 0.5))));
+    let built = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&mesh, 0.5))));
     assert_eq!(distance(&built, &ray, 10.0), Some(1.0));
     // All at one place: no plane can cut them.
     let same = vec![[[0.0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]]; 1000];
@@ -99,24 +100,38 @@ fn odd_meshes_are_fine() {
     assert_eq!(distance(&tree(&nested), &ray, 100.0), nearest_watertight(&ray, &nested));
 }
 
+/// Whatever the builder has built before, and with every instruction set; also where sizes leave the range.
 #[test]
 fn the_same_boxes_give_the_same_tree() {
-    let boxes: Vec<_> = soup(&mut Dice(9), 500, [0.0; 3])
-        .iter()
-        .map(|t| [[0, 1, 2].map(|k| t[0][k].min(t[1][k])), [0, 1, 2].map(|k| t[0][k].max(t[1][k]))])
-        .collect();
-    let (a, b) = (Bvh::build(boxes.iter().copied()), Bvh::build(boxes.iter().copied()));
-    assert_eq!(format!("{a:?}"), format!("{b:?}"));
-    let mut order = a.1;
-    order.sort_unstable();
-    assert!(order.into_iter().eq(0..500), "everything once");
+    let boxes = |count, scale: f32| -> Vec<_> {
+        soup(&mut Dice(9), count, [0.0; 3])
+            .iter()
+            .map(|t| t.map(|p| p.map(|x| x * scale)))
+            .map(|t| [[0, 1, 2].map(|k| t[0][k].min(t[1][k])), [0, 1, 2].map(|k| t[0][k].max(t[1][k]))])
+            .collect()
+    };
+    let all: Vec<Vec<_>> =
+        [(500, 1.0), (3, 1.0), (0, 1.0), (3000, 1e-20), (700, 1e37)].map(|(n, s)| boxes(n, s)).into();
+    for (known, boxes) in all.iter().enumerate() {
+        let (tree, mut order) = Bvh::build(boxes.iter().copied());
+        for level in levels() {
+            let mut builder = Builder::new(level);
+            for before in &all[..known] {
+                builder.build(before.iter().copied());
+            }
+            let again = builder.build(boxes.iter().copied());
+            assert_eq!(format!("{:?}", (&tree, &order)), format!("{again:?}"), "{level:?}");
+        }
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..boxes.len() as u32), "everything once");
+    }
 }
 
 /// A mesh of a shape is hit where the shape is, up to the flatness of its triangles.
 #[test]
 fn a_tessellated_ball_is_nearly_a_ball() {
     let ball = Shape::from(scene::shape::Sphere { radius: 0.5 }).tessellate(256);
-    let mesh = Mesh::of_tree(Arc::new(MeshTree::new(&RenderMesh::new(&ball, RenderMesh::CREASE))));
+    let mesh = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&ball, RenderMesh::CREASE))));
     // The sagitta of 1/256 of a turn.
     let flat = 0.5 * (1.0 - (std::f64::consts::PI / 256.0).cos()) * 2.0;
     for k in 0..100 {

@@ -2,106 +2,82 @@
 //! j things are the cheapest leaves of fewer, and one leaf more.
 
 use super::{GROUP, Item, WIDE};
+use crate::lanes::{F4, F8, Simd};
 
 /// Things of a leaf, at most.
 const LEAF: usize = 4;
 /// What a leaf that is met costs, in tests of one thing.
 const LEAF_COST: f32 = 1.0;
+/// What leaves of one thing, two, and so on cost that are met.
+const TESTS: [f32; LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
 const _: () = assert!(GROUP <= LEAF * WIDE, "every group can be cut into leaves");
 
 /// Where the leaves of things that lie together on the curve end, and how many leaves there are.
 #[inline(always)]
-pub(super) fn ends(things: &[Item]) -> ([u8; WIDE], usize) {
-    // Loops are as long as the arrays, so that compilers make vectors of them; half of all groups are small.
-    match things.len() {
-        0..=8 => ends_of::<8, 9>(things),
-        9..=16 => ends_of::<16, 17>(things),
-        _ => ends_of::<GROUP, { GROUP + 1 }>(things),
-    }
-}
-
-/// With room for N things; M is one more.
-#[inline(always)]
-fn ends_of<const N: usize, const M: usize>(things: &[Item]) -> ([u8; WIDE], usize) {
-    let count = things.len().min(N);
-    let last = costs_of_leaves::<N>(things);
-    // Least cost of the first j things as k leaves; and of all of them, as k + 1.
-    let mut least = [[f32::INFINITY; WIDE]; M];
-    least[0][0] = 0.0;
-    let mut best = [f32::INFINITY; WIDE];
+pub(super) fn ends<S: Simd>(s: S, things: &[Item]) -> ([u8; WIDE], usize) {
+    let things = &things[..things.len().min(GROUP)];
+    // What leaves cost that end with each of the things, one thing long, two, and so on.
+    let mut costs = [[0.0; LEAF]; GROUP];
+    // Least cost of the first j things as k leaves; and before those, of fewer things than none.
+    let mut least = [[f32::INFINITY; WIDE]; LEAF + GROUP];
+    least[LEAF - 1][0] = 0.0;
     // The last rows, the newest first: not read from memory that has just been written.
-    let mut recent = [[f32::INFINITY; WIDE]; LEAF];
-    recent[0] = least[0];
-    for j in 1..=count {
-        best = [f32::INFINITY; WIDE];
-        for before in 0..LEAF {
-            let cost = last[before][j - 1];
-            for k in 0..WIDE {
-                let sum = recent[before][k] + cost;
-                best[k] = if sum < best[k] { sum } else { best[k] };
-            }
+    let none = F8::splat(s, f32::INFINITY);
+    let mut recent = [none; LEAF];
+    recent[0] = F8::load(s, &least[LEAF - 1]);
+    // And of all of them, as k + 1.
+    let mut best = none;
+    // The boxes around the last thing, the last two, and so on.
+    let mut lo = [F4::splat(s, f32::INFINITY); 3];
+    let mut hi = [F4::splat(s, f32::NEG_INFINITY); 3];
+    let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &TESTS));
+    for (j, thing) in things.iter().enumerate() {
+        for axis in 0..3 {
+            lo[axis] = lo[axis].shift_in(f32::INFINITY).min(F4::splat(s, thing.lo[axis]));
+            hi[axis] = hi[axis].shift_in(f32::NEG_INFINITY).max(F4::splat(s, thing.hi[axis]));
         }
-        let [a, b, c, d, e, f, g, _] = best;
-        recent = [[f32::INFINITY, a, b, c, d, e, f, g], recent[0], recent[1], recent[2]];
-        least[j] = recent[0];
+        // Numbers all of them: no side is infinite, so that none times infinity is none.
+        let [x, y, z] = [0, 1, 2].map(
+            #[inline(always)]
+            |axis| (hi[axis] - lo[axis]).min(longest),
+        );
+        costs[j] = ((x * y + y * z + z * x) * tests).array();
+        // The newest row last: it is what all else waits for.
+        best = none;
+        for (row, &cost) in recent.iter().zip(&costs[j]).rev() {
+            best = best.min(*row + F8::splat(s, cost));
+        }
+        recent = [best.shift_in(f32::INFINITY), recent[0], recent[1], recent[2]];
+        least[LEAF + j] = recent[0].array();
     }
-    let (mut leaves, mut cost) = (0, best[0]);
-    for (k, &other) in best.iter().enumerate() {
+    let (mut leaves, mut cost) = (0, f32::INFINITY);
+    for (k, other) in best.array().into_iter().enumerate() {
         (leaves, cost) = if other < cost { (k, other) } else { (leaves, cost) };
     }
-    // Costs that are no numbers come from sizes beyond the range: any leaves will do, but not too long ones.
-    if !cost.is_finite() {
-        let ends = std::array::from_fn(|k| (LEAF * (k + 1)).min(count) as u8);
-        return (ends, count.div_ceil(LEAF));
+    // Sizes beyond the range cost too much to compare: any leaves will do, but not too long ones.
+    if cost == f32::INFINITY {
+        let ends = std::array::from_fn(|k| (LEAF * (k + 1)).min(things.len()) as u8);
+        return (ends, things.len().div_ceil(LEAF));
     }
     let mut ends = [0; WIDE];
-    let mut j = count;
+    let mut j = things.len();
     for k in (0..=leaves).rev() {
         ends[k] = j as u8;
-        // Those that gave the least.
-        let longer = (0..LEAF.min(j)).find(|&before| least[j - 1 - before][k] + last[before][j - 1] == cost);
-        j -= longer.unwrap_or(0) + 1;
-        cost = least[j][k];
+        // Those that gave the least. All are looked at: where the first one is cannot be foreseen.
+        let gave = (0..LEAF).fold(1 << LEAF, |bits: u32, before| {
+            bits | u32::from(least[LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
+        });
+        j -= gave.trailing_zeros() as usize + 1;
+        cost = least[LEAF + j - 1][k];
     }
     (ends, leaves + 1)
-}
-
-/// What a leaf costs that ends with each of the things and has from one to [`LEAF`] of them; with fewer things before than that,
-/// it means nothing.
-#[inline(always)]
-fn costs_of_leaves<const N: usize>(things: &[Item]) -> [[f32; N]; LEAF] {
-    let mut single = [[0.0f32; N]; 6];
-    for (j, thing) in things.iter().enumerate().take(N) {
-        for axis in 0..3 {
-            (single[axis][j], single[axis + 3][j]) = (thing.lo[axis], thing.hi[axis]);
-        }
-    }
-    let mut sides = single;
-    let mut costs = [[0.0f32; N]; LEAF];
-    for (before, costs) in costs.iter_mut().enumerate() {
-        if before > 0 {
-            for axis in 0..3 {
-                for j in before..N {
-                    let (a, b) = (single[axis][j - before], sides[axis][j]);
-                    sides[axis][j] = if a < b { a } else { b };
-                    let (a, b) = (single[axis + 3][j - before], sides[axis + 3][j]);
-                    sides[axis + 3][j] = if a > b { a } else { b };
-                }
-            }
-        }
-        let tests = before as f32 + 1.0 + LEAF_COST;
-        for (j, cost) in costs.iter_mut().enumerate() {
-            let [x, y, z] = [0, 1, 2].map(|k| sides[k + 3][j] - sides[k][j]);
-            *cost = (x * y + y * z + z * x) * tests;
-        }
-    }
-    costs
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::Bounds;
     use super::*;
+    use crate::lanes::{Scalar, at_level, levels};
 
     /// What leaves cost: the tests of those that are met.
     fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
@@ -133,7 +109,7 @@ mod tests {
                     Item::item(lo, lo.map(|x| x + long), k, 1)
                 })
                 .collect();
-            let (ends, leaves) = ends(&things);
+            let (ends, leaves) = ends(Scalar, &things);
             let chosen = ends[..leaves].iter().map(|&end| usize::from(end));
             assert!(chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= LEAF));
             let mut least = f32::INFINITY;
@@ -154,7 +130,9 @@ mod tests {
     fn sizes_beyond_the_range_have_short_leaves() {
         let huge = [[-3e38f32; 3], [3e38; 3]];
         let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
-        let (ends, leaves) = ends(&things);
-        assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
+        for level in levels() {
+            let (ends, leaves) = at_level!(level, s => ends(s, &things));
+            assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
+        }
     }
 }

@@ -1,0 +1,100 @@
+//! Where to cut a part of the tree in two: the surface area heuristic of planes between bins, or of places on the curve.
+
+use super::{Bounds, Cells, Item, NOTHING, quad};
+
+/// Bins along a side.
+const BINS: usize = 16;
+/// No more groups than these are cut between neighbours on the curve: clearing and summing up bins would take longer than
+/// filling them.
+const FEW: usize = 16;
+
+/// How many of at least two groups come before the best cut, once they are sorted by it, and the boxes of both sides; `None`
+/// where all are at one place.
+#[inline(always)]
+pub(super) fn best(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
+    // Cuts have kept the order along the curve.
+    if groups.len() <= FEW { Some(between(groups)) } else { halve(groups, aside) }
+}
+
+/// The best place to cut up to [`FEW`] groups along the curve: how many come before, and the boxes of both sides.
+fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
+    let n = groups.len().min(FEW);
+    let mut rest = [NOTHING; FEW];
+    let mut costs = [0.0f32; FEW];
+    let (mut sum, mut after) = (NOTHING, 0.0);
+    for k in (1..n).rev() {
+        sum = sum.with(&groups[k]);
+        rest[k] = sum;
+        after += groups[k].hi[3];
+        costs[k] = after * sum.area();
+    }
+    let (mut sum, mut before) = (NOTHING, 0.0);
+    let (mut best, mut cost) = ((1, groups[0]), f32::INFINITY);
+    for k in 1..n {
+        sum = sum.with(&groups[k - 1]);
+        before += groups[k - 1].hi[3];
+        let whole = before * sum.area() + costs[k];
+        if whole < cost {
+            (best, cost) = ((k, sum), whole);
+        }
+    }
+    let (at, near) = best;
+    (at, [near, rest[at % FEW]])
+}
+
+/// Sorts groups by the best plane between bins along the longest side of the box around their middles: how many come before,
+/// and the boxes of both sides; `None` where all are at one place.
+fn halve(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
+    let middles = groups.iter().fold(NOTHING, |all, group| {
+        let middle = group.middle();
+        all.with(&Bounds { lo: middle, hi: middle })
+    });
+    let cells = Cells::<BINS>::of(&middles);
+    let [x, y, z, _] = quad(|k| middles.hi[k] - middles.lo[k]);
+    let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
+    let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % BINS;
+    // The last place holds how many things there are.
+    let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..NOTHING }; BINS];
+    for group in &*groups {
+        let bin = &mut bins[cell(group)];
+        let count = bin.hi[3] + group.hi[3];
+        *bin = bin.with(group);
+        bin.hi[3] = count;
+    }
+    let mut costs = [0.0; BINS];
+    let mut rest = [NOTHING; BINS];
+    let (mut sum, mut after) = (NOTHING, 0.0);
+    for k in (1..BINS).rev() {
+        sum = sum.with(&bins[k]);
+        rest[k] = sum;
+        after += bins[k].hi[3];
+        costs[k] = after;
+    }
+    let mut best: Option<(f32, usize, Bounds)> = None;
+    let (mut sum, mut before) = (NOTHING, 0.0);
+    for k in 0..BINS - 1 {
+        sum = sum.with(&bins[k]);
+        before += bins[k].hi[3];
+        if before == 0.0 || costs[k + 1] == 0.0 {
+            continue;
+        }
+        let cost = before * sum.area() + costs[k + 1] * rest[k + 1].area();
+        // A cost that is no number comes from sizes beyond the range: any plane will do.
+        if best.is_none_or(|(least, ..)| cost < least) {
+            best = Some((cost, k, sum));
+        }
+    }
+    let (_, last, near_bounds) = best?;
+    let (mut near, mut far) = (0, 0);
+    let aside = &mut aside[..groups.len()];
+    for k in 0..groups.len() {
+        let group = groups[k];
+        let first = cell(&group) <= last;
+        // To both places, without a branch: one of them is written over.
+        (groups[near], aside[far]) = (group, group);
+        near += usize::from(first);
+        far += usize::from(!first);
+    }
+    groups[near..].copy_from_slice(&aside[..far]);
+    Some((near, [near_bounds, rest[last + 1]]))
+}
