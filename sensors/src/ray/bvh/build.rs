@@ -7,7 +7,7 @@
 //! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
-use crate::lanes::{Level, Simd, at_level};
+use crate::lanes::{F4, Level, Simd, at_level};
 use crate::ray::vector::to_f64;
 use curve::Curve;
 
@@ -79,6 +79,18 @@ impl Bounds {
     }
 }
 
+/// The box around all items.
+#[inline(always)]
+fn bounds_of<S: Simd>(s: S, all: &[Item]) -> Bounds {
+    let mut lo = F4::load(s, &NOTHING.lo);
+    let mut hi = F4::load(s, &NOTHING.hi);
+    for item in all {
+        lo = F4::load(s, &item.lo).min(lo);
+        hi = F4::load(s, &item.hi).max(hi);
+    }
+    Bounds { lo: lo.array(), hi: hi.array() }
+}
+
 /// What tells in which of `count` cells along each axis of a box a point is.
 #[derive(Clone, Copy, Debug)]
 struct Cells<const N: usize> {
@@ -97,11 +109,6 @@ impl<const N: usize> Cells<N> {
     #[inline(always)]
     fn along(&self, axis: usize, x: f32) -> u32 {
         ((x - self.base[axis]) * self.scale[axis] - 0.5 + TO_BITS).to_bits() & (N as u32 - 1)
-    }
-
-    #[inline(always)]
-    fn at(&self, point: Quad) -> [u32; 4] {
-        std::array::from_fn(|k| self.along(k, point[k]))
     }
 }
 
@@ -150,6 +157,22 @@ pub(crate) struct Builder {
     pad: f32,
 }
 
+impl Node {
+    const EMPTY: Self = {
+        let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
+        Self { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] }
+    };
+
+    #[inline(always)]
+    fn set(&mut self, k: usize, Bounds { lo, hi }: &Bounds, pad: f32, (child, count): (u32, u32)) {
+        for axis in 0..3 {
+            self.sides[axis][k] = lo[axis] - pad;
+            self.sides[axis + 3][k] = hi[axis] + pad;
+        }
+        (self.child[k], self.count[k]) = (child, count);
+    }
+}
+
 impl Bvh {
     /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
     pub(crate) fn build(boxes: impl IntoIterator<Item = Aabb>) -> (Self, Vec<u32>) {
@@ -177,12 +200,20 @@ impl Builder {
     pub(crate) fn build(&mut self, boxes: impl IntoIterator<Item = Aabb>) -> (Bvh, Vec<u32>) {
         self.unsorted.clear();
         self.unsorted.extend((0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)));
-        let bounds = Bounds::around(&self.unsorted);
         if self.unsorted.is_empty() {
             return (Bvh { nodes: Vec::new(), root: 0, around: [[0.0; 3]; 2], bounds: [[0.0; 3]; 2] }, Vec::new());
         }
-        let order: Vec<u32> =
-            self.curve.sort(&self.unsorted, &bounds, &mut self.starts).iter().map(|&key| key as u32).collect();
+        at_level!(self.level, s => s.vectorize(
+            #[inline(always)]
+            || self.build_unsorted(s)
+        ))
+    }
+
+    #[inline(always)]
+    fn build_unsorted<S: Simd>(&mut self, s: S) -> (Bvh, Vec<u32>) {
+        let bounds = bounds_of(s, &self.unsorted);
+        let sorted = self.curve.sort(s, &self.unsorted, &bounds, &mut self.starts);
+        let order: Vec<u32> = sorted.iter().map(|&key| key as u32).collect();
         let around = [bounds.lo, bounds.hi].map(|q| [q[0], q[1], q[2]]);
         let [lo, hi] = around.map(to_f64);
         let reach = lo.iter().chain(&hi).fold(0.0f64, |m, x| m.max(x.abs()));
@@ -193,10 +224,7 @@ impl Builder {
         self.groups.clear();
         self.children.clear();
         self.nodes = Vec::with_capacity(count + count / 4 + 1);
-        at_level!(self.level, s => s.vectorize(
-            #[inline(always)]
-            || self.add_groups(s, &order)
-        ));
+        self.add_groups(s, &order);
         let root = if count == 1 {
             0
         } else {
@@ -229,37 +257,27 @@ impl Builder {
     fn add_group<S: Simd>(&mut self, s: S, things: &[Item], start: u32, alone: bool) {
         let count = things.len() as u32;
         let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
-            (Bounds::around(things), (start, count))
+            (bounds_of(s, things), (start, count))
         } else {
-            let index = self.empty_node();
             let (ends, leaves) = leaves::ends(s, things);
+            let mut node = Node::EMPTY;
             let (mut around, mut first) = (NOTHING, 0);
             for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
-                let leaf = Bounds::around(&things[first..end]);
-                self.set_child(index, k, &leaf, (start + first as u32, (end - first) as u32));
+                let leaf = bounds_of(s, &things[first..end]);
+                node.set(k, &leaf, self.pad, (start + first as u32, (end - first) as u32));
                 (around, first) = (around.with(&leaf), end);
             }
-            (around, (index, 0))
+            (around, (self.push(node), 0))
         };
         let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
         self.groups.push(Item::item([a, b, c], [d, e, f], self.children.len() as u32, count));
         self.children.push(child);
     }
 
-    fn empty_node(&mut self) -> u32 {
-        let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
-        self.nodes.push(Node { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] });
-        self.nodes.len() as u32 - 1
-    }
-
     #[inline(always)]
-    fn set_child(&mut self, node: u32, k: usize, Bounds { lo, hi }: &Bounds, (child, count): (u32, u32)) {
-        let node = &mut self.nodes[node as usize];
-        for axis in 0..3 {
-            node.sides[axis][k] = lo[axis] - self.pad;
-            node.sides[axis + 3][k] = hi[axis] + self.pad;
-        }
-        (node.child[k], node.count[k]) = (child, count);
+    fn push(&mut self, node: Node) -> u32 {
+        self.nodes.push(node);
+        self.nodes.len() as u32 - 1
     }
 
     /// Adds the wide node of the first `count` of two parts, and all above groups that is below; returns its index.
@@ -284,7 +302,7 @@ impl Builder {
             (parts[largest], parts[count]) = (first, second);
             count += 1;
         }
-        let index = self.empty_node();
+        let mut node = Node::EMPTY;
         for (k, part) in parts.iter().enumerate().take(count) {
             let child = if part.len() == 1 {
                 self.children[self.groups[part.start as usize].number() as usize]
@@ -292,18 +310,18 @@ impl Builder {
                 let halves = self.open(part);
                 (self.add(halves, 2), 0)
             };
-            self.set_child(index, k, &part.bounds, child);
+            node.set(k, &part.bounds, self.pad, child);
         }
-        index
+        self.push(node)
     }
 
     /// The halves of a part of several groups.
     #[inline(always)]
     fn open(&mut self, part: &Part) -> [Part; 2] {
         let groups = &mut self.groups[part.start as usize..part.end as usize];
-        let best = if part.depth < MAX_DEPTH { cut::best(groups, &mut self.aside) } else { None };
+        let best = if part.depth < MAX_DEPTH { cut::best(&part.bounds, groups, &mut self.aside) } else { None };
         let (at, sides) = best.unwrap_or_else(|| {
-            // All at one place, or too deep.
+            // Too close together, or too deep.
             let at = groups.len() / 2;
             (at, [Bounds::around(&groups[..at]), Bounds::around(&groups[at..])])
         });

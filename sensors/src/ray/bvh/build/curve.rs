@@ -1,6 +1,7 @@
 //! Boxes along a Morton curve, and the groups of those that lie together on it.
 
-use super::{Bounds, Cells, GROUP, Item, NOTHING};
+use super::{Bounds, Cells, GROUP, Item, NOTHING, TO_BITS};
+use crate::lanes::{F4, Simd};
 
 /// Bits of a coordinate on the curve.
 const BITS: u32 = 10;
@@ -8,6 +9,8 @@ const BITS: u32 = 10;
 const DIGITS: usize = 1 << BITS;
 /// Fewer keys than these are compared: clearing and summing up places takes longer.
 const FEW: usize = 512;
+/// Cells that follow each other are one group where that is no more than these: a node less, and no more to test.
+const JOINED: usize = 12;
 /// Bits of a place within a cell that more than a group may not share.
 const CROWDED: u32 = 3;
 
@@ -36,27 +39,37 @@ pub(super) struct Curve {
 
 impl Curve {
     /// Sorts items by their middles' places on the curve through a box around them, and says where groups begin, and where the
-    /// last one ends: the largest cells of the curve, halves of halves of the box, that hold no more than a group may.
-    pub(super) fn sort(&mut self, items: &[Item], bounds: &Bounds, starts: &mut Vec<u32>) -> &[u64] {
-        self.through(items, 0..items.len() as u32, bounds);
+    /// last one ends: the largest cells of the curve, halves of halves of the box, that hold no more than a group may, or a few
+    /// small ones.
+    #[inline(always)]
+    pub(super) fn sort<S: Simd>(&mut self, s: S, items: &[Item], bounds: &Bounds, starts: &mut Vec<u32>) -> &[u64] {
+        self.through(s, items, 0..items.len() as u32, bounds);
         starts.clear();
-        group(items, &mut self.keys, 0, starts);
+        group(s, items, &mut self.keys, 0, starts);
         starts.push(items.len() as u32);
         &self.keys
     }
 
     /// Keys of some of the items, sorted.
-    fn through(&mut self, items: &[Item], numbers: impl Iterator<Item = u32>, bounds: &Bounds) {
+    #[inline(always)]
+    fn through<S: Simd>(&mut self, s: S, items: &[Item], numbers: impl ExactSizeIterator<Item = u32>, bounds: &Bounds) {
         let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
         // Cells are cubes: what a flat thing has of thickness, rounding perhaps, is not cut as if it were as long as the rest.
         let least =
             cells.scale.iter().take(3).filter(|&&scale| scale > 0.0).fold(f32::INFINITY, |least, &x| least.min(x));
         cells.scale = [if least.is_finite() { least } else { 0.0 }; 4];
+        let [half, down, to_bits] = [0.5, -0.5, TO_BITS].map(|x| F4::splat(s, x));
+        let (base, scale) = (F4::load(s, &cells.base), F4::load(s, &cells.scale));
         self.keys.clear();
-        self.keys.extend(numbers.map(|number| {
-            let [x, y, z, _] = cells.at(items[number as usize].middle()).map(|x| SPREAD[x as usize % DIGITS]);
-            u64::from(x | y << 1 | z << 2) << 32 | u64::from(number)
-        }));
+        self.keys.reserve(numbers.len());
+        // No closures of the library's: what those hold is not compiled for the instruction set.
+        for number in numbers {
+            let Bounds { lo: [a, b, c, _], hi: [d, e, f, _] } = items[number as usize];
+            let middle = half * F4::load(s, &[a, b, c, 0.0]) + half * F4::load(s, &[d, e, f, 0.0]);
+            let [x, y, z, _] = ((middle - base) * scale + down + to_bits).array();
+            let place = |x: f32| SPREAD[x.to_bits() as usize % DIGITS];
+            self.keys.push(u64::from(place(x) | place(y) << 1 | place(z) << 2) << 32 | u64::from(number));
+        }
         if self.keys.len() < FEW {
             self.keys.sort_unstable();
             return;
@@ -86,9 +99,10 @@ impl Curve {
 }
 
 /// Where the groups of sorted keys begin.
-fn group(items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let place = |key: u64| (key >> 32) as u32;
-    let mut at = 0;
+    // None that the first one could join.
+    let (mut at, mut last) = (0, GROUP);
     while at < keys.len() {
         let here = place(keys[at]);
         let differs = |key: Option<&u64>| key.map_or(u32::MAX, |&key| place(key) ^ here);
@@ -96,33 +110,42 @@ fn group(items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
         let (before, after) = (differs(keys[..at].last()), differs(keys.get(at + GROUP)));
         if after >> CROWDED == 0 {
             let count = keys[at..].partition_point(|&key| place(key) >> CROWDED == here >> CROWDED);
-            crowd(items, &mut keys[at..at + count], first + at as u32, starts);
-            at += count;
+            crowd(s, items, &mut keys[at..at + count], first + at as u32, starts);
+            (at, last) = (at + count, GROUP);
             continue;
         }
         let bits = before.checked_ilog2().unwrap_or(0).min(after.ilog2());
-        starts.push(first + at as u32);
         // Of those that may be in the cell, all are looked at: where it ends cannot be foreseen.
         let few = &keys[at..keys.len().min(at + GROUP)];
-        at += few.iter().filter(|&&key| place(key) >> bits == here >> bits).count();
+        let count = few.iter().filter(|&&key| place(key) >> bits == here >> bits).count();
+        if last + count <= JOINED {
+            last += count;
+        } else {
+            starts.push(first + at as u32);
+            last = count;
+        }
+        at += count;
     }
 }
 
 /// The same of more keys than the bits that are left can tell apart: they are sorted along a curve of their own. Details that
 /// lie close together, and something else far away.
 #[cold]
-fn crowd(items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+fn crowd<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let numbers = || keys.iter().map(|&key| key as u32);
     let within = numbers().fold(NOTHING, |sum, number| {
         let middle = items[number as usize].middle();
         sum.with(&Bounds { lo: middle, hi: middle })
     });
     let mut finer = Curve::default();
-    finer.through(items, numbers(), &within);
+    s.vectorize(
+        #[inline(always)]
+        || finer.through(s, items, numbers(), &within),
+    );
     let finer = finer.keys;
     if finer[0] >> 32 != finer[finer.len() - 1] >> 32 {
         keys.copy_from_slice(&finer);
-        group(items, keys, first, starts);
+        group(s, items, keys, first, starts);
     } else {
         // At one place.
         starts.extend((0..keys.len() as u32).step_by(GROUP).map(|k| first + k));

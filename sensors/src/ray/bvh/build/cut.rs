@@ -8,12 +8,12 @@ const BINS: usize = 16;
 /// filling them.
 const FEW: usize = 16;
 
-/// How many of at least two groups come before the best cut, once they are sorted by it, and the boxes of both sides; `None`
-/// where all are at one place.
+/// How many of at least two groups within a box come before the best cut, once they are sorted by it, and the boxes of both
+/// sides; `None` where no plane cuts them.
 #[inline(always)]
-pub(super) fn best(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
+pub(super) fn best(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
     // Cuts have kept the order along the curve.
-    if groups.len() <= FEW { Some(between(groups)) } else { halve(groups, aside) }
+    if groups.len() <= FEW { Some(between(groups)) } else { halve(within, groups, aside) }
 }
 
 /// The best place to cut up to [`FEW`] groups along the curve: how many come before, and the boxes of both sides.
@@ -42,15 +42,11 @@ fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
     (at, [near, rest[at % FEW]])
 }
 
-/// Sorts groups by the best plane between bins along the longest side of the box around their middles: how many come before,
-/// and the boxes of both sides; `None` where all are at one place.
-fn halve(groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
-    let middles = groups.iter().fold(NOTHING, |all, group| {
-        let middle = group.middle();
-        all.with(&Bounds { lo: middle, hi: middle })
-    });
-    let cells = Cells::<BINS>::of(&middles);
-    let [x, y, z, _] = quad(|k| middles.hi[k] - middles.lo[k]);
+/// Sorts groups by the best plane between bins along the longest side of the box around them: how many come before, and the
+/// boxes of both sides; `None` where the middles of all are in one bin.
+fn halve(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
+    let cells = Cells::<BINS>::of(within);
+    let [x, y, z, _] = quad(|k| within.hi[k] - within.lo[k]);
     let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
     let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % BINS;
     // The last place holds how many things there are.
