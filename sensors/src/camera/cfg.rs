@@ -228,21 +228,21 @@ impl CameraCfg {
         }
     }
 
-    /// What is only right where rays are straight lines of the picture.
+    /// What some lenses do not have.
     fn check_lens(&self) -> Result<(), CameraError> {
-        let what = [
-            ("the channel flow", self.channels.flow),
-            ("vignetting", self.imperfections.vignetting.is_some()),
-            ("holes of structured light", self.imperfections.holes.is_some()),
-            ("noise of measured depth", self.imperfections.depth_noise.is_some()),
-        ];
-        let wrong = what.into_iter().find(|(_, wanted)| *wanted && !self.lens.is_pinhole());
-        wrong.map_or(Ok(()), |(what, _)| Err(CameraError::PinholeOnly { what, lens: self.lens.name() }))
+        let (lens, Imperfections { vignetting, holes, .. }) = (self.lens.name(), &self.imperfections);
+        if vignetting.is_some() && !self.lens.has_axis() {
+            return Err(CameraError::NoAxis { what: "vignetting", lens });
+        }
+        if holes.as_ref().is_some_and(|holes| holes.baseline != 0.0) && !self.lens.is_pinhole() {
+            return Err(CameraError::PinholeOnly { what: "shadows of a projector (baseline of the holes)", lens });
+        }
+        Ok(())
     }
 
     /// The rays of the lens in every row.
     fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
-        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays() {
+        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays(true) {
             let (lens, renderer) = (self.lens.name(), self.renderer.name());
             return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
         }

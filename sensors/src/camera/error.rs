@@ -152,6 +152,14 @@ pub enum CameraError {
         /// The lens.
         lens: &'static str,
     },
+    /// Something that needs an optical axis, of a lens that has none.
+    #[error("{what}: the lens {lens} has no optical axis; take it away, or choose another lens")]
+    NoAxis {
+        /// What was asked for.
+        what: &'static str,
+        /// The lens.
+        lens: &'static str,
+    },
     /// Flow of a camera whose pictures come late, get lost, or are kept.
     #[error(
         "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"

@@ -1,7 +1,7 @@
 //! What happens to pictures after they were drawn: imperfections of the camera, then noise of the numbers that it sends.
 
 use super::cfg::CameraCfg;
-use super::imperfection::Imperfections;
+use super::imperfection::{Imperfections, Picture};
 use super::parallel::Job;
 use super::picture_noise::PictureNoise;
 use super::ticket::Ticket;
@@ -41,7 +41,7 @@ impl Faults {
         let Self { imperfections, tone, noise, workers, crew } = self;
         let noise = noise.as_ref();
         crew.share(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
-            imperfections.spoil(frame, *tone, shot.view, ticket);
+            imperfections.spoil(frame, *tone, Picture { view: shot.view, rays: shot.lens, ticket });
             if let Some(noise) = noise {
                 noise.disturb(frame, ticket);
             }

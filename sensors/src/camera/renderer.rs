@@ -22,7 +22,7 @@ pub enum Renderer {
     /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too; and
     /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](super::RasterCfg::occlusion_rays) asks for some.
     /// Meshes are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
-    /// goes dark triangle by triangle.
+    /// goes dark triangle by triangle. Behind a lens that bends lines what is seen is found by rays too.
     Hybrid,
     /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
     /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
@@ -101,9 +101,13 @@ impl Renderer {
         }
     }
 
-    /// Whether what is seen at a pixel is found by rays.
-    pub(crate) fn sees_by_rays(self) -> bool {
-        matches!(self, Self::FastRayTraced | Self::RayTraced { .. })
+    /// Whether what is seen at a pixel is found by rays; `bent` says whether there is a lens that bends lines.
+    pub(crate) fn sees_by_rays(self, bent: bool) -> bool {
+        match self {
+            Self::Raster => false,
+            Self::Hybrid => bent,
+            Self::FastRayTraced | Self::RayTraced { .. } => true,
+        }
     }
 
     /// Whether colours come from paths.

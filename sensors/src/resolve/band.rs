@@ -95,7 +95,7 @@ impl Brush {
         let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges } = self;
         let list = &plan.list;
         let mut draw = |tile: &mut Tile, item: &Item| {
-            if plan.renderer.sees_by_rays() {
+            if plan.sees_by_rays {
                 let what = (&*list.placed, shot.scene.first_ids());
                 plan.tracer.draw(s, stack, tile, (projection, shot.lens), what, item);
             } else {

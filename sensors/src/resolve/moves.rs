@@ -1,7 +1,8 @@
 //! Where things were when the picture before was taken.
 
 use crate::camera::rasterizer::{Before, Shot};
-use crate::lanes::{F, Simd, V3, select, splat};
+use crate::camera::{LensRays, Optics, PixelIntrinsics};
+use crate::lanes::{F, LANES, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
 use scene::PoseF32;
 
@@ -9,8 +10,16 @@ use scene::PoseF32;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Moves {
     list: Vec<Move>,
-    /// fx, fy, cx, cy of the picture before \[pixels\]; `None` where there is none.
-    lens: Option<[f32; 4]>,
+    /// Where the picture before saw what; `None` where there is none.
+    eye: Option<Eye>,
+}
+
+/// Where a camera sees a point of its optical frame.
+#[derive(Clone, Copy, Debug)]
+enum Eye {
+    /// fx, fy, cx, cy \[pixels\].
+    Pinhole([f32; 4]),
+    Lens(Optics),
 }
 
 /// How one instance moved.
@@ -34,11 +43,8 @@ impl Moves {
     /// A picture before of another scene, or with a view or a pose that is no good.
     pub(crate) fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), RenderError> {
         self.list.clear();
-        self.lens = None;
+        self.eye = None;
         let Some(Before { poses, view }) = shot.before else { return Ok(()) };
-        if shot.lens.is_some() {
-            return Err(RenderError::LensFlow);
-        }
         view.validate()?;
         let expected = shot.scene.instances().len();
         if poses.len() != expected {
@@ -47,13 +53,19 @@ impl Moves {
         if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, pose)| !pose.is_rigid()) {
             return Err(RenderError::InstancePose { instance, pose: *pose });
         }
-        let lens = |view: &View| [view.fx, view.fy, view.cx, view.cy];
-        let same = lens(view) == lens(shot.view) && view.world_from_camera == shot.view.world_from_camera;
+        let numbers = |view: &View| [view.fx, view.fy, view.cx, view.cy];
+        let (then, now) = (numbers(view), numbers(shot.view));
+        let same = then == now && view.world_from_camera == shot.view.world_from_camera;
         self.list.extend(poses.iter().zip(shot.poses).map(|(before, now)| Move {
             still: same && before == now,
             camera_from_instance: view.world_from_camera.inverse_times(before),
         }));
-        self.lens = Some(lens(view));
+        let behind = |rays: &LensRays| {
+            // The rays' own numbers have more digits.
+            let [fx, fy, cx, cy] = then.map(f64::from);
+            if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
+        };
+        self.eye = Some(shot.lens.map_or(Eye::Pinhole(then), |rays| Eye::Lens(behind(rays))));
         Ok(())
     }
 
@@ -61,18 +73,34 @@ impl Moves {
     #[inline(always)]
     pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2]) -> [F<S>; 2] {
         let unknown = splat(s, f32::INFINITY);
-        let (Some(Move { still, camera_from_instance }), Some([fx, fy, cx, cy])) = (self.list.get(instance), self.lens)
-        else {
+        let (Some(Move { still, camera_from_instance }), Some(eye)) = (self.list.get(instance), self.eye) else {
             return [unknown; 2];
         };
         if *still {
             return [splat(s, 0.0); 2];
         }
         let there = local.rotate(&camera_from_instance.rotation).add(V3::splat(s, camera_from_instance.translation));
-        let ahead = there.z.simd_gt(splat(s, 0.0));
-        let nearness = 1.0 / select(ahead, there.z, splat(s, 1.0));
-        let right = u - (there.x * nearness * fx + cx);
-        let down = v - (there.y * nearness * fy + cy);
-        [select(ahead, right, unknown), select(ahead, down, unknown)]
+        match eye {
+            Eye::Pinhole([fx, fy, cx, cy]) => {
+                let ahead = there.z.simd_gt(splat(s, 0.0));
+                let nearness = 1.0 / select(ahead, there.z, splat(s, 1.0));
+                let right = u - (there.x * nearness * fx + cx);
+                let down = v - (there.y * nearness * fy + cy);
+                [select(ahead, right, unknown), select(ahead, down, unknown)]
+            }
+            Eye::Lens(optics) => {
+                let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
+                let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());
+                let mut flow = [[f32::INFINITY; LANES]; 2];
+                for lane in 0..LANES {
+                    let direction = [x[lane], y[lane], z[lane]].map(f64::from);
+                    if let Some(before) = optics.project(direction) {
+                        flow[0][lane] = (f64::from(u[lane]) - before[0]) as f32;
+                        flow[1][lane] = (f64::from(v[lane]) - before[1]) as f32;
+                    }
+                }
+                flow.map(|axis| load(s, &axis))
+            }
+        }
     }
 }

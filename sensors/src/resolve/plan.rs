@@ -39,6 +39,8 @@ pub(crate) struct Plan {
     /// What rays meet, where some are cast.
     pub(crate) tracer: Tracer,
     pub(crate) renderer: Renderer,
+    /// Whether what is seen is found by rays.
+    pub(crate) sees_by_rays: bool,
     /// Whether shadows are cast by rays.
     shadow_rays: bool,
     /// Rays for ambient occlusion.
@@ -141,14 +143,15 @@ impl Plan {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
         }
         self.planes = if multisampled { SAMPLES.len() } else { 1 };
+        self.sees_by_rays = renderer.sees_by_rays(shot.lens.is_some());
         let parts = match renderer {
+            _ if self.sees_by_rays => Parts::Whole,
             Renderer::Raster if cfg.lod => Parts::Levels,
-            Renderer::Raster | Renderer::Hybrid => Parts::Clusters,
-            Renderer::FastRayTraced | Renderer::RayTraced { .. } => Parts::Whole,
+            _ => Parts::Clusters,
         };
         let keep = |instance: &Instance| Layer::of(instance, cfg.groups);
         self.list.build(&projection, shot.lens, scene, poses, parts, keep);
-        if renderer.sees_by_rays() || casts_rays {
+        if self.sees_by_rays || casts_rays {
             self.tracer.find_bodies(scene, assets, keep);
         }
         if casts_rays || wants_color && renderer.follows_paths() {
@@ -261,7 +264,7 @@ pub(crate) fn check_light(
 
 /// Whether the rays of a lens are those of the picture, and can be followed.
 fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
-    if !renderer.sees_by_rays() {
+    if !renderer.sees_by_rays(true) {
         let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
         return Err(RenderError::LensRenderer { lens, renderer });
     }

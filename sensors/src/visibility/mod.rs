@@ -99,7 +99,7 @@ pub enum RenderError {
     },
     /// A renderer that draws straight lines, and a lens that bends them.
     #[error(
-        "the {lens} lens bends straight lines, which {renderer} does not; use renderer: FastRayTraced, or RayTraced"
+        "the {lens} lens bends straight lines, which {renderer} does not; use renderer: FastRayTraced, Hybrid or RayTraced"
     )]
     LensRenderer {
         /// The lens.
@@ -161,9 +161,6 @@ pub enum RenderError {
         /// Paths that there were to follow.
         total: u64,
     },
-    /// Flow through a lens.
-    #[error("flow is known of pinhole cameras only; this picture has a lens")]
-    LensFlow,
     /// Rays of a lens that are not those of the picture.
     #[error(
         "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \

@@ -8,8 +8,9 @@ use ndarray::Ix4;
 ///
 /// It is exact, from the poses of the thing and of the camera at both instants, and the lenses of both; whether something hid
 /// the point before it does not say. Exactly 0 where neither moved. +inf where nothing was hit, where the point was not in
-/// front of the camera before, and in the first picture, which has none before it. Isaac's `motion_vectors` are minus this: they
-/// count to the left and up.
+/// front of the camera before (behind a lens: where the lens did not see it, [`Optics::domain`](crate::camera::Optics::domain)), and in the
+/// first picture, which has none before it. Of what crosses the seam of a panorama it is a whole turn, 2 pi fx, less or more.
+/// Isaac's `motion_vectors` are minus this: they count to the left and up.
 #[derive(Clone, Copy, Debug)]
 pub struct Flow;
 

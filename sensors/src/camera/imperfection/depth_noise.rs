@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// Noise of depth from triangulation: disparities have errors of the same size everywhere, so that those of depth z grow with
 /// its square. The standard deviation is `constant + quadratic (z - offset)²`. What comes out nearer than the near plane or
-/// beyond the far plane saturates there.
+/// beyond the far plane saturates there. Behind a lens whose rays do not all go forward z is the distance along the ray: errors
+/// of angles grow with its square too.
 ///
 /// By default [`DepthNoise::KHOSHELHAM`]. Errors of neighbouring pixels are independent; on a real sensor they are not quite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

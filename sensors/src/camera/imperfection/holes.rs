@@ -2,6 +2,7 @@
 
 use super::{OfDepth, Picture, within};
 use crate::error::SensorError;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,7 +13,8 @@ use std::f64::consts::FRAC_PI_2;
 ///   depths differ less.
 /// - **Shadows of the projector**: a pinhole beside the camera, on its x axis, in line with its rows. A pixel whose ray from
 ///   the projector meets something else before has no pattern on it: a band beside the edge of what is in front, of
-///   `fx baseline (1/z_front - 1/z_behind)` pixels. Shadows of what the camera does not see are missing.
+///   `fx baseline (1/z_front - 1/z_behind)` pixels. Shadows of what the camera does not see are missing. Behind a lens that
+///   bends rows there are none: `baseline` must be 0 there.
 ///
 /// Source: Khoshelham and Oude Elberink 2012, section 2 (geometry: a projector 75 mm beside the camera) and 3.1 (gaps from
 /// occlusions and surfaces' properties); Nguyen, Izadi and Lovell 2012 (little is measured beyond some 80 degrees).
@@ -63,26 +65,29 @@ fn inverse(depth: f32) -> Option<f64> {
 
 /// Cosine of the angle between a pixel's ray and the normal of the surface there; `None` for a miss.
 ///
-/// On a plane the inverse depth is a linear function of the ray (x, y, 1), whose coefficients are its normal.
+/// On a plane the inverse depth is a linear function of the ray, whose coefficients n are its normal: three rays give them, by
+/// Cramer's rule.
 fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
-    let (width, view) = (picture.view.width, picture.view);
+    let width = picture.view.width;
     let here = inverse(depths[pixel])?;
-    // The smaller of the differences to both sides: the other may be across an edge.
-    let slope = |before: Option<usize>, after: Option<usize>| {
-        let at = |pixel: Option<usize>| inverse(*depths.get(pixel?)?);
-        let (before, after) = (at(before).map(|there| here - there), at(after).map(|there| there - here));
-        match (before, after) {
-            (Some(a), Some(b)) => Some(if a.abs() < b.abs() { a } else { b }),
+    // The neighbour whose inverse depth differs less: the other may be across an edge.
+    let nearer = |before: Option<usize>, after: Option<usize>| {
+        let at = |pixel: Option<usize>| Some((pixel?, inverse(*depths.get(pixel?)?)?));
+        match (at(before), at(after)) {
+            (Some(a), Some(b)) => Some(if (here - a.1).abs() < (b.1 - here).abs() { a } else { b }),
             (one, other) => one.or(other),
         }
     };
     let column = pixel % width;
-    let across = slope((column > 0).then(|| pixel.wrapping_sub(1)), (column + 1 < width).then_some(pixel + 1))?;
-    let down = slope(pixel.checked_sub(width), Some(pixel + width))?;
-    let [x, y] = picture.ray(pixel);
-    let (a, b) = (across * f64::from(view.fx), down * f64::from(view.fy));
-    let c = here - a * x - b * y;
-    Some(here / ((a * a + b * b + c * c) * (x * x + y * y + 1.0)).sqrt())
+    let beside = nearer((column > 0).then(|| pixel.wrapping_sub(1)), (column + 1 < width).then_some(pixel + 1))?;
+    let below = nearer(pixel.checked_sub(width), Some(pixel + width))?;
+    let ray = Vector3::from(picture.ray(pixel));
+    let [a, b] = [beside, below].map(|(other, inverse)| (Vector3::from(picture.ray(other)) - ray, inverse - here));
+    // Differences instead of rays and inverses: the same plane, and nothing cancels.
+    let volume = ray.dot(&a.0.cross(&b.0));
+    let normal = here * a.0.cross(&b.0) + a.1 * b.0.cross(&ray) + b.1 * ray.cross(&a.0);
+    let cosine = here * volume.abs() / (normal.norm() * ray.norm());
+    cosine.is_finite().then_some(cosine)
 }
 
 /// Marks the pixels of a row that the projector does not reach. Something at depth z is seen by it `reach / z` pixels to the

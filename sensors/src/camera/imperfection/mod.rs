@@ -2,8 +2,9 @@
 //!
 //! Those of light work on linear light, where 1 is a white surface in full light: colours are taken back through the tone curve
 //! and sRGB, spoilt, and brought to the screen again. So they see what the bytes still tell, 256 levels, and of what is white
-//! on the screen the least light that is. Only the exposure is the renderers' own, before the tone curve. Those of depth work on the depth along the optical axis, from which distance
-//! follows. All other channels stay the truth.
+//! on the screen the least light that is. Only the exposure is the renderers' own, before the tone curve. Those of depth work
+//! on what near and far count, the *reach*: depth along the optical axis, or behind lenses whose rays do not all go forward
+//! distance along the ray. The other of the two follows from it. All other channels stay the truth.
 //!
 //! Motion blur is none of them: light that falls in while the shutter is open is of several instants, which a finished picture
 //! does not know any more. It is [`CameraCfg::shutter`](super::CameraCfg::shutter)'s.
@@ -12,6 +13,7 @@ mod tone;
 
 use super::channel::{Channel, Channels, Color, Depth, FrameMut};
 use super::error::CameraError;
+use super::lens::LensRays;
 use super::ticket::Ticket;
 use crate::error::SensorError;
 use crate::resolve::tone::ToneCurve;
@@ -33,15 +35,17 @@ trait OfDepth {
     /// Checks its numbers.
     fn check(&self) -> Result<(), SensorError>;
 
-    /// Spoils a picture of depths \[m\], row by row; where nothing is measured they are infinite.
+    /// Spoils a picture of reaches \[m\], row by row; where nothing is measured they are infinite.
     fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>);
 }
 
 /// What picture it is, and through which lens.
 #[derive(Clone, Copy, Debug)]
-struct Picture<'a> {
-    view: &'a View,
-    ticket: &'a Ticket,
+pub(super) struct Picture<'a> {
+    pub(super) view: &'a View,
+    /// The rays of its lens; `None` is a pinhole.
+    pub(super) rays: Option<&'a LensRays>,
+    pub(super) ticket: &'a Ticket,
 }
 
 /// A pixel of a picture.
@@ -53,17 +57,34 @@ struct Place<'a> {
 }
 
 impl Picture<'_> {
-    /// The direction through the centre of a pixel whose depth is 1, x and y.
-    fn ray(&self, pixel: usize) -> [f64; 2] {
+    /// The direction through the centre of a pixel whose reach is 1; 0 where the lens sees nothing.
+    fn ray(&self, pixel: usize) -> [f64; 3] {
         let View { width, fx, fy, cx, cy, .. } = *self.view;
-        let (u, v) = ((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
-        [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy)]
+        let [column, row] = [pixel % width, pixel / width];
+        if let Some(rays) = self.rays {
+            return rays.direction(0, [column, row]).map(f64::from);
+        }
+        let (u, v) = (column as f64 + 0.5, row as f64 + 0.5);
+        [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy), 1.0]
     }
 
-    /// Cosine of the angle between the ray of a pixel and the optical axis.
-    fn cosine(&self, pixel: usize) -> f64 {
-        let [x, y] = self.ray(pixel);
-        1.0 / (x * x + y * y + 1.0).sqrt()
+    /// Whether rays go aside, so that reach is distance, not depth.
+    fn reaches_aside(&self) -> bool {
+        self.rays.is_some_and(|rays| !rays.is_forward())
+    }
+
+    /// Distance of what has depth 1, where rays go forward; depth of what has distance 1, where they go aside.
+    fn other_than_reach(&self, pixel: usize) -> f64 {
+        let [x, y, z] = self.ray(pixel);
+        if self.reaches_aside() { z } else { (x * x + y * y + z * z).sqrt() }
+    }
+
+    /// How much of the light of the optical axis falls on a pixel: see [`Vignetting`].
+    fn falloff(&self, pixel: usize) -> f64 {
+        match self.rays {
+            None => self.other_than_reach(pixel).powi(-4),
+            Some(rays) => rays.falloff([pixel % self.view.width, pixel / self.view.width]),
+        }
     }
 }
 
@@ -158,8 +179,8 @@ impl Imperfections {
     }
 
     /// Spoils a frame in which misses are infinite.
-    pub(crate) fn spoil(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, view: &View, ticket: &Ticket) {
-        let (picture, tone) = (Picture { view, ticket }, Tone::of(curve));
+    pub(super) fn spoil(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, picture: Picture<'_>) {
+        let tone = Tone::of(curve);
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
             for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
                 let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.light(byte));
@@ -170,22 +191,32 @@ impl Imperfections {
         if !self.of_depth() {
             return;
         }
-        match (frame.depth.as_deref_mut(), frame.distance.as_deref_mut()) {
-            (Some(depths), distances) => {
-                self.spoil_depth(depths, &picture);
-                for (pixel, (distance, depth)) in distances.into_iter().flatten().zip(depths).enumerate() {
-                    *distance = (f64::from(*depth) / picture.cosine(pixel)) as f32;
+        let [depth, distance] = [frame.depth.as_deref_mut(), frame.distance.as_deref_mut()];
+        let (reach, other) = if picture.reaches_aside() { (distance, depth) } else { (depth, distance) };
+        let times = |number: f32, factor: f64| match number.is_finite() {
+            true => (f64::from(number) * factor) as f32,
+            false => f32::INFINITY,
+        };
+        match (reach, other) {
+            (Some(reach), other) => {
+                self.spoil_depth(reach, &picture);
+                for (pixel, (other, reach)) in other.into_iter().flatten().zip(reach).enumerate() {
+                    *other = times(*reach, picture.other_than_reach(pixel));
                 }
             }
-            (None, Some(distances)) => {
-                let scale = |distances: &mut [f32], factor: &dyn Fn(f64) -> f64| {
-                    for (pixel, distance) in distances.iter_mut().enumerate() {
-                        *distance = (f64::from(*distance) * factor(picture.cosine(pixel))) as f32;
-                    }
-                };
-                scale(distances, &|cosine| cosine);
-                self.spoil_depth(distances, &picture);
-                scale(distances, &|cosine| 1.0 / cosine);
+            (None, Some(other)) => {
+                for (pixel, number) in other.iter_mut().enumerate() {
+                    // At a right angle depth is 0 and tells of no reach; nor does any reach change it.
+                    let factor = picture.other_than_reach(pixel).recip();
+                    *number = match factor.is_finite() || number.is_infinite() {
+                        true => times(*number, factor),
+                        false => picture.view.near,
+                    };
+                }
+                self.spoil_depth(other, &picture);
+                for (pixel, number) in other.iter_mut().enumerate() {
+                    *number = times(*number, picture.other_than_reach(pixel));
+                }
             }
             (None, None) => {}
         }

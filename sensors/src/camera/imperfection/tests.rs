@@ -1,7 +1,8 @@
 //! Every imperfection against its law.
 
 use super::*;
-use crate::camera::Frame;
+use crate::camera::lens::{Equidistant, OpenCv};
+use crate::camera::{Frame, Lens, Optics, PixelIntrinsics};
 use scene::PoseF32;
 use std::f64::consts::FRAC_PI_2;
 
@@ -11,6 +12,10 @@ fn view(size: [usize; 2], f: f32) -> View {
     let [cx, cy] = size.map(|side| 0.5 * side as f32);
     let world_from_camera = PoseF32::IDENTITY;
     View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
+}
+
+fn pinhole<'a>(view: &'a View, ticket: &'a Ticket) -> Picture<'a> {
+    Picture { view, rays: None, ticket }
 }
 
 fn tone() -> &'static Tone {
@@ -28,7 +33,7 @@ fn ticket(number: u64) -> Ticket {
 fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<u8> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
-    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, &view([SIDE; 2], 150.0), &ticket(picture));
+    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &ticket(picture)));
     frame.color.unwrap()
 }
 
@@ -118,7 +123,7 @@ fn few_electrons_are_counted_one_by_one() {
         let mut counts = Vec::new();
         for pixel in 0..n {
             let mut light = [tone().light(byte); 3];
-            shot.spoil(&mut light, &Place { picture: Picture { view: &view, ticket: &ticket(1) }, pixel });
+            shot.spoil(&mut light, &Place { picture: pinhole(&view, &ticket(1)), pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
@@ -172,41 +177,74 @@ fn nothing_is_what_it_was() {
 
 /// What becomes of depths, with distances beside them.
 fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
-    let picture = Picture { view, ticket: &ticket(1) };
-    let along = |depths: &[f32]| -> Vec<f32> {
-        let distance = |(pixel, depth): (usize, &f32)| (f64::from(*depth) / picture.cosine(pixel)) as f32;
-        depths.iter().enumerate().map(distance).collect()
-    };
-    let channels = Channels { depth: true, distance: true, ..Channels::default() };
-    let mut frame = Frame::new(view.width, view.height, channels);
-    (frame.depth, frame.distance) = (Some(depths.to_vec()), Some(along(depths)));
-    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, view, picture.ticket);
-    let (depths, distances) = (frame.depth.take().unwrap(), frame.distance.clone().unwrap());
-    assert_eq!(distances, along(&depths), "distance follows depth");
-    depths
+    spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
 }
 
-/// Without a depth channel, distances are spoilt as with one, but for rounding.
+/// Depths and distances of reaches: of a lens whose rays go aside these are distances, of others depths.
+fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
+    let of_pixel = |(pixel, reach): (usize, &f32)| {
+        let [x, y, z] = picture.ray(pixel);
+        let cosine = z / (x * x + y * y + z * z).sqrt();
+        let aside = picture.rays.is_some_and(|rays| rays.optics().lens().name() == "equidistant");
+        let reach = f64::from(*reach);
+        match reach.is_finite() {
+            true if aside => [(reach * cosine) as f32, reach as f32],
+            true => [reach as f32, (reach / cosine) as f32],
+            false => [f32::INFINITY; 2],
+        }
+    };
+    let pixels: Vec<[f32; 2]> = reaches.iter().enumerate().map(of_pixel).collect();
+    [0, 1].map(|k| pixels.iter().map(|pixel| pixel[k]).collect())
+}
+
+/// As [`spoilt_depths`], with any lens: reaches, from both channels, from each alone, and all of them the same.
+fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Picture<'_>) -> Vec<f32> {
+    let seen = |(pixel, reach): (usize, &f32)| if picture.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
+    let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
+    let [depths, distances] = both(&reaches, picture);
+    let view = picture.view;
+    let spoilt = |depth: bool, distance: bool| {
+        let mut frame = Frame::new(view.width, view.height, Channels { depth, distance, ..Channels::default() });
+        (frame.depth, frame.distance) = (depth.then(|| depths.clone()), distance.then(|| distances.clone()));
+        imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, picture);
+        [frame.depth.take(), frame.distance.take()]
+    };
+    let [found_depths, found_distances] = spoilt(true, true).map(Option::unwrap);
+    let alone = [spoilt(true, false)[0].clone().unwrap(), spoilt(false, true)[1].clone().unwrap()];
+    let found = if picture.reaches_aside() { &found_distances } else { &found_depths };
+    let expected = both(found, picture);
+    for (k, all) in [found_depths.clone(), found_distances.clone()].into_iter().enumerate() {
+        for pixel in 0..all.len() {
+            let (one, expected) = (alone[k][pixel], expected[k][pixel]);
+            assert!(all[pixel] == expected || (all[pixel] / expected - 1.0).abs() < 1e-6, "{pixel}: {expected}");
+            // A depth of 1e-3 of the distance tells that to 1e-4 of it.
+            let flat = (found_depths[pixel] / found_distances[pixel]).abs() < 1e-2;
+            let near = (one - expected).abs() < if flat { 1e-3 } else { 1e-5 } * expected.abs() + 1e-6;
+            let edge = one.is_infinite() != expected.is_infinite();
+            assert!(one == expected || near || edge && flat, "{pixel} alone: {one} is not {expected}");
+        }
+    }
+    found.clone()
+}
+
+/// Both depth and distance of a camera tell the same of holes and noise, and each alone too.
 #[test]
 fn distances_alone_are_spoilt_alike() {
     let (view, n) = (view([60, 40], 50.0), 60 * 40);
-    let all = Imperfections {
-        depth_noise: Some(DepthNoise::NGUYEN),
-        holes: Some(Holes::default()),
-        ..Imperfections::default()
-    };
-    let depths: Vec<f32> = (0..n).map(|k| if k % 60 < 30 { 2.0 } else { 1.0 }).collect();
-    let expected = spoilt_depths(&all, &depths, &view);
-    let picture = Picture { view: &view, ticket: &ticket(1) };
-    let mut frame = Frame::new(60, 40, Channels { distance: true, ..Channels::default() });
-    let distances = depths.iter().enumerate().map(|(k, depth)| (f64::from(*depth) / picture.cosine(k)) as f32);
-    frame.distance = Some(distances.collect());
-    all.spoil(&mut frame.as_mut(), ToneCurve::Soft, &view, picture.ticket);
-    for (pixel, (distance, depth)) in frame.distance.unwrap().iter().zip(&expected).enumerate() {
-        let found = f64::from(*distance) * picture.cosine(pixel);
-        assert!(found == f64::from(*depth) || (found / f64::from(*depth) - 1.0).abs() < 1e-6, "{found} {depth}");
+    let reaches: Vec<f32> = (0..n).map(|k| if k % 60 < 30 { 2.0 } else { 1.0 }).collect();
+    for rays in lenses(&view) {
+        let baseline = if rays.is_none() { 0.075 } else { 0.0 };
+        let all = Imperfections {
+            depth_noise: Some(DepthNoise::NGUYEN),
+            holes: Some(Holes { baseline, ..Holes::default() }),
+            ..Imperfections::default()
+        };
+        let ticket = ticket(1);
+        let found = spoilt_behind(&all, &reaches, Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
+        assert!(rays.is_some() || found.iter().any(|reach| reach.is_infinite()), "there are holes");
+        let same = found.iter().zip(&reaches).filter(|(found, reach)| found == reach).count();
+        assert!(same < 10, "there is noise, but for {same}");
     }
-    assert!(expected.iter().any(|depth| depth.is_infinite()), "there are holes");
 }
 
 /// The standard deviation of depth, as a function of depth \[m\].
@@ -269,38 +307,169 @@ fn the_projector_casts_a_shadow() {
     assert_eq!(holes_with(0.15).iter().filter(|depth| depth.is_infinite()).count(), 7 * 8, "the control");
 }
 
-/// Tilted planes: the angle between ray and normal is known at every pixel.
+/// Tilted planes: the angle between ray and normal is known at every pixel, behind any lens.
 #[test]
 fn grazing_surfaces_are_holes() {
     let view = view([80, 60], 60.0);
     let max_angle = 60f64.to_radians();
     let holes = Some(Holes { max_angle, baseline: 0.0 });
     let all = Imperfections { holes, ..Imperfections::default() };
-    let (mut inside, mut outside) = (0, 0);
-    for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
-        let picture = Picture { view: &view, ticket: &ticket(1) };
-        let ray = |pixel| {
-            let [x, y] = picture.ray(pixel);
-            nalgebra::Vector3::new(x, y, 1.0)
-        };
-        let normal = nalgebra::Vector3::from(normal).normalize();
-        // A plane 2 m from the camera; what it does not reach is missed.
-        let depth = |pixel| -2.0 / normal.dot(&ray(pixel));
-        let depths: Vec<f32> =
-            (0..80 * 60).map(|k| if depth(k) > 0.0 { depth(k) as f32 } else { f32::INFINITY }).collect();
-        let found = spoilt_depths(&all, &depths, &view);
-        for (pixel, (found, depth)) in found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite())
-        {
-            let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
-            // Depths in single precision tell the angle to this.
-            if (angle - max_angle).abs() > 1e-3 {
-                assert_eq!(found.is_infinite(), angle > max_angle, "{normal:?}, {pixel}: {angle}");
-                *(if angle > max_angle { &mut inside } else { &mut outside }) += 1;
-                assert!(found.is_infinite() || found == depth);
+    for rays in lenses(&view) {
+        let (mut inside, mut outside) = (0, 0);
+        for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
+            let ticket = ticket(1);
+            let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+            let ray = |pixel| nalgebra::Vector3::from(picture.ray(pixel));
+            let normal = nalgebra::Vector3::from(normal).normalize();
+            // A plane 2 m from the camera; what it does not reach is missed.
+            let depth = |pixel| -2.0 / normal.dot(&ray(pixel));
+            let reached = |depth: f64| depth > 0.0 && depth < 1e3;
+            let depths: Vec<f32> =
+                (0..80 * 60).map(|k| if reached(depth(k)) { depth(k) as f32 } else { f32::INFINITY }).collect();
+            let found = spoilt_behind(&all, &depths, picture);
+            let hits = found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite());
+            for (pixel, (found, depth)) in hits {
+                let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
+                // Depths and rays in single precision tell the angle to this: 6e-8 of each, over a pixel of 1/60.
+                if (angle - max_angle).abs() > 1e-3 {
+                    assert_eq!(found.is_infinite(), angle > max_angle, "{normal:?}, {pixel}: {angle}");
+                    *(if angle > max_angle { &mut inside } else { &mut outside }) += 1;
+                    assert!(found.is_infinite() || found == depth);
+                }
             }
         }
+        assert!(inside > 1000 && outside > 1000, "the control: {inside} {outside}");
     }
-    assert!(inside > 1000 && outside > 1000, "the control: {inside} {outside}");
+}
+
+/// No lens, one whose rays go forward, and one whose rays go aside too: of pictures of a view.
+fn lenses(view: &View) -> [Option<LensRays>; 3] {
+    let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
+    let rays = |lens: Lens, by: f64| {
+        let pixels = PixelIntrinsics { fx: by * fx, fy: by * fy, cx, cy };
+        LensRays::new(&Optics::new(lens, pixels).unwrap(), [view.width, view.height], 1).unwrap()
+    };
+    let warped = rays(OpenCv { k1: -0.2, k2: 0.03, p1: 0.01, ..OpenCv::default() }.into(), 1.0);
+    [None, Some(warped), Some(rays(Equidistant { max_angle: 1.9 }.into(), 0.4))]
+}
+
+/// Behind lenses too the deviation of what is measured is the law's: of depths where rays go forward, of distances elsewhere.
+#[test]
+fn depth_is_noisy_behind_lenses() {
+    let (view, law) = (view([120, 90], 60.0), DepthNoise { constant: 1e-3, quadratic: 2e-3, offset: 0.0 });
+    let all = Imperfections { depth_noise: Some(law), ..Imperfections::default() };
+    for rays in lenses(&view) {
+        let ticket = ticket(1);
+        let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+        for z in [0.5f64, 3.0] {
+            let errors: Vec<f64> = spoilt_behind(&all, &[z as f32; 120 * 90], picture)
+                .into_iter()
+                .filter(|found| found.is_finite())
+                .map(|found| f64::from(found) - z)
+                .collect();
+            assert!(errors.len() > 5000);
+            let (n, sigma) = (errors.len() as f64, 1e-3 + 2e-3 * z * z);
+            let found = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+            assert!((found / sigma - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{found} is not {sigma}");
+        }
+    }
+}
+
+/// What falls on a white picture, by pixel.
+fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
+    let (view, ticket) = (view(size, 1.0), ticket(1));
+    let picture = Picture { rays: Some(rays), ..pinhole(&view, &ticket) };
+    let shade = |pixel| {
+        let mut light = [1.0; 3];
+        Vignetting::default().spoil(&mut light, &Place { picture, pixel });
+        assert!(light[0] == light[1] && light[1] == light[2]);
+        light[0]
+    };
+    (0..size[0] * size[1]).map(shade).collect()
+}
+
+/// Fisheyes by their formulas, lenses of zero distortion as a pinhole, and all of them by their mapping from directions to
+/// points, which the falloff does not use: a patch of the sky of solid angle d omega, seen at the angle theta, lights an area of
+/// the picture, and gets there cos theta d omega of the light.
+#[test]
+fn light_falls_off_as_the_lens_maps_the_sky() {
+    let size = [64, 48];
+    let law = |name: &str, t: f64| match name {
+        "equidistant" => Some(t.cos().max(0.0) * t.sin() / t),
+        "equisolid" => Some(t.cos().max(0.0)),
+        "orthographic" => Some(1.0),
+        "stereographic" => Some(t.cos().max(0.0) * (t / 2.0).cos().powi(4)),
+        "pinhole" => Some(t.cos().powi(4)),
+        _ => None,
+    };
+    let (mut by_law, mut by_mapping, mut dark) = (0, 0, 0);
+    for (lens, pixels) in crate::camera::tests::lenses::all() {
+        if !lens.has_axis() {
+            continue;
+        }
+        let optics = Optics::new(lens, pixels).unwrap();
+        let rays = LensRays::new(&optics, size, 1).unwrap();
+        for (k, found) in left(&rays, size).into_iter().enumerate() {
+            let at = [(k % 64) as f64 + 0.5, (k / 64) as f64 + 0.5];
+            let Some(ray) = optics.unproject(at).map(nalgebra::Vector3::from) else {
+                assert_eq!(found, 0.0, "{}", lens.name());
+                continue;
+            };
+            let theta = ray.x.hypot(ray.y).atan2(ray.z);
+            if theta > FRAC_PI_2 {
+                assert_eq!(found, 0.0, "{}", lens.name());
+                dark += 1;
+                continue;
+            }
+            if let Some(expected) = law(lens.name(), theta) {
+                assert!((found - expected).abs() < 1e-6, "{}: {theta}: {found} is not {expected}", lens.name());
+                by_law += 1;
+            }
+            // The area of the picture that a unit of solid angle lights there, and on the axis.
+            let area = |ray: nalgebra::Vector3<f64>| {
+                let beside = ray.cross(&nalgebra::Vector3::new(0.3, -0.5, 0.2)).normalize();
+                let slope = |along: nalgebra::Vector3<f64>| {
+                    let [a, b] = [-1e-5, 1e-5].map(|by| optics.project((ray + by * along).into()));
+                    Some([0, 1].map(|axis| (b.unwrap_or_default()[axis] - a.unwrap_or_default()[axis]) / 2e-5))
+                        .filter(|_| a.is_some() && b.is_some())
+                };
+                let (a, b) = (slope(beside)?, slope(ray.cross(&beside))?);
+                Some((a[0] * b[1] - a[1] * b[0]).abs())
+            };
+            let Some(here) = area(ray) else { continue };
+            let expected = theta.cos() * area(nalgebra::Vector3::z()).unwrap() / here;
+            assert!((found - expected).abs() < 1e-6, "{}: {theta}: {found} is not {expected}", lens.name());
+            by_mapping += 1;
+        }
+    }
+    assert!(by_law > 5000 && by_mapping > 15_000 && dark > 100, "{by_law} {by_mapping} {dark}");
+}
+
+/// Under a sky that is equally bright everywhere, a lens that sees up to the angle theta collects pi sin² theta of light, up to
+/// a right angle, however it spreads it: the sum over all pixels times the area of one.
+#[test]
+fn lenses_collect_the_light_of_the_sky() {
+    use crate::camera::lens::{Equisolid, Orthographic, Stereographic};
+    use std::f64::consts::PI;
+    let (size, f) = ([300, 300], 50.0);
+    let pixels = PixelIntrinsics { fx: f, fy: f, cx: 150.0, cy: 150.0 };
+    let all: [(Lens, f64); 6] = [
+        (Equidistant { max_angle: 1.0 }.into(), 1.0),
+        (Equidistant { max_angle: 2.5 }.into(), FRAC_PI_2),
+        (Equisolid { max_angle: 2.8 }.into(), FRAC_PI_2),
+        (Orthographic { max_angle: 1.2 }.into(), 1.2),
+        (Stereographic { max_angle: 1.9 }.into(), FRAC_PI_2),
+        (OpenCv { k1: -0.1, max_angle: Some(0.9), ..OpenCv::default() }.into(), 0.9),
+    ];
+    for (lens, most) in all {
+        let rays = LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap();
+        let found = left(&rays, size).iter().sum::<f64>() / (f * f);
+        let expected = PI * most.sin().powi(2);
+        // Of a sharp edge at radius r only pixels on it, 2 pi r of them, may be counted wrong, by half each at most and
+        // by chance: their square root is enough six times.
+        let edge = (2.0 * PI * rays.optics().domain().radius * f).sqrt() * 0.5 * 6.0 / (f * f);
+        assert!((found - expected).abs() < edge.min(0.01 * expected), "{}: {found} is not {expected}", lens.name());
+    }
 }
 
 #[test]

@@ -4,9 +4,14 @@ use super::{OfLight, Place, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Less light away from the optical axis: a thin lens in front of a flat sensor lets through the fourth power of the cosine of
-/// the angle between a pixel's ray and the axis. Source: Horn 1986, "Robot Vision", chapter 10. Light is multiplied by
-/// `1 + strength (cos⁴ - 1)`.
+/// Less light away from the optical axis. Light is multiplied by `1 + strength (falloff - 1)`.
+///
+/// Of what is equally bright, the light on a pixel is proportional to the solid angle that it sees times the area of the
+/// aperture as seen from there, which is as the cosine of the angle theta between the pixel's ray and the axis; the falloff is
+/// that product, 1 on the axis, and 0 beyond a right angle. So it is cos⁴ theta of a pinhole (Horn 1986, "Robot Vision",
+/// chapter 10), cos theta sin theta / theta of the equidistant fisheye, cos theta of the equisolid one, 1 of the orthographic
+/// one, cos theta cos⁴(theta / 2) of the stereographic one, and of others what their mapping makes of it. A panorama has no
+/// optical axis, and is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vignetting {
@@ -26,7 +31,7 @@ impl OfLight for Vignetting {
     }
 
     fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
-        let factor = 1.0 + self.strength * (place.picture.cosine(place.pixel).powi(4) - 1.0);
+        let factor = 1.0 + self.strength * (place.picture.falloff(place.pixel) - 1.0);
         *light = light.map(|light| factor * light);
     }
 }

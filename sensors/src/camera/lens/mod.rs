@@ -41,6 +41,8 @@ pub trait LensModel: Copy + Default {
     /// Whether every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
     /// Of others, near and far are distances along the ray.
     const FORWARD: bool = false;
+    /// Whether there is an aperture with an optical axis; a panorama is put together of many pictures.
+    const HAS_AXIS: bool = true;
 
     /// Whether it is no lens at all, with these numbers.
     fn is_pinhole(&self) -> bool {
@@ -78,9 +80,8 @@ macro_rules! lenses {
         /// In files: the name alone (`lens = "equidistant"`) for the default numbers, or a table with the name
         /// (`lens.opencv = { k1 = -0.28, k2 = 0.07 }`).
         ///
-        /// Lenses other than a pinhole bend straight lines, which only rays follow: they need
-        /// [`Renderer::FastRayTraced`](super::Renderer::FastRayTraced) or
-        /// [`Renderer::RayTraced`](super::Renderer::RayTraced).
+        /// Lenses other than a pinhole bend straight lines, which only rays follow: they need another renderer than
+        /// [`Renderer::Raster`](super::Renderer::Raster).
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[non_exhaustive]
         pub enum Lens {
@@ -120,6 +121,11 @@ macro_rules! lenses {
             /// distances along the ray.
             pub fn is_forward(&self) -> bool {
                 match self { $(Self::$Name(_) => $Name::FORWARD,)* }
+            }
+
+            /// Whether it is one lens with an optical axis, off which there is less light.
+            pub(crate) fn has_axis(&self) -> bool {
+                match self { $(Self::$Name(_) => $Name::HAS_AXIS,)* }
             }
 
             /// Whether it bends nothing: pictures are those without a lens, bit for bit, with every renderer.

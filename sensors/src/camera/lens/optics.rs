@@ -3,6 +3,7 @@
 use super::{Domain, Lens};
 use crate::camera::error::CameraError;
 use crate::camera::intrinsics::{Intrinsics, PixelIntrinsics};
+use nalgebra::Vector3;
 
 /// A lens in front of pixels, checked: from directions to pixels and back.
 ///
@@ -33,6 +34,11 @@ impl Optics {
     pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, CameraError> {
         let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
         Ok(Self { lens, pixels, domain: lens.domain()? })
+    }
+
+    /// The same lens in front of other pixels, which are good.
+    pub(crate) fn with_pixels(&self, pixels: PixelIntrinsics) -> Self {
+        Self { pixels, ..*self }
     }
 
     /// The lens.
@@ -69,5 +75,46 @@ impl Optics {
     pub(crate) fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])
+    }
+
+    /// How much light falls on a pixel, where 1 falls on the principal point: the solid angle that it sees, and the cosine by
+    /// which the aperture is turned aside. 0 where nothing is seen, and from a right angle on.
+    pub(crate) fn falloff(&self, pixel: [f64; 2]) -> f64 {
+        let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
+        let point = [(pixel[0] - cx) / fx, (pixel[1] - cy) / fy];
+        let (Some(ray), Some(seen), Some(most)) =
+            (self.unit(point), self.solid_angle(point), self.solid_angle([0.0; 2]))
+        else {
+            return 0.0;
+        };
+        ray.z.max(0.0) * seen / most
+    }
+
+    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays. Rounding
+    /// takes less than 1e-7 of it; where the rays spread without end, at a right angle of the orthographic fisheye, what they
+    /// are apart takes more.
+    fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
+        const APART: f64 = 1e-7;
+        let here = self.unit(point)?;
+        let slope = |axis: usize| {
+            let beside = |by: f64| {
+                let mut there = point;
+                there[axis] += by;
+                self.unit(there)
+            };
+            // One side may be outside of what the lens sees.
+            match (beside(-APART), beside(APART)) {
+                (Some(before), Some(after)) => Some((after - before) / (2.0 * APART)),
+                (Some(before), None) => Some((here - before) / APART),
+                (None, Some(after)) => Some((after - here) / APART),
+                (None, None) => None,
+            }
+        };
+        Some(slope(0)?.cross(&slope(1)?).norm())
+    }
+
+    /// The direction of length 1 that is seen at a point of the normalised picture.
+    fn unit(&self, point: [f64; 2]) -> Option<Vector3<f64>> {
+        Some(Vector3::from(self.lens.unproject(&self.domain, point)?).normalize())
     }
 }

@@ -24,6 +24,7 @@ impl Panorama {
 impl LensModel for Panorama {
     const NAME: &'static str = "panorama";
     const ALIASES: &'static [&'static str] = &["equirectangular", "omnidirectional", "spherical"];
+    const HAS_AXIS: bool = false;
 
     fn max_angle(&self) -> Option<f64> {
         None

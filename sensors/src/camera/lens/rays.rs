@@ -5,6 +5,7 @@ use crate::camera::error::CameraError;
 use crate::lanes::{F, LANES, Simd, V3, load};
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
 use std::fmt;
+use std::sync::OnceLock;
 
 /// Numbers of a group: x, y, z of two rows of eight pixels.
 const GROUP: usize = 3 * LANES;
@@ -13,8 +14,8 @@ const WIDER: f64 = 1e-5;
 
 /// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::camera::Shot::lens).
 ///
-/// It takes 12 bytes for each pixel, 60 where colours have four samples besides, and is computed once: cameras keep one for each
-/// kind of lens and intrinsics among their environments.
+/// It takes 12 bytes for each pixel, 60 where colours have four samples besides, 4 more where there is vignetting, and is
+/// computed once: cameras keep one for each kind of lens and intrinsics among their environments.
 #[derive(Clone, PartialEq)]
 pub struct LensRays {
     optics: Optics,
@@ -27,6 +28,8 @@ pub struct LensRays {
     cones: Vec<Cone>,
     /// Distance of the rays of neighbouring pixels, where they are as long as they are kept: a mean.
     pixel: f64,
+    /// Of each pixel, row by row, once somebody asks for one; see [`Optics::falloff`].
+    falloff: OnceLock<Vec<f32>>,
 }
 
 /// Directions around one.
@@ -84,6 +87,7 @@ impl LensRays {
             directions: vec![0.0; planes * blocks[0] * blocks[1] * (BLOCK / 2) * GROUP],
             cones: Vec::with_capacity(blocks[0] * blocks[1]),
             pixel: 0.0,
+            falloff: OnceLock::new(),
         };
         for (plane, offset) in SAMPLES.iter().enumerate().take(planes) {
             let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
@@ -124,14 +128,16 @@ impl LensRays {
 
     /// Memory held \[bytes\].
     pub fn bytes(&self) -> usize {
-        size_of::<f32>() * self.directions.capacity() + size_of::<Cone>() * self.cones.capacity()
+        let numbers = self.directions.capacity() + self.falloff.get().map_or(0, Vec::capacity);
+        size_of::<f32>() * numbers + size_of::<Cone>() * self.cones.capacity()
     }
 
     /// The memory of rays for a picture \[bytes\], before it is taken.
     pub(crate) fn bytes_of([width, height]: [usize; 2], samples: u8) -> usize {
         let blocks = width.div_ceil(BLOCK).saturating_mul(height.div_ceil(BLOCK));
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
-        blocks.saturating_mul(size_of::<Cone>() + planes * BLOCK / 2 * GROUP * size_of::<f32>())
+        let of_block = planes * BLOCK / 2 * GROUP + BLOCK * BLOCK;
+        blocks.saturating_mul(size_of::<Cone>() + of_block * size_of::<f32>())
     }
 
     /// Whether all rays have z = 1, not length 1.
@@ -164,6 +170,16 @@ impl LensRays {
     pub(crate) fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
         let (group, lane) = self.place(plane, at);
         [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
+    }
+
+    /// How much of the light of the optical axis falls on a pixel: [`Optics::falloff`] of its centre.
+    pub(crate) fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
+        let all = self.falloff.get_or_init(|| {
+            let [width, height] = self.size;
+            let centre = |k: usize| [(k % width) as f64 + 0.5, (k / width) as f64 + 0.5];
+            (0..width * height).map(|k| self.optics.falloff(centre(k)) as f32).collect()
+        });
+        f64::from(all[y * self.size[0] + x])
     }
 
     /// The rays of the centres of 8 x 2 pixels, of which this is the first.

@@ -2,7 +2,8 @@
 
 use super::super::channel::Flow;
 use super::super::{
-    Before, Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Frame, RasterCfg, Rasterizer, Renderer, Shot,
+    Before, Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Frame, Intrinsics, LensRays, Optics,
+    PixelIntrinsics, RasterCfg, Rasterizer, Renderer, Shot,
 };
 use super::scenes::{Random, random};
 use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, state, tip};
@@ -108,6 +109,92 @@ fn random_scenes_move_as_their_points_do() {
         }
     }
     assert!(judged > 100_000, "{judged}");
+}
+
+/// Behind every lens, things and the camera move and the pixels change: each point is where the lens saw it before, or it did
+/// not see it. The lens itself is judged elsewhere.
+#[test]
+fn what_lenses_see_moves_as_its_points_do() {
+    let (mut numbers, mut unseen_by_all) = (Random(8), 0);
+    for (lens, pixels) in super::lenses::all() {
+        let (mut judged, mut unseen) = (0, 0);
+        for _ in 0..6 {
+            let r = &mut numbers;
+            let (scene, poses) = random(r, 1.2);
+            let (eye, target) = (r.pose(2.0), r.vector(-0.5, 0.5).map(|x| x as f32));
+            let size = [64, 48];
+            let numbers = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
+            let [fx, fy, cx, cy] = numbers;
+            let view =
+                View { fx, fy, cx, cy, ..View::look_at(size, 1.0, eye.translation, target, [0., 0., 1.]).unwrap() };
+            let mut nudge = |pose: &PoseF32| {
+                let by = scene::pose::from_xyz_rpy(r.vector(-0.1, 0.1), r.vector(-0.2, 0.2));
+                PoseF32::from(&(wide(pose) * by))
+            };
+            let before: Vec<PoseF32> = poses.iter().map(&mut nudge).collect();
+            let world_from_camera = nudge(&view.world_from_camera);
+            for old in
+                [View { world_from_camera, ..view }, View { world_from_camera, fx: 0.9 * fx, cy: cy + 2.0, ..view }]
+            {
+                let optics_of = |view: &View, exact: bool| {
+                    let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
+                    Optics::new(lens, if exact { pixels } else { PixelIntrinsics { fx, fy, cx, cy } }).unwrap()
+                };
+                let rays = LensRays::new(&optics_of(&view, true), size, 1).unwrap();
+                let then = optics_of(&old, old.fx == view.fx);
+                let shot = Shot {
+                    scene: &scene,
+                    poses: &poses,
+                    view: &view,
+                    lights: None,
+                    lens: Some(&rays),
+                    before: Some(Before { poses: &before, view: &old }),
+                };
+                let renderer = if old.fx == view.fx { Renderer::FastRayTraced } else { Renderer::Hybrid };
+                let frame = draw(renderer, shot);
+                let (flow, mask) = (frame.flow.as_ref().unwrap(), frame.mask.as_ref().unwrap());
+                for (k, id) in mask.iter().enumerate() {
+                    let found = [0, 1].map(|axis| f64::from(flow[2 * k + axis]));
+                    if *id == 0 {
+                        assert!(found.iter().all(|x| *x == f64::INFINITY), "nothing is there: {found:?}");
+                        continue;
+                    }
+                    let place = |k: usize| f64::from(frame.position.as_ref().unwrap()[k]);
+                    let at = scene.instances().iter().position(|instance| instance.mask_id == *id).unwrap();
+                    let point = Point3::new(place(3 * k), place(3 * k + 1), place(3 * k + 2));
+                    let point = wide(&before[at]) * (wide(&poses[at]).inverse() * point);
+                    let point = wide(&old.world_from_camera).inverse() * point;
+                    if point.coords.norm() < 0.2 {
+                        continue;
+                    }
+                    // What is within 1e-4 rad of the end of the lens may be told either way.
+                    let aside = point.x.hypot(point.y).atan2(point.z);
+                    if (aside - then.domain().angle).abs() < 1e-4 {
+                        continue;
+                    }
+                    let Some(there) = then.project(point.coords.into()) else {
+                        unseen += 1;
+                        assert!(found.iter().all(|x| *x == f64::INFINITY), "it was not seen: {found:?}");
+                        continue;
+                    };
+                    judged += 1;
+                    let here = [(k % size[0]) as f64 + 0.5, (k / size[0]) as f64 + 0.5];
+                    // Far beside the picture a pixel is a small angle.
+                    let slope = 1.0 / aside.cos().abs().max(0.02);
+                    for axis in 0..2 {
+                        let expected = here[axis] - there[axis];
+                        let off = (found[axis] - expected).abs();
+                        let name = lens.name();
+                        assert!(off < ROUNDING * slope, "{name}: {found:?} is not {expected} along {axis}, {off}");
+                    }
+                }
+            }
+        }
+        println!("{}: {judged} judged, {unseen} not seen before", lens.name());
+        assert!(judged > 5000, "{}: {judged}", lens.name());
+        unseen_by_all += unseen;
+    }
+    assert!(unseen_by_all > 100, "the control: {unseen_by_all}");
 }
 
 /// A camera that turns about itself: flow is that of the homography K R K^-1, whatever the distance; what neither moves nor
@@ -233,6 +320,76 @@ fn a_ball_moves_and_the_ground_does_not() {
         }
     }
     assert!(balls > 100, "{balls}");
+}
+
+/// A fisheye with everything that lenses have of their own: the ball's points were where the lens sees them now and saw them
+/// before, although the intrinsics of one environment were set meanwhile; depths are noisy along the ray; and no light comes
+/// from beyond a right angle. The same camera without imperfections is the control.
+#[test]
+fn cameras_have_all_of_it_behind_a_lens() {
+    use super::super::imperfection::{DepthNoise, Vignetting};
+    let clean = CameraCfg {
+        lens: super::super::lens::Equidistant { max_angle: 1.9 }.into(),
+        intrinsics: Intrinsics::Pixels { fx: 13.0, fy: 13.0, cx: 24.0, cy: 16.0 },
+        renderer: Renderer::FastRayTraced,
+        channels: Channels { color: true, distance: true, ..WANTED },
+        ..cfg()
+    };
+    let mut imperfect = clean.clone();
+    imperfect.imperfections.vignetting = Some(Vignetting::default());
+    imperfect.imperfections.depth_noise = Some(DepthNoise { constant: 0.01, quadratic: 0.0, offset: 0.0 });
+    let [clean, imperfect] = [clean, imperfect].map(|cfg| {
+        let mut camera = built(&cfg, &context(2));
+        let other = Intrinsics::Pixels { fx: 14.0, fy: 14.5, cx: 23.0, cy: 17.0 };
+        camera.update(&state(&[1, 1])).unwrap();
+        let before = camera.optics(1).unwrap();
+        camera.set_intrinsics(&[other], Some(&[1])).unwrap();
+        camera.update(&state(&[6, 6])).unwrap();
+        (camera, before)
+    });
+    let (before, camera) = (clean.1, &clean.0);
+    assert!(before != camera.optics(1).unwrap() && camera.flow().unwrap() == imperfect.0.flow().unwrap());
+    let (mut balls, mut dark, mut noise) = (0, 0, Vec::new());
+    for row in 0..2 {
+        let now = camera.optics(row).unwrap();
+        let then = if row == 1 { before } else { now };
+        let camera_from_world = camera.world_from_camera(row).unwrap().inverse();
+        for (k, found) in flow_of(camera, row).into_iter().enumerate() {
+            let [u, v] = [k % SIZE[0], k / SIZE[0]];
+            let here = [u as f64 + 0.5, v as f64 + 0.5];
+            let Some(ray) = now.unproject(here) else { continue };
+            let light = [camera, &imperfect.0].map(|camera| camera.color().unwrap()[(row, v, u, 0)]);
+            match ray[2] {
+                // A pixel sees 4 degrees. Only the ground and the sky are there, and no pixel of theirs is black.
+                z if z < -0.06 => {
+                    assert!(light[0] > 0 && light[1] == 0, "{light:?}");
+                    dark += 1;
+                }
+                z if z > 0.99 => assert!(light[0].abs_diff(light[1]) <= 3, "{light:?}"),
+                _ => assert!(light[1] <= light[0]),
+            }
+            let [clean, noisy] = [camera, &imperfect.0].map(|camera| camera.distance().unwrap()[(row, v, u)]);
+            let depth = f64::from(imperfect.0.depth().unwrap()[(row, v, u)]);
+            let along = f64::from(noisy) * ray[2];
+            assert!(if noisy.is_finite() { (depth - along).abs() < 1e-5 } else { depth == f64::INFINITY }, "{depth}");
+            if camera.mask().unwrap()[(row, v, u)] == BALL {
+                noise.push(f64::from(noisy - clean));
+                let moved = ball(row, 6)[1] - ball(row, 1)[1];
+                let position = camera.position().unwrap();
+                let p = Point3::from([0, 1, 2].map(|axis| f64::from(position[(row, v, u, axis)])));
+                let there = then.project((camera_from_world * (p - Vector3::y() * moved)).coords.into()).unwrap();
+                for axis in 0..2 {
+                    let expected = here[axis] - there[axis];
+                    assert!((f64::from(found[axis]) - expected).abs() < ROUNDING, "{found:?}, {expected}");
+                }
+                balls += 1;
+            }
+        }
+    }
+    let n = noise.len() as f64;
+    let deviation = (noise.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+    assert!((deviation / 0.01 - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{deviation}");
+    assert!(balls > 30 && dark > 50, "{balls} {dark}");
 }
 
 #[test]

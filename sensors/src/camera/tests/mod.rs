@@ -12,7 +12,7 @@ mod flow;
 mod golden;
 mod late;
 mod lens_pictures;
-mod lenses;
+pub(super) mod lenses;
 mod metals;
 mod noisy;
 mod pictures;

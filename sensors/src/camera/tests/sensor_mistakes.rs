@@ -47,16 +47,19 @@ fn configurations_are_checked() {
     ] {
         assert_eq!(refused(&past), CameraError::FlowOfThePast.into());
     }
-    let rays = CameraCfg { lens: Lens::from_name("equidistant").unwrap(), renderer: Renderer::FastRayTraced, ..cfg() };
-    let bent = CameraCfg { channels: flow.channels, ..rays.clone() };
-    assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "the channel flow", lens: "equidistant" }.into());
+    let rays = |lens| CameraCfg {
+        lens: Lens::from_name(lens).unwrap(),
+        renderer: Renderer::FastRayTraced,
+        channels: Channels { color: true, depth: true, ..Channels::NONE },
+        ..cfg()
+    };
     let imperfections = Imperfections { vignetting: Some(Default::default()), ..Default::default() };
-    let bent = CameraCfg { imperfections, ..rays.clone() };
-    assert_eq!(refused(&bent), CameraError::PinholeOnly { what: "vignetting", lens: "equidistant" }.into());
-    let imperfections = Imperfections { depth_noise: Some(Default::default()), ..Default::default() };
-    let channels = Channels { depth: true, ..Channels::default() };
-    let error = refused(&CameraCfg { imperfections, channels, ..rays });
-    assert_eq!(error, CameraError::PinholeOnly { what: "noise of measured depth", lens: "equidistant" }.into());
+    let all_around = CameraCfg { imperfections, ..rays("panorama") };
+    assert_eq!(refused(&all_around), CameraError::NoAxis { what: "vignetting", lens: "panorama" }.into());
+    let imperfections = Imperfections { holes: Some(Default::default()), ..Default::default() };
+    let error = refused(&CameraCfg { imperfections, ..rays("equidistant") });
+    let what = "shadows of a projector (baseline of the holes)";
+    assert_eq!(error, CameraError::PinholeOnly { what, lens: "equidistant" }.into());
 
     let place = |placement| CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..cfg() };
     let nan = Placement::Pose { pos: [0.0, f64::NAN, 0.0], rotation: UnitQuaternion::identity() };
