@@ -194,7 +194,8 @@ fn heading(machine: &str) -> String {
          everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the rival ran in one run, \
          in turns. Numbers are medians of the turns; so is the ratio, which is taken turn by turn and need not be that of the \
          medians. `ratio > 1`: ours is faster. `-`: there is no rival, it was not on the machine, or it has another MuJoCo. \
-         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves.\n\nRivals in Python: {}, and \
+         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves. Against an `aim` of `trace` \
+         stands the repetition that a tenth of all are faster than: an aim is about a core that nobody else uses.\n\nRivals in Python: {}, and \
          the `mujoco` of the row.\n",
         rivals.join(", ")
     )

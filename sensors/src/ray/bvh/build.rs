@@ -10,6 +10,7 @@ use super::{Aabb, Bvh, Node, PAD, WIDE};
 use crate::lanes::{F4, Level, Simd, at_level};
 use crate::ray::vector::to_f64;
 use curve::Curve;
+use leaves::Costs;
 
 mod curve;
 mod cut;
@@ -154,6 +155,7 @@ pub(crate) struct Builder {
     /// What a cut moves.
     aside: Vec<Item>,
     nodes: Vec<Node>,
+    costs: Costs,
     pad: f32,
 }
 
@@ -192,6 +194,7 @@ impl Builder {
             children: Vec::new(),
             aside: Vec::new(),
             nodes: Vec::new(),
+            costs: Costs::default(),
             pad: 0.0,
         }
     }
@@ -259,15 +262,17 @@ impl Builder {
         let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
             (bounds_of(s, things), (start, count))
         } else {
-            let (ends, leaves) = leaves::ends(s, things);
-            let mut node = Node::EMPTY;
+            let (ends, leaves) = leaves::ends(s, things, &mut self.costs);
+            // Filled where it stays.
+            let index = self.push(Node::EMPTY);
+            let node = &mut self.nodes[index as usize];
             let (mut around, mut first) = (NOTHING, 0);
             for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
                 let leaf = bounds_of(s, &things[first..end]);
                 node.set(k, &leaf, self.pad, (start + first as u32, (end - first) as u32));
                 (around, first) = (around.with(&leaf), end);
             }
-            (around, (self.push(node), 0))
+            (around, (index, 0))
         };
         let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
         self.groups.push(Item::item([a, b, c], [d, e, f], self.children.len() as u32, count));
@@ -306,11 +311,22 @@ impl Builder {
         for (k, part) in parts.iter().enumerate().take(count) {
             let child = if part.len() == 1 {
                 self.children[self.groups[part.start as usize].number() as usize]
+            } else if part.len() <= WIDE {
+                (self.add_few(part), 0)
             } else {
                 let halves = self.open(part);
                 (self.add(halves, 2), 0)
             };
             node.set(k, &part.bounds, self.pad, child);
+        }
+        self.push(node)
+    }
+
+    /// Adds the node of a part of no more groups than a node has children: however they are cut, all are its children.
+    fn add_few(&mut self, part: &Part) -> u32 {
+        let mut node = Node::EMPTY;
+        for (k, group) in self.groups[part.start as usize..part.end as usize].iter().enumerate().take(WIDE) {
+            node.set(k, group, self.pad, self.children[group.number() as usize]);
         }
         self.push(node)
     }

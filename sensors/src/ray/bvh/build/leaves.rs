@@ -12,15 +12,28 @@ const LEAF_COST: f32 = 1.0;
 const TESTS: [f32; LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
 const _: () = assert!(GROUP <= LEAF * WIDE, "every group can be cut into leaves");
 
+/// What leaves of a group cost: memory to be kept, so that only what is looked at is written. Rows of more things than the group
+/// has are an earlier group's.
+#[derive(Clone, Debug)]
+pub(super) struct Costs {
+    /// Of leaves that end with each of the things, one thing long, two, and so on.
+    costs: [[f32; LEAF]; GROUP],
+    /// Least cost of the first j things as k leaves; and before those, of fewer things than none.
+    least: [[f32; WIDE]; LEAF + GROUP],
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        let mut least = [[f32::INFINITY; WIDE]; LEAF + GROUP];
+        least[LEAF - 1][0] = 0.0;
+        Self { costs: [[0.0; LEAF]; GROUP], least }
+    }
+}
+
 /// Where the leaves of things that lie together on the curve end, and how many leaves there are.
 #[inline(always)]
-pub(super) fn ends<S: Simd>(s: S, things: &[Item]) -> ([u8; WIDE], usize) {
+pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut Costs) -> ([u8; WIDE], usize) {
     let things = &things[..things.len().min(GROUP)];
-    // What leaves cost that end with each of the things, one thing long, two, and so on.
-    let mut costs = [[0.0; LEAF]; GROUP];
-    // Least cost of the first j things as k leaves; and before those, of fewer things than none.
-    let mut least = [[f32::INFINITY; WIDE]; LEAF + GROUP];
-    least[LEAF - 1][0] = 0.0;
     // The last rows, the newest first: not read from memory that has just been written.
     let none = F8::splat(s, f32::INFINITY);
     let mut recent = [none; LEAF];
@@ -100,6 +113,8 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1u32 << 24) as f32
         };
+        // Kept from group to group, as the builder does.
+        let mut kept = Costs::default();
         for round in 0..200 {
             let count = 1 + round % 14;
             let things: Vec<Item> = (0..count as u32)
@@ -109,7 +124,7 @@ mod tests {
                     Item::item(lo, lo.map(|x| x + long), k, 1)
                 })
                 .collect();
-            let (ends, leaves) = ends(Scalar, &things);
+            let (ends, leaves) = ends(Scalar, &things, &mut kept);
             let chosen = ends[..leaves].iter().map(|&end| usize::from(end));
             assert!(chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= LEAF));
             let mut least = f32::INFINITY;
@@ -131,7 +146,7 @@ mod tests {
         let huge = [[-3e38f32; 3], [3e38; 3]];
         let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
         for level in levels() {
-            let (ends, leaves) = at_level!(level, s => ends(s, &things));
+            let (ends, leaves) = at_level!(level, s => ends(s, &things, &mut Costs::default()));
             assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
         }
     }
