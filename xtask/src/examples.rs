@@ -269,6 +269,7 @@ const TABLE: &[Run] = &[
     run_of("fisheye", &[0], "--headless --lens ftheta --steps 20 --record {out}/fisheye.mcap --out {out}/served"),
     run_of("fisheye", &[2], "--headless --serve nowhere --out {out}/none"),
     run_of("fisheye", &[2], "--headless --lens opencv --renderer raster --out {out}/none"),
+    run_of("fisheye", &[0], "--headless --lens opencv --lens equidistant --renderer hybrid --out {out}/hybrid"),
     run_of("fisheye", &[2], "--headless --camera-info {out}/malformed.urdf --out {out}/none"),
     run_of("fisheye", &[2], "--headless --camera-info {out}/there_is_no_such_file.yaml --out {out}/none"),
     run_of("inspect_robot", &[0, 1], "assets/sr5/SR5.urdf"),
