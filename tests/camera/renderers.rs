@@ -6,8 +6,44 @@ use std::f64::consts::FRAC_PI_2;
 
 const SIZE: [usize; 2] = [320, 240];
 
-/// The arm, the hand and the cube, and a camera for each renderer at one of the two places of the example.
-fn cameras(attached: bool) -> (SimulationManager, Vec<(Renderer, SensorId<Camera>)>) {
+/// Where the cameras are.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// Above the cube, as the example has it.
+    Above,
+    /// On the tip of the arm, as the example has it with `--attach-sensor`.
+    Tip,
+    /// Beside the arm, so that all of it is seen.
+    Beside,
+}
+
+impl Place {
+    fn extrinsics(self) -> Extrinsics {
+        let (parent, placement, convention) = match self {
+            Self::Above => {
+                let rotation = from_wxyz([0.0, 0.0, 1.0, 0.0]);
+                (None, Placement::Pose { pos: [1.2, -0.2, 1.5], rotation }, CameraConvention::default())
+            }
+            Self::Tip => {
+                let angles = [(-35f64).to_radians(), 135f64.to_radians(), 0.0];
+                let rotation = from_xyz_rpy([0.0; 3], angles).rotation;
+                (
+                    Some("sr5/ee_link".into()),
+                    Placement::Pose { pos: [0.09, 0.05, 0.04], rotation },
+                    CameraConvention::OpenGl,
+                )
+            }
+            Self::Beside => {
+                let (eye, target) = ([1.6, -1.2, 1.0], [0.2, 0.0, 0.4]);
+                (None, Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] }, CameraConvention::default())
+            }
+        };
+        Extrinsics { parent, placement, convention }
+    }
+}
+
+/// The arm, the hand and the cube, and a camera for each renderer.
+fn cameras(place: Place) -> (SimulationManager, Vec<(Renderer, SensorId<Camera>)>) {
     let mut sim =
         SimulationManager::new(SimulationManagerCfg { physics_dt: 0.01, threads: Some(2), ..Default::default() })
             .unwrap();
@@ -25,15 +61,6 @@ fn cameras(attached: bool) -> (SimulationManager, Vec<(Renderer, SensorId<Camera
         ..Default::default()
     })
     .unwrap();
-    let free = Extrinsics {
-        placement: Placement::Pose { pos: [1.2, -0.2, 1.5], rotation: from_wxyz([0.0, 0.0, 1.0, 0.0]) },
-        ..Default::default()
-    };
-    // From beside, so that all of the arm is seen.
-    let beside = Extrinsics {
-        placement: Placement::LookAt { eye: [1.6, -1.2, 1.0], target: [0.2, 0.0, 0.4], up: [0.0, 0.0, 1.0] },
-        ..Default::default()
-    };
     let few = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: true, seed: 0 };
     let all = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced, few];
     let cameras = all.into_iter().enumerate().map(|(k, renderer)| {
@@ -43,7 +70,7 @@ fn cameras(attached: bool) -> (SimulationManager, Vec<(Renderer, SensorId<Camera
             intrinsics: Intrinsics::Pixels { fx: 300.0, fy: 300.0, cx: 160.0, cy: 120.0 },
             near: 0.01,
             far: 10.0,
-            extrinsics: if attached { beside.clone() } else { free.clone() },
+            extrinsics: place.extrinsics(),
             channels: Channels::ALL,
             renderer,
             raster: RasterCfg { lod: false, ..RasterCfg::of_cameras() },
@@ -58,8 +85,8 @@ fn cameras(attached: bool) -> (SimulationManager, Vec<(Renderer, SensorId<Camera
 
 #[test]
 fn masks_depths_and_normals_are_the_rasterizers_off_silhouettes() {
-    for beside in [false, true] {
-        let (sim, cameras) = cameras(beside);
+    for place in [Place::Above, Place::Tip, Place::Beside] {
+        let (sim, cameras) = cameras(place);
         let raster = sim.sensor(cameras[0].1).unwrap();
         let (mask, depth) = (raster.mask().unwrap(), raster.depth().unwrap());
         let normal = raster.normal().unwrap();
@@ -90,7 +117,7 @@ fn masks_depths_and_normals_are_the_rasterizers_off_silhouettes() {
                     different += usize::from(!same || !(nothing || cosine >= 0.5f32.to_radians().cos()));
                 }
             }
-            println!("{renderer:?}: {different} of {compared} pixels differ");
+            println!("{place:?}, {renderer:?}: {different} of {compared} pixels differ");
             assert!(compared > SIZE[0] * SIZE[1] * 8 / 10, "{renderer:?}: {compared}");
             // Centres of pixels on edges between triangles may belong to either of them.
             assert!(different * 1000 <= compared, "{renderer:?}: {different} of {compared}");

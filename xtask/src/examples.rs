@@ -100,6 +100,11 @@ const TABLE: &[Run] = &[
         "--headless --steps 1 --enable-rt --rt-samples 4 --rt-bounces 2 --width 160 --height 120 --out {out}/paths",
     ),
     run_of("create_sensor", &[0], "--headless --steps 1 --renderer hybrid --width 160 --height 120 --out {out}/hybrid"),
+    run_of(
+        "create_sensor",
+        &[0],
+        "--headless --steps 1 --attach-sensor --renderer fast-rt --width 160 --height 120 --out {out}/seen_by_rays",
+    ),
     run_of("create_sensor", &[2], "--headless --steps 1 --renderer rt --rt-samples 0 --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --renderer raster --enable-rt --out {out}/none"),
     run_of("create_sensor", &[2], "--headless --steps 1 --renderer fast-rt --rt-samples 4 --out {out}/none"),

@@ -42,6 +42,14 @@ pub(crate) fn bits(value: serde_json::Value) -> serde_json::Value {
     }
 }
 
+/// The matrix of a camera in environment `env` for ROS, which counts pixels from the centre of the first one.
+fn ros_matrix(camera: &Camera, env: usize) -> Vec<f64> {
+    let mut matrix = camera.intrinsic_matrices().index_axis(Axis(0), env).to_owned();
+    matrix[(0, 2)] -= 0.5;
+    matrix[(1, 2)] -= 0.5;
+    matrix.into_iter().collect()
+}
+
 /// Records, and gives what the last row should be; what is not finished is left as by a process that was killed.
 fn recorded(path: &Path, finish: bool) -> serde_json::Value {
     let mut world = World::new(2, 2);
@@ -65,7 +73,7 @@ fn recorded(path: &Path, finish: bool) -> serde_json::Value {
         "cube": world.sim.rigid_object(world.cube).get_pose().row(1).to_vec(),
         "acceleration": world.sim.sensor(world.imu).unwrap().lin_acc_b().row(1).to_vec(),
         "orientation": world.sim.sensor(world.imu).unwrap().quat_w().row(1).to_vec(),
-        "intrinsics": camera.intrinsic_matrices().index_axis(Axis(0), 1).iter().copied().collect::<Vec<f64>>(),
+        "intrinsics": ros_matrix(camera, 1),
         "camera": camera.pose_w(CameraConvention::Ros).row(1).to_vec(),
         "nanoseconds": (world.sim.time()[1] * 1e9).round() as u64,
         "depth_shape": depth.shape(),
@@ -163,7 +171,7 @@ fn sensed(path: &Path) -> serde_json::Value {
     let recorder = sim.record(RecorderCfg::new(path)).unwrap();
     sim.update(100);
     let fish = sim.sensor(fish).unwrap();
-    let matrix: Vec<f64> = fish.intrinsic_matrices().index_axis(Axis(0), 1).iter().copied().collect();
+    let matrix = ros_matrix(fish, 1);
     let scanner = sim.sensor(scanner).unwrap();
     let hits = scanner.hits().index_axis(Axis(0), 1).to_owned();
     let points = hits.rows().into_iter().filter(|p| p.iter().all(|x| x.is_finite()));
@@ -195,7 +203,7 @@ fn sensed(path: &Path) -> serde_json::Value {
     // P of ROS: of the right eye it brings points of the left one, 6 cm beside it, into the picture.
     let projections = [0.0, 0.06].map(|baseline| {
         let k = sim.sensor(pair).unwrap().left().intrinsic_matrices();
-        let [fx, cx, fy, cy] = [k[(1, 0, 0)], k[(1, 0, 2)], k[(1, 1, 1)], k[(1, 1, 2)]];
+        let [fx, cx, fy, cy] = [k[(1, 0, 0)], k[(1, 0, 2)] - 0.5, k[(1, 1, 1)], k[(1, 1, 2)] - 0.5];
         [fx, 0.0, cx, 0.0 - fx * baseline, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| (x * 1e9).round() / 1e9)
     });
     let scanner_pose = [scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat();

@@ -2,6 +2,7 @@
 
 use super::cdr::Cdr;
 use crate::stream::Distortion;
+use sensors::camera::CameraInfo;
 
 /// When and where something was measured.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +83,8 @@ pub(crate) fn image(
     to.blob_of(height * bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of its matrix, `baseline` \[m\] is that of the right eye of a pair.
+/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of the camera's matrix, `baseline` \[m\] is that of the right eye of a
+/// pair. ROS counts pixels from the centre of the first one, not from its corner.
 pub(crate) fn camera_info(
     to: &mut Cdr,
     stamp: Stamp<'_>,
@@ -95,7 +97,9 @@ pub(crate) fn camera_info(
     to.count(width);
     to.text(&distortion.model);
     to.list(&distortion.coefficients);
-    to.f64s(k);
+    let k: Vec<f64> =
+        k.iter().enumerate().map(|(i, x)| if matches!(i, 2 | 5) { x - CameraInfo::FIRST_CENTRE } else { *x }).collect();
+    to.f64s(&k);
     to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     // Points of the left eye, in the right eye's picture.
     let fourth = [if baseline == 0.0 { 0.0 } else { -k.first().unwrap_or(&0.0) * baseline }, 0.0, 0.0];

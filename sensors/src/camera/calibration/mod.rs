@@ -65,7 +65,11 @@ impl DistortionModel {
     }
 }
 
-/// A camera's calibration.
+/// A camera's calibration, with the numbers of a file.
+///
+/// There the *centre* of the first pixel is at (0, 0), as OpenCV's pictures have it; in [`Intrinsics`] and [`Lens`] its corner is.
+/// So principal points are half a pixel less here: that of a centred camera of 640 pixels is 319.5. [`of`](Self::of),
+/// [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) go from one to the other.
 ///
 /// ```
 /// use sensors::camera::{CameraCfg, CameraInfo, Renderer};
@@ -85,7 +89,9 @@ impl DistortionModel {
 /// let mut cfg = CameraCfg { renderer: Renderer::FastRayTraced, ..CameraCfg::default() };
 /// info.apply_to(&mut cfg);
 /// assert_eq!((cfg.width, cfg.lens.name()), (640, "opencv"));
-/// # Ok::<(), sensors::camera::CalibrationError>(())
+/// // The same point of the picture, counted from the corner of the first pixel.
+/// assert_eq!(info.intrinsics().to_pixels(640, 480)?.cx, 324.6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraInfo {
@@ -95,7 +101,7 @@ pub struct CameraInfo {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// K: `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of raw pictures \[pixels\].
+    /// K: `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of raw pictures \[pixels\], cx and cy from the centre of the first pixel.
     pub camera_matrix: Matrix3<f64>,
     /// What D means.
     pub distortion_model: DistortionModel,
@@ -103,11 +109,14 @@ pub struct CameraInfo {
     pub distortion_coefficients: Vec<f64>,
     /// R: the rotation that rectified pictures are turned by. Raw pictures do not depend on it.
     pub rectification_matrix: Matrix3<f64>,
-    /// P: of rectified pictures \[pixels\]. Raw pictures do not depend on it.
+    /// P: of rectified pictures \[pixels\], from the centre of the first one. Raw pictures do not depend on it.
     pub projection_matrix: Matrix3x4<f64>,
 }
 
 impl CameraInfo {
+    /// Where the centre of the first pixel is for [`Intrinsics`] \[pixels\], along both axes of the picture; here it is at 0.
+    pub const FIRST_CENTRE: f64 = 0.5;
+
     /// Reads a file.
     ///
     /// # Errors
@@ -186,7 +195,8 @@ impl CameraInfo {
         lens: &Lens,
     ) -> Result<Self, CalibrationError> {
         let (distortion_model, distortion_coefficients) = of_lens(lens)?;
-        let camera_matrix = Intrinsics::from(*pixels).matrix(width, height)?;
+        let mut camera_matrix = Intrinsics::from(*pixels).matrix(width, height)?;
+        (0..2).for_each(|axis| camera_matrix[(axis, 2)] -= Self::FIRST_CENTRE);
         let mut projection_matrix = Matrix3x4::zeros();
         projection_matrix.fixed_columns_mut::<3>(0).copy_from(&camera_matrix);
         Ok(Self {
@@ -204,7 +214,8 @@ impl CameraInfo {
     /// Focal lengths and principal point of raw pictures.
     pub fn intrinsics(&self) -> Intrinsics {
         let k = &self.camera_matrix;
-        Intrinsics::Pixels { fx: k[(0, 0)], fy: k[(1, 1)], cx: k[(0, 2)], cy: k[(1, 2)] }
+        let [cx, cy] = [0, 1].map(|axis| k[(axis, 2)] + Self::FIRST_CENTRE);
+        Intrinsics::Pixels { fx: k[(0, 0)], fy: k[(1, 1)], cx, cy }
     }
 
     /// The lens of raw pictures.

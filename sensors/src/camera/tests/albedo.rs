@@ -3,8 +3,10 @@
 use super::super::{Channels, Frame, RasterCfg, Rasterizer, Renderer};
 use super::scenes::{Random, random};
 use crate::visibility::View;
-use scene::shape::{Box, Plane, Sphere};
-use scene::{Headlight, Hemisphere, Instance, Light, Material, PoseF32, RenderScene, Texture};
+use scene::shape::{Box, Mesh, Plane, Sphere};
+use scene::{
+    Headlight, Hemisphere, Instance, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind,
+};
 use std::sync::Arc;
 
 const WANTED: Channels = Channels { albedo: true, mask: true, ..Channels::NONE };
@@ -110,6 +112,85 @@ fn textures_are_in_it() {
             fields[which ^ diagonal] += 1;
         }
         assert!(fields.iter().sum::<usize>() > 10_000 && fields.contains(&0), "one diagonal is dark: {fields:?}");
+    }
+}
+
+/// What a path finds of a texture is what the rasterizer draws of it: on a plane, by texture coordinates of a mesh that are turned,
+/// squeezed and end nowhere, and of the six pictures of a cube. In even light what is matt and convex is as bright as its albedo
+/// times that light, so the colour that paths find tells the albedo.
+#[test]
+fn paths_find_the_same_textures() {
+    const LIGHT: f32 = 0.5;
+    let image = |kind, side: u32, faces: u32| {
+        let step = 256 / side;
+        let texel = |k: u32| [step * (k % side), step * (k / side % side), 40 * (k / side / side)].map(|x| x as u8);
+        let bytes: Vec<u8> = (0..side * side * faces).flat_map(texel).collect();
+        Some(Arc::new(Texture::new(kind, side, side * faces, 3, &bytes).unwrap()))
+    };
+    let brick = Box { half: [0.4, 0.5, 0.3] };
+    let turned = |by: f32| {
+        let mut mesh = Shape::from(brick).tessellate(0);
+        let uv = |p: [f32; 3]| {
+            let [x, y, z] = p.map(|x| by * x);
+            [0.5 + 0.5 * y + 0.2 * z, 0.5 - 0.4 * x + 0.6 * z]
+        };
+        mesh.uvs = Some(mesh.positions.iter().map(|p| uv(*p)).collect());
+        Shape::from(Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+    };
+    let flat = Shape::from(Plane { half: [0.5, 0.5] });
+    let (square, cube) = (image(TextureKind::TwoD, 64, 1), image(TextureKind::Cube, 32, 6));
+    let scene_of = |shape: &Shape, texture: &Option<Arc<Texture>>| {
+        let matt = Material { specular: 0.0, tex_repeat: [1.0, 1.0], ..Material::from_rgba([1.0; 4]) };
+        let material = Material { texture: texture.clone(), ..matt };
+        let mut scene = RenderScene::new(vec![Instance::new(shape.clone(), material, 1)]).unwrap();
+        scene.lights.clear();
+        scene.headlight.active = false;
+        scene.ambient = Hemisphere { sky: [LIGHT; 3], ground: [LIGHT; 3] };
+        scene
+    };
+    let wanted = Channels { color: true, ..WANTED };
+    let paths = Renderer::RayTraced { samples: 16, max_bounces: 1, denoise: false, seed: 0 };
+    let linear = |byte: u8| scene::material::decode_srgb(f32::from(byte) / 255.0);
+    let srgb = |x: f32| 255.0 * if x <= 0.003_130_8 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    // How many pixels were compared, and how many differ: where neighbours are alike, that is off edges and seams.
+    let compare = |drawn: &RenderScene, traced: &RenderScene, eye: [f32; 3]| {
+        let view = View::look_at([96, 96], 0.7, eye, [0.0; 3], [0., 0., 1.]).unwrap();
+        let raster = draw(Renderer::Raster, wanted, drawn, &[PoseF32::IDENTITY], &view);
+        let seen = draw(paths, wanted, traced, &[PoseF32::IDENTITY], &view);
+        let (albedo, colors) = (pixels(&raster), seen.color.as_ref().unwrap().as_chunks::<4>().0);
+        let (mut compared, mut different) = (0, 0);
+        for k in (1..95).flat_map(|y| (1..95).map(move |x| y * 96 + x)) {
+            let alike = |n: usize| {
+                let there = k + (n / 3) * 96 + n % 3 - 97;
+                albedo[there][3] == 255 && (0..3).all(|c| albedo[k][c].abs_diff(albedo[there][c]) <= 16)
+            };
+            if (0..9).all(alike) {
+                compared += 1;
+                // Of the part of a pixel that a path falls on, the mean in linear light is off by less than a byte of 16; the
+                // polynomials and two roundings are another one each.
+                let off = |c: usize| (f32::from(colors[k][c]) - srgb(LIGHT * linear(albedo[k][c]))).abs();
+                different += usize::from((0..3).any(|c| off(c) > 3.0));
+            }
+        }
+        (compared, different)
+    };
+    let eyes = [[1.5, 0.9, 1.1], [-1.2, 1.4, 0.8], [0.4, -1.5, 1.3], [-0.9, -1.0, -1.6]];
+    for (shape, texture) in
+        [(&flat, &square), (&turned(1.0), &square), (&brick.into(), &cube), (&brick.into(), &square)]
+    {
+        let scene = scene_of(shape, texture);
+        for eye in eyes.into_iter().filter(|eye| shape.name() != "plane" || eye[2] > 0.0) {
+            let (compared, different) = compare(&scene, &scene, eye);
+            assert!(compared > 1000, "{} from {eye:?}: {compared}", shape.name());
+            assert!(different * 200 <= compared, "{} from {eye:?}: {different} of {compared}", shape.name());
+        }
+    }
+    // Controls: texture coordinates that are turned by half, and a picture that is not a cube's.
+    for (drawn, traced) in
+        [((&turned(1.0), &square), (&turned(-1.0), &square)), ((&brick.into(), &cube), (&brick.into(), &square))]
+    {
+        let (compared, different) = compare(&scene_of(drawn.0, drawn.1), &scene_of(traced.0, traced.1), eyes[0]);
+        assert!(different * 2 > compared, "{different} of {compared}");
     }
 }
 

@@ -1,9 +1,9 @@
 //! A scene for the camera as a sensor: a ground and a ball that is elsewhere in every environment.
 
-use super::super::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use super::super::{Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, Placement};
 use crate::sensor::{SensorCfg, SensorContext};
 use ndarray::{Array2, Array3};
-use scene::pose::to_row;
+use scene::pose::{from_row, to_row};
 use scene::shape::{Plane, Sphere};
 use scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::sync::Arc;
@@ -88,6 +88,12 @@ pub(super) fn built(cfg: &CameraCfg, context: &SensorContext) -> Camera {
     let envs: Vec<usize> = (0..context.num_envs).collect();
     camera.reset(&envs, &state(&vec![0; context.num_envs])).unwrap();
     camera
+}
+
+/// Where the camera of a row is.
+pub(super) fn pose_of(camera: &Camera, row: usize) -> Pose {
+    let poses = camera.pose_w(CameraConvention::Ros);
+    from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
 
 /// All channels as bits, of some rows of the camera.

@@ -4,7 +4,7 @@ use super::super::{
     Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Lens, Placement,
     Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
-use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, state, tip};
+use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
 use crate::camera::lens::OpenCvFisheye;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
@@ -26,11 +26,6 @@ fn of(cfg: &StereoCameraCfg, context: &SensorContext) -> StereoCamera {
     let envs: Vec<usize> = (0..context.num_envs).collect();
     stereo.reset(&envs, &state(&vec![0; context.num_envs])).unwrap();
     stereo
-}
-
-fn pose_of(camera: &Camera, row: usize) -> Pose {
-    let poses = camera.pose_w(CameraConvention::Ros);
-    from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
 
 fn near(a: &Pose, b: &Pose) -> bool {
@@ -395,8 +390,10 @@ fn calibrations_of_a_pair_project_points_of_the_left_eye() {
             let local = pose.inverse() * (eyes[0] * point);
             let seen = [0, 1].map(|i| k[(1, i, i)] * local[i] / local.z + k[(1, i, 2)]);
             let p = info.projection_matrix * point.to_homogeneous();
+            // ROS counts from the centre of the first pixel.
+            let p = [p.x / p.z + 0.5, p.y / p.z + 0.5];
             // Some ulps of 100 pixels, and of poses.
-            assert!((p.x / p.z - seen[0]).abs() < 1e-10 && (p.y / p.z - seen[1]).abs() < 1e-10, "{p} {seen:?}");
+            assert!((p[0] - seen[0]).abs() < 1e-10 && (p[1] - seen[1]).abs() < 1e-10, "{p:?} {seen:?}");
         }
         // The control: without the fourth column it is 40 * 0.2 / z pixels off, at least 2.
         let alone = stereo.right().camera_info("head", 1).unwrap();

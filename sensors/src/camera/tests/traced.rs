@@ -29,17 +29,28 @@ fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF3
     frame
 }
 
+/// What pixels off silhouettes show in two pictures.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Comparison {
+    /// How many pixels.
+    pub(super) compared: usize,
+    /// How many differ in any channel.
+    pub(super) different: usize,
+    /// How many differ in another channel than the normals.
+    pub(super) elsewhere: usize,
+}
+
 /// Compares all channels but the colour where no silhouette is: where all eight neighbours show the same thing at about the
-/// same depth, in both pictures. How many pixels were compared, and how many of them differ.
+/// same depth, in both pictures.
 ///
 /// Depth and distance may differ by 1e-4 of themselves: of surfaces seen at a slant of up to 1 : 100, rounding of rays in
 /// single precision makes 1e-5. Normals by 0.5 degrees: a pixel's centre on an edge between two triangles may belong to
 /// either, which is what the few pixels that differ are.
-pub(super) fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
+pub(super) fn compare(a: &Frame, b: &Frame, width: usize) -> Comparison {
     let (depth, mask) = (a.depth.as_ref().unwrap(), a.mask.as_ref().unwrap());
     let height = mask.len() / width;
     let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| y * width + x));
-    let (mut compared, mut different) = (0, 0);
+    let mut all = Comparison::default();
     let near = |a: f32, b: f32, part: f32| a == b || (a - b).abs() <= part * a.abs();
     for k in inner {
         let around = (0..9).map(|n| k + (n / 3) * width + n % 3 - width - 1);
@@ -50,7 +61,7 @@ pub(super) fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
         if !(whole((depth, mask)) && whole(other)) {
             continue;
         }
-        compared += 1;
+        all.compared += 1;
         let vector = |f: &Option<Vec<f32>>| {
             let f = f.as_ref().unwrap();
             nalgebra::Vector3::new(f[3 * k], f[3 * k + 1], f[3 * k + 2])
@@ -59,21 +70,21 @@ pub(super) fn compare(a: &Frame, b: &Frame, width: usize) -> (usize, usize) {
             let (a, b) = (vector(a), vector(b));
             a == b || a.dot(&b) >= 0.5f32.to_radians().cos()
         };
-        let same = mask[k] == other.1[k]
+        let here = mask[k] == other.1[k]
             && near(depth[k], other.0[k], 1e-4)
             && near(a.distance.as_ref().unwrap()[k], b.distance.as_ref().unwrap()[k], 1e-4)
-            && same_normal(&a.normal, &b.normal)
-            && same_normal(&a.shading_normal, &b.shading_normal)
             && (vector(&a.position) - vector(&b.position)).norm() <= 1e-4 * depth[k].min(1e9);
-        different += usize::from(!same);
+        let same = here && same_normal(&a.normal, &b.normal) && same_normal(&a.shading_normal, &b.shading_normal);
+        all.different += usize::from(!same);
+        all.elsewhere += usize::from(!here);
     }
-    (compared, different)
+    all
 }
 
 #[test]
 fn rays_see_what_the_rasterizer_draws() {
     let mut numbers = Random(11);
-    let (mut compared, mut different) = (0, 0);
+    let mut sum = Comparison::default();
     for seed in 0..40 {
         let r = &mut numbers;
         let (scene, poses) = random(r, 1.2);
@@ -84,18 +95,21 @@ fn rays_see_what_the_rasterizer_draws() {
         let view = View { near, far, cx: r.within(20., 80.) as f32, fy: r.within(40., 120.) as f32, ..view };
         let raster = draw(Renderer::Raster, EXACT, &scene, &poses, &view);
         let traced = draw(Renderer::FastRayTraced, EXACT, &scene, &poses, &view);
-        let (all, other) = compare(&raster, &traced, view.width);
-        (compared, different) = (compared + all, different + other);
+        let found = compare(&raster, &traced, view.width);
+        sum.compared += found.compared;
+        sum.different += found.different;
+        sum.elsewhere += found.elsewhere;
         // Colours come from the same shading: they differ where samples on edges do.
         let [a, b] = [&raster, &traced].map(|f| f.color.as_ref().unwrap());
         let pixels = a.chunks(4).zip(b.chunks(4));
         let far_apart = pixels.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 3)).count();
         assert!(far_apart * 50 < 101 * 75, "scene {seed}: {far_apart} pixels look different");
     }
-    println!("{different} of {compared} pixels differ");
-    assert!(compared > 40 * 101 * 75 / 2, "{compared}");
-    // Centres on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
-    assert!(different * 1000 <= compared, "{different} of {compared}");
+    println!("{sum:?}");
+    assert!(sum.compared > 40 * 101 * 75 / 2, "{sum:?}");
+    assert_eq!(sum.elsewhere, 0, "{sum:?}");
+    // Normals at centres on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
+    assert!(sum.different * 1000 <= sum.compared, "{sum:?}");
     // A control: a picture from a millimetre beside is not the same.
     let (scene, poses) = random(&mut Random(5), 1.2);
     let view = View::look_at([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3], [0., 0., 1.]).unwrap();
@@ -103,8 +117,8 @@ fn rays_see_what_the_rasterizer_draws() {
     beside.world_from_camera.translation[2] += 1e-3;
     let a = draw(Renderer::Raster, EXACT, &scene, &poses, &view);
     let b = draw(Renderer::FastRayTraced, EXACT, &scene, &poses, &beside);
-    let (all, other) = compare(&a, &b, 101);
-    assert!(other * 2 > all, "{other} of {all}");
+    let beside = compare(&a, &b, 101);
+    assert!(beside.elsewhere * 2 > beside.compared, "{beside:?}");
 }
 
 #[test]
@@ -116,8 +130,8 @@ fn path_tracing_changes_no_channel_but_the_colour() {
     let without = |frame: &Frame| bits(&Frame { color: None, ..frame.clone() });
     assert!(without(&traced) == without(&paths) && without(&raster) == without(&hybrid));
     assert!(traced.color != paths.color && raster.color != hybrid.color);
-    let (all, other) = compare(&raster, &paths, 97);
-    assert!(all > 97 * 83 / 2 && other * 1000 <= all, "{other} of {all}");
+    let found = compare(&raster, &paths, 97);
+    assert!(found.compared > 97 * 83 / 2 && found.different * 1000 <= found.compared, "{found:?}");
 }
 
 /// A scene with all kinds of lamps and things that are not quite opaque.
@@ -136,11 +150,16 @@ fn rich(seed: u64, size: [usize; 2]) -> (RenderScene, Vec<PoseF32>, View) {
     (scene, poses, view)
 }
 
+/// With all that a renderer can do with rays.
+fn with_occlusion(renderer: Renderer) -> RasterCfg {
+    RasterCfg { occlusion_rays: if renderer == Renderer::Hybrid { 4 } else { 0 }, ..RasterCfg::default() }
+}
+
 #[test]
 fn every_renderer_draws_the_same_bits_with_any_number_of_threads() {
     let shots: Vec<_> = [[61, 47], [8, 8], [33, 70]].into_iter().zip(1..).map(|(s, k)| rich(k, s)).collect();
     for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS] {
-        let cfg = RasterCfg::default();
+        let cfg = with_occlusion(renderer);
         let alone: Vec<_> = shots.iter().map(|(s, p, v)| bits(&draw(renderer, cfg, s, p, v))).collect();
         for threads in [1, 2, 3] {
             let mut parallel = ParallelRasterizer::new(cfg, threads);
@@ -176,7 +195,7 @@ fn every_instruction_set_casts_the_same_rays() {
     let (scene, poses, view) = rich(2, [61, 47]);
     for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS] {
         let all = levels().into_iter().map(|level| {
-            let mut rasterizer = Rasterizer::with_level(RasterCfg::default(), level);
+            let mut rasterizer = Rasterizer::with_level(with_occlusion(renderer), level);
             rasterizer.renderer = renderer;
             let mut frame = Frame::new(view.width, view.height, Channels::ALL);
             rasterizer.render(&scene, &poses, &view, &mut frame).unwrap();
@@ -294,6 +313,49 @@ fn hybrid_shadows_end_where_the_light_passes_and_are_as_dark_as_what_is_left() {
         let (counts, wrong) = count(&draw(Renderer::Hybrid, unshaded, &scene, &poses, &view));
         assert_eq!(wrong, counts[0]);
     }
+}
+
+/// Ambient occlusion of a hybrid picture, at the foot of a long wall of height h: of the light that is everywhere, the wall takes
+/// `(1 - d / sqrt(d² + h²)) / 2` at the distance d. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
+#[test]
+fn hybrid_pictures_are_darker_at_the_foot_of_a_wall() {
+    let matt = Material { specular: 0.0, ..Material::from_rgba([0.7, 0.7, 0.7, 1.0]) };
+    // From x = 0 on, 1 m high.
+    let mut scene = RenderScene::new(vec![
+        Instance::new(Plane::INFINITE, matt.clone(), 1),
+        Instance::new(scene::shape::Box { half: [0.5, 300.0, 0.5] }, matt, 2),
+    ])
+    .unwrap();
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.5, 0.0, 0.5])];
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.6; 3], ground: [0.2; 3] };
+    let view = View::look_at([48, 16], 0.4, [-1.0, -3.0, 2.5], [-0.8, 0.0, 0.0], [0., 0., 1.]).unwrap();
+    let albedo = scene::material::decode_srgb(0.7);
+    let byte = |x: f32| 255.0 * (1.055 * x.powf(1.0 / 2.4) - 0.055);
+    let off = |occlusion_rays: u16| {
+        let frame = draw(Renderer::Hybrid, RasterCfg { occlusion_rays, ..EXACT }, &scene, &poses, &view);
+        let mask = frame.mask.as_ref().unwrap();
+        let floor = frame.position.as_ref().unwrap().chunks(3).enumerate().filter(|(k, _)| mask[*k] == 1);
+        // Colours of pixels at edges are means.
+        let floor = floor.filter(|(_, p)| p[0] < -0.02);
+        let off = floor.map(|(k, p)| {
+            let blocked = 0.5 * (1.0 - -p[0] / (p[0] * p[0] + 1.0).sqrt());
+            let expected = byte(albedo * 0.6 * (1.0 - blocked));
+            (p[0], f32::from(frame.color.as_ref().unwrap()[4 * k]) - expected)
+        });
+        off.collect::<Vec<_>>()
+    };
+    let with = off(1024);
+    let nearest = with.iter().map(|(x, _)| -x).fold(f32::INFINITY, f32::min);
+    assert!(with.len() > 300 && nearest < 0.1, "{} pixels, from {nearest} m on", with.len());
+    // The net finds the share to 1/256 or so, and byte(x) rises by 250 at most here.
+    for (x, off) in &with {
+        assert!(off.abs() <= 1.5, "at {x} m: off by {off}");
+    }
+    // The control: without rays the floor is as bright as in the open, at the foot of the wall by 35.
+    let without = off(0);
+    assert!(without.iter().all(|(x, off)| *x < -0.1 || *off > 30.0) && without.iter().all(|(_, off)| *off > -1.5));
 }
 
 #[test]
