@@ -50,7 +50,8 @@ fn ros_matrix(camera: &Camera, env: usize) -> Vec<f64> {
     matrix.into_iter().collect()
 }
 
-/// Records, and gives what the last row should be; what is not finished is left as by a process that was killed.
+/// Records, and gives what the last row should be; what is not finished is left as by a process that was killed. Messages of
+/// ROS have the matrix of ROS, arrays that of the camera.
 fn recorded(path: &Path, finish: bool) -> serde_json::Value {
     let mut world = World::new(2, 2);
     let recorder = world.sim.record(RecorderCfg::new(path)).unwrap();
@@ -62,6 +63,10 @@ fn recorded(path: &Path, finish: bool) -> serde_json::Value {
     let mask = camera.mask().unwrap().index_axis(Axis(0), 1).to_owned();
     let finite = depth.iter().copied().filter(|x| x.is_finite());
     let range = [finite.clone().fold(f32::INFINITY, f32::min), finite.fold(0.0, f32::max)].map(f64::from);
+    let intrinsics = match path.extension() {
+        Some(mcap) if mcap == "mcap" => ros_matrix(camera, 1),
+        _ => camera.intrinsic_matrices().index_axis(Axis(0), 1).iter().copied().collect(),
+    };
     let expected = serde_json::json!({
         "names": robot.joint_names(),
         "position": robot.get_qpos().row(1).to_vec(),
@@ -73,7 +78,7 @@ fn recorded(path: &Path, finish: bool) -> serde_json::Value {
         "cube": world.sim.rigid_object(world.cube).get_pose().row(1).to_vec(),
         "acceleration": world.sim.sensor(world.imu).unwrap().lin_acc_b().row(1).to_vec(),
         "orientation": world.sim.sensor(world.imu).unwrap().quat_w().row(1).to_vec(),
-        "intrinsics": ros_matrix(camera, 1),
+        "intrinsics": intrinsics,
         "camera": camera.pose_w(CameraConvention::Ros).row(1).to_vec(),
         "nanoseconds": (world.sim.time()[1] * 1e9).round() as u64,
         "depth_shape": depth.shape(),
