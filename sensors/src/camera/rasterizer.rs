@@ -103,7 +103,8 @@ pub struct Shot<'a> {
 pub struct Before<'a> {
     /// Where each instance was: world from instance.
     pub poses: &'a [PoseF32],
-    /// The camera.
+    /// The camera. Behind a lens, its focal lengths and principal point tell the intrinsics from those of
+    /// [`Shot::view`]: where both are the same, the lens had the same ones.
     pub view: &'a View,
 }
 

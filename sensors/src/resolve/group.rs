@@ -174,7 +174,7 @@ fn resolve_lanes<S: Simd>(
             }
         }
         if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
-            let [right, down] = moves.of(s, last, at.local, [u, v]);
+            let [right, down] = moves.of(s, last, at.local, [u, v], here);
             store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
             store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
         }

@@ -2,7 +2,7 @@
 
 use crate::camera::rasterizer::{Before, Shot};
 use crate::camera::{LensRays, Optics, PixelIntrinsics};
-use crate::lanes::{F, LANES, Simd, V3, load, select, splat};
+use crate::lanes::{F, LANES, M, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
 use scene::PoseF32;
 
@@ -69,9 +69,10 @@ impl Moves {
         Ok(())
     }
 
-    /// How far points of an instance, seen at (u, v), have moved; `local` is where they are in its frame.
+    /// How far points of an instance, seen at (u, v), have moved; `local` is where they are in its frame. Of lanes that are
+    /// not `here` it says nothing of use.
     #[inline(always)]
-    pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2]) -> [F<S>; 2] {
+    pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2], here: M<S>) -> [F<S>; 2] {
         let unknown = splat(s, f32::INFINITY);
         let (Some(Move { still, camera_from_instance }), Some(eye)) = (self.list.get(instance), self.eye) else {
             return [unknown; 2];
@@ -92,7 +93,9 @@ impl Moves {
                 let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
                 let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());
                 let mut flow = [[f32::INFINITY; LANES]; 2];
-                for lane in 0..LANES {
+                // One after the other, and some lenses take long: only what is wanted.
+                let here = here.to_bitmask();
+                for lane in (0..LANES).filter(|lane| here >> lane & 1 == 1) {
                     let direction = [x[lane], y[lane], z[lane]].map(f64::from);
                     if let Some(before) = optics.project(direction) {
                         flow[0][lane] = (f64::from(u[lane]) - before[0]) as f32;

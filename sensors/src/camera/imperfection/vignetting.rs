@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 /// aperture as seen from there, which is as the cosine of the angle theta between the pixel's ray and the axis; the falloff is
 /// that product, 1 on the axis, and 0 beyond a right angle. So it is cos⁴ theta of a pinhole (Horn 1986, "Robot Vision",
 /// chapter 10), cos theta sin theta / theta of the equidistant fisheye, cos theta of the equisolid one, 1 of the orthographic
-/// one, cos theta cos⁴(theta / 2) of the stereographic one, and of others what their mapping makes of it. A panorama has no
-/// optical axis, and is refused.
+/// one, cos theta cos⁴(theta / 2) of the stereographic one, and of others what their mapping makes of it: more than 1 where a
+/// barrel distortion crowds more of the view into a pixel than it has on the axis. A panorama has no optical axis, and is
+/// refused.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vignetting {

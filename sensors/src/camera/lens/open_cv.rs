@@ -81,6 +81,12 @@ impl OpenCv {
         Self { k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, max_angle: None }
     }
 
+    /// Whether it is the same in all directions.
+    fn is_radial(&self) -> bool {
+        let Self { p1, p2, s1, s2, s3, s4, .. } = *self;
+        [p1, p2, s1, s2, s3, s4] == [0.0; 6]
+    }
+
     fn distort(&self, [x, y]: [f64; 2]) -> Distorted {
         let Self { k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, .. } = *self;
         let r = x * x + y * y;
@@ -124,7 +130,9 @@ impl OpenCv {
             return true;
         }
         let angle = r.atan();
+        // What is the same in all directions folds back at the same angle in all of them.
         domain.folds
+            && !self.is_radial()
             && angle <= self.max_angle.unwrap_or(MOST)
             && Self::fold([x / r, y / r], angle, self).is_none()
     }
@@ -202,9 +210,7 @@ impl LensModel for OpenCv {
 
     fn domain(&self) -> Domain {
         let most = self.max_angle.unwrap_or(MOST);
-        let all = self.coefficients();
-        let radial = [2, 3, 8, 9, 10, 11].iter().all(|&k| all[k] == 0.0);
-        let count = if radial { 1 } else { DIRECTIONS };
+        let count = if self.is_radial() { 1 } else { DIRECTIONS };
         let folds = (0..count).filter_map(|k| {
             let (s, c) = (TAU * k as f64 / count as f64).sin_cos();
             Some((Self::fold([c, s], most, self)?, [c, s]))

@@ -77,24 +77,35 @@ impl Optics {
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])
     }
 
-    /// How much light falls on a pixel, where 1 falls on the principal point: the solid angle that it sees, and the cosine by
+    /// How much light falls on pixels, where 1 falls on the principal point: the solid angle that one sees, and the cosine by
     /// which the aperture is turned aside. 0 where nothing is seen, and from a right angle on.
-    pub(crate) fn falloff(&self, pixel: [f64; 2]) -> f64 {
+    pub(crate) fn falloff(&self) -> impl Fn([f64; 2]) -> f64 {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
-        let point = [(pixel[0] - cx) / fx, (pixel[1] - cy) / fy];
-        let (Some(ray), Some(seen), Some(most)) =
-            (self.unit(point), self.solid_angle(point), self.solid_angle([0.0; 2]))
-        else {
-            return 0.0;
-        };
-        ray.z.max(0.0) * seen / most
+        let most = self.solid_angle([0.0; 2]);
+        move |pixel| {
+            let point = [(pixel[0] - cx) / fx, (pixel[1] - cy) / fy];
+            let (Some(ray), Some(seen), Some(most)) = (self.unit(point), self.solid_angle(point), most) else {
+                return 0.0;
+            };
+            ray.z.max(0.0) * seen / most
+        }
     }
 
-    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays. Rounding
-    /// takes less than 1e-7 of it; where the rays spread without end, at a right angle of the orthographic fisheye, what they
-    /// are apart takes more.
+    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays that are
+    /// 1e-7 rad apart near the axis. Where they spread without end, at a right angle of the orthographic fisheye and where a
+    /// distortion is about to fold back, that is not little.
     fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
-        const APART: f64 = 1e-7;
+        const NEAR_THE_AXIS: f64 = 1e-4;
+        let [x, y] = self.lens.project(&self.domain, [NEAR_THE_AXIS, 0.0, 1.0])?;
+        let apart = 1e-7 * x.hypot(y) / NEAR_THE_AXIS;
+        // On the edge of what the lens sees there may be nothing on either side of a point, but there is of one farther in.
+        self.solid_angle_by(point, apart).or_else(|| {
+            let inwards = 1.0 - apart / point[0].hypot(point[1]);
+            self.solid_angle_by(point.map(|x| inwards * x), apart)
+        })
+    }
+
+    fn solid_angle_by(&self, point: [f64; 2], apart: f64) -> Option<f64> {
         let here = self.unit(point)?;
         let slope = |axis: usize| {
             let beside = |by: f64| {
@@ -103,10 +114,10 @@ impl Optics {
                 self.unit(there)
             };
             // One side may be outside of what the lens sees.
-            match (beside(-APART), beside(APART)) {
-                (Some(before), Some(after)) => Some((after - before) / (2.0 * APART)),
-                (Some(before), None) => Some((here - before) / APART),
-                (None, Some(after)) => Some((after - here) / APART),
+            match (beside(-apart), beside(apart)) {
+                (Some(before), Some(after)) => Some((after - before) / (2.0 * apart)),
+                (Some(before), None) => Some((here - before) / apart),
+                (None, Some(after)) => Some((after - here) / apart),
                 (None, None) => None,
             }
         };

@@ -177,7 +177,8 @@ impl LensRays {
         let all = self.falloff.get_or_init(|| {
             let [width, height] = self.size;
             let centre = |k: usize| [(k % width) as f64 + 0.5, (k / width) as f64 + 0.5];
-            (0..width * height).map(|k| self.optics.falloff(centre(k)) as f32).collect()
+            let falloff = self.optics.falloff();
+            (0..width * height).map(|k| falloff(centre(k)) as f32).collect()
         });
         f64::from(all[y * self.size[0] + x])
     }

@@ -20,9 +20,10 @@ fn rich(seed: u64) -> (RenderScene, Vec<PoseF32>, View) {
 
 /// Frames are compared as bits: NaN would equal itself.
 pub(super) fn bits(frame: &Frame) -> Vec<u32> {
-    let mut out: Vec<u32> = frame.color.iter().flatten().map(|&x| x.into()).collect();
+    let bytes = [&frame.color, &frame.albedo].into_iter().flatten().flatten();
+    let mut out: Vec<u32> = bytes.map(|&x| x.into()).collect();
     out.extend(frame.mask.iter().flatten().map(|&x| x as u32));
-    let floats = [&frame.depth, &frame.distance, &frame.normal, &frame.shading_normal, &frame.position];
+    let floats = [&frame.depth, &frame.distance, &frame.normal, &frame.shading_normal, &frame.position, &frame.flow];
     out.extend(floats.into_iter().flatten().flatten().map(|x| x.to_bits()));
     out
 }
