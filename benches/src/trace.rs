@@ -39,12 +39,12 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     });
     sim.add_robot(RobotCfg { urdf, ..Default::default() })?;
     let still = Still::of_env(&mut sim, EnvId(0))?;
-    let view = covering(&still)?;
+    let (view, hits) = covering(&still)?;
     let shot = still.shot(&view);
     let pixels = (SIZE[0] * SIZE[1]) as f64;
     let geometry = Channels { depth: true, mask: true, ..Channels::default() };
     let (time, _) = seconds(settings, Renderer::FastRayTraced, geometry, &shot)?;
-    let rays = pixels / time;
+    let (rays, met) = (pixels / time, hits as f64 / time);
 
     let (scene, poses) = boxed(&still, &shot)?;
     let inside = View::look_at(SIZE, 0.9, [1.2, -1.1, 1.1], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0])?;
@@ -70,6 +70,8 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     };
     Ok(vec![
         at_least(format!("{name}, what is seen, 640x480"), "rays/s", rays, RAYS),
+        // Those that pass by cost little.
+        Row::new("trace", format!("{name}, what is seen, 640x480, rays that meet it"), "rays/s", 1, met),
         pictures,
         at_least(format!("{name} in a lit box, 4 bounces"), "paths/s", paths, PATHS),
         // Where the time of a path goes: rays that go on and shadow rays.
@@ -103,8 +105,8 @@ fn undisturbed(mut times: Vec<f64>) -> f64 {
     times.get(times.len() / 10).copied().unwrap_or(f64::NAN)
 }
 
-/// A view of which the robot covers about [`COVERED`].
-fn covering(still: &Still) -> Outcome<View> {
+/// A view of which the robot covers about [`COVERED`], and how many pixels these are.
+fn covering(still: &Still) -> Outcome<(View, usize)> {
     let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
     let (mut near, mut far) = (0.2f32, 4.0f32);
     loop {
@@ -117,7 +119,7 @@ fn covering(still: &Still) -> Outcome<View> {
         let covered = hits as f64 / (SIZE[0] * SIZE[1]) as f64;
         if (covered - COVERED).abs() < 0.01 || far - near < 1e-3 {
             eprintln!("  the robot covers {:.0} % from {distance:.2} m", 100.0 * covered);
-            return Ok(view);
+            return Ok((view, hits));
         }
         if covered > COVERED { near = distance } else { far = distance }
     }

@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// The scene file that was recorded, where the recording does not hold its scene, or for --verify
-    #[arg(long, value_name = "SCENE.toml")]
+    #[arg(long, value_name = "SCENE.toml|yaml")]
     scene: Option<PathBuf>,
     /// Show it in browsers at this address instead of a window
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]

@@ -177,8 +177,8 @@ impl Launcher {
         if !matches!(self.renderer, Renderer::Auto | Renderer::Raster) {
             let name = self.renderer.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
             return Err(format!(
-                "--renderer {name} is not for this example: use --renderer raster or auto here, or create_sensor or \
-                 render_model, which draw with every renderer"
+                "--renderer {name} is not for this example: use --renderer raster or auto here, or create_sensor, stereo, \
+                 surfaces or render_model, which draw with every renderer"
             )
             .into());
         }

@@ -235,7 +235,10 @@ impl CameraCfg {
             return Err(CameraError::NoAxis { what: "vignetting", lens });
         }
         if holes.as_ref().is_some_and(|holes| holes.baseline != 0.0) && !self.lens.is_pinhole() {
-            return Err(CameraError::PinholeOnly { what: "shadows of a projector (baseline of the holes)", lens });
+            return Err(CameraError::PinholeOnly {
+                what: "shadows of a projector (holes with a baseline other than 0)",
+                lens,
+            });
         }
         Ok(())
     }

@@ -145,7 +145,7 @@ pub enum CameraError {
         expected: String,
     },
     /// Something that is only known of pictures without a lens.
-    #[error("{what}: only of a pinhole camera; this one has the lens {lens}")]
+    #[error("{what}: only of a pinhole camera, and this one has the lens {lens}; leave it out, or the lens")]
     PinholeOnly {
         /// What was asked for.
         what: &'static str,

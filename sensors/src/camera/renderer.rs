@@ -2,14 +2,21 @@
 
 use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Shot};
+use crate::error::SensorError;
 use crate::visibility::RenderError;
-use serde::{Deserialize, Serialize};
+use scene::pattern::closest;
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
 
 /// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes,
 /// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](super::RasterCfg::lod), which is on by default, its
 /// surfaces are moved as is said there, and no other renderer's are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+///
+/// In files it is a name, `"hybrid"`, or a table of paths with what is not as in [`Renderer::RAY_TRACED`]:
+/// `{ ray_traced = { samples = 256 } }`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Renderer {
     /// The rasterizer.
@@ -91,6 +98,15 @@ impl Renderer {
         Ok(())
     }
 
+    /// The renderer of a name in files; paths are those of [`RAY_TRACED`](Self::RAY_TRACED).
+    fn from_name(name: &str) -> Result<Self, SensorError> {
+        const ALL: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED];
+        ALL.into_iter().find(|renderer| renderer.name() == name).ok_or_else(|| {
+            let candidates = closest(name, ALL.map(Self::name)).into_iter().map(String::from).collect();
+            SensorError::UnknownName { what: "renderer", name: name.into(), candidates }
+        })
+    }
+
     /// Its name in files.
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -134,6 +150,100 @@ impl Renderer {
             Self::RayTraced { samples, max_bounces, .. } => {
                 (samples as usize).saturating_mul(20 * (1 + max_bounces as usize))
             }
+        }
+    }
+}
+
+/// What a file says of the paths of [`Renderer::RayTraced`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Paths {
+    samples: Option<u32>,
+    max_bounces: Option<u32>,
+    denoise: Option<bool>,
+    seed: Option<u32>,
+}
+
+/// Reads a renderer.
+struct InFile;
+
+impl<'de> Visitor<'de> for InFile {
+    type Value = Renderer;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a renderer, or a table with ray_traced")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Renderer, E> {
+        Renderer::from_name(name).map_err(E::custom)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Renderer, A::Error> {
+        let Some(name) = map.next_key::<String>()? else {
+            return Err(A::Error::custom("a renderer is a name, or a table such as { ray_traced = { samples = 64 } }"));
+        };
+        let renderer = match Renderer::from_name(&name).map_err(A::Error::custom)? {
+            Renderer::RayTraced { samples, max_bounces, denoise, seed } => {
+                let paths: Paths = map.next_value()?;
+                Renderer::RayTraced {
+                    samples: paths.samples.unwrap_or(samples),
+                    max_bounces: paths.max_bounces.unwrap_or(max_bounces),
+                    denoise: paths.denoise.unwrap_or(denoise),
+                    seed: paths.seed.unwrap_or(seed),
+                }
+            }
+            _ => return Err(A::Error::custom(format!("renderer {name:?} has no numbers: its name is enough"))),
+        };
+        match map.next_key::<String>()? {
+            Some(other) => Err(A::Error::custom(format!("one renderer only: {name:?} or {other:?}"))),
+            None => Ok(renderer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Renderer {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(InFile)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::super::CameraCfg;
+    use super::Renderer;
+
+    /// As scene files have them: a name, or a table with numbers; and back.
+    #[test]
+    fn renderers_stand_in_files() {
+        let read = |text: &str| toml::from_str::<CameraCfg>(text).map(|cfg| cfg.renderer);
+        let some = Renderer::RayTraced { samples: 256, max_bounces: 4, denoise: true, seed: 7 };
+        let all = Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed: 9 };
+        for (text, expected) in [
+            ("", Renderer::Raster),
+            ("renderer = 'fast_ray_traced'", Renderer::FastRayTraced),
+            ("renderer = 'ray_traced'", Renderer::RAY_TRACED),
+            ("renderer = { ray_traced = {} }", Renderer::RAY_TRACED),
+            ("renderer.ray_traced = { samples = 256, seed = 7 }", some),
+            ("[renderer.ray_traced]\nsamples = 1\nmax_bounces = 0\ndenoise = false\nseed = 9", all),
+        ] {
+            assert_eq!(read(text).unwrap(), expected, "{text}");
+        }
+        for renderer in [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, some, all] {
+            let text = toml::to_string(&CameraCfg { renderer, ..CameraCfg::default() }).unwrap();
+            assert_eq!(read(&text).unwrap(), renderer, "{text}");
+        }
+        for (text, said) in [
+            ("renderer = 'fast_raytraced'", "there is no renderer \"fast_raytraced\"; known are \"fast_ray_traced\""),
+            ("renderer.ray_traced.sample = 3", "unknown field `sample`"),
+            ("renderer.ray_traced.samples = -3", "invalid value: integer `-3`"),
+            ("renderer.hybrid = {}", "renderer \"hybrid\" has no numbers: its name is enough"),
+            ("renderer = {}", "a renderer is a name, or a table"),
+            ("renderer = { ray_traced = {}, raster = {} }", "one renderer only"),
+            ("renderer = 3", "the name of a renderer"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(said), "{text}: {error}");
         }
     }
 }

@@ -58,7 +58,7 @@ fn configurations_are_checked() {
     assert_eq!(refused(&all_around), CameraError::NoAxis { what: "vignetting", lens: "panorama" }.into());
     let imperfections = Imperfections { holes: Some(Default::default()), ..Default::default() };
     let error = refused(&CameraCfg { imperfections, ..rays("equidistant") });
-    let what = "shadows of a projector (baseline of the holes)";
+    let what = "shadows of a projector (holes with a baseline other than 0)";
     assert_eq!(error, CameraError::PinholeOnly { what, lens: "equidistant" }.into());
 
     let place = |placement| CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..cfg() };
