@@ -4,6 +4,7 @@
 mod aperture;
 mod emitters;
 mod glass;
+mod shadows;
 
 use super::*;
 use crate::lanes::Scalar;
@@ -244,50 +245,6 @@ fn a_glowing_rectangle_lights_a_floor_by_its_form_factor() {
     // From behind the rectangle is not there.
     let behind = [PoseF32::IDENTITY, PoseF32::from_translation([0., 0., 0.8])];
     assert_eq!(seen(&scene, &behind, &view, 64, 0).0, 0.0);
-}
-
-/// A lamp of a size through the edge of a box: what is lit is the part of the lamp's disc that is seen.
-#[test]
-fn lamps_of_a_size_cast_soft_shadows() {
-    let mut scene = dark(vec![
-        Instance::new(Plane::INFINITE, matt(0.6), 1),
-        Instance::new(Box { half: [1.0, 2.0, 0.1] }, matt(0.6), 2),
-    ]);
-    // The box covers x < 0 at heights from 0.9 to 1.1; the lamp is 2 m up.
-    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
-    let radius = 0.2f64;
-    let light =
-        |radius| Light { attenuation: [1., 0., 0.], radius, ..lamp(LightKind::Point, [0., 0., 2.], [0., 0., -1.]) };
-    let at = |x: f32, radius: f32| {
-        let mut scene = scene.clone();
-        scene.lights = vec![light(radius)];
-        seen(&scene, &poses, &looking([2.5, 0.3, 0.6], [x, 0.0, 0.0]), 1024, 0)
-    };
-    let open = |x: f64| albedo(0.6) * f64::from(0.9f32) * 2.0 / (4.0 + x * x).sqrt();
-    // Below the edge of the box's lower side (0, 0.9) a ray to the height 2 goes through x' with (x' - x) 0.9 / 2 = -x,
-    // and below that of its upper side (0, 1.1) with 1.1. The disc is nearly level: its tilt is x / 2, seen from x; what is
-    // lit is what lies beyond the larger of both.
-    let cut = |x: f64| (x - x * 2.0 / 0.9).max(x - x * 2.0 / 1.1);
-    let part = |c: f64| {
-        let c = (c / radius).clamp(-1.0, 1.0);
-        (c.acos() - c * (1.0 - c * c).sqrt()) / PI
-    };
-    let mut last = -1.0;
-    for x in [-0.5f32, -0.12, -0.06, 0.0, 0.06, 0.12, 0.5] {
-        let (mean, deviation) = at(x, radius as f32);
-        let expected = open(x.into()) * part(cut(x.into()));
-        // The tilt of the disc moves its points by up to r (1 - cos) sideways and r sin in height: both below 1 %.
-        assert!((mean - expected).abs() < 5.0 * deviation + 0.015 * open(x.into()), "{x}: {mean}, not {expected}");
-        assert!(mean > last - 1e-3, "{x}");
-        last = mean;
-        // A control: points cast sharp shadows.
-        let (sharp, _) = at(x, 0.0);
-        let lit = if x < 0.0 { 0.0 } else { open(x.into()) };
-        assert!(x == 0.0 || (sharp - lit).abs() < 1e-5, "{x}: {sharp}, not {lit}");
-    }
-    scene.lights = vec![Light { cast_shadow: false, ..light(0.0) }];
-    let view = looking([2.5, 0.3, 0.6], [-0.5, 0.0, 0.0]);
-    assert!((seen(&scene, &poses, &view, 4, 0).0 - open(-0.5)).abs() < 1e-5, "this one casts none");
 }
 
 /// A ball of alpha 0.3 between the floor and a lamp lets 0.7 of the light past, once; seen from above it takes 0.3 of the

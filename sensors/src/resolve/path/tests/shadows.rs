@@ -1,0 +1,121 @@
+//! Soft shadows of lamps that have a size, against closed forms.
+
+use super::*;
+
+/// Heights of the lower and the upper side of the box that casts the shadow \[m\].
+const SIDES: [f64; 2] = [0.9, 1.1];
+const RADIUS: f64 = 0.2;
+const PLACES: [f32; 7] = [-0.5, -0.12, -0.06, 0.0, 0.06, 0.12, 0.5];
+
+/// A floor, and a box that covers x < 0 at the heights [`SIDES`].
+fn covered() -> (RenderScene, [PoseF32; 2]) {
+    let scene = dark(vec![
+        Instance::new(Plane::INFINITE, matt(0.6), 1),
+        Instance::new(Box { half: [1.0, 2.0, 0.1] }, matt(0.6), 2),
+    ]);
+    (scene, [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])])
+}
+
+/// What the floor sends at (x, 0).
+fn at(light: Light, x: f32) -> (f64, f64) {
+    let (mut scene, poses) = covered();
+    scene.lights = vec![light];
+    seen(&scene, &poses, &looking([2.5, 0.3, 0.6], [x, 0.0, 0.0]), 1024, 0)
+}
+
+/// A lamp of a size through the edge of a box: what is lit is the part of the lamp's disc that is seen.
+#[test]
+fn lamps_of_a_size_cast_soft_shadows() {
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 4.0 };
+    for (kind, exponent) in [(LightKind::Point, 0), (spot, 4)] {
+        // The lamp is 2 m up.
+        let light = |radius: f64| Light {
+            attenuation: [1., 0., 0.],
+            radius: radius as f32,
+            ..lamp(kind, [0., 0., 2.], [0., 0., -1.])
+        };
+        let cosine = |x: f64| 2.0 / (4.0 + x * x).sqrt();
+        let open = |x: f64| albedo(0.6) * f64::from(0.9f32) * cosine(x).powi(1 + exponent);
+        // Below the edge of the box's lower side (0, 0.9) a ray to the height 2 goes through x' with (x' - x) 0.9 / 2 = -x,
+        // and below that of its upper side (0, 1.1) with 1.1. The disc is nearly level: its tilt is x / 2, seen from x; what
+        // is lit is what lies beyond the larger of both.
+        let cut = |x: f64| SIDES.map(|height| x - x * 2.0 / height).into_iter().fold(f64::MIN, f64::max);
+        let part = |c: f64| {
+            let c = (c / RADIUS).clamp(-1.0, 1.0);
+            (c.acos() - c * (1.0 - c * c).sqrt()) / PI
+        };
+        let mut last = -1.0;
+        for x in PLACES {
+            let (mean, deviation) = at(light(RADIUS), x);
+            let expected = open(x.into()) * part(cut(x.into()));
+            // The tilt of the disc moves its points by up to r (1 - cos) sideways and r sin in height: both below 1 %.
+            assert!((mean - expected).abs() < 5.0 * deviation + 0.015 * open(x.into()), "{x}: {mean}, not {expected}");
+            // Off the edge a spot is darker again.
+            assert!(mean > last - 1e-3 || x == 0.5, "{x}");
+            last = mean;
+            // A control: points cast sharp shadows.
+            let (sharp, _) = at(light(0.0), x);
+            let lit = if x < 0.0 { 0.0 } else { open(x.into()) };
+            assert!(x == 0.0 || (sharp - lit).abs() < 1e-5, "{x}: {sharp}, not {lit}");
+        }
+        let (none, _) = at(Light { cast_shadow: false, ..light(0.0) }, -0.5);
+        assert!((none - open(-0.5)).abs() < 1e-5, "this one casts none");
+    }
+}
+
+/// Of a directional lamp directions are spread over a disc of its radius at a distance of 1 m: the light at x is the mean cosine
+/// of those that pass the edge of the box, an integral over the disc whose inner part is closed.
+#[test]
+fn directional_lamps_of_a_size_cast_soft_shadows() {
+    let light = Light { radius: RADIUS as f32, ..lamp(LightKind::Directional, [0.; 3], [0., 0., -1.]) };
+    // Of the directions (u, v, 1) with a given u, whose cosine is 1 / sqrt(1 + u² + v²).
+    let column = |u: f64| 2.0 * ((RADIUS * RADIUS - u * u).max(0.0) / (1.0 + u * u)).sqrt().asinh();
+    let expected = |x: f64| {
+        let cut = SIDES.map(|height| -x / height).into_iter().fold(-RADIUS, f64::max).min(RADIUS);
+        const STEPS: usize = 20_000;
+        let step = (RADIUS - cut) / STEPS as f64;
+        let sum: f64 = (0..STEPS).map(|k| column(cut + (k as f64 + 0.5) * step)).sum();
+        albedo(0.6) * f64::from(0.9f32) * sum * step / (PI * RADIUS * RADIUS)
+    };
+    // The control of the integral: all of the disc.
+    let whole = 2.0 * ((1.0 + RADIUS * RADIUS).sqrt() - 1.0) / (RADIUS * RADIUS);
+    assert!((expected(0.5) - albedo(0.6) * f64::from(0.9f32) * whole).abs() < 1e-6);
+    let mut between = 0;
+    for x in PLACES {
+        let found = at(light.clone(), x);
+        let expected = expected(x.into());
+        assert!(agrees(found, expected), "{x}: {found:?}, not {expected}");
+        between += usize::from(expected > 0.1 * whole * 0.54 && !agrees(found, 0.98 * expected));
+    }
+    assert!(between >= 4, "the control: {between} places tell a fiftieth");
+}
+
+/// A glowing rectangle behind the edge of a board: the form factor of the part that is seen. Source: Howell, B-3, of which parts
+/// on either side of the middle are halves.
+#[test]
+fn what_glows_casts_soft_shadows() {
+    const BOARD: f64 = 0.4;
+    const THIN: f64 = 1e-4;
+    let emitter = Material { emission: 2.0, ..matt(0.5) };
+    let half = [0.6f32, 0.4];
+    let scene = dark(vec![
+        Instance::new(Plane::INFINITE, matt(0.7), 1),
+        Instance::new(Plane { half }, emitter, 2),
+        Instance::new(Box { half: [1.0, 1.0, THIN as f32] }, matt(0.0), 3),
+    ]);
+    // Face down, 0.8 m up.
+    let rotation = [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
+    let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
+    let whole = |side: f64| form_factor(side / 0.8, f64::from(half[1]) / 0.8);
+    for edge in [-0.2, -0.1, 0.05, 0.1, 0.2] {
+        let board = PoseF32::from_translation([(edge - 1.0) as f32, 0.0, BOARD as f32]);
+        let poses = [PoseF32::IDENTITY, PoseF32 { rotation, translation: [0., 0., 0.8] }, board];
+        // Seen from the origin, by the edge that covers more of it.
+        let cut = edge * 0.8 / (BOARD - THIN * f64::signum(edge));
+        let factor = 0.5 * (whole(f64::from(half[0])) - f64::signum(cut) * whole(cut.abs()));
+        let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
+        let light = seen(&scene, &poses, &view, 1024, 0);
+        assert!(agrees(light, expected), "{edge}: {light:?}, not {expected}");
+        assert!(!agrees(light, 1.1 * expected), "it can tell a tenth: {light:?}");
+    }
+}
