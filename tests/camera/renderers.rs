@@ -3,7 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::Still;
 use std::f64::consts::FRAC_PI_2;

@@ -82,7 +82,7 @@ fn directional_lamps_of_a_size_cast_soft_shadows() {
     assert!((expected(0.5) - albedo(0.6) * f64::from(0.9f32) * whole).abs() < 1e-6);
     let mut between = 0;
     for x in PLACES {
-        let found = at(light.clone(), x);
+        let found = at(light, x);
         let expected = expected(x.into());
         assert!(agrees(found, expected), "{x}: {found:?}, not {expected}");
         between += usize::from(expected > 0.1 * whole * 0.54 && !agrees(found, 0.98 * expected));
