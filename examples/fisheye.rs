@@ -76,10 +76,11 @@ fn run(args: &Args) -> launcher::Result {
     let target = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0];
     sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
     args.launcher.serve(&mut sim)?;
+    args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
     // Pictures are what it is for: it ends with them, unless somebody watches.
     let mut launcher = args.launcher.clone();
-    launcher.steps = launcher.steps.or(launcher.serve.is_none().then_some(100));
+    launcher.steps = launcher.steps.or((launcher.headless && launcher.serve.is_none()).then_some(100));
     let progress = Progress::new(&launcher, 100);
     let mut step = 0;
     while !progress.stop(step) {

@@ -11,7 +11,7 @@ use kinetoscope::ndarray::{Array2, ArrayView2, ArrayView3};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Renderer as Known, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use launcher::still::StillFlags;
 use launcher::{PathFlags, Renderer, picture, waiting};
@@ -74,7 +74,7 @@ struct Args {
     /// Draw again and again for so many seconds and report images per second
     #[arg(long)]
     bench: Option<f64>,
-    /// Also draw the color with the rasterizer, and write both side by side: raster-and-rt.png
+    /// Also draw the color with the rasterizer, and write both side by side: raster-and-rt.png, or whatever --renderer is
     #[arg(long)]
     compare: bool,
     /// Folder for color.png, depth.png, mask.png, normal.png and meta.json
@@ -110,6 +110,15 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result {
     let renderer = args.renderer.of_cameras(args.paths)?;
+    if args.time_limit.is_some() && args.renderer != Renderer::Rt {
+        return Err("--time-limit is of path tracing: use it with --renderer rt".into());
+    }
+    if args.compare && renderer == Known::Raster {
+        return Err(
+            "--compare puts the rasterizer beside another renderer: use it with --renderer rt, fast-rt or hybrid"
+                .into(),
+        );
+    }
     let still = load(args)?;
     for left_out in still.visible().left_out() {
         eprintln!("warning: {left_out}");
@@ -151,11 +160,11 @@ fn run(args: &Args) -> launcher::Result {
     if args.compare {
         let mut raster = Frame::new(view.width, view.height, Channels { color: true, ..Channels::default() });
         rasterizer.set_cfg(RasterCfg { occlusion_rays: 0, ..cfg });
-        rasterizer.set_renderer(kinetoscope::sensors::camera::Renderer::Raster);
+        rasterizer.set_renderer(Known::Raster);
         rasterizer.render(&mut [(still.shot(&view), raster.as_mut())]).map_err(|(_, error)| error)?;
         let both = [&raster, &frame].map(|frame| frame.color.as_deref().unwrap_or_default());
         picture::write_png(
-            &args.out.join("raster-and-rt.png"),
+            &args.out.join(format!("raster-and-{}.png", args.renderer.name())),
             &picture::side_by_side([view.width, view.height], both),
         )?;
     }

@@ -6,6 +6,11 @@
 #[doc = include_str!("../docs/recording.md")]
 struct PageOfRecordings;
 
+/// So are those of this page.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/cameras.md")]
+struct PageOfCameras;
+
 pub mod assets;
 #[cfg(all(feature = "record", feature = "view"))]
 mod record_button;
@@ -35,9 +40,9 @@ pub mod prelude {
     pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use scene::Pose;
     pub use sensors::camera::{
-        Camera, CameraCfg, CameraConvention, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Placement,
-        RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, StereoCamera, StereoCameraCfg, StereoOrigin,
-        ToneCurve,
+        Aperture, Camera, CameraCfg, CameraConvention, CameraInfo, Channels, DepthMiss, Extrinsics, Imperfections,
+        Intrinsics, Lens, Placement, RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter,
+        StereoCamera, StereoCameraCfg, StereoOrigin, ToneCurve,
     };
     pub use sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,

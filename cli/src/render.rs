@@ -52,9 +52,9 @@ pub(crate) struct Look {
     /// How it is drawn
     #[arg(long, value_enum, default_value_t = Method::Raster)]
     renderer: Method,
-    /// Paths per pixel, with --renderer rt
-    #[arg(long, default_value_t = 64)]
-    samples: u32,
+    /// Paths per pixel, with --renderer rt [default: 64]
+    #[arg(long)]
+    samples: Option<u32>,
 }
 
 /// How a picture is drawn.
@@ -158,17 +158,22 @@ impl Look {
     /// What draws it, on every core.
     ///
     /// # Errors
-    /// A number of paths that is not possible.
+    /// A number of paths that is not possible, or any without path tracing.
     pub(crate) fn rasterizer(&self) -> Result<ParallelRasterizer> {
+        if let Some(samples) = self.samples.filter(|_| self.renderer != Method::Rt) {
+            return Err(format!("--samples {samples}: paths are of --renderer rt").into());
+        }
         let renderer = match self.renderer {
             Method::Raster => Renderer::Raster,
             Method::Hybrid => Renderer::Hybrid,
             Method::FastRt => Renderer::FastRayTraced,
-            Method::Rt => Renderer::RayTraced { samples: self.samples, max_bounces: 4, denoise: true, seed: 0 },
+            Method::Rt => {
+                Renderer::RayTraced { samples: self.samples.unwrap_or(64), max_bounces: 4, denoise: true, seed: 0 }
+            }
         };
         renderer.validate()?;
         let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-        let cfg = RasterCfg { samples: 4, ..RasterCfg::of_cameras() };
+        let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
         let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_crew(staying_crew());
         rasterizer.set_renderer(renderer);
         Ok(rasterizer)

@@ -109,8 +109,8 @@ pub(crate) enum Device {
     Cuda,
 }
 
-/// How images are drawn; examples that draw none accept the names so that scripts run, and those that draw in one way only
-/// refuse the others ([`Launcher::simulation`]).
+/// How images are drawn; examples without a camera accept the names so that scripts run, and those whose cameras draw in one way
+/// only refuse the others ([`Launcher::simulation`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renderer {
     /// The default
@@ -140,6 +140,11 @@ pub(crate) struct PathFlags {
 }
 
 impl Renderer {
+    /// What the flag calls it.
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
     /// What cameras call it.
     ///
     /// # Errors
@@ -175,10 +180,10 @@ impl Launcher {
     /// The device is not supported, or another renderer is asked for.
     pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
         if !matches!(self.renderer, Renderer::Auto | Renderer::Raster) {
-            let name = self.renderer.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
+            let name = self.renderer.name();
             return Err(format!(
                 "--renderer {name} is not for this example: use --renderer raster or auto here, or create_sensor, stereo, \
-                 surfaces or render_model, which draw with every renderer"
+                 fisheye, surfaces or render_model, which draw by rays too"
             )
             .into());
         }

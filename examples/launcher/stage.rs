@@ -27,7 +27,7 @@ pub(crate) fn write(
     let view = View { width, height, fx, fy, cx, cy, near: 0.05, far: 500.0, world_from_camera };
     let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::default() });
     let mut job = [(stage.shot(&view), frame.as_mut())];
-    let cfg = RasterCfg { samples: 4, ..RasterCfg::of_cameras() };
+    let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
     ParallelRasterizer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
     let color = frame.color.unwrap_or_default();
     picture::write_png(path, &picture::color_picture([width, height], &color))

@@ -174,7 +174,7 @@ impl Scenes {
         let mut updates = Vec::new();
         // Most look as another one does.
         let mut known: Vec<(Arc<RenderScene>, Looks)> = Vec::new();
-        let groups = RasterCfg::of_cameras().groups;
+        let groups = RasterCfg::default().groups;
         for &env in envs {
             let Some(told) = self.told.get_mut(&env) else { continue };
             let scene = sim.scene_of(EnvId(env))?;

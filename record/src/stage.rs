@@ -73,7 +73,7 @@ impl Painter {
         let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
         let [near, far] = CLIP;
         let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(&pose) };
-        let raster = RasterCfg { samples: 4, ..RasterCfg::of_cameras() };
+        let raster = RasterCfg { samples: 4, ..RasterCfg::default() };
         Ok(Self { view, rasterizer: ParallelRasterizer::new(raster, sim.threads()) })
     }
 

@@ -11,7 +11,8 @@ pub enum LightKind {
     Spot {
         /// Half angle of the cone \[deg\], at most 90.
         cutoff_deg: f32,
-        /// How fast the light falls off from the axis: cos(angle) to this power.
+        /// How fast the light falls off from the axis: cos(angle) to this power, of which the nearest whole number up to 128 is
+        /// drawn.
         exponent: f32,
     },
     /// The same in all directions; the rasterizer draws no shadow of it.

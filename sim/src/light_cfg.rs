@@ -19,7 +19,8 @@ pub enum LampKind {
     Spot {
         /// Half angle of the cone \[deg\], above 0 and at most 90.
         cutoff_deg: f64,
-        /// How fast the light falls off from the axis: cos(angle) to this power, at least 0.
+        /// How fast the light falls off from the axis: cos(angle) to this power, a whole number up to
+        /// 128.
         exponent: f64,
     },
 }
@@ -74,8 +75,8 @@ impl LightCfg {
             if !(cutoff_deg > 0.0 && cutoff_deg <= 90.0) {
                 return fail("lights.kind.spot.cutoff_deg", &cutoff_deg, "it must be above 0 and at most 90 degrees");
             }
-            if !(0.0..=1e3).contains(&exponent) {
-                return fail("lights.kind.spot.exponent", &exponent, "it must be 0 to 1000, such as 10");
+            if !(0.0..=128.0).contains(&exponent) || exponent.fract() != 0.0 {
+                return fail("lights.kind.spot.exponent", &exponent, "it must be a whole number, 0 to 128, such as 10");
             }
         }
         if !self.position.iter().all(|x| x.abs() <= 1e6) {

@@ -67,7 +67,7 @@ fn camera(renderer: Renderer, draw_markers: bool) -> CameraCfg {
             ..Default::default()
         },
         channels: Channels { color: true, depth: true, mask: true, normal: true, position: true, ..Channels::NONE },
-        raster: RasterCfg { shadows: false, ..RasterCfg::of_cameras() },
+        raster: RasterCfg { shadows: false, ..RasterCfg::default() },
         renderer,
         draw_markers,
         ..Default::default()

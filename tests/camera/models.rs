@@ -18,7 +18,7 @@ fn seen(still: &Still) -> f64 {
     let view = View { width: 64, height: 48, fx, fy, cx, cy, near, far, world_from_camera };
     let channels = Channels { color: true, mask: true, ..Channels::default() };
     let mut frame = Frame::new(64, 48, channels);
-    let cfg = RasterCfg { groups: 0b111, ..RasterCfg::default() };
+    let cfg = RasterCfg { ..RasterCfg::default() };
     Rasterizer::new(cfg).render_shot(&still.shot(&view), &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap();
     assert!(color.as_chunks::<4>().0.iter().any(|c| c != &color[..4]), "a picture of one colour");

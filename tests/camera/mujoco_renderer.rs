@@ -62,7 +62,7 @@ fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Pictures, Vec<i32>) {
     let view = View { width: SIZE[0], height: SIZE[1], fx, fy, cx, cy, near, far, world_from_camera };
     let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
-    let cfg = RasterCfg { groups: 0b111, shadows: false, samples: 1, lod: false, ..RasterCfg::default() };
+    let cfg = RasterCfg { shadows: false, samples: 1, lod: false, ..RasterCfg::default() };
     let shot = Shot { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, before: None };
     Rasterizer::new(cfg).render_shot(&shot, &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap().as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]).collect();

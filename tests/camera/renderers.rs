@@ -77,7 +77,7 @@ fn cameras(place: Place) -> (SimulationManager, Vec<(Renderer, SensorId<Camera>)
             extrinsics: place.extrinsics(),
             channels: Channels::ALL,
             renderer,
-            raster: RasterCfg { lod: false, ..RasterCfg::of_cameras() },
+            raster: RasterCfg { lod: false, ..RasterCfg::default() },
             ..Default::default()
         };
         (renderer, sim.add_sensor(format!("camera_{k}"), cfg).unwrap())
@@ -189,7 +189,7 @@ fn files_are_drawn_alike_by_all_renderers() {
         let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(&pose) };
         let draw = |renderer| {
             let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
-            let mut rasterizer = ParallelRasterizer::new(RasterCfg { lod: false, ..RasterCfg::of_cameras() }, 2);
+            let mut rasterizer = ParallelRasterizer::new(RasterCfg { lod: false, ..RasterCfg::default() }, 2);
             rasterizer.set_renderer(renderer);
             let mut frame = Frame::new(width, height, channels);
             rasterizer.render(&mut [(still.shot(&view), frame.as_mut())]).unwrap();

@@ -181,6 +181,8 @@ fn what_lamps_cannot_be_is_refused() {
         ("lights.kind.spot.cutoff_deg", spot(90.5, 1.0)),
         ("lights.kind.spot.cutoff_deg", spot(f64::NAN, 1.0)),
         ("lights.kind.spot.exponent", spot(45.0, -1.0)),
+        ("lights.kind.spot.exponent", spot(45.0, 129.0)),
+        ("lights.kind.spot.exponent", spot(45.0, 2.5)),
         ("lights.position", LightCfg { position: [0.0, f64::NAN, 0.0].into(), ..Default::default() }),
         ("lights.attenuation", LightCfg { attenuation: [0.0; 3], ..Default::default() }),
         ("lights.attenuation", LightCfg { attenuation: [1.0, -1.0, 0.0], ..Default::default() }),

@@ -4,6 +4,7 @@
 //! project, so that it builds before MuJoCo is there.
 #![forbid(unsafe_code)]
 
+mod alike;
 mod arrows;
 mod bench;
 mod bless;

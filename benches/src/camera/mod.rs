@@ -17,6 +17,7 @@ mod scene;
 mod sides;
 
 pub(crate) use by_rays::by_rays;
+pub(crate) use scene::Scene;
 
 use crate::interleave::{Plan, Side, Times, measure};
 use crate::rival::{can_run, python};
@@ -24,7 +25,7 @@ use crate::row::Row;
 use crate::{Outcome, Settings};
 use kinetoscope::sensors::camera::Renderer as OurRenderer;
 use limit::{Compute, Copying};
-use scene::{Scene, Scenes};
+use scene::Scenes;
 use sides::{Look, Ours, Renderer, Rival, Work};
 use std::ffi::OsString;
 
@@ -109,10 +110,22 @@ impl<'s> Contest<'s> {
         Ok(self.sides.len() - 1)
     }
 
-    /// The rival, where it is on the machine; it must see what ours sees.
+    /// The rival, where it is on the machine; it must see what our rasterizer sees.
     fn rival(&mut self, rivals: &Rivals, renderer: Renderer, scene: &'s Scene, work: &Work) -> Outcome<Option<usize>> {
+        self.rival_of(rivals, renderer, scene, work, OurRenderer::Raster)
+    }
+
+    /// The same of one of our renderers.
+    fn rival_of(
+        &mut self,
+        rivals: &Rivals,
+        renderer: Renderer,
+        scene: &'s Scene,
+        work: &Work,
+        by: OurRenderer,
+    ) -> Outcome<Option<usize>> {
         let Some(mut rival) = rivals.start(renderer, scene, work)? else { return Ok(None) };
-        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, OurRenderer::Raster)?;
+        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, by)?;
         rival.must_see(&ours.depth()?, work.size)?;
         let (ours, theirs) = (scene.triangles(), rival.triangles()?);
         if ours != theirs {

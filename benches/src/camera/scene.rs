@@ -5,7 +5,7 @@ use crate::Outcome;
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
 use crate::startup::robots;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::{PoseF32, Shape};
+use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::mj::{self, Data, Model, TARGET, Target};
@@ -20,9 +20,9 @@ const FOVY: f32 = 45.0;
 const STATES: usize = 64;
 
 /// A model, what can be seen of it, and a camera.
-pub(super) struct Scene {
+pub(crate) struct Scene {
     /// Name in the results.
-    pub(super) name: &'static str,
+    pub(crate) name: &'static str,
     /// The MJCF with the camera `bench`.
     pub(super) file: PathBuf,
     pub(super) model: Model,
@@ -54,19 +54,34 @@ impl Scenes {
                 Some(Scene::new("humanoid", &text, tempfile::tempdir()?, states, [2.5, -2.5, 1.8], [0.0, 0.0, 0.9])?)
             }
         };
-        let vendor = robots().map(|dir| dir.join("rokae_description/urdf/SR5.urdf")).filter(|file| file.exists());
-        if vendor.is_none() {
-            eprintln!("  skipped: no vendor robots; set KINETOSCOPE_ROBOTS to their folder");
-        }
-        let vendor = match vendor {
-            None => None,
+        let vendor = match vendor_arm() {
+            None => {
+                eprintln!("  skipped: no vendor robots; set KINETOSCOPE_ROBOTS to their folder");
+                None
+            }
             Some(file) => Some(Scene::exported("vendor SR5", &arm_with_hand(&file, "joint[1-6]", 1, 1)?.0)?),
         };
         Ok(Self { humanoid, vendor, bundled: Scene::exported("SR5 + hand", &sr5(1, 1)?.0)? })
     }
 }
 
+/// The vendor's SR5, where it is on the machine.
+fn vendor_arm() -> Option<PathBuf> {
+    robots().map(|dir| dir.join("rokae_description/urdf/SR5.urdf")).filter(|file| file.exists())
+}
+
 impl Scene {
+    /// The vendor's SR5 and nothing else, the bundled one where there is none.
+    pub(crate) fn arm_alone() -> Outcome<Self> {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
+        let (name, file) = match vendor_arm() {
+            Some(file) => ("vendor SR5", file),
+            None => ("bundled SR5", assets::path("sr5/SR5.urdf")?),
+        };
+        sim.add_robot(RobotCfg { urdf: UrdfCfg::single(file), ..Default::default() })?;
+        Self::exported(name, &sim)
+    }
+
     fn new(
         name: &'static str,
         mjcf: &str,
@@ -104,32 +119,41 @@ impl Scene {
     }
 
     /// The same seen from so near, or so far, that things cover this part of a picture.
-    pub(super) fn covering(mut self, share: f64) -> Outcome<Self> {
+    pub(crate) fn covering(mut self, share: f64) -> Outcome<Self> {
         let size = [320, 240];
-        let mut data = Data::new(&self.model)?;
-        data.qpos_mut().copy_from_slice(self.state(0));
-        data.step1()?;
-        let seen = self.visible.scene();
-        let mut poses = vec![PoseF32::IDENTITY; seen.instances().len()];
-        let mut lights = seen.lights.clone();
-        self.visible.read(&data, &mut poses, &mut lights);
-        let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
-        let mut rasterizer = ParallelRasterizer::new(RasterCfg { groups, ..RasterCfg::default() }, 1);
+        let (drawn, poses) = self.drawn(0)?;
+        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
         let (far, target) = (self.eye, self.target);
-        let (mut nearest, mut farthest) = (0.1f32, 4.0f32);
+        let (mut nearest, mut farthest, mut covered) = (0.1f32, 4.0f32, 0.0);
         while farthest - nearest > 1e-3 {
             let part = 0.5 * (nearest + farthest);
             self.eye = [0, 1, 2].map(|k| target[k] + part * (far[k] - target[k]));
             let mut frame = Frame::new(size[0], size[1], Channels { depth: true, ..Channels::default() });
             let view = self.view(size)?;
-            let shot = Shot { scene: seen, poses: &poses, view: &view, lights: None, lens: None, before: None };
+            let shot = Shot { scene: &drawn, poses: &poses, view: &view, lights: None, lens: None, before: None };
             rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
             let hits = frame.depth.iter().flatten().filter(|depth| depth.is_finite()).count();
-            let covered = hits as f64 / (size[0] * size[1]) as f64;
+            covered = hits as f64 / (size[0] * size[1]) as f64;
             if covered > share { nearest = part } else { farthest = part }
+        }
+        if (covered - share).abs() > 0.01 {
+            return Err(format!("{} covers {:.0} % of the picture at best", self.name, 100.0 * covered).into());
         }
         std::fs::write(&self.file, with_camera(&self.mjcf, &self.view([1, 1])?)?)?;
         Ok(self)
+    }
+
+    /// What is drawn, without what belongs to other geom groups, and where it is in environment `index`.
+    pub(crate) fn drawn(&self, index: usize) -> Outcome<(RenderScene, Vec<PoseF32>)> {
+        let mut data = Data::new(&self.model)?;
+        data.qpos_mut().copy_from_slice(self.state(index));
+        data.step1()?;
+        let all = self.visible.scene();
+        let mut poses = vec![PoseF32::IDENTITY; all.instances().len()];
+        self.visible.read(&data, &mut poses, &mut all.lights.clone());
+        let drawn = all.instances().iter().cloned().zip(poses).filter(|(instance, _)| is_drawn(instance));
+        let (instances, poses) = drawn.unzip();
+        Ok((all.with_instances(instances)?, poses))
     }
 
     /// The joint positions of environment `index`.
@@ -138,17 +162,21 @@ impl Scene {
     }
 
     /// The camera with pictures of this size.
-    pub(super) fn view(&self, size: [usize; 2]) -> Outcome<View> {
+    pub(crate) fn view(&self, size: [usize; 2]) -> Outcome<View> {
         Ok(View::look_at(size, FOVY.to_radians(), self.eye, self.target, [0.0, 0.0, 1.0])?)
     }
 
     /// Triangles of the meshes that are drawn.
     pub(super) fn triangles(&self) -> usize {
-        let drawn = self.visible.scene().instances().iter().filter(|i| i.visible && GROUPS.contains(&i.group));
+        let drawn = self.visible.scene().instances().iter().filter(|instance| is_drawn(instance));
         drawn
             .filter_map(|i| if let Shape::Mesh(shape) = &i.shape { Some(shape.mesh.triangles().len()) } else { None })
             .sum()
     }
+}
+
+fn is_drawn(instance: &Instance) -> bool {
+    instance.visible && GROUPS.contains(&instance.group)
 }
 
 fn compile(file: &Path) -> Outcome<Model> {

@@ -54,7 +54,7 @@ fn the_stage_is_what_a_camera_there_sees() {
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
         near: 0.05,
         far: 500.0,
-        raster: RasterCfg { samples: 4, ..RasterCfg::of_cameras() },
+        raster: RasterCfg { samples: 4, ..RasterCfg::default() },
         channels: Channels { color: true, ..Channels::NONE },
         update_period: 0.05,
         ..CameraCfg::default()

@@ -16,6 +16,7 @@ use super::sensor::{Camera, Lens};
 use super::shutter::Shutter;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
+use crate::resolve::path::film::Film;
 use crate::resolve::plan::{check_light, check_occlusion};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
@@ -152,7 +153,7 @@ impl Default for CameraCfg {
             channels: Channels { color: true, ..Channels::default() },
             depth_miss: DepthMiss::Inf,
             renderer: Renderer::default(),
-            raster: RasterCfg::of_cameras(),
+            raster: RasterCfg::default(),
             env_ids: None,
             lazy: true,
             history_length: 0,
@@ -266,20 +267,27 @@ impl CameraCfg {
         // A shutter that takes time is twice a moment.
         let moments = if self.shutter.is_instant() { 1 } else { 2 };
         let capture = moments * instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
+        // What paths find is kept for one picture at a time.
+        let film = match self.renderer {
+            Renderer::RayTraced { denoise, .. } if self.channels.color => {
+                self.width.saturating_mul(self.height).saturating_mul(Film::bytes_per_pixel(denoise))
+            }
+            _ => 0,
+        };
         let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
         let fits = |pictures: usize, captures: usize| {
             let captures = captures.checked_mul(capture.saturating_add(CAPTURE));
             let pictures = picture.and_then(|bytes| bytes.checked_mul(pictures));
             let bytes = pictures
                 .zip(captures)
-                .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views))
+                .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views)?.checked_add(film))
                 .filter(|&bytes| bytes as u64 <= MAX_BYTES);
             // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
             bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
         };
         if !fits(1, 1) {
             let (width, height) = (self.width, self.height);
-            return Err(CameraError::Memory { views, width, height, bytes_per_pixel, limit: MAX_BYTES });
+            return Err(CameraError::Memory { views, width, height, bytes_per_pixel, paths: film, limit: MAX_BYTES });
         }
         let (pictures, captures) = (self.history_length, Memory::waiting(self, schedule));
         let all = pictures.saturating_add(captures).saturating_add(1);

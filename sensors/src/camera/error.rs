@@ -197,8 +197,9 @@ pub enum CameraError {
     },
     /// The pictures of all environments do not fit into memory.
     #[error(
-        "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes do not fit into memory \
-         (at most {limit} bytes)"
+        "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes{} do not fit into memory \
+         (at most {limit} bytes)",
+        if *.paths > 0 { format!(", with {} bytes for paths,", .paths) } else { String::new() }
     )]
     Memory {
         /// How many environments.
@@ -207,8 +208,10 @@ pub enum CameraError {
         width: usize,
         /// Rows.
         height: usize,
-        /// Memory of a pixel.
+        /// Memory of a pixel \[bytes\].
         bytes_per_pixel: usize,
+        /// What path tracing needs besides, for one picture at a time \[bytes\].
+        paths: usize,
         /// The most that is allowed.
         limit: u64,
     },

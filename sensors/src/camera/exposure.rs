@@ -101,7 +101,7 @@ fn draw_colors(
         let Film { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
         crew.share(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
-            smooth::pass([width, k * ROWS], pass, pixels, guides, to);
+            smooth::pass([width, k * ROWS], (pass, plan.exposure), pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }

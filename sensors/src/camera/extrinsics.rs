@@ -64,10 +64,10 @@ pub struct Extrinsics {
 pub enum Placement {
     /// By a pose; the axes are those of [`Extrinsics::convention`].
     Pose {
-        /// Position \[m\].
+        /// Position in the frame of the parent, or of the environment for free cameras \[m\].
         #[serde(default)]
         pos: [f64; 3],
-        /// Rotation.
+        /// How the camera's axes are turned in that frame.
         #[serde(default, with = "scene::file_format::rotation")]
         rotation: UnitQuaternion<f64>,
     },

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 /// How frames are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default = "RasterCfg::of_cameras", deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RasterCfg {
     /// Samples per pixel for the colour: 1 or 4. All other channels see the pixel's centre.
     pub samples: u8,
@@ -61,6 +61,7 @@ pub struct RasterCfg {
 }
 
 impl Default for RasterCfg {
+    /// Four samples and shadows; geom groups 0, 1 and 2, as in MuJoCo's own viewers: collision shapes are in group 3.
     fn default() -> Self {
         Self {
             samples: 4,
@@ -68,16 +69,9 @@ impl Default for RasterCfg {
             shadow_size: 0,
             occlusion_rays: 0,
             tone: ToneCurve::Soft,
-            groups: u32::MAX,
+            groups: 0b111,
             lod: true,
         }
-    }
-}
-
-impl RasterCfg {
-    /// What cameras have by default, in files too: geom groups 0, 1 and 2, as in MuJoCo's own viewers.
-    pub fn of_cameras() -> Self {
-        Self { groups: 0b111, ..Self::default() }
     }
 }
 

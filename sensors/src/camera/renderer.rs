@@ -14,7 +14,7 @@ use std::fmt;
 /// surfaces are moved as is said there, and no other renderer's are.
 ///
 /// In files it is a name, `"hybrid"`, or a table of paths with what is not as in [`Renderer::RAY_TRACED`]:
-/// `{ ray_traced = { samples = 256 } }`.
+/// `{ ray_traced = { samples = 256 } }`. EmbodiChain's names `auto`, `fast-rt` and `rt` are known there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -98,13 +98,16 @@ impl Renderer {
         Ok(())
     }
 
-    /// The renderer of a name in files; paths are those of [`RAY_TRACED`](Self::RAY_TRACED).
+    /// The renderer of a name in files, EmbodiChain's too; paths are those of [`RAY_TRACED`](Self::RAY_TRACED).
     fn from_name(name: &str) -> Result<Self, SensorError> {
         const ALL: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED];
-        ALL.into_iter().find(|renderer| renderer.name() == name).ok_or_else(|| {
-            let candidates = closest(name, ALL.map(Self::name)).into_iter().map(String::from).collect();
-            SensorError::UnknownName { what: "renderer", name: name.into(), candidates }
-        })
+        ALL.into_iter().find(|renderer| renderer.name() == name || renderer.aliases().contains(&name)).ok_or_else(
+            || {
+                let all = ALL.iter().flat_map(|renderer| [&[renderer.name()], renderer.aliases()].concat());
+                let candidates = closest(name, all).into_iter().map(String::from).collect();
+                SensorError::UnknownName { what: "renderer", name: name.into(), candidates }
+            },
+        )
     }
 
     /// Its name in files.
@@ -114,6 +117,16 @@ impl Renderer {
             Self::FastRayTraced => "fast_ray_traced",
             Self::Hybrid => "hybrid",
             Self::RayTraced { .. } => "ray_traced",
+        }
+    }
+
+    /// What EmbodiChain, and so the flags of examples, call it.
+    fn aliases(self) -> &'static [&'static str] {
+        match self {
+            Self::Raster => &["auto"],
+            Self::FastRayTraced => &["fast-rt", "fast_rt"],
+            Self::Hybrid => &[],
+            Self::RayTraced { .. } => &["rt"],
         }
     }
 
@@ -223,6 +236,10 @@ mod tests {
             ("", Renderer::Raster),
             ("renderer = 'fast_ray_traced'", Renderer::FastRayTraced),
             ("renderer = 'ray_traced'", Renderer::RAY_TRACED),
+            ("renderer = 'auto'", Renderer::Raster),
+            ("renderer = 'fast-rt'", Renderer::FastRayTraced),
+            ("renderer = 'rt'", Renderer::RAY_TRACED),
+            ("renderer.rt.samples = 9", Renderer::RayTraced { samples: 9, max_bounces: 4, denoise: true, seed: 0 }),
             ("renderer = { ray_traced = {} }", Renderer::RAY_TRACED),
             ("renderer.ray_traced = { samples = 256, seed = 7 }", some),
             ("[renderer.ray_traced]\nsamples = 1\nmax_bounces = 0\ndenoise = false\nseed = 9", all),

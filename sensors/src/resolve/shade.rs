@@ -95,7 +95,7 @@ impl Lighting {
         self.lamps.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
             let (cutoff_cos, exponent) = match light.kind {
-                LightKind::Spot { cutoff_deg, exponent } => (cos_deg(cutoff_deg), exponent.clamp(0.0, 128.0) as u32),
+                LightKind::Spot { cutoff_deg, exponent } => (cos_deg(cutoff_deg), whole_exponent(exponent)),
                 LightKind::Directional | LightKind::Point => (-2.0, 0),
             };
             self.lamps.push(Lamp {
@@ -107,6 +107,11 @@ impl Lighting {
             });
         }
     }
+}
+
+/// The exponent of a spot as it is drawn: the nearest whole number, up to OpenGL's largest.
+pub(super) fn whole_exponent(exponent: f32) -> u32 {
+    (exponent.clamp(0.0, 128.0) + 0.5) as u32
 }
 
 /// Highlights weaker than this are black: a third of the weakest light that is not black on a screen.

@@ -1,5 +1,6 @@
 //! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
 
+use super::path::REACH;
 use super::path::lobe::{Basis, cosine};
 use super::path::sobol::Sequence;
 use crate::lanes::{F, LANES, M, Simd, V3, load, splat};
@@ -85,7 +86,7 @@ impl ShadowRays<'_> {
                 (toward.map(f64::from), f64::INFINITY)
             } else {
                 let to = sub(light.position.map(f64::from), origin);
-                (to, dot(to, to).sqrt())
+                (to, REACH * dot(to, to).sqrt())
             };
             let length = dot(direction, direction).sqrt();
             if length > 0.0 {

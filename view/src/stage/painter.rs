@@ -40,7 +40,7 @@ pub struct Look<'a> {
 impl Painter {
     /// Draws on `threads` threads, with four samples per pixel.
     pub fn new(threads: usize) -> Self {
-        let cfg = RasterCfg::of_cameras();
+        let cfg = RasterCfg::default();
         Self { rasterizer: ParallelRasterizer::new(cfg, threads), cfg, assembly: Assembly::default() }
     }
 

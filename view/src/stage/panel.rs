@@ -25,7 +25,7 @@ pub struct Panel {
 
 /// What the panel draws with.
 fn cfg() -> RasterCfg {
-    RasterCfg { samples: 1, ..RasterCfg::of_cameras() }
+    RasterCfg { samples: 1, ..RasterCfg::default() }
 }
 
 impl Panel {

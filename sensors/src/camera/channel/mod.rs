@@ -27,7 +27,7 @@ pub struct PixelGroup {
     pub normal: [[f32; LANES]; 3],
     /// Smooth normal, world frame; 0 on a miss.
     pub shading_normal: [[f32; LANES]; 3],
-    /// Where the surface is, world frame \[m\]; 0 on a miss.
+    /// Where the surface is, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
     /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
     pub flow: [[f32; LANES]; 2],
@@ -405,7 +405,7 @@ channels! {
     normal::Normal,
     /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
     shading_normal::ShadingNormal,
-    /// Where the surface is, world frame \[m\], f32, 3 per pixel; 0 where nothing was hit.
+    /// Where the surface is, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
     position::Position,
     /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
     albedo::Albedo,

@@ -38,7 +38,7 @@ fn seen_by(rest: CameraCfg, scene: RenderScene, poses: &[PoseF32], eye: [f64; 3]
         far: 50.0,
         extrinsics: Extrinsics { placement, ..Extrinsics::default() },
         channels: Channels { mask: true, position: true, ..Channels::default() },
-        raster: RasterCfg { lod: false, ..RasterCfg::of_cameras() },
+        raster: RasterCfg { lod: false, ..RasterCfg::default() },
         ..rest
     };
     let mut camera = cfg.build(&context).unwrap();
@@ -87,7 +87,7 @@ fn alone(camera: &Camera, scene: &RenderScene, poses: &[PoseF32], k: usize, is: 
         *x *= k as f32;
     }
     let mut frame = Frame::new(view.width, view.height, Channels { mask: true, ..Channels::default() });
-    let cfg = RasterCfg { lod: false, ..RasterCfg::of_cameras() };
+    let cfg = RasterCfg { lod: false, ..RasterCfg::default() };
     Rasterizer::new(cfg).render(&RenderScene::new(instances).unwrap(), &poses, &view, &mut frame).unwrap();
     frame.mask.unwrap()
 }

@@ -139,7 +139,7 @@ fn a_camera_exposes_as_its_imperfections_say() {
     let sky = |stops: Option<f64>| {
         let exposure = stops.map(|stops| Exposure { stops });
         let imperfections = Imperfections { exposure, ..Imperfections::default() };
-        let raster = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::of_cameras() };
+        let raster = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::default() };
         let camera = super::stage::built(&CameraCfg { imperfections, raster, ..super::stage::cfg() }, &context);
         let bytes: Vec<u8> = camera.color().unwrap().iter().copied().collect();
         bytes

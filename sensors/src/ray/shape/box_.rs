@@ -27,6 +27,12 @@ impl RayShape for Box {
         Some(Touch { t, normal: [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }) })
     }
 
+    /// Two of each axis, the negative one first.
+    fn face(&self, touch: &Touch, ray: &Ray) -> usize {
+        let axis = touch.normal.iter().position(|&n| n != 0.0).unwrap_or(2);
+        2 * axis + usize::from(ray.at(touch.t)[axis] >= 0.0)
+    }
+
     fn bounds(&self) -> Option<[V3; 2]> {
         Some([self.half.map(|h| -h), self.half])
     }

@@ -32,6 +32,14 @@ impl RayShape for Cylinder {
         Some(Touch { t, normal })
     }
 
+    /// The side, the lower end, the upper one.
+    fn face(&self, touch: &Touch, ray: &Ray) -> usize {
+        match touch.normal {
+            [0.0, 0.0, _] => 1 + usize::from(ray.at(touch.t)[2] >= 0.0),
+            _ => 0,
+        }
+    }
+
     fn bounds(&self) -> Option<[V3; 2]> {
         let (r, h) = (self.radius, self.half_length);
         Some([[-r, -r, -h], [r, r, h]])

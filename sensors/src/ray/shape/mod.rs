@@ -39,6 +39,11 @@ pub(crate) trait RayShape {
         touch_each(self, packet, stack, touches);
     }
 
+    /// Which smooth part of the surface a ray touches, of shapes with a closed form: numbered as the rasterizer's.
+    fn face(&self, _touch: &Touch, _ray: &Ray) -> usize {
+        0
+    }
+
     /// Smallest and largest coordinates; `None` for a shape without an end.
     fn bounds(&self) -> Option<[V3; 2]>;
 }
@@ -82,6 +87,11 @@ macro_rules! ray_shapes {
             #[inline(always)]
             pub(crate) fn with<W: ForShape>(&self, work: W) {
                 match self { $(Self::$Name(shape) => work.run(shape),)* }
+            }
+
+            /// Which smooth part of the surface a ray touches.
+            pub(crate) fn face(&self, touch: &Touch, ray: &Ray) -> usize {
+                match self { $(Self::$Name(shape) => shape.face(touch, ray),)* }
             }
 
             /// The nearest surface at a distance from 0 to `limit`, both included.

@@ -33,9 +33,9 @@ impl Paths<'_> {
             }
             let passes = if lamp.cast_shadow {
                 let origin = *origin.get_or_insert_with(|| self.lifted(s, point, path));
-                let ray = Ray { origin, direction: light.direction };
+                let (direction, distance) = light.seen_from(point.position, origin);
                 path.rays += 1;
-                self.tracer.passes(s, &ray, light.distance * REACH, path.time, path.stack)
+                self.tracer.passes(s, &Ray { origin, direction }, distance * REACH, path.time, path.stack)
             } else {
                 1.0
             };

@@ -7,6 +7,9 @@ use crate::lanes::{LANES, Level, Simd, at_level, load};
 use crate::ray::bvh::Stack;
 use crate::resolve::tone::{ToneCurve, encode};
 
+/// Light that is brighter is not told apart from this: sums of some dozen of its squares are numbers of single precision.
+const BRIGHTEST: f32 = 1e18;
+
 /// A picture in linear light; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Film {
@@ -38,6 +41,11 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Film {
+    /// Memory for a pixel of a picture, with or without smoothing.
+    pub(crate) const fn bytes_per_pixel(smooth: bool) -> usize {
+        if smooth { 2 * size_of::<Pixel>() + size_of::<Guide>() } else { size_of::<Pixel>() }
+    }
+
     pub(crate) fn bytes(&self) -> usize {
         (self.pixels.capacity() + self.next.capacity()) * size_of::<Pixel>()
             + self.guides.capacity() * size_of::<Guide>()
@@ -102,8 +110,8 @@ impl Rows<'_> {
             }
             let mean = super::brightness(by.map(f64::from));
             *pixel = Pixel {
-                color: [0, 1, 2].map(|c| color[c] as f32 / by[c]),
-                variance: (variance / (mean * mean)) as f32,
+                color: [0, 1, 2].map(|c| (color[c] as f32 / by[c]).min(BRIGHTEST)),
+                variance: ((variance / (mean * mean)) as f32).min(BRIGHTEST * BRIGHTEST),
             };
             debug_assert!(albedo.iter().all(|x| x.is_finite()));
         }

@@ -2,7 +2,7 @@
 
 use super::lobe::{Basis, on_disc};
 use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
-use crate::resolve::shade::cos_deg;
+use crate::resolve::shade::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
 use scene::{Light, LightKind};
 
@@ -37,13 +37,24 @@ pub(super) struct Incoming {
     pub(super) strength: f64,
 }
 
+impl Incoming {
+    /// Light that was asked for at one point, asked for at another beside it: the same point of the lamp, where it is from there
+    /// and how far.
+    pub(super) fn seen_from(&self, asked: V3, origin: V3) -> (V3, f64) {
+        if !(self.distance.is_finite() && self.distance > 0.0) {
+            return (self.direction, self.distance);
+        }
+        let to = sub(along(asked, self.distance, self.direction), origin);
+        // Where both are one point nothing is between them.
+        unit(to).map_or((self.direction, 0.0), |direction| (direction, dot(to, to).sqrt()))
+    }
+}
+
 impl Lamp {
     pub(super) fn new(light: &Light) -> Self {
         let wide = |v: [f32; 3]| v.map(f64::from);
         let (cutoff_cos, exponent) = match light.kind {
-            LightKind::Spot { cutoff_deg, exponent } => {
-                (f64::from(cos_deg(cutoff_deg)), exponent.clamp(0.0, 128.0) as u32)
-            }
+            LightKind::Spot { cutoff_deg, exponent } => (f64::from(cos_deg(cutoff_deg)), whole_exponent(exponent)),
             LightKind::Directional | LightKind::Point => (-2.0, 0),
         };
         Self {

@@ -4,6 +4,7 @@
 //! masking-shadowing function, JCGT 3(2), 2014; Dupuy and Benyoub, Sampling visible GGX normals with spherical caps, 2023;
 //! Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
 
+use super::brightness;
 use crate::ray::vector::{V3, dot, scale};
 use scene::Material;
 use std::f64::consts::PI;
@@ -153,6 +154,17 @@ impl Lobe {
         let along = (here - self.ratio * there) / (here + self.ratio * there);
         let mirrored = 0.5 * (across * across + along * along);
         (mirrored, Some([-self.ratio * o[0], -self.ratio * o[1], -there]))
+    }
+
+    /// About what of light that comes from everywhere goes to `o`, and which part of that is mirrored rather than scattered
+    /// below the layer. Of Schlick's term 1/21 is left in the mean over all directions.
+    pub(super) fn reflects(&self, o: V3) -> (V3, f64) {
+        let (rest, layer) = (self.rest(), self.fresnel(o[2]));
+        let out = self.f0.map(|f0| 1.0 - f0 - (self.f90 - f0) / 21.0);
+        let below = [0, 1, 2].map(|k| rest * self.body[k] * (1.0 - layer[k]) * out[k]);
+        let mirrored = layer.map(|layer| rest * layer + (1.0 - rest));
+        let all = [0, 1, 2].map(|k| below[k] + mirrored[k]);
+        (all, brightness(mirrored) / brightness(all).max(1e-12))
     }
 
     /// Density of microfacets, by the cosine of their tilt.
@@ -427,6 +439,29 @@ mod tests {
                 // A control: a little above, something is, and it is a number.
                 let next = lobe.choose(toward(0.5), chance, [0.3, 0.7]);
                 assert!(next.is_none_or(|next| next.weight.iter().all(|x| x.is_finite())));
+            }
+        }
+    }
+
+    /// What the smoothing divides by, against chosen directions: of rough layers and matt surfaces to some percent of what comes
+    /// in, as it leaves out what facets hide of each other.
+    #[test]
+    fn what_is_reflected_of_light_from_everywhere_is_about_known() {
+        for (specular, shininess, albedo, mirrored) in
+            [(0.0, 0.5, 0.7, 0.0), (0.5, 0.5, 0.5, 0.08), (1.0, 0.2, 0.0, 1.0), (1.0, 0.2, 1.0, 0.09)]
+        {
+            let lobe = lobe(specular, shininess, albedo);
+            for cos in [1.0, 0.6] {
+                let o = toward(cos);
+                let (about, gloss) = lobe.reflects(o);
+                let count = 1 << 12;
+                let weight = |k| {
+                    let sample = Sequence::new([3, 1], 5).sample(k);
+                    lobe.choose(o, sample.pair(0)[0], sample.pair(1)).map_or(0.0, |next| next.weight[1])
+                };
+                let chosen = (0..count).map(weight).sum::<f64>() / f64::from(count);
+                assert!((about[1] - chosen).abs() < 0.03, "specular {specular}, {cos}: {about:?}, not {chosen}");
+                assert!((gloss - mirrored).abs() < 0.03, "specular {specular}, {cos}: {gloss}");
             }
         }
     }

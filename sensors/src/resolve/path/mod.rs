@@ -44,7 +44,7 @@ const ABOVE: f64 = 1e-7;
 /// Bounces after which paths may end by chance.
 const SURE: u32 = 2;
 /// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
-const REACH: f64 = 1.0 - 1e-6;
+pub(super) const REACH: f64 = 1.0 - 1e-6;
 /// Surfaces that are not opaque that a path goes through, at most.
 const MAX_PASSES: u32 = 64;
 /// How much wider by the metre what is seen together gets where light is scattered, at least.
@@ -177,8 +177,10 @@ pub(crate) struct Found {
     /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
     /// 0 of one sample.
     pub(crate) variance: f64,
-    /// Means over what is seen: colour of the surface (1 for mirrors and sky), normal, distance (0 for the sky).
+    /// Means over what is seen: what the surface reflects (1 for mirrors and sky), the mirrored part of that, normal, distance (0
+    /// for the sky).
     pub(crate) albedo: V3,
+    pub(crate) gloss: f64,
     pub(crate) normal: V3,
     pub(crate) distance: f64,
     /// How many rays were cast.
@@ -189,6 +191,7 @@ pub(crate) struct Found {
 #[derive(Clone, Copy, Debug)]
 struct First {
     albedo: V3,
+    gloss: f64,
     normal: V3,
     distance: f64,
 }
@@ -223,6 +226,7 @@ impl Paths<'_> {
             squares += bright * bright / n;
             out.color = along(out.color, 1.0 / n, color);
             out.albedo = along(out.albedo, 1.0 / n, first.albedo);
+            out.gloss += first.gloss / n;
             out.normal = along(out.normal, 1.0 / n, first.normal);
             out.distance += first.distance / n;
         }
@@ -243,7 +247,7 @@ impl Paths<'_> {
     #[inline(always)]
     fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
         let (sample, time) = (path.sample, path.time);
-        let mut first = First { albedo: [1.0; 3], normal: [0.0; 3], distance: 0.0 };
+        let mut first = First { albedo: [1.0; 3], gloss: 0.0, normal: [0.0; 3], distance: 0.0 };
         let Some(eye::First { mut ray, travelled: near, mut limit, mut width, mut spread }) =
             self.eye.look(at, &self.camera(time), || sample.pair(ON_LENS))
         else {
@@ -286,12 +290,8 @@ impl Paths<'_> {
             }
             let o = scale(ray.direction, -1.0);
             if bounce == 0 {
-                let matt = point.lobe.rest();
-                first = First {
-                    albedo: point.lobe.albedo.map(|x| matt * x + (1.0 - matt)),
-                    normal: point.normal,
-                    distance: travelled,
-                };
+                let (albedo, gloss) = point.lobe.reflects(Basis::of(point.normal).to_local(o));
+                first = First { albedo, gloss, normal: point.normal, distance: travelled };
                 if let Some((color, start, end)) = self.lamps.haze {
                     let k = ((travelled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
                     let k = k * k * (3.0 - 2.0 * k);

@@ -1,5 +1,6 @@
 //! Smooths noise: a few passes of a small filter with holes, each twice as wide as the one before, that does not blend across
-//! edges of normals, of depth or of light brighter than its own noise.
+//! edges of normals, of depth or of light brighter than its own noise. What surfaces reflect was divided out before, so that
+//! their colours stay as they are; where some of it is mirrored, which has a colour of its own, edges of it are edges too.
 //!
 //! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
 //! weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with polynomials
@@ -16,12 +17,18 @@ const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
 const BEND: f32 = 0.016;
 /// Light may differ by so many standard deviations of its noise.
 const NOISE: f32 = 4.0;
+/// And by this, as exposed: far below what is seen.
+const UNSEEN: f32 = 1e-4;
+/// What mirrors in part may reflect this part more or less.
+const TINT: f32 = 0.2;
 
 /// What a pixel shows, apart from light.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Guide {
     /// Never 0.
     pub(crate) albedo: [f32; 3],
+    /// The mirrored part of what it reflects.
+    pub(crate) gloss: f32,
     pub(crate) normal: [f32; 3],
     /// 0 for the sky.
     pub(crate) distance: f32,
@@ -31,6 +38,7 @@ impl Guide {
     pub(super) fn new(found: &Found) -> Self {
         Self {
             albedo: found.albedo.map(|x| (x as f32).max(0.02)),
+            gloss: found.gloss as f32,
             normal: found.normal.map(|x| x as f32),
             distance: found.distance as f32,
         }
@@ -61,8 +69,14 @@ pub(crate) fn guess([width, first]: [usize; 2], from: &[Pixel], guides: &[Guide]
     }
 }
 
-/// One pass over some rows, of which the first is `first`; `pass` counts from 0.
-pub(crate) fn pass([width, first]: [usize; 2], pass: u32, from: &[Pixel], guides: &[Guide], to: &mut [Pixel]) {
+/// One pass over some rows, of which the first is `first`; `pass` counts from 0, light will be multiplied by `exposure`.
+pub(crate) fn pass(
+    [width, first]: [usize; 2],
+    (pass, exposure): (u32, f32),
+    from: &[Pixel],
+    guides: &[Guide],
+    to: &mut [Pixel],
+) {
     let step = 1isize << pass;
     let height = from.len() / width.max(1);
     for (k, to) in to.iter_mut().enumerate() {
@@ -72,7 +86,7 @@ pub(crate) fn pass([width, first]: [usize; 2], pass: u32, from: &[Pixel], guides
         let mut sum = Pixel::default();
         let mut whole = 0.0;
         let bright = light(&center);
-        let noise = NOISE * around(from, [width, height], [x, y]).sqrt() + 1e-4;
+        let noise = NOISE * around(from, [width, height], [x, y]).sqrt() + UNSEEN / exposure;
         for j in -2isize..=2 {
             for i in -2isize..=2 {
                 let (px, py) = (x + i * step, y + j * step);
@@ -130,5 +144,7 @@ fn alike(a: &Guide, b: &Guide, reach: f32) -> f32 {
     let facing = if a.distance == 0.0 { 1.0 } else { (0..6).fold(cosine, |x, _| x * x) };
     let depth = (a.distance - b.distance).abs() / (BEND * a.distance.max(1e-6) * reach.max(1.0));
     let near = (1.0 - depth * depth).max(0.0);
-    facing * near * near
+    let tint = (0..3).map(|c| (a.albedo[c] - b.albedo[c]).abs() / (a.albedo[c] + b.albedo[c])).fold(0.0, f32::max);
+    let same = 1.0 - a.gloss.max(b.gloss) * (tint / TINT).min(1.0);
+    facing * near * near * same * same
 }

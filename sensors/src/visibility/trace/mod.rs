@@ -24,7 +24,7 @@ use crate::ray::shape::Solid;
 use crate::ray::shape::mesh::MeshTree;
 use crate::ray::triangle::ShearPacket;
 use crate::ray::vector::{V3, along, dot, scale};
-use crate::ray::{Ray, RayAssets};
+use crate::ray::{Assets, Ray, RayAssets};
 use motion::{Motion, rigid, wide};
 use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
@@ -81,15 +81,15 @@ pub(crate) struct Tracer {
 }
 
 impl Body {
-    fn of(instance: &Instance, known: Option<Self>, assets: &RayAssets) -> Self {
+    fn of(instance: &Instance, known: Option<Self>, assets: &mut Assets) -> Self {
         let mesh = match &instance.shape {
             Shape::Mesh(shape) => &shape.mesh,
             Shape::HeightField(shape) => shape.mesh(),
-            shape => return Self::Closed(assets.with(|assets| Solid::of(shape, assets))),
+            shape => return Self::Closed(Solid::of(shape, assets)),
         };
         match known {
             Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
-            _ => Self::Mesh(Arc::clone(mesh), assets.with(|assets| assets.mesh(mesh))),
+            _ => Self::Mesh(Arc::clone(mesh), assets.mesh(mesh)),
         }
     }
 
@@ -122,12 +122,15 @@ impl Tracer {
     pub(crate) fn find_bodies(&mut self, scene: &RenderScene, assets: &RayAssets, keep: impl Fn(&Instance) -> Layer) {
         let instances = scene.instances();
         self.bodies.resize_with(instances.len(), || None);
-        for (body, instance) in self.bodies.iter_mut().zip(instances) {
-            *body = match keep(instance) {
-                Layer::Hidden => None,
-                _ => Some(Body::of(instance, body.take(), assets)),
-            };
-        }
+        // All at once: what building takes of memory is kept from one mesh to the next.
+        assets.with(|assets| {
+            for (body, instance) in self.bodies.iter_mut().zip(instances) {
+                *body = match keep(instance) {
+                    Layer::Hidden => None,
+                    _ => Some(Body::of(instance, body.take(), assets)),
+                };
+            }
+        });
     }
 
     /// Puts everything where it is, for rays that go anywhere at any time; `before` is where it was at time 0, if it was not
@@ -170,9 +173,8 @@ impl Tracer {
                     #[inline(always)]
                     |thing: u32, limit: f64| {
                         let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
-                        // Of two that are as near, the first in the scene counts.
                         if best.is_none_or(|b| {
-                            found.distance < b.distance || found.distance == b.distance && thing < b.thing
+                            found.distance < b.distance || found.distance == b.distance && self.hides(thing, b.thing)
                         }) {
                             best = Some(found);
                         }
@@ -186,6 +188,14 @@ impl Tracer {
                 self.hit(best?, time)
             },
         )
+    }
+
+    /// Which of two things that are as near counts: a mat, not the endless ground that it lies on, as in the rasterizer; else the
+    /// first in the scene.
+    #[cold]
+    fn hides(&self, thing: u32, other: u32) -> bool {
+        let order = |thing: u32| (self.endless.contains(&thing), thing);
+        order(thing) < order(other)
     }
 
     /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
@@ -440,7 +450,8 @@ impl Lens {
             }
             Body::Closed(solid) => {
                 for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-                    found[k] = solid.touch(&rays[k], packet.limit(k), stack).map(|touch| (touch.t, 0));
+                    let touch = solid.touch(&rays[k], packet.limit(k), stack);
+                    found[k] = touch.map(|touch| (touch.t, solid.face(&touch, &rays[k])));
                 }
             }
         }

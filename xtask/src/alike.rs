@@ -1,0 +1,147 @@
+//! Whether two runs of an example saw the same: depth and mask in the arrays that they wrote.
+
+use std::fs;
+use std::path::Path;
+
+/// Part of its depth \[m/m\] that a pixel may differ by: rounding of rays in single precision, at the slants of the examples.
+const DEPTH: f32 = 1e-4;
+/// Neighbours are of one surface where their depths differ by no more than this part.
+const SURFACE: f32 = 0.1;
+
+/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes, and different colours.
+pub(crate) fn check(ours: &Path, other: &Path) -> Result<(), String> {
+    let names = |folder: &Path| -> Result<Vec<String>, String> {
+        let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
+        names.sort();
+        Ok(names)
+    };
+    let (here, there) = (names(ours)?, names(other)?);
+    if here != there {
+        return Err(format!("{} has {here:?}, {} has {there:?}", ours.display(), other.display()));
+    }
+    let depths: Vec<&String> = here.iter().filter(|name| name.starts_with("depth") && name.ends_with(".npy")).collect();
+    if depths.is_empty() {
+        return Err(format!("{} has no depth*.npy", ours.display()));
+    }
+    for depth in depths {
+        let mask = depth.replacen("depth", "mask", 1);
+        let seen = |folder: &Path| Ok::<_, String>((array(&folder.join(depth))?, array(&folder.join(&mask))?));
+        let (compared, different) = compare(&seen(ours)?, &seen(other)?)?;
+        if compared == 0 || different > 0 {
+            return Err(format!(
+                "{depth} and {mask} of {} and {} differ at {different} of {compared} pixels off silhouettes",
+                ours.display(),
+                other.display()
+            ));
+        }
+    }
+    let read = |folder: &Path, name: &String| fs::read(folder.join(name)).map_err(|e| format!("{name}: {e}"));
+    for picture in here.iter().filter(|name| name.ends_with(".png")) {
+        if read(ours, picture)? == read(other, picture)? {
+            return Err(format!("{picture} of {} and {} are one picture", ours.display(), other.display()));
+        }
+    }
+    Ok(())
+}
+
+/// An array of numbers of four bytes: its shape, and the bits.
+type Array = (Vec<usize>, Vec<u32>);
+
+/// Reads what `examples/launcher/npy.rs` writes, version 1.0 of NumPy's format.
+fn array(path: &Path) -> Result<Array, String> {
+    let wrong = |what: &str| format!("{}: {what}", path.display());
+    let bytes = fs::read(path).map_err(|e| wrong(&e.to_string()))?;
+    let length =
+        bytes.get(8..10).and_then(|b| b.try_into().ok()).map(u16::from_le_bytes).ok_or_else(|| wrong("short"))?;
+    let (header, data) = bytes.split_at_checked(10 + usize::from(length)).ok_or_else(|| wrong("short"))?;
+    let header = String::from_utf8_lossy(header);
+    if !header.contains("'<f4'") && !header.contains("'<i4'") {
+        return Err(wrong("not of numbers of four bytes"));
+    }
+    let shape = header.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')')).map(|(shape, _)| shape);
+    let shape = shape.ok_or_else(|| wrong("no shape"))?.split(',').map(str::trim).filter(|n| !n.is_empty());
+    let shape: Vec<usize> = shape.map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong("no shape"))?;
+    let numbers: Vec<u32> = data.as_chunks::<4>().0.iter().map(|&b| u32::from_le_bytes(b)).collect();
+    if numbers.len() != shape.iter().product() || shape.len() < 2 {
+        return Err(wrong("a shape of other numbers"));
+    }
+    Ok((shape, numbers))
+}
+
+/// How many pixels off silhouettes were compared, and how many differ: where a pixel and its eight neighbours are of one thing
+/// and one surface in both.
+fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usize), String> {
+    let ((shape, _), _) = ours;
+    if [&ours.1.0, &other.0.0, &other.1.0].into_iter().any(|other| other != shape) {
+        return Err(format!("shapes differ from {shape:?}"));
+    }
+    let [.., height, width] = shape[..] else { return Err("not pictures".into()) };
+    let pictures = shape.iter().product::<usize>() / (height * width).max(1);
+    let near = |a: f32, b: f32, part: f32| a == b || (a - b).abs() <= part * a.abs();
+    let (mut compared, mut different) = (0, 0);
+    for picture in 0..pictures {
+        for (y, x) in (1..height.max(2) - 1).flat_map(|y| (1..width.max(2) - 1).map(move |x| (y, x))) {
+            let at = |y: usize, x: usize| (picture * height + y) * width + x;
+            let k = at(y, x);
+            let whole = |((_, depth), (_, mask)): &(Array, Array)| {
+                (0..9).all(|n| {
+                    let n = at(y + n / 3 - 1, x + n % 3 - 1);
+                    mask[n] == mask[k] && near(f32::from_bits(depth[k]), f32::from_bits(depth[n]), SURFACE)
+                })
+            };
+            if whole(ours) && whole(other) {
+                let [a, b] = [ours, other].map(|seen| f32::from_bits(seen.0.1[k]));
+                compared += 1;
+                different += usize::from(ours.1.1[k] != other.1.1[k] || !near(a, b, DEPTH));
+            }
+        }
+    }
+    Ok((compared, different))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder with one picture of 5 x 4 pixels: things 7 and 8 side by side, at 2 and 3 m.
+    fn folder(shift: f32, id: i32, color: &str) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let write = |name: &str, descr: &str, numbers: Vec<[u8; 4]>| {
+            let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 4, 6), }}\n");
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((header.len() as u16).to_le_bytes());
+            bytes.extend(header.as_bytes());
+            bytes.extend(numbers.concat());
+            fs::write(dir.path().join(name), bytes).expect("writable");
+        };
+        let left = |k: &usize| k % 6 < 3;
+        write(
+            "depth_0.npy",
+            "<f4",
+            (0..24).map(|k| if left(&k) { 2.0f32 } else { 3.0 + shift }.to_le_bytes()).collect(),
+        );
+        write("mask_0.npy", "<i4", (0..24).map(|k| if left(&k) { 7i32 } else { id }.to_le_bytes()).collect());
+        fs::write(dir.path().join("color.png"), color).expect("writable");
+        dir
+    }
+
+    #[test]
+    fn what_is_off_silhouettes_must_be_the_same_and_the_colour_another() {
+        let ours = folder(0.0, 8, "ours");
+        // Two columns of each half are whole in two rows.
+        let seen = |dir: &tempfile::TempDir| {
+            let read = |name: &str| array(&dir.path().join(name)).expect("an array");
+            (read("depth_0.npy"), read("mask_0.npy"))
+        };
+        assert_eq!(compare(&seen(&ours), &seen(&folder(0.0, 8, ""))), Ok((4, 0)));
+        assert_eq!(compare(&seen(&ours), &seen(&folder(0.001, 8, ""))), Ok((4, 2)));
+        let verdict = |other: tempfile::TempDir| check(ours.path(), other.path());
+        assert_eq!(verdict(folder(0.0002, 8, "other")), Ok(()));
+        let said = |other| verdict(other).expect_err("they differ");
+        assert!(said(folder(0.001, 8, "other")).contains("differ at 2 of 4 pixels"));
+        assert!(said(folder(0.0, 9, "other")).contains("differ at 2 of 4 pixels"));
+        assert!(said(folder(0.0, 8, "ours")).contains("are one picture"));
+        assert!(said(tempfile::tempdir().expect("a scratch folder")).contains("has []"));
+    }
+}
