@@ -1,9 +1,9 @@
 //! Pictures with level of detail against pictures of the meshes themselves, in eight times as many rows and columns.
 
-use super::super::{CameraCfg, Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Shot, ToneCurve};
+use super::super::{CameraCfg, Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
 use super::determinism::bits;
 use super::robots::{sr5, sr5_view};
-use super::scenes::checker_plane;
+use super::scenes::{EXACT, checker_plane};
 use crate::lanes::levels;
 use crate::visibility::View;
 use scene::mesh::TriMesh;
@@ -18,15 +18,7 @@ const PIXELS: f64 = 0.5 + 2.0 / 256.0;
 /// \[m\]; a little more for rounding.
 const METRES: f32 = 1e-3 + 1e-6;
 
-const OFF: RasterCfg = RasterCfg {
-    samples: 4,
-    shadows: true,
-    shadow_size: 0,
-    occlusion_rays: 0,
-    tone: ToneCurve::Soft,
-    groups: u32::MAX,
-    lod: false,
-};
+const OFF: RasterCfg = EXACT;
 const ON: RasterCfg = RasterCfg { lod: true, ..OFF };
 
 fn draw(cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {

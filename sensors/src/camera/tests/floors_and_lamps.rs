@@ -1,6 +1,6 @@
 //! Endless planes, and what lamps see of a scene, against closed forms.
 
-use super::super::{Channels, Frame, RasterCfg, Rasterizer};
+use super::super::{Channels, Frame, RasterCfg, Rasterizer, Renderer};
 use crate::visibility::View;
 use scene::shape::{Plane, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene, Texture, TextureKind};
@@ -9,8 +9,14 @@ use std::sync::Arc;
 const SIZE: [usize; 2] = [160, 120];
 
 fn draw(scene: &RenderScene, poses: &[PoseF32], view: &View, cfg: RasterCfg) -> Frame {
+    draw_by(Renderer::Raster, scene, poses, view, cfg)
+}
+
+fn draw_by(renderer: Renderer, scene: &RenderScene, poses: &[PoseF32], view: &View, cfg: RasterCfg) -> Frame {
     let mut frame = Frame::new(view.width, view.height, Channels::ALL);
-    Rasterizer::new(cfg).render(scene, poses, view, &mut frame).unwrap();
+    let mut rasterizer = Rasterizer::new(cfg);
+    rasterizer.renderer = renderer;
+    rasterizer.render(scene, poses, view, &mut frame).unwrap();
     frame
 }
 
@@ -24,10 +30,13 @@ fn a_mat_on_the_ground_hides_it() {
         Instance::new(mat, Material::default(), 2),
     ]);
     let scene = scene.unwrap();
-    for (height, samples) in [(2.0, 1), (1.1, 4), (0.3, 1), (0.3, 4)] {
+    let by_rays = Renderer::FastRayTraced;
+    let all =
+        [(2.0, 1), (1.1, 4), (0.3, 1), (0.3, 4)].into_iter().flat_map(|of| [(of, Renderer::Raster), (of, by_rays)]);
+    for ((height, samples), renderer) in all {
         let view = View::look_at(SIZE, 0.9, [2.5, 0.7, height], [0., 0., 0.], [0., 0.2, 1.]).unwrap();
         let cfg = RasterCfg { samples, ..RasterCfg::default() };
-        let frame = draw(&scene, &[PoseF32::IDENTITY; 2], &view, cfg);
+        let frame = draw_by(renderer, &scene, &[PoseF32::IDENTITY; 2], &view, cfg);
         let (mask, position) = (frame.mask.unwrap(), frame.position.unwrap());
         let mut counts = [0, 0];
         for (id, p) in mask.iter().zip(position.chunks_exact(3)).filter(|(id, _)| **id != 0) {

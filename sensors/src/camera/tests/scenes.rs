@@ -1,5 +1,6 @@
 //! Scenes for tests, the same on every run.
 
+use super::super::{RasterCfg, ToneCurve};
 use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
 use scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
 use std::sync::Arc;
@@ -39,6 +40,17 @@ impl Random {
         PoseF32::from(&pose)
     }
 }
+
+/// Every geom group, and meshes as they are: what all renderers draw alike.
+pub(super) const EXACT: RasterCfg = RasterCfg {
+    samples: 4,
+    shadows: true,
+    shadow_size: 0,
+    occlusion_rays: 0,
+    tone: ToneCurve::Soft,
+    groups: u32::MAX,
+    lod: false,
+};
 
 /// Two of every shape, each somewhere within `reach` \[m\].
 pub(super) fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {

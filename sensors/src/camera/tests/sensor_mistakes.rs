@@ -91,6 +91,10 @@ fn pictures_that_do_not_fit_into_memory_are_refused() {
     let error = cfg.build(&context(100)).unwrap_err();
     let text = "pictures of 100 environments with 8000 x 8000 pixels of 56 bytes do not fit into memory";
     assert!(error.to_string().starts_with(text), "{error}");
+    // Path tracing keeps what it found of a picture, and what the smoothing looks at: 64 bytes of a pixel.
+    let error = CameraCfg { renderer: Renderer::RAY_TRACED, ..cfg }.build(&context(100)).unwrap_err();
+    let text = "pictures of 100 environments with 8000 x 8000 pixels of 56 bytes, with 4096000000 bytes for paths, do";
+    assert!(error.to_string().starts_with(text), "{error}");
 }
 
 #[test]

@@ -2,24 +2,13 @@
 
 use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, ToneCurve};
 use super::determinism::bits;
-use super::scenes::{Random, figure, random};
+use super::scenes::{EXACT, Random, figure, random};
 use crate::lanes::levels;
 use crate::visibility::{RenderError, View};
 use scene::shape::{Ellipsoid, Plane, Sphere};
 use scene::{Hemisphere, Instance, Light, LightKind, Material, PoseF32, RenderScene};
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
-
-/// Every level of detail as it is, for all renderers.
-const EXACT: RasterCfg = RasterCfg {
-    samples: 4,
-    shadows: true,
-    shadow_size: 0,
-    occlusion_rays: 0,
-    tone: ToneCurve::Soft,
-    groups: u32::MAX,
-    lod: false,
-};
 
 fn draw(renderer: Renderer, cfg: RasterCfg, scene: &RenderScene, poses: &[PoseF32], view: &View) -> Frame {
     let mut rasterizer = Rasterizer::new(cfg);
@@ -119,6 +108,102 @@ fn rays_see_what_the_rasterizer_draws() {
     let b = draw(Renderer::FastRayTraced, EXACT, &scene, &poses, &beside);
     let beside = compare(&a, &b, 101);
     assert!(beside.elsewhere * 2 > beside.compared, "{beside:?}");
+}
+
+/// What paths meet first is what the mask says: things that glow, each in a colour of its own, in a scene without any other light.
+/// Paths go through all of a pixel, so that where it and its neighbours show one thing they must meet it.
+///
+/// Found by reading: where a mat lies on endless ground both are as near, to the bit, and paths met what came first in the scene.
+#[test]
+fn paths_see_what_the_mask_says() {
+    // Steps of 51 of 255, which the test tells apart.
+    let color_of = |k: usize| [k % 6, k / 6 % 6, k / 36 % 6].map(|x| 51 * x as u8);
+    // Of what glows a hundred times as bright as its colour, only a hundredth more is the others' light.
+    let glowing = |k: usize| {
+        let [r, g, b] = color_of(k).map(|x| {
+            let linear = 0.01 * scene::material::decode_srgb(f32::from(x) / 255.0);
+            if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+        });
+        Material { emission: 100.0, specular: 0.0, ..Material::from_rgba([r, g, b, 1.0]) }
+    };
+    let mut numbers = Random(23);
+    let (mut compared, mut on_mats) = (0, 0);
+    for seed in 0..12 {
+        let (scene, mut poses) = random(&mut numbers, 1.2);
+        let mut instances = scene.instances().to_vec();
+        instances.push(Instance::new(Plane { half: [0.7, 0.5] }, Material::default(), 101));
+        poses.push(PoseF32::from_translation([0.3, 0.0, -1.0]));
+        for (k, instance) in instances.iter_mut().enumerate() {
+            (instance.mask_id, instance.material) = (k as i32 + 1, glowing(k + 1));
+        }
+        let mat = instances.len() as i32;
+        let mut scene = RenderScene::new(instances).unwrap();
+        scene.lights.clear();
+        scene.headlight.active = false;
+        scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+        let eye = numbers.vector(-2.0, 2.0).map(|x| x as f32);
+        let view = View::look_at([101, 75], 1.0, [eye[0], eye[1], 0.6 + eye[2].abs()], [0., 0., -0.4], [0., 0., 1.]);
+        let renderer = Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed };
+        let frame = draw(renderer, RasterCfg { tone: ToneCurve::Clip, ..EXACT }, &scene, &poses, &view.unwrap());
+        let (mask, color) = (frame.mask.unwrap(), frame.color.unwrap());
+        let depth = frame.depth.unwrap();
+        for k in (1..74).flat_map(|y| (1..100).map(move |x| y * 101 + x)) {
+            let alone = (0..9).map(|n| k + (n / 3) * 101 + n % 3 - 102);
+            if !alone.clone().all(|n| mask[n] == mask[k] && (depth[n] - depth[k]).abs() <= 0.1 * depth[k]) {
+                continue;
+            }
+            let expected = match mask[k] {
+                0 => continue,
+                id => color_of(id as usize),
+            };
+            let same = (0..3).all(|c| color[4 * k + c].abs_diff(expected[c]) <= 4);
+            assert!(same, "scene {seed}, pixel {k}: {:?}, not {expected:?}", &color[4 * k..4 * k + 3]);
+            compared += 1;
+            on_mats += usize::from(mask[k] == mat);
+        }
+    }
+    assert!(compared > 12 * 99 * 73 / 3 && on_mats > 500, "{compared}, {on_mats} on mats");
+}
+
+/// Edges between the faces of a box, and of a cylinder, are as smooth by rays as by the rasterizer: each sample tells its face.
+///
+/// Found by reading: rays gave every face of a closed form the number of the first, so that colours had one sample there.
+#[test]
+fn edges_of_solids_are_as_smooth_by_rays() {
+    let plain = |shape: scene::Shape, id| Instance::new(shape, Material::from_rgba([0.7, 0.7, 0.7, 1.0]), id);
+    let mut scene = RenderScene::new(vec![
+        plain(scene::shape::Box { half: [0.3, 0.3, 0.3] }.into(), 1),
+        plain(scene::shape::Cylinder { radius: 0.25, half_length: 0.3 }.into(), 2),
+    ])
+    .unwrap();
+    scene.lights[0].direction = [-0.3, -0.9, -0.6];
+    let poses = [[-0.4f32, 0.0, 0.0], [0.4, 0.0, 0.0]].map(PoseF32::from_translation);
+    let view = View::look_at([161, 121], 0.8, [0.5, 1.6, 1.1], [0., 0., 0.], [0.1, 0., 1.]).unwrap();
+    let cfg = RasterCfg { shadows: false, ..EXACT };
+    let [raster, traced] =
+        [Renderer::Raster, Renderer::FastRayTraced].map(|renderer| draw(renderer, cfg, &scene, &poses, &view));
+    let (mask, color, other) = (raster.mask.unwrap(), raster.color.unwrap(), traced.color.unwrap());
+    let normal = raster.normal.unwrap();
+    let (mut edges, mut differ) = (0, 0);
+    for k in (1..120).flat_map(|y| (1..160).map(move |x| y * 161 + x)).filter(|&k| mask[k] != 0) {
+        let around = (0..9).map(|n| k + (n / 3) * 161 + n % 3 - 162);
+        if !around.clone().all(|n| mask[n] == mask[k]) {
+            continue;
+        }
+        let at = |n: usize| nalgebra::Vector3::new(normal[3 * n], normal[3 * n + 1], normal[3 * n + 2]);
+        if around.clone().all(|n| at(n).dot(&at(k)) > 0.5) {
+            continue;
+        }
+        edges += 1;
+        // A sample at the very edge may belong to either face: a quarter of what is between them.
+        differ += usize::from((0..3).any(|c| color[4 * k + c].abs_diff(other[4 * k + c]) > 3));
+    }
+    assert!(edges > 200, "{edges}");
+    assert!(differ * 50 <= edges, "{differ} of {edges}");
+    // The control: one sample looks otherwise at most of them.
+    let rough = draw(Renderer::FastRayTraced, RasterCfg { samples: 1, ..cfg }, &scene, &poses, &view).color.unwrap();
+    let apart = color.chunks(4).zip(rough.chunks(4)).filter(|(a, b)| a[0].abs_diff(b[0]) > 3).count();
+    assert!(apart * 4 > edges, "{apart} of {edges}");
 }
 
 #[test]
@@ -244,6 +329,89 @@ fn smoothing_takes_noise_away_and_keeps_the_picture() {
     assert!(more < 0.75 * rough, "{more} of {rough}");
 }
 
+/// A floor of black and white tiles below a glossy layer, lit from everywhere by a little light, and the edge of a shadow on it.
+fn tiles(emission: f32) -> (RenderScene, Vec<PoseF32>) {
+    let tile = |white: bool| Material {
+        specular: 1.0,
+        shininess: 0.3,
+        ..Material::from_rgba(if white { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] })
+    };
+    let mut instances = Vec::new();
+    let mut poses = Vec::new();
+    for k in 0..36 {
+        instances.push(Instance::new(Plane { half: [0.1, 0.1] }, tile((k / 6 + k % 6) % 2 == 0), k + 1));
+        poses.push(PoseF32::from_translation([0.2 * (k / 6) as f32 - 0.5, 0.2 * (k % 6) as f32 - 0.5, 0.0]));
+    }
+    let lamp = Material { emission, specular: 0.0, ..Material::from_rgba([1.0; 4]) };
+    instances.push(Instance::new(Sphere { radius: 0.4 }, lamp, 50));
+    poses.push(PoseF32::from_translation([0.4, 0.9, 1.0]));
+    let mut scene = RenderScene::new(instances).unwrap();
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.05; 3], ground: [0.05; 3] };
+    (scene, poses)
+}
+
+/// Black tiles mirror what they mirror, and white ones beside them are as bright as they are: nothing of the one is blended into
+/// the other.
+///
+/// Found by reading: light was divided by the colour of the surface, though what is mirrored does not have it.
+#[test]
+fn smoothing_does_not_blend_what_tiles_mirror() {
+    let (scene, poses) = tiles(3.0);
+    let view = View::look_at([96, 72], 0.6, [-1.2, -0.8, 0.9], [0., 0., 0.], [0., 0., 1.]).unwrap();
+    let paths = |samples, denoise, seed| {
+        let renderer = Renderer::RayTraced { samples, max_bounces: 1, denoise, seed };
+        draw(renderer, EXACT, &scene, &poses, &view)
+    };
+    let many = paths(1024, false, 9);
+    let mask = many.mask.as_ref().unwrap();
+    // Of tiles that are black, away from their edges.
+    let black: Vec<usize> = (2..70)
+        .flat_map(|y| (2..94).map(move |x| y * 96 + x))
+        .filter(|&k| (1..=36).contains(&mask[k]) && ((mask[k] - 1) / 6 + (mask[k] - 1) % 6) % 2 == 1)
+        .filter(|&k| [1, 96, 97, 95].into_iter().all(|n| mask[k - n] == mask[k] && mask[k + n] == mask[k]))
+        .collect();
+    let color = many.color.unwrap();
+    let error = |other: &Frame| {
+        let other = other.color.as_ref().unwrap();
+        let square: f64 = black.iter().map(|&k| f64::from(color[4 * k].abs_diff(other[4 * k])).powi(2)).sum();
+        (square / black.len() as f64).sqrt()
+    };
+    let (rough, smooth) = (error(&paths(2, false, 1)), error(&paths(2, true, 1)));
+    println!("{} pixels of black tiles are off by {rough}, {smooth} smoothed", black.len());
+    // A third. With the tiles' colours out of sight it was half.
+    assert!(black.len() > 300 && smooth < 0.4 * rough, "{smooth} of {rough}");
+}
+
+/// Smoothing knows how bright the picture will be: a thousandth of the light, exposed a thousand times as long, is smoothed as
+/// the whole of it is. And what is far too bright for single precision stays a number.
+///
+/// Found by reading: light that differed by less than a fixed amount was blended, and an infinity times a weight of 0 spread.
+#[test]
+fn smoothing_does_as_much_whatever_the_exposure() {
+    let view = View::look_at([96, 72], 0.6, [-1.2, -0.8, 0.9], [0., 0., 0.], [0., 0., 1.]).unwrap();
+    let paths = |emission: f32, dim: f32, stops: f64| {
+        let (mut scene, poses) = tiles(emission * dim);
+        scene.ambient = Hemisphere { sky: [0.05 * dim; 3], ground: [0.05 * dim; 3] };
+        scene.sky = scene::Sky::uniform([0.0; 3]);
+        let mut rasterizer = Rasterizer::new(EXACT);
+        rasterizer.renderer = Renderer::RayTraced { samples: 16, max_bounces: 1, denoise: true, seed: 3 };
+        rasterizer.stops = stops;
+        let mut frame = Frame::new(view.width, view.height, Channels { color: true, ..Channels::NONE });
+        rasterizer.render(&scene, &poses, &view, &mut frame).unwrap();
+        frame.color.unwrap()
+    };
+    let (plain, dim) = (paths(3.0, 1.0, 0.0), paths(3.0, 1.0 / 1024.0, 10.0));
+    let most = plain.iter().zip(&dim).map(|(a, b)| a.abs_diff(*b)).max();
+    // Powers of two change no digit; the tiles' colours are the same.
+    assert!(most <= Some(1), "{most:?}");
+    let blinding = paths(1e30, 1.0, 0.0);
+    // Where the lamp is mirrored or seen all is white, and nothing is black that the dome lights.
+    let dark = |color: &[u8]| color.chunks(4).filter(|c| c[..3] == [0; 3]).count();
+    assert!(dark(&blinding) <= dark(&plain), "{} pixels, not {}", dark(&blinding), dark(&plain));
+}
+
 #[test]
 fn numbers_that_no_path_has_are_refused() {
     let (scene, poses) = figure();
@@ -313,6 +481,45 @@ fn hybrid_shadows_end_where_the_light_passes_and_are_as_dark_as_what_is_left() {
         let (counts, wrong) = count(&draw(Renderer::Hybrid, unshaded, &scene, &poses, &view));
         assert_eq!(wrong, counts[0]);
     }
+}
+
+/// A point lamp exactly on a ceiling, which is not between it and the floor: the floor below is lit everywhere, by the cosine.
+///
+/// Found by reading: rays went as far as the lamp, so that the last bit decided whether the ceiling was before it.
+#[test]
+fn a_lamp_on_a_ceiling_lights_the_floor_of_a_hybrid_picture() {
+    let matt = Material { specular: 0.0, ..Material::from_rgba([0.7, 0.7, 0.7, 1.0]) };
+    let mut scene = RenderScene::new(vec![
+        Instance::new(Plane::INFINITE, matt.clone(), 1),
+        Instance::new(scene::shape::Box { half: [3.0, 3.0, 0.5] }, matt, 2),
+    ])
+    .unwrap();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, 2.5])];
+    let view = View::look_at([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0, 0.0, 0.0], [0., 0., 1.]).unwrap();
+    let albedo = scene::material::decode_srgb(0.7);
+    let byte = |x: f32| 255.0 * (1.055 * x.powf(1.0 / 2.4) - 0.055);
+    let mut wrong = |height: f32| {
+        let light =
+            Light { kind: LightKind::Point, position: [0.1, 0.0, height], diffuse: [0.7; 3], ..Light::default() };
+        scene.lights = vec![Light { attenuation: [1., 0., 0.], ..light }];
+        let frame = draw(Renderer::Hybrid, EXACT, &scene, &poses, &view);
+        let (mask, color) = (frame.mask.unwrap(), frame.color.unwrap());
+        let floor = frame.position.unwrap();
+        let floor = floor.chunks(3).enumerate().filter(|(k, p)| mask[*k] == 1 && p[0].abs() < 1.0 && p[1].abs() < 1.0);
+        let off = floor.map(|(k, p)| {
+            let cosine = 2.0 / ((p[0] - 0.1).powi(2) + p[1].powi(2) + 4.0).sqrt();
+            (f32::from(color[4 * k]) - byte(albedo * 0.7 * cosine)).abs()
+        });
+        let off: Vec<f32> = off.collect();
+        assert!(off.len() > 2000, "{}", off.len());
+        // A quarter for the polynomial, a half for rounding.
+        off.iter().filter(|off| **off > 0.8).count() as f32 / off.len() as f32
+    };
+    assert_eq!(wrong(2.0), 0.0);
+    // The control: a millimetre inside of it the lamp lights nothing.
+    assert_eq!(wrong(2.001), 1.0);
 }
 
 /// Ambient occlusion of a hybrid picture, at the foot of a long wall of height h: of the light that is everywhere, the wall takes

@@ -177,8 +177,8 @@ pub(crate) struct Found {
     /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
     /// 0 of one sample.
     pub(crate) variance: f64,
-    /// Means over what is seen: what the surface reflects (1 for mirrors and sky), the mirrored part of that, normal, distance (0
-    /// for the sky).
+    /// Means over what is seen: colour of the surface (1 for mirrors and sky), the part of its light that is mirrored rather than
+    /// coloured, normal, distance (0 for the sky).
     pub(crate) albedo: V3,
     pub(crate) gloss: f64,
     pub(crate) normal: V3,
@@ -290,7 +290,8 @@ impl Paths<'_> {
             }
             let o = scale(ray.direction, -1.0);
             if bounce == 0 {
-                let (albedo, gloss) = point.lobe.reflects(Basis::of(point.normal).to_local(o));
+                let (matt, gloss) = (point.lobe.rest(), point.lobe.gloss(Basis::of(point.normal).to_local(o)));
+                let albedo = point.lobe.albedo.map(|x| matt * x + (1.0 - matt));
                 first = First { albedo, gloss, normal: point.normal, distance: travelled };
                 if let Some((color, start, end)) = self.lamps.haze {
                     let k = ((travelled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);

@@ -1,6 +1,6 @@
 //! Smooths noise: a few passes of a small filter with holes, each twice as wide as the one before, that does not blend across
-//! edges of normals, of depth or of light brighter than its own noise. What surfaces reflect was divided out before, so that
-//! their colours stay as they are; where some of it is mirrored, which has a colour of its own, edges of it are edges too.
+//! edges of normals, of depth or of light brighter than its own noise. Colours of surfaces were divided out before, so that they stay
+//! as they are; where some of the light is mirrored, which does not have them, their edges are edges too.
 //!
 //! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
 //! weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with polynomials

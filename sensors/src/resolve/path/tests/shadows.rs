@@ -119,3 +119,33 @@ fn what_glows_casts_soft_shadows() {
         assert!(!agrees(light, 1.1 * expected), "it can tell a tenth: {light:?}");
     }
 }
+
+/// Smooth things made of triangles below a lamp exactly on a ceiling: the ceiling takes nothing of its light, wherever the smooth
+/// surface is meant to be.
+///
+/// Found by reading: shadow rays began above the triangles, where the surface is meant to be, and went as far as from the
+/// triangles: beyond the lamp, into the ceiling.
+#[test]
+fn a_ceiling_takes_no_light_of_a_lamp_on_it() {
+    let ball = Shape::from(Sphere { radius: 0.4 }).tessellate(12);
+    let mesh = std::sync::Arc::new(scene::RenderMesh::new(&ball, scene::RenderMesh::CREASE));
+    let ball = Instance::new(scene::shape::Mesh { mesh }, matt(0.6), 1);
+    let black = Instance::new(Box { half: [3.0, 3.0, 0.5] }, matt(0.0), 2);
+    let poses = [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, 2.5])];
+    let light = |instances: Vec<Instance>, height: f32, at: [f32; 3]| {
+        let mut scene = dark(instances);
+        scene.lights =
+            vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, [0., 0., height], [0., 0., -1.]) }];
+        seen(&scene, &poses[..scene.instances().len()], &looking([1.5, 0.3, 1.2], at), 1, 0).0
+    };
+    let mut lit = 0;
+    for k in 0..60 {
+        let at = [0.008 * k as f32, 0.003 * k as f32 - 0.1, 0.2];
+        let [below, alone] = [light(vec![ball.clone(), black.clone()], 2.0, at), light(vec![ball.clone()], 2.0, at)];
+        assert_eq!(below, alone, "{at:?}");
+        lit += usize::from(alone > 0.1);
+        // The control: a millimetre inside it is in the dark.
+        assert_eq!(light(vec![ball.clone(), black.clone()], 2.001, at), 0.0);
+    }
+    assert!(lit > 30, "{lit}");
+}
