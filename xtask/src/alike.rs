@@ -63,7 +63,7 @@ fn array(path: &Path) -> Result<Array, String> {
     let shape = shape.ok_or_else(|| wrong("no shape"))?.split(',').map(str::trim).filter(|n| !n.is_empty());
     let shape: Vec<usize> = shape.map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong("no shape"))?;
     let numbers: Vec<u32> = data.as_chunks::<4>().0.iter().map(|&b| u32::from_le_bytes(b)).collect();
-    if numbers.len() != shape.iter().product() || shape.len() < 2 {
+    if numbers.len() != shape.iter().product::<usize>() || shape.len() < 2 {
         return Err(wrong("a shape of other numbers"));
     }
     Ok((shape, numbers))
