@@ -113,11 +113,6 @@ impl Tile {
         (self.empty, self.only) = (other.empty, other.only);
     }
 
-    /// The rows of each block that rays are cast for.
-    pub(crate) fn rows(&self) -> std::ops::Range<usize> {
-        self.only.map_or(0..BLOCK, |row| row..row + 1)
-    }
-
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())

@@ -13,7 +13,7 @@ pub(crate) mod motion;
 mod tree;
 
 use super::Projection;
-use super::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
+use super::raster::tile::{AREA, BLOCK, NOTHING, SAMPLES, Tile};
 use super::raster::{Item, Layer, Placed};
 use crate::camera::LensRays;
 use crate::camera::lens::Sight;
@@ -34,6 +34,13 @@ use tree::Tree;
 const MAX_FRONTS: usize = 64;
 /// Rays go on this part of their coordinates past a surface.
 const PAST: f64 = 1e-9;
+
+/// Where the samples of a packet are beside the first, in pixels.
+type Side = [[usize; 2]; WIDTH];
+/// As near to each other as can be: fewer triangles are between them than between those of a row.
+const TOGETHER: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
+/// Of pictures whose rows have an instant each.
+const IN_A_ROW: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
 
 /// What rays meet of an instance, in its own frame.
 #[derive(Clone, Debug)]
@@ -321,15 +328,18 @@ impl Tracer {
                         for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                             let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
                             let samples = tile.samples(block, plane);
-                            for row in tile.rows() {
-                                let corner = [(bx * BLOCK) as f64 + dx, (by * BLOCK + row) as f64 + dy];
-                                let at = samples + row * BLOCK..samples + (row + 1) * BLOCK;
-                                let (near, ids) = (&mut tile.nearness[at.clone()], &mut tile.id[at]);
+                            let (side, parts) =
+                                if tile.only.is_some() { (&IN_A_ROW, 1) } else { (&TOGETHER, AREA / WIDTH) };
+                            for part in 0..parts {
+                                let [x, y] = tile.only.map_or([4 * (part % 2), part & !1], |row| [0, row]);
+                                let first = [bx * BLOCK + x, by * BLOCK + y];
+                                let at = side.map(|[i, j]| samples + (y + j) * BLOCK + x + i);
                                 let rays = match lens_rays {
-                                    None => lens.pinhole(corner),
-                                    Some(rays) => lens.bent(rays, plane, [bx * BLOCK, by * BLOCK + row]),
+                                    None => lens.pinhole([first[0] as f64 + dx, first[1] as f64 + dy], side),
+                                    Some(rays) => lens.bent(rays, plane, first, side),
                                 };
-                                drawn |= lens.row(s, body, rays, stack, near, ids, first_ids[index]);
+                                let (near, ids) = (&mut tile.nearness, &mut tile.id);
+                                drawn |= lens.cast(s, body, rays, stack, (near, ids, at), first_ids[index]);
                             }
                         }
                         if drawn {
@@ -389,37 +399,36 @@ impl Lens {
         }
     }
 
-    /// The rays of eight samples beside each other through a pinhole, in the optical frame, the first of them at (u, v).
+    /// The rays of eight samples through a pinhole, in the optical frame, the first of them at (u, v).
     #[inline(always)]
-    fn pinhole(&self, [u, v]: [f64; 2]) -> [V3; WIDTH] {
+    fn pinhole(&self, [u, v]: [f64; 2], side: &Side) -> [V3; WIDTH] {
         let mut rays = [[0.0, 0.0, 1.0]; WIDTH];
-        for (k, ray) in rays.iter_mut().enumerate() {
-            *ray = [(u + k as f64 - self.c[0]) / self.f[0], (v - self.c[1]) / self.f[1], 1.0];
+        for (ray, [i, j]) in rays.iter_mut().zip(side) {
+            *ray = [(u + *i as f64 - self.c[0]) / self.f[0], (v + *j as f64 - self.c[1]) / self.f[1], 1.0];
         }
         rays
     }
 
-    /// The rays of a kind of samples of eight pixels beside each other behind a lens; 0 where there is none.
+    /// The rays of a kind of samples of eight pixels behind a lens; 0 where there is none.
     #[inline(always)]
-    fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2]) -> [V3; WIDTH] {
+    fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2], side: &Side) -> [V3; WIDTH] {
         let mut out = [[0.0; 3]; WIDTH];
-        for (k, ray) in out.iter_mut().enumerate() {
-            *ray = rays.direction(plane, [x + k, y]).map(f64::from);
+        for (ray, [i, j]) in out.iter_mut().zip(side) {
+            *ray = rays.direction(plane, [x + i, y + j]).map(f64::from);
         }
         out
     }
 
-    /// Casts the rays of eight samples beside each other, and keeps what is nearer than what is there. Whether there is any.
+    /// Casts the rays of eight samples, and keeps what is nearer than what is there, `at` some places of the tile. Whether there
+    /// is any.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
-    fn row<S: Simd>(
+    fn cast<S: Simd>(
         &self,
         s: S,
         body: &Body,
         directions: [V3; WIDTH],
         stack: &mut Stack,
-        nearness: &mut [f32],
-        ids: &mut [u32],
+        (nearness, ids, at): (&mut [f32], &mut [u32], [usize; WIDTH]),
         first_id: u32,
     ) -> bool {
         // Distances along a ray for a metre of depth.
@@ -437,7 +446,7 @@ impl Lens {
         let mut packet = Packet::of(&rays, f64::INFINITY);
         for k in 0..WIDTH {
             // What is there is known to single precision.
-            let limit = (1.000_001 / f64::from(nearness[k]) - self.near) * length[k];
+            let limit = (1.000_001 / f64::from(nearness[at[k]]) - self.near) * length[k];
             packet.shorten(k, if none[k] { -1.0 } else { limit });
         }
         let mut found = [None; WIDTH];
@@ -459,8 +468,8 @@ impl Lens {
         for k in 0..WIDTH {
             let Some((t, number)) = found[k] else { continue };
             let q = (1.0 / (self.near + t / length[k])) as f32;
-            if q > nearness[k] {
-                (nearness[k], ids[k]) = (q, first_id + number as u32);
+            if q > nearness[at[k]] {
+                (nearness[at[k]], ids[at[k]]) = (q, first_id + number as u32);
                 drawn = true;
             }
         }
