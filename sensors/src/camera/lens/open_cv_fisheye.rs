@@ -54,7 +54,7 @@ impl LensModel for OpenCvFisheye {
         let most = self.max_angle.unwrap_or(PI);
         let fold = first_sign_change(&self.slope(), most * most).map(f64::sqrt);
         let angle = fold.unwrap_or(most);
-        Domain { angle, radius: self.radius(angle).0, folds: fold.is_some() }
+        Domain::new(angle, self.radius(angle).0, fold.is_some())
     }
 
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]> {

@@ -12,6 +12,7 @@ mod flow;
 mod golden;
 mod late;
 mod lens_pictures;
+mod lens_poles;
 pub(super) mod lenses;
 mod metals;
 mod noisy;
