@@ -214,7 +214,7 @@ impl OpenCv {
 impl LensModel for OpenCv {
     const NAME: &'static str = "opencv";
     const ALIASES: &'static [&'static str] =
-        &["plumb_bob", "rational_polynomial", "opencv_pinhole", "brown_conrady", "fisheyeRadTanThinPrism"];
+        &["plumb_bob", "rational_polynomial", "radtan", "opencv_pinhole", "brown_conrady", "fisheyeRadTanThinPrism"];
     const FORWARD: bool = true;
 
     fn is_pinhole(&self) -> bool {

@@ -39,7 +39,7 @@ impl OpenCvFisheye {
 
 impl LensModel for OpenCvFisheye {
     const NAME: &'static str = "opencv_fisheye";
-    const ALIASES: &'static [&'static str] = &["kannala_brandt", "fisheyeKannalaBrandtK3", "fisheye"];
+    const ALIASES: &'static [&'static str] = &["kannala_brandt", "kannala_brandt4", "fisheyeKannalaBrandtK3", "fisheye"];
 
     fn max_angle(&self) -> Option<f64> {
         self.max_angle

@@ -4,6 +4,8 @@
 mod albedo;
 mod boxes;
 mod calibration;
+mod calibration_files;
+mod calibration_open_cv;
 mod degenerate;
 mod detail;
 mod determinism;
