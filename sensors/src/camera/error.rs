@@ -28,17 +28,19 @@ pub enum CameraError {
         /// What is possible.
         allowed: &'static str,
     },
-    /// The mapping of a lens folds back on itself before where the lens is to see: there are two directions for a pixel.
+    /// The mapping of a lens folds back on itself, or has a pole, before where the lens is to see: there are two directions for a
+    /// pixel.
     #[error(
-        "the mapping of the {lens} lens cannot be inverted: it folds back {:.2} degrees from the optical axis, at radius \
-         {radius:.4} of the normalised picture (times fx: in pixels), and {wanted}; check the coefficients, make the picture \
+        "the mapping of the {lens} lens cannot be inverted: it folds back, or nears a pole, {:.2} degrees from the optical axis, at \
+         radius {radius:.4} of the normalised picture (times fx: in pixels), and {wanted}; check the coefficients, make the picture \
          smaller, or end the lens before with max_angle",
         .angle.to_degrees()
     )]
     LensFolds {
         /// The lens.
         lens: &'static str,
-        /// The angle with the optical axis where it folds back, in the first direction in which it does \[rad\].
+        /// The angle with the optical axis where it folds back or is about to reach its pole, in the first direction in which it
+        /// does \[rad\].
         angle: f64,
         /// How far from the principal point that is, in the normalised picture (times fx: in pixels).
         radius: f64,

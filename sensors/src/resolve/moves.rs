@@ -15,6 +15,7 @@ pub(crate) struct Moves {
 }
 
 /// Where a camera sees a point of its optical frame.
+#[expect(clippy::large_enum_variant, reason = "there is one for a picture; a box would be an allocation for each")]
 #[derive(Clone, Copy, Debug)]
 enum Eye {
     /// fx, fy, cx, cy \[pixels\].

@@ -1,6 +1,6 @@
 //! ROS's calibration files: `camera_info` as `camera_calibration` and `camera_info_manager` write it.
 //!
-//! Source: ROS, package `camera_calibration_parsers`, and the message `sensor_msgs/CameraInfo`.
+//! Source: ROS, package `camera_calibration_parsers` (`parse_yml.cpp`), and the message `sensor_msgs/CameraInfo`.
 
 mod error;
 mod write;
@@ -8,7 +8,8 @@ mod yaml;
 
 use super::cfg::CameraCfg;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
-use super::lens::{Lens, OpenCv, OpenCvFisheye};
+use super::lens::{Lens, LensModel, OpenCv, OpenCvFisheye};
+use super::renderer::Renderer;
 use super::sensor::Camera;
 use crate::error::SensorError;
 pub use error::CalibrationError;
@@ -32,12 +33,17 @@ const FIELDS: [&str; 8] = [
 /// How far a rectification matrix may be from a rotation: files have six digits or more.
 const ROTATION: f64 = 1e-3;
 
-/// ROS's names of distortions.
+/// ROS's names of distortions. Files may have the names of other tools too, which are those of [`Lens::from_name`]: `radtan`,
+/// `fisheye`, `kannala_brandt4` and more; `equidistant` is ROS's, and so OpenCV's fisheye.
+///
+/// The first two are one lens, and may have as many numbers as OpenCV takes for it: none, 4, 5, 8, 12 or 14, of which the last
+/// two have to be 0, for tilted sensors are not supported. Where a file names none of the two it is the one that ROS's nodes
+/// write for so many numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DistortionModel {
     /// k1, k2, p1, p2, k3 of [`OpenCv`].
     PlumbBob,
-    /// k1, k2, p1, p2, k3, k4, k5, k6 of [`OpenCv`]; s1 to s4 too where there are twelve.
+    /// k1, k2, p1, p2, k3, k4, k5, k6 of [`OpenCv`], and s1 to s4.
     RationalPolynomial,
     /// k1, k2, k3, k4 of [`OpenCvFisheye`].
     Equidistant,
@@ -58,10 +64,35 @@ impl DistortionModel {
     /// How many coefficients it may have.
     fn counts(self) -> &'static [usize] {
         match self {
-            Self::PlumbBob => &[4, 5],
-            Self::RationalPolynomial => &[8, 12, 14],
+            Self::PlumbBob | Self::RationalPolynomial => &[0, 4, 5, 8, 12, 14],
             Self::Equidistant => &[4],
         }
+    }
+
+    /// That of OpenCV's lens for so many numbers.
+    fn of_open_cv(count: usize) -> Self {
+        if count > 5 { Self::RationalPolynomial } else { Self::PlumbBob }
+    }
+
+    /// The model that a file with so many numbers calls so.
+    fn from_name(name: &str, count: usize) -> Option<Self> {
+        let own = Self::ALL.into_iter().find(|model| model.name() == name);
+        own.or_else(|| match Lens::from_name(name).ok()? {
+            Lens::OpenCv(_) => Some(Self::of_open_cv(count)),
+            Lens::OpenCvFisheye(_) => Some(Self::Equidistant),
+            _ => None,
+        })
+    }
+
+    /// All names that files may have.
+    fn names() -> impl Iterator<Item = &'static str> {
+        let lenses = [OpenCv::NAME, OpenCvFisheye::NAME].into_iter();
+        let aliases = [OpenCv::ALIASES, OpenCvFisheye::ALIASES].into_iter().flatten().copied();
+        Self::ALL
+            .map(Self::name)
+            .into_iter()
+            .chain(lenses)
+            .chain(aliases.filter(|alias| Self::ALL.iter().all(|model| model.name() != *alias)))
     }
 }
 
@@ -72,7 +103,7 @@ impl DistortionModel {
 /// [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) go from one to the other.
 ///
 /// ```
-/// use sensors::camera::{CameraCfg, CameraInfo, Renderer};
+/// use sensors::camera::{CameraCfg, CameraInfo};
 ///
 /// let text = "
 /// image_width: 640
@@ -86,7 +117,7 @@ impl DistortionModel {
 /// ";
 /// let info = CameraInfo::parse(text, "wrist.yaml")?;
 /// // The simulated twin: raw pictures of that camera, as its driver publishes them.
-/// let mut cfg = CameraCfg { renderer: Renderer::FastRayTraced, ..CameraCfg::default() };
+/// let mut cfg = CameraCfg::default();
 /// info.apply_to(&mut cfg);
 /// assert_eq!((cfg.width, cfg.lens.name()), (640, "opencv"));
 /// // The same point of the picture, counted from the corner of the first pixel.
@@ -130,6 +161,9 @@ impl CameraInfo {
 
     /// Reads the text of a file; errors call it `file`. Fields other than those of `camera_info` do not count.
     ///
+    /// A file without `distortion_model` is of OpenCV's lens, as ROS has it, and one without numbers is of none: see
+    /// [`DistortionModel`]. `binning_x`, `binning_y` and `roi` have to say that pictures are those of the calibration.
+    ///
     /// # Errors
     ///
     /// As [`read`](Self::read).
@@ -155,7 +189,9 @@ impl CameraInfo {
         Intrinsics::from_matrix(&camera_matrix)
             .map_err(|error| reader.wrong(k.line, "camera_matrix", format!("is of no camera: {error}")))?;
         let (distortion_model, distortion_coefficients) =
-            reader.distortion(get("distortion_model")?, get("distortion_coefficients")?)?;
+            reader.distortion(find("distortion_model"), get("distortion_coefficients")?)?;
+        reader.not_binned(["binning_x", "binning_y"].map(|name| (name, find(name))))?;
+        find("roi").map_or(Ok(()), |roi| reader.not_a_part(roi, [width, height]))?;
         let r = get("rectification_matrix")?;
         let rectification_matrix = Matrix3::from_row_slice(&reader.matrix("rectification_matrix", r, [3, 3])?);
         let off = (rectification_matrix * rectification_matrix.transpose() - Matrix3::identity()).amax();
@@ -183,7 +219,11 @@ impl CameraInfo {
         })
     }
 
-    /// The calibration of a simulated camera: R is the identity and P is K, as of a camera alone.
+    /// The calibration of a simulated camera: R is the identity and P is K, as of a camera alone. Where a lens ends (`max_angle`) is
+    /// not said: K and D are the same, some pixels are dark.
+    ///
+    /// The lens [`Equidistant`](super::lens::Equidistant) is `equidistant` with four zeros. `cv::fisheye` takes that for what it is; ROS's `image_geometry` takes
+    /// zeros of any model for no distortion at all, and does not rectify.
     ///
     /// # Errors
     ///
@@ -230,11 +270,14 @@ impl CameraInfo {
         }
     }
 
-    /// Makes a camera the simulated twin of this one: its size, intrinsics and lens. The renderer stays: a lens needs one that
-    /// follows rays.
+    /// Makes a camera the simulated twin of this one: its size, intrinsics and lens. A lens that bends lines is nothing for
+    /// [`Renderer::Raster`], the default: it becomes [`Renderer::FastRayTraced`], which has the same light. Other renderers stay.
     pub fn apply_to(&self, cfg: &mut CameraCfg) {
         (cfg.width, cfg.height) = (self.width, self.height);
         (cfg.intrinsics, cfg.lens) = (self.intrinsics(), self.lens());
+        if cfg.renderer == Renderer::Raster && !cfg.lens.is_pinhole() {
+            cfg.renderer = Renderer::FastRayTraced;
+        }
     }
 }
 
@@ -252,11 +295,8 @@ impl Camera {
 
 /// ROS's model of a lens, and its coefficients.
 fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
-    let refuse = |reason| Err(CalibrationError::Lens { lens: lens.name(), reason });
     match *lens {
         Lens::Pinhole(_) => Ok((DistortionModel::PlumbBob, vec![0.0; 5])),
-        Lens::OpenCv(OpenCv { max_angle: Some(_), .. })
-        | Lens::OpenCvFisheye(OpenCvFisheye { max_angle: Some(_), .. }) => refuse("it has no place for max_angle"),
         Lens::OpenCv(lens) => {
             let all = lens.coefficients();
             let used = all.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);
@@ -267,7 +307,11 @@ fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError>
             })
         }
         Lens::OpenCvFisheye(lens) => Ok((DistortionModel::Equidistant, vec![lens.k1, lens.k2, lens.k3, lens.k4])),
-        _ => refuse("its models are plumb_bob, rational_polynomial (opencv) and equidistant (opencv_fisheye)"),
+        Lens::Equidistant(_) => Ok((DistortionModel::Equidistant, vec![0.0; 4])),
+        _ => Err(CalibrationError::Lens {
+            lens: lens.name(),
+            reason: "its models are plumb_bob, rational_polynomial (opencv) and equidistant (opencv_fisheye, equidistant)",
+        }),
     }
 }
 
@@ -346,26 +390,90 @@ impl Reader<'_> {
         Ok(numbers)
     }
 
-    fn distortion(&self, model: &Node, d: &Node) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
-        let name = self.text("distortion_model", model)?;
-        let Some(known) = DistortionModel::ALL.into_iter().find(|known| known.name() == name) else {
-            let candidates = closest(name, DistortionModel::ALL.map(DistortionModel::name));
-            let (file, line) = (self.file.into(), model.line);
-            return Err(CalibrationError::Model { file, line, model: name.into(), candidates });
-        };
+    fn distortion(&self, model: Option<&Node>, d: &Node) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
         let field = "distortion_coefficients";
         let (_, numbers) = self.numbers(field, d)?;
-        let (found, counts) = (numbers.len(), known.counts());
-        if !counts.contains(&found) {
-            let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
-            let problem = format!("has {found} numbers; {name} has {}", counts.join(" or "));
+        let found = numbers.len();
+        let named = match model {
+            Some(node) => {
+                Some((node, self.text("distortion_model", node)?)).filter(|(_, name)| !yaml::is_nothing(name))
+            }
+            None => None,
+        };
+        let known = match named {
+            None => DistortionModel::of_open_cv(found),
+            Some((node, name)) => DistortionModel::from_name(name, found).ok_or_else(|| CalibrationError::Model {
+                file: self.file.into(),
+                line: node.line,
+                model: name.into(),
+                candidates: closest(name, DistortionModel::names()),
+            })?,
+        };
+        let counts = known.counts();
+        if let Some((last, others)) = counts.split_last().filter(|_| !counts.contains(&found)) {
+            let name = named.map_or(DistortionModel::PlumbBob.name(), |(_, name)| name);
+            let others: Vec<String> = others.iter().map(usize::to_string).collect();
+            let or = if others.is_empty() { "" } else { " or " };
+            let problem = format!("has {found} numbers; {name} has {}{or}{last}", others.join(", "));
             return Err(self.wrong(d.line, field, problem));
         }
-        if numbers.iter().skip(12).any(|&tilt| tilt != 0.0) {
-            let problem = "tilts the sensor (its last two numbers), which is not offered".into();
+        if let [tau_x, tau_y] = numbers[found.min(12)..]
+            && [tau_x, tau_y] != [0.0; 2]
+        {
+            let problem = format!(
+                "tilts the sensor (tau_x = {tau_x}, tau_y = {tau_y}): tilted sensors are not supported; the last two of 14 numbers \
+                 have to be 0"
+            );
             return Err(self.wrong(d.line, field, problem));
         }
         Ok((known, numbers))
+    }
+
+    fn count(&self, field: &str, node: &Node) -> Result<usize, CalibrationError> {
+        let text = self.text(field, node)?;
+        text.parse()
+            .map_err(|_| self.wrong(node.line, field, format!("is {text:?}; it must be a whole number of pixels")))
+    }
+
+    /// Refuses pixels of several pixels of the calibration.
+    fn not_binned(&self, fields: [(&str, Option<&Node>); 2]) -> Result<(), CalibrationError> {
+        for (field, node) in fields {
+            let Some(node) = node else { continue };
+            let count = self.count(field, node)?;
+            if count > 1 {
+                let problem = format!(
+                    "is {count}: several pixels in one are not supported; give image_width, image_height and camera_matrix of the \
+                     pictures as they come, and no {field}"
+                );
+                return Err(self.wrong(node.line, field, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a part of the picture of the calibration.
+    fn not_a_part(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
+        let Value::Table(parts) = &roi.value else {
+            let problem =
+                format!("is {}, not a table of x_offset, y_offset, height, width and do_rectify", roi.value.kind());
+            return Err(self.wrong(roi.line, "roi", problem));
+        };
+        let part = |name: &str| match parts.iter().find(|(key, _)| key == name) {
+            Some((_, node)) => self.count(&format!("roi.{name}"), node),
+            None => Ok(0),
+        };
+        let [x, y, w, h] = [part("x_offset")?, part("y_offset")?, part("width")?, part("height")?];
+        // 0 is as far as it goes.
+        let [w, h] =
+            [(w, width, x), (h, height, y)].map(|(size, all, at)| if size > 0 { size } else { all.saturating_sub(at) });
+        if [x, y, w, h] != [0, 0, width, height] {
+            let problem = format!(
+                "is {w} x {h} at ({x}, {y}), a part of {width} x {height}, which is not supported; give the numbers of the part and \
+                 no roi: image_width: {w}, image_height: {h}, cx less by {x}, cy less by {y}"
+            );
+            return Err(self.wrong(roi.line, "roi", problem));
+        }
+        Ok(())
     }
 }
 

@@ -39,6 +39,25 @@ enum Open {
     Table(usize, Vec<(String, Node)>, Option<(String, usize)>),
 }
 
+/// Whether a word means that there is none.
+pub(super) fn is_nothing(text: &str) -> bool {
+    ["", "~", "null"].contains(&text)
+}
+
+/// A text without byte order mark, and with spaces where tabs stand between a key and its value: YAML allows both, the parser
+/// neither. Lines and columns stay.
+fn readable(text: &str) -> String {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let spaced = |line: &str| {
+        let rest = line.trim_start_matches(' ').trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
+        let value = rest.strip_prefix(':')?;
+        let blanks = value.len() - value.trim_start_matches([' ', '\t']).len();
+        let (key, value) = line.split_at(line.len() - value.len());
+        Some(format!("{key}{}{}", " ".repeat(blanks), &value[blanks..]))
+    };
+    text.split_inclusive('\n').map(|line| spaced(line).unwrap_or_else(|| line.into())).collect()
+}
+
 /// The only document of a text.
 pub(super) fn parse(text: &str, file: &str) -> Result<Node, CalibrationError> {
     let wrong = |line: usize, column: usize, message: String| CalibrationError::Yaml {
@@ -48,7 +67,8 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Node, CalibrationError> {
         message,
     };
     let at = |span: &Span, message: &str| wrong(span.start.line(), span.start.col(), message.into());
-    let mut parser = Parser::new_from_str(text);
+    let text = readable(text);
+    let mut parser = Parser::new_from_str(&text);
     let (mut open, mut root): (Vec<Open>, Option<Node>) = (Vec::new(), None);
     while let Some(event) = parser.next_event() {
         let (event, span) = event.map_err(|e| wrong(e.marker().line(), e.marker().col(), e.info().into()))?;

@@ -86,10 +86,10 @@ impl LensModel for FTheta {
         let fold = first_sign_change(&slope, far);
         let end = fold.unwrap_or(far);
         if !reached(end) {
-            return Domain { angle: self.angle(end).0, radius: end / self.focal_length, folds: true };
+            return Domain::new(self.angle(end).0, end / self.focal_length, true);
         }
         let radius = solve(self.max_angle, 0.0, end, 0.5 * end, |radius| self.angle(radius));
-        Domain { angle: self.max_angle, radius: radius / self.focal_length, folds: false }
+        Domain::new(self.max_angle, radius / self.focal_length, false)
     }
 
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]> {

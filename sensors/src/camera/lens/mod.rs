@@ -5,6 +5,7 @@
 //! lens are independent of each other. All of it is double precision.
 
 mod optics;
+mod poles;
 mod polynomial;
 mod radial;
 mod rays;
@@ -13,6 +14,7 @@ mod rows;
 use super::error::CameraError;
 use crate::error::SensorError;
 pub use optics::Optics;
+use poles::Poles;
 pub use rays::LensRays;
 pub(crate) use rays::Sight;
 pub(crate) use rows::RaysOfRows;
@@ -28,8 +30,17 @@ pub struct Domain {
     pub angle: f64,
     /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
     pub radius: f64,
-    /// Whether rays end there because the mapping folds back, not because the lens was to see no farther.
+    /// Whether rays end there because the mapping folds back or has a pole, not because the lens was to see no farther.
     pub folds: bool,
+    /// Of [`OpenCv`] alone.
+    poles: Poles,
+}
+
+impl Domain {
+    /// How far a lens sees that needs no more to be known of it.
+    pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
+        Self { angle, radius, folds, poles: Poles::NONE }
+    }
 }
 
 /// One kind of lens: its file, and a line in the list below.

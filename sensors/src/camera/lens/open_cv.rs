@@ -1,12 +1,13 @@
 //! A pinhole with OpenCV's distortion.
 
+use super::poles::{Fraction, Poles};
 use super::polynomial::bisect;
 use super::{CameraError, Domain, LensModel, angle_up_to, finite};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Nothing is seen farther from the optical axis than this \[rad\] (89.9 degrees), where no smaller angle is given.
-const MOST: f64 = 1.569_051;
+pub(super) const MOST: f64 = 1.569_051;
 /// Angles and directions at which it is looked whether the distortion folds back.
 const ANGLES: usize = 1024;
 const DIRECTIONS: usize = 64;
@@ -23,7 +24,15 @@ const PARTS: usize = 32;
 /// its `rational_polynomial` k4 to k6 too. OpenCV's tilted sensor (tau) is not offered.
 ///
 /// The mapping is inverted by Newton's method, where it can be: from the optical axis to where it folds back in the direction
-/// in question. Whether it does is looked at in steps of less than a tenth of a degree.
+/// in question. Whether it does is looked at in steps of less than a tenth of a degree. Of the directions that OpenCV's formula
+/// has for a pixel it is the one within that, which `cv::undistortPoints` need not find.
+///
+/// **Poles.** Where the fraction g has a pole that a zero beside it nearly cancels, as calibrations with k4 to k6 often have one in
+/// the picture, OpenCV's formula runs to infinity and back within a ring of directions, in which pixels have two of them or none.
+/// There, within 2 degrees of the pole and mostly much less, the radius of the picture is a straight line from one end of the ring
+/// to the other, for lack of anything that would be right: each pixel has a direction, each direction a pixel, and everywhere else
+/// it is OpenCV's formula to the last digit. Another pole ends the lens: where it would be without pole and zero, if there are
+/// directions behind it, for they would be seen in the same pixels; else the picture has no end before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenCv {
@@ -87,14 +96,16 @@ impl OpenCv {
         [p1, p2, s1, s2, s3, s4] == [0.0; 6]
     }
 
-    fn distort(&self, [x, y]: [f64; 2]) -> Distorted {
-        let Self { k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, .. } = *self;
+    /// The factor of the radial distortion.
+    fn fraction(&self) -> Fraction {
+        Fraction { above: [1.0, self.k1, self.k2, self.k3], below: [1.0, self.k4, self.k5, self.k6] }
+    }
+
+    fn distort(&self, poles: &Poles, [x, y]: [f64; 2]) -> Distorted {
+        let Self { p1, p2, s1, s2, s3, s4, .. } = *self;
         let r = x * x + y * y;
-        let above = 1.0 + r * (k1 + r * (k2 + r * k3));
-        let below = 1.0 + r * (k4 + r * (k5 + r * k6));
-        let g = above / below;
-        // By r².
-        let slope = ((k1 + r * (2.0 * k2 + r * 3.0 * k3)) - g * (k4 + r * (2.0 * k5 + r * 3.0 * k6))) / below;
+        // The slope is by r².
+        let (g, slope) = poles.factor(&self.fraction(), r);
         let point = [
             x * g + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x) + r * (s1 + r * s2),
             y * g + p1 * (r + 2.0 * y * y) + 2.0 * p2 * x * y + r * (s3 + r * s4),
@@ -112,15 +123,23 @@ impl OpenCv {
             ],
         ];
         let area = slope[0][0] * slope[1][1] - slope[0][1] * slope[1][0];
-        Distorted { point, slope, regular: below > 0.0 && area > 0.0 && area.is_finite() }
+        Distorted { point, slope, regular: g > 0.0 && area > 0.0 && area.is_finite() }
     }
 
     /// The angle up to which all is regular in a direction, if that is less than `most` \[rad\].
-    fn fold([c, s]: [f64; 2], most: f64, lens: &Self) -> Option<f64> {
-        let regular = |angle: f64| lens.distort([c * angle.tan(), s * angle.tan()]).regular;
-        let at = |k: usize| most * k as f64 / ANGLES as f64;
-        let first = (1..=ANGLES).find(|&k| !regular(at(k)))?;
-        Some(bisect(at(first - 1), at(first), regular))
+    fn fold(&self, poles: &Poles, [c, s]: [f64; 2], most: f64) -> Option<f64> {
+        let end = poles.end.map(|end| end.angle).filter(|end| *end < most);
+        let last = end.unwrap_or(most);
+        // What ends at a pole is good up to there.
+        let regular = |angle: f64| {
+            let r = angle.tan();
+            Some(angle) == end || self.distort(poles, [c * r, s * r]).regular
+        };
+        let at = |k: usize| if k == ANGLES { last } else { last * k as f64 / ANGLES as f64 };
+        match (1..=ANGLES).find(|&k| !regular(at(k))) {
+            Some(first) => Some(bisect(at(first - 1), at(first), regular)),
+            None => end,
+        }
     }
 
     /// Whether a point before the distortion belongs to the lens: in its domain, or in a direction that folds back later.
@@ -134,13 +153,13 @@ impl OpenCv {
         domain.folds
             && !self.is_radial()
             && angle <= self.max_angle.unwrap_or(MOST)
-            && Self::fold([x / r, y / r], angle, self).is_none()
+            && self.fold(&domain.poles, [x / r, y / r], angle).is_none()
     }
 
     /// The point that is distorted to `target`, from one that is near it.
-    fn undistort_from(&self, target: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
+    fn undistort_from(&self, poles: &Poles, target: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
         let mut p = start;
-        let mut now = self.distort(p);
+        let mut now = self.distort(poles, p);
         let scale = 1.0 + target[0].hypot(target[1]);
         let error = |d: &Distorted| [d.point[0] - target[0], d.point[1] - target[1]];
         for _ in 0..100 {
@@ -158,7 +177,7 @@ impl OpenCv {
             let mut part = 1.0;
             loop {
                 let next = [p[0] - part * step[0], p[1] - part * step[1]];
-                let then = self.distort(next);
+                let then = self.distort(poles, next);
                 let [fx, fy] = error(&then);
                 if then.regular && fx.hypot(fy) < size {
                     (p, now) = (next, then);
@@ -177,11 +196,16 @@ impl OpenCv {
         None
     }
 
-    fn undistort(&self, target: [f64; 2]) -> Option<[f64; 2]> {
-        self.undistort_from(target, target).or_else(|| {
+    /// The point that belongs to the lens and is distorted to `target`: Newton's method finds it from there, or what is beyond a
+    /// fold, which is another direction for the same pixel; then it is gone after from the optical axis.
+    fn undistort(&self, domain: &Domain, target: [f64; 2]) -> Option<[f64; 2]> {
+        let from = |target: [f64; 2], start: [f64; 2]| {
+            self.undistort_from(&domain.poles, target, start).filter(|point| self.sees(domain, *point))
+        };
+        from(target, target).or_else(|| {
             (1..=PARTS).try_fold([0.0; 2], |near, k| {
                 let part = k as f64 / PARTS as f64;
-                self.undistort_from(target.map(|x| x * part), near)
+                from(target.map(|x| x * part), near)
             })
         })
     }
@@ -190,7 +214,7 @@ impl OpenCv {
 impl LensModel for OpenCv {
     const NAME: &'static str = "opencv";
     const ALIASES: &'static [&'static str] =
-        &["plumb_bob", "rational_polynomial", "opencv_pinhole", "brown_conrady", "fisheyeRadTanThinPrism"];
+        &["plumb_bob", "rational_polynomial", "radtan", "opencv_pinhole", "brown_conrady", "fisheyeRadTanThinPrism"];
     const FORWARD: bool = true;
 
     fn is_pinhole(&self) -> bool {
@@ -210,15 +234,18 @@ impl LensModel for OpenCv {
 
     fn domain(&self) -> Domain {
         let most = self.max_angle.unwrap_or(MOST);
+        let poles = Poles::of(&self.fraction(), most);
         let count = if self.is_radial() { 1 } else { DIRECTIONS };
         let folds = (0..count).filter_map(|k| {
             let (s, c) = (TAU * k as f64 / count as f64).sin_cos();
-            Some((Self::fold([c, s], most, self)?, [c, s]))
+            Some((self.fold(&poles, [c, s], most)?, [c, s]))
         });
         let first = folds.min_by(|(a, _), (b, _)| a.total_cmp(b));
         let (angle, [c, s]) = first.unwrap_or((most, [1.0, 0.0]));
-        let [x, y] = self.distort([c * angle.tan(), s * angle.tan()]).point;
-        Domain { angle, radius: x.hypot(y), folds: first.is_some() }
+        let endless = poles.end.is_some_and(|end| end.endless && end.angle == angle);
+        let [x, y] = self.distort(&poles, [c * angle.tan(), s * angle.tan()]).point;
+        let radius = if endless { f64::INFINITY } else { x.hypot(y) };
+        Domain { poles, ..Domain::new(angle, radius, first.is_some()) }
     }
 
     fn project(&self, domain: &Domain, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
@@ -226,11 +253,11 @@ impl LensModel for OpenCv {
             return None;
         }
         let point = [x / z, y / z];
-        self.sees(domain, point).then(|| self.distort(point).point)
+        self.sees(domain, point).then(|| self.distort(&domain.poles, point).point)
     }
 
     fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]> {
-        let [x, y] = self.undistort(point).filter(|point| self.sees(domain, *point))?;
+        let [x, y] = self.undistort(domain, point)?;
         Some([x, y, 1.0])
     }
 }

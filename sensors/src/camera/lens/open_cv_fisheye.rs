@@ -39,7 +39,7 @@ impl OpenCvFisheye {
 
 impl LensModel for OpenCvFisheye {
     const NAME: &'static str = "opencv_fisheye";
-    const ALIASES: &'static [&'static str] = &["kannala_brandt", "fisheyeKannalaBrandtK3", "fisheye"];
+    const ALIASES: &'static [&'static str] = &["kannala_brandt", "kannala_brandt4", "fisheyeKannalaBrandtK3", "fisheye"];
 
     fn max_angle(&self) -> Option<f64> {
         self.max_angle
@@ -54,7 +54,7 @@ impl LensModel for OpenCvFisheye {
         let most = self.max_angle.unwrap_or(PI);
         let fold = first_sign_change(&self.slope(), most * most).map(f64::sqrt);
         let angle = fold.unwrap_or(most);
-        Domain { angle, radius: self.radius(angle).0, folds: fold.is_some() }
+        Domain::new(angle, self.radius(angle).0, fold.is_some())
     }
 
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]> {

@@ -36,7 +36,7 @@ impl LensModel for Panorama {
 
     /// Everything.
     fn domain(&self) -> Domain {
-        Domain { angle: PI, radius: PI, folds: false }
+        Domain::new(PI, PI, false)
     }
 
     fn project(&self, _: &Domain, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {

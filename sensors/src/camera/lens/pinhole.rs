@@ -27,7 +27,7 @@ impl LensModel for Pinhole {
     }
 
     fn domain(&self) -> Domain {
-        Domain { angle: FRAC_PI_2, radius: f64::INFINITY, folds: false }
+        Domain::new(FRAC_PI_2, f64::INFINITY, false)
     }
 
     fn project(&self, _: &Domain, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {

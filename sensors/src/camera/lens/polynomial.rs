@@ -15,7 +15,7 @@ pub(super) fn derivative(coefficients: &[f64]) -> Vec<f64> {
 
 /// Where the sign changes between `from` and `to`, in order. Between two neighbouring ones, or the ends, there is at most one,
 /// for the derivative's are known. A root where the sign stays is none.
-fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64> {
+pub(super) fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64> {
     let used = coefficients.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);
     let coefficients = &coefficients[..used];
     if used < 2 {

@@ -65,7 +65,7 @@ macro_rules! fisheye {
 
             fn domain(&self) -> super::Domain {
                 let radius: fn(f64) -> f64 = $radius;
-                super::Domain { angle: self.max_angle, radius: radius(self.max_angle), folds: false }
+                super::Domain::new(self.max_angle, radius(self.max_angle), false)
             }
 
             fn project(&self, domain: &super::Domain, direction: [f64; 3]) -> Option<[f64; 2]> {

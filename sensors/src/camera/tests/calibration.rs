@@ -1,8 +1,10 @@
 //! Calibration files: what a real one says, and what is wrong with broken ones.
 
-use super::super::lens::{Equidistant, OpenCv, OpenCvFisheye};
+use super::super::lens::{
+    Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
+};
 use super::super::{
-    CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, PixelIntrinsics, Renderer,
+    CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, Optics, PixelIntrinsics, Renderer,
 };
 use super::stage::{built, cfg, context, pose_of};
 use nalgebra::Point3;
@@ -127,12 +129,6 @@ fn files_come_back_as_they_were_written() {
         assert_eq!(again.intrinsics(), Intrinsics::from(pixels));
         assert!(again.lens() == lens || lens.is_pinhole() && again.lens().is_pinhole());
     }
-    let refused =
-        [Lens::from(Equidistant::default()), OpenCvFisheye { max_angle: Some(1.5), ..Default::default() }.into()];
-    for lens in refused {
-        let error = CameraInfo::of("front", [640, 480], &pixels, &lens).unwrap_err();
-        assert!(matches!(error, CalibrationError::Lens { .. }), "{error}");
-    }
     let folder = std::env::temp_dir().join(format!("kinetoscope-calibration-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("front.yaml");
@@ -141,6 +137,75 @@ fn files_come_back_as_they_were_written() {
     std::fs::remove_dir_all(&folder).unwrap();
     let error = CameraInfo::read(&path).unwrap_err();
     assert!(matches!(&error, CalibrationError::File { path: p, .. } if *p == path), "{error}");
+}
+
+/// Root cause: what `max_angle` says, where pixels are dark, was taken for a part of the mapping, which K and D say in full. So the
+/// repair that errors of folding lenses advise took the camera's calibration away.
+#[test]
+fn lenses_that_end_early_have_their_calibration_too() {
+    let pixels = PixelIntrinsics { fx: 300.0, fy: 301.0, cx: 320.0, cy: 240.0 };
+    let of = |lens: Lens| CameraInfo::of("front", [640, 480], &pixels, &lens);
+    let fisheye = OpenCvFisheye { k1: 0.1, k4: -0.01, ..Default::default() };
+    for (short, long) in [
+        (
+            Lens::from(OpenCv { k1: -0.2, max_angle: Some(0.5), ..OpenCv::default() }),
+            OpenCv { k1: -0.2, ..OpenCv::default() }.into(),
+        ),
+        (OpenCv { max_angle: Some(0.5), ..OpenCv::default() }.into(), Lens::default()),
+        (OpenCvFisheye { max_angle: Some(1.4), ..fisheye }.into(), fisheye.into()),
+        // r = theta: four zeros, wherever it ends.
+        (Equidistant { max_angle: 1.2 }.into(), OpenCvFisheye::default().into()),
+    ] {
+        assert_eq!(of(short).unwrap(), of(long).unwrap());
+        // What is seen with both is seen in the same place.
+        let [short, long] = [short, of(short).unwrap().lens()].map(|lens| Optics::new(lens, pixels).unwrap());
+        for direction in [[0.0, 0.0, 1.0], [0.3, -0.1, 1.0], [-0.1, 0.4, 0.9]] {
+            let [a, b] = [short, long].map(|optics| optics.project(direction).unwrap());
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-12, "{a:?} {b:?}");
+        }
+    }
+    let info = of(Equidistant::default().into()).unwrap();
+    assert_eq!(
+        (info.distortion_model, info.distortion_coefficients.as_slice()),
+        (DistortionModel::Equidistant, [0.0; 4].as_slice())
+    );
+    // The camera itself says so.
+    let lens = OpenCv { k1: -0.9, max_angle: Some(0.4), ..OpenCv::default() }.into();
+    let camera = built(&CameraCfg { renderer: Renderer::FastRayTraced, lens, ..cfg() }, &context(1));
+    assert_eq!(camera.camera_info("dark", 0).unwrap().distortion_coefficients, [-0.9, 0.0, 0.0, 0.0, 0.0]);
+    // What ROS has no words for stays refused.
+    for lens in [
+        Lens::from(Stereographic::default()),
+        Equisolid::default().into(),
+        Orthographic::default().into(),
+        FTheta::default().into(),
+        Panorama {}.into(),
+    ] {
+        let error = of(lens).unwrap_err();
+        assert!(matches!(error, CalibrationError::Lens { .. }), "{error}");
+        assert!(error.to_string().contains("equidistant (opencv_fisheye, equidistant)"), "{error}");
+    }
+}
+
+/// Root cause: the default renderer refuses lenses, and `apply_to` left it, so that the twin of every distorted camera began with
+/// an error.
+#[test]
+fn twins_of_distorted_cameras_follow_rays() {
+    let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
+    let twin = |info: &CameraInfo, renderer| {
+        let mut twin = CameraCfg { renderer, ..cfg() };
+        info.apply_to(&mut twin);
+        twin
+    };
+    let plain = twin(&info, Renderer::default());
+    assert_eq!((Renderer::default(), plain.renderer), (Renderer::Raster, Renderer::FastRayTraced));
+    assert!(built(&plain, &context(1)).depth().unwrap().iter().any(|depth| depth.is_finite()));
+    // Any other follows them already, and what bends nothing is for all.
+    for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED] {
+        assert_eq!(twin(&info, renderer).renderer, renderer);
+    }
+    let straight = CameraInfo { distortion_coefficients: vec![0.0; 5], ..info };
+    assert_eq!(twin(&straight, Renderer::Raster).renderer, Renderer::Raster);
 }
 
 /// Every mistake is named with file, line and field.
@@ -177,8 +242,4 @@ fn broken_files_say_where() {
     assert!(error("just words").contains("not a table of fields"));
     assert!(error(&format!("a: {}", "[".repeat(2000))).starts_with("f:1:"));
     assert!(error("a: 1\n---\nb: 2\n").contains("second document"));
-    let tilted = FILE.replacen("plumb_bob", "rational_polynomial", 1);
-    let tilted =
-        tilted.replacen("[-0.312471, 0.118365, 4.13e-4, -0.000218, 0.000000]", "[0,0,0,0,0,0,0,0,0,0,0,0,0.1,0]", 1);
-    assert!(error(&tilted.replacen("cols: 5", "cols: 14", 1)).contains("tilts the sensor"));
 }

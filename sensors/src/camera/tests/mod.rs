@@ -4,6 +4,8 @@
 mod albedo;
 mod boxes;
 mod calibration;
+mod calibration_files;
+mod calibration_open_cv;
 mod degenerate;
 mod detail;
 mod determinism;
@@ -12,6 +14,7 @@ mod flow;
 mod golden;
 mod late;
 mod lens_pictures;
+mod lens_poles;
 pub(super) mod lenses;
 mod metals;
 mod noisy;
