@@ -74,12 +74,7 @@ impl Camera {
             if self.draws_markers {
                 marked.push(&captures.markers[place]);
             }
-            let opened = captures.opened(place).and_then(|(poses, parent)| {
-                let camera = self.world_from(look(place).0, Some(parent))?;
-                let before = self.opening.as_ref()?.seconds();
-                Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
-            });
-            takes.push(Take { noise: captures.tickets[place].bits(Stream::PATHS), opened });
+            takes.push(self.take_of(captures, place, look(place).0));
         }
         let result = match self.draws_markers && self.channels.color {
             true => render_marked(rasterizer, &mut jobs, &takes, &marked),
@@ -102,17 +97,33 @@ impl Camera {
         result
     }
 
-    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
+    /// What tells the capture of a place from others, seen from a mount.
+    fn take_of<'a>(&self, captures: &'a Captures, place: usize, mount: &Mount) -> Take<'a> {
+        let opened = captures.opened(place).and_then(|(poses, parent)| {
+            let camera = self.world_from(mount, Some(parent))?;
+            let before = self.opening.as_ref()?.seconds();
+            Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
+        });
+        Take { noise: captures.tickets[place].bits(Stream::PATHS), opened }
+    }
+
+    /// Whether rows of its pictures may be of several instants.
+    pub(in crate::camera) fn takes_time(&self) -> bool {
+        self.opening.is_some()
+    }
+
+    /// What there is to draw of a row as it was captured, and what draws it: for whoever needs more than pictures.
     pub(in crate::camera) fn shot_of<T>(
         &self,
         row: usize,
-        act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T,
+        act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>, Take<'_>) -> T,
     ) -> T {
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
         let view = &self.view_of(row);
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
+        let take = self.take_of(&self.captures, row, self.mounts.row(row));
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None }, take)
     }
 }
 

@@ -19,6 +19,7 @@ mod pictures;
 mod progress;
 mod reference;
 mod robots;
+mod rolling_boxes;
 mod scenes;
 mod sensor;
 mod sensor_mistakes;
