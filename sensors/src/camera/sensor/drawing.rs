@@ -89,7 +89,10 @@ impl Camera {
             DepthMiss::Far => Some(self.lens.far),
             DepthMiss::Zero => Some(0.0),
         };
-        for (_, frame) in &mut jobs {
+        for (shot, frame) in &mut jobs {
+            if self.depth_miss == DepthMiss::Far {
+                keep_before(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
+            }
             miss.into_iter().for_each(|value| frame.replace_misses(value));
         }
         self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
@@ -183,6 +186,16 @@ impl Stage {
         let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
         let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
         Ok(Self { scene, poses: with(shot.poses), opened: take.opened.as_ref().map(|opened| with(opened.poses)) })
+    }
+}
+
+/// Keeps what was hit nearer than the far plane, whose number means that nothing was: noise ends there. What counts to the far
+/// plane is depth, or distance where rays go aside.
+fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
+    let last = far.next_down();
+    let reach = frame.distance.as_deref_mut().filter(|_| aside);
+    for numbers in frame.depth.as_deref_mut().into_iter().chain(reach) {
+        numbers.iter_mut().filter(|number| number.is_finite()).for_each(|number| *number = number.min(last));
     }
 }
 

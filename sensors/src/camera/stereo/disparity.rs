@@ -24,8 +24,11 @@ impl StereoCamera {
     /// sees the same point, d = fx b / z with the focal length fx, the baseline b = `left_to_right_pos.x` and the depth z of
     /// the left eye (so that z = fx b / d). The point is at (u - d, v) in the right eye's picture, and at
     /// (u - d + cx_right - cx_left, v) where principal points differ. 0 where nothing was hit, which is where infinitely far
-    /// points are, whatever [`depth_miss`](crate::CameraCfg::depth_miss) says. It is exact, and says nothing of whether the
-    /// right eye sees the point: something may be in the way.
+    /// points are, whatever [`depth_miss`](crate::CameraCfg::depth_miss) says.
+    ///
+    /// It is of the depth that the left eye measures, at every pixel: exact where that is, and with its noise, its holes and its
+    /// imperfections where it has some (so an error of depth e is one of about d e / z of disparity). Nothing is matched: it says
+    /// nothing of whether the right eye sees the point, which something may be in the way of.
     ///
     /// Draws the left eye's pictures if nobody has yet.
     ///
