@@ -1,14 +1,13 @@
 //! How far apart the eyes of a pair see the same point.
 
 use super::sensor::StereoCamera;
-use crate::camera::calibration::CameraInfo;
 use crate::camera::channel::Depth;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
 use ndarray::{Array1, Array3, ArrayView3, Axis};
 
 /// Lengths and angles smaller than this part of the baseline, or this many rad, are rounding.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Disparities, and of which pictures they are.
 #[derive(Clone, Debug, Default)]
@@ -66,31 +65,10 @@ impl StereoCamera {
         self.left().channels().depth && self.baseline().is_ok()
     }
 
-    /// The calibrations of both eyes in environment `env`, left and right, called `name` and `/left` or `/right`. Rectified
-    /// pictures have the principal points and focal lengths of raw ones. P of the right eye is
-    /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b = `left_to_right_pos.x` \[m\]: it brings points of
-    /// the *left* eye's optical frame into the right eye's picture. Source: ROS, message `sensor_msgs/CameraInfo`.
-    ///
-    /// # Errors
-    ///
-    /// As [`Camera::camera_info`](crate::Camera::camera_info), and [`CameraError::NotRectified`] where the eyes are not
-    /// parallel and side by side, or their intrinsics differ in more than cx.
-    pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
-        let left = self.left().camera_info(&format!("{name}/left"), env)?;
-        let mut right = self.right().camera_info(&format!("{name}/right"), env)?;
-        right.projection_matrix[(0, 3)] = -right.projection_matrix[(0, 0)] * self.side_by_side()?;
-        Ok([left, right])
-    }
-
-    /// Where the right eye is along x \[m\], if there is a disparity.
+    /// Where the right eye is along x \[m\], if there is a disparity: if rows of the pictures of both are the same.
     fn baseline(&self) -> Result<f64, CameraError> {
         self.left().must_be_pinhole("disparity")?;
         self.right().must_be_pinhole("disparity")?;
-        self.side_by_side()
-    }
-
-    /// Where the right eye is along x \[m\], if rows of the pictures of both are the same.
-    fn side_by_side(&self) -> Result<f64, CameraError> {
         let t = self.rig.left_from_right.translation.vector;
         let angle = self.rig.left_from_right.rotation.angle();
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });

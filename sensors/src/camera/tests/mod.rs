@@ -17,6 +17,7 @@ mod metals;
 mod noisy;
 mod pictures;
 mod progress;
+mod rectified;
 mod reference;
 mod robots;
 mod rolling_boxes;
