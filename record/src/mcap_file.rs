@@ -259,9 +259,9 @@ impl McapFile {
                     }
                 }
             }
-            Kind::Lens { camera, height, width, distortion, baseline } => {
-                let (k, pose) = states.split_at(9.min(states.len()));
-                ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), pose);
+            Kind::Lens { camera, height, width, distortion } => {
+                let part = |name| stream.part(states, name);
+                ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), part("pose"));
                 let Some(distortion) = distortion else {
                     return Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?);
                 };
@@ -269,7 +269,8 @@ impl McapFile {
                 cdr.begin();
                 let frame = seen_by(camera);
                 let size = (*height, *width);
-                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, size, (k, *baseline), distortion);
+                let matrices = ["intrinsics", "rectification", "projection"].map(part);
+                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, size, matrices, distortion);
             }
             Kind::Imu => {
                 let part = |name| stream.part(states, name);

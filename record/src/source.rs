@@ -170,8 +170,11 @@ impl Source {
                     sources.push(Self::of_eye(sim, uid, eye, channel, envs)?);
                 }
                 let ((height, width), distortion) = (eye.image_shape(any), eye.distortion(any));
-                let kind = Kind::Lens { camera: eye.name(uid), height, width, distortion, baseline: eye.baseline(any) };
-                let parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
+                let kind = Kind::Lens { camera: eye.name(uid), height, width, distortion };
+                let mut parts = vec![Part::new("intrinsics", [3, 3]), Part::new("pose", [7])];
+                if eye.rectified(any).is_some() {
+                    parts.extend([Part::new("rectification", [3, 3]), Part::new("projection", [3, 4])]);
+                }
                 let name = format!("{}/lens", eye.name(uid));
                 let lens = Self::new(name, kind, Element::F64, parts, envs, What::Lens(uid.into(), eye));
                 sources.push(lens.of_sensor(uid, sensor)?);
@@ -405,10 +408,12 @@ impl Source {
             What::Stage(_) => {}
             What::Picture { uid, eye, channel } => self.copy_picture(sim.sensor_called(uid)?, *eye, channel, values)?,
             What::Lens(uid, eye) => {
-                let (intrinsics, poses) = eye.lenses(sim.sensor_called(uid)?).ok_or_else(|| self.changed())?;
+                let sensor: &dyn Any = sim.sensor_called(uid)?;
+                let (intrinsics, poses) = eye.lenses(sensor).ok_or_else(|| self.changed())?;
                 let rows = intrinsics.len_of(Axis(0));
                 let flat = intrinsics.into_shape_with_order((rows, 9)).map_err(|_| self.changed())?;
-                self.join(values, &[flat.view(), poses.view()]);
+                let rectified = eye.rectified(sensor).unwrap_or_else(|| Array2::zeros((rows, 0)));
+                self.join(values, &[flat.view(), poses.view(), rectified.view()]);
             }
             What::Numbers(uid) => {
                 let sensor = sim.sensor_called(uid)?;

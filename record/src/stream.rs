@@ -104,7 +104,8 @@ pub enum Kind {
         /// Pixels per row.
         width: usize,
     },
-    /// The intrinsic matrix of a camera \[pixels\] and its pose in the environment, Ros axes.
+    /// The intrinsic matrix of a camera \[pixels\] and its pose in the environment, Ros axes. Of an eye of a pair also what rectifies
+    /// its pictures: `rectification` and `projection`, see [`Rectification`](sensors::camera::Rectification).
     Lens {
         /// The camera.
         camera: String,
@@ -114,9 +115,6 @@ pub enum Kind {
         width: usize,
         /// What its lens does to them; `None` for a lens that ROS has no words for.
         distortion: Option<Distortion>,
-        /// How far to the right of the left eye the right one of a pair is, whose rows are the same \[m\]; 0 for all other
-        /// cameras.
-        baseline: f64,
     },
     /// An inertial measurement unit; the quantities are called as its channels.
     Imu,

@@ -167,12 +167,27 @@ pub enum SensorError {
     /// Something is wrong with a camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// Something is wrong with one eye of a pair.
+    #[error("the {eye} eye: {error}")]
+    Eye {
+        /// `left` or `right`.
+        eye: &'static str,
+        /// What is wrong with it.
+        error: Box<SensorError>,
+    },
     /// Something is wrong with a calibration.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// Something is wrong with a ray caster.
     #[error(transparent)]
     Ray(#[from] RayError),
+}
+
+impl SensorError {
+    /// What is wrong with an eye of a pair.
+    pub(crate) fn of_eye(eye: &'static str) -> impl FnOnce(Self) -> Self {
+        move |error| Self::Eye { eye, error: Box::new(error) }
+    }
 }
 
 fn quoted(names: &[String]) -> String {

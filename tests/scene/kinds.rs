@@ -2,7 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::camera::imperfection::{Holes, ShotNoise, Vignetting};
+use kinetoscope::sensors::camera::imperfection::{Holes, ReadNoise, ShotNoise, Vignetting};
 use kinetoscope::sensors::ray::{HitTargets, RayPattern};
 use kinetoscope::sensors::{Channel, RayCasterCfg, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
 use serde::{Deserialize, Serialize};
@@ -178,7 +178,8 @@ fn sensors_have_all_their_fields() {
     let scene = read(
         "[entities.s]\ntype = \"stereo_camera\"\nleft_to_right_pos = [0.1, 0, 0]\norigin = \"left\"\n\
          left_to_right_rot = { rpy_deg = [0, 0, 90] }\nintrinsics_right.fovy.radians = 0.9\n\
-         channels_right = [\"mask\"]\n[entities.s.camera]\nwidth = 320\nchannels = [\"rgb\", \"depth\"]",
+         channels_right = [\"mask\"]\nimperfections_right.read_noise.std = 0.01\nnoise_right.rgb.std = 2\n\
+         [entities.s.camera]\nwidth = 320\nchannels = [\"rgb\", \"depth\"]",
     );
     let expected = StereoCameraCfg {
         camera: CameraCfg {
@@ -189,6 +190,8 @@ fn sensors_have_all_their_fields() {
         intrinsics_right: Some(Intrinsics::Fovy { radians: 0.9 }),
         lens_right: None,
         channels_right: Some(Channels { mask: true, ..Default::default() }),
+        imperfections_right: Some(Imperfections { read_noise: Some(ReadNoise { std: 0.01 }), ..Default::default() }),
+        noise_right: Some([("rgb".to_string(), NoiseCfg::white(2.0))].into()),
         left_to_right_pos: [0.1, 0.0, 0.0],
         left_to_right_rot: nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, 90f64.to_radians()),
         origin: StereoOrigin::Left,

@@ -86,13 +86,7 @@ pub(super) fn resolve(
         return Err(RecordError::SameName { path: cfg.path.clone(), name });
     }
     if format == Format::Mcap {
-        let unspoken = sources.iter().filter_map(|source| match &source.stream.kind {
-            Kind::Lens { camera, distortion: None, .. } => {
-                Some(format!("{camera}/camera_info (ROS has no words for its lens)"))
-            }
-            _ => None,
-        });
-        left_out.extend(unspoken);
+        left_out.extend(sources.iter().filter_map(|source| source.unspoken(sim)));
     }
     set_rates(&mut sources, cfg, format)?;
     if sources.is_empty() && !cfg.topics.contains(&Topic::Events) {

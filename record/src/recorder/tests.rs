@@ -1,4 +1,5 @@
 mod events;
+mod pairs;
 
 use super::*;
 use crate::npy;

@@ -83,13 +83,14 @@ pub(crate) fn image(
     to.blob_of(height * bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of the camera's matrix, `baseline` \[m\] is that of the right eye of a
-/// pair. ROS counts pixels from the centre of the first one, not from its corner.
+/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of the camera's matrix, `r` and `p` the nine and twelve of what rectifies an eye
+/// of a pair, row by row, nothing of a camera alone: R is the identity then, and P is K. ROS counts pixels from the centre of the
+/// first one, not from its corner.
 pub(crate) fn camera_info(
     to: &mut Cdr,
     stamp: Stamp<'_>,
     (height, width): (usize, usize),
-    (k, baseline): (&[f64], f64),
+    [k, r, p]: [&[f64]; 3],
     distortion: &Distortion,
 ) {
     header(to, stamp);
@@ -97,16 +98,17 @@ pub(crate) fn camera_info(
     to.count(width);
     to.text(&distortion.model);
     to.list(&distortion.coefficients);
-    let k: Vec<f64> =
-        k.iter().enumerate().map(|(i, x)| if matches!(i, 2 | 5) { x - CameraInfo::FIRST_CENTRE } else { *x }).collect();
-    to.f64s(&k);
-    to.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
-    // Points of the left eye, in the right eye's picture.
-    let fourth = [if baseline == 0.0 { 0.0 } else { -k.first().unwrap_or(&0.0) * baseline }, 0.0, 0.0];
-    for (row, fourth) in k.chunks_exact(3).zip(fourth) {
-        to.f64s(row);
-        to.f64(fourth);
-    }
+    // The first two rows of both K and P have the principal point in their third column.
+    let counted = |matrix: &[f64], columns: usize| -> Vec<f64> {
+        let at = |(i, x): (usize, &f64)| if i == 2 || i == columns + 2 { x - CameraInfo::FIRST_CENTRE } else { *x };
+        matrix.iter().enumerate().map(at).collect()
+    };
+    to.f64s(&counted(k, 3));
+    const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let alone: Vec<f64> = k.chunks_exact(3).flat_map(|row| [row[0], row[1], row[2], 0.0]).collect();
+    let (r, p) = if p.is_empty() { (&IDENTITY[..], &alone[..]) } else { (r, p) };
+    to.f64s(r);
+    to.f64s(&counted(p, 4));
     // Neither binned nor a part of a larger picture.
     (0..6).for_each(|_| to.u32(0));
     to.u8(0);

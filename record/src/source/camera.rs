@@ -1,13 +1,14 @@
 //! Cameras as they are recorded: their channels, their eyes, their lenses.
 
-use super::{Number, Source, sim_error};
+use super::{Number, Source, What, sim_error};
 use crate::error::Result;
 use crate::packet::Values;
-use crate::stream::{Distortion, Element};
-use ndarray::{Array2, Array3};
+use crate::stream::{Distortion, Element, Kind};
+use ndarray::{Array2, Array3, Axis};
 use sensors::camera::channel::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal};
-use sensors::camera::{CameraConvention, Channel, DistortionModel};
+use sensors::camera::{CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification};
 use sensors::{Camera, RayCasterCamera, StereoCamera};
+use sim::SimulationManager;
 use std::any::Any;
 
 /// The channel that both eyes of a pair tell together.
@@ -89,11 +90,18 @@ impl Eye {
         Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
     }
 
-    /// How far it is to the right of the left eye \[m\], for the right one of a pair whose rows are the same; else 0.
-    pub(super) fn baseline(self, sensor: &dyn Any) -> f64 {
-        let pair = sensor.downcast_ref::<StereoCamera>().filter(|_| self == Self::Right);
-        let infos = pair.and_then(|pair| pair.camera_info("", *pair.right().env_ids().first()?).ok());
-        infos.map_or(0.0, |[_, right]| -right.projection_matrix[(0, 3)] / right.projection_matrix[(0, 0)])
+    /// R and P of an eye of a pair, as [`Rectification`] has them, of the pictures that arrived last: 9 and 12 numbers of each row.
+    /// `None` for cameras alone and for eyes that cannot be rectified.
+    pub(super) fn rectified(self, sensor: &dyn Any) -> Option<Array2<f64>> {
+        let eye = usize::from(self == Self::Right);
+        let rows = rectifications(sensor)?.ok()?.into_iter().map(|Rectification { rotations, projections }| {
+            // Row by row.
+            let (r, p) = (rotations[eye].transpose(), projections[eye].transpose());
+            let mut numbers = [0.0; 21];
+            numbers.iter_mut().zip(r.iter().chain(p.iter())).for_each(|(to, from)| *to = *from);
+            numbers
+        });
+        Some(Array2::from(rows.collect::<Vec<_>>()))
     }
 
     /// Intrinsic matrices and poses, in the axes of ROS, of the pictures that arrived last.
@@ -104,6 +112,23 @@ impl Eye {
         let pictures = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::arrived);
         pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
     }
+}
+
+/// How the pictures of a pair that arrived last are rectified, row by row; `None` for other sensors.
+fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectification>, CameraError>> {
+    let pair = sensor.downcast_ref::<StereoCamera>()?;
+    let matrices = [pair.left(), pair.right()].map(Camera::arrived_intrinsic_matrices);
+    let rows = 0..matrices[0].len_of(Axis(0));
+    let of = |row| {
+        let eye = |k: &Array3<f64>| PixelIntrinsics {
+            fx: k[(row, 0, 0)],
+            fy: k[(row, 1, 1)],
+            cx: k[(row, 0, 2)],
+            cy: k[(row, 1, 2)],
+        };
+        Rectification::of(&pair.left_from_right(), matrices.each_ref().map(eye))
+    };
+    Some(rows.map(of).collect())
 }
 
 /// The camera that tells when a sensor of cameras has taken pictures, and of which environments: both eyes of a pair do together.
@@ -141,6 +166,18 @@ const RAY_CAMERA: [(&str, Element, usize); 4] = [
 ];
 
 impl Source {
+    /// What ROS's message of a camera does not say of this one, and why.
+    pub(crate) fn unspoken(&self, sim: &SimulationManager) -> Option<String> {
+        let (Kind::Lens { camera, distortion, .. }, What::Lens(uid, _)) = (&self.stream.kind, &self.what) else {
+            return None;
+        };
+        if distortion.is_none() {
+            return Some(format!("{camera}/camera_info (ROS has no words for its lens)"));
+        }
+        let error = rectifications(sim.sensor_called(uid).ok()?)?.err()?;
+        Some(format!("R and P of {camera}/camera_info ({error})"))
+    }
+
     pub(super) fn copy_picture(&self, sensor: &dyn Any, eye: Eye, channel: &str, values: &mut Values) -> Result<()> {
         if let Some(pair) = sensor.downcast_ref::<StereoCamera>()
             && channel == DISPARITY

@@ -37,7 +37,9 @@ pub enum DepthMiss {
     /// +inf.
     #[default]
     Inf,
-    /// The depth of the far plane; the same number in the distance channel.
+    /// The depth of the far plane; the same number in the distance channel. What was hit is nearer, with noise too: by the last
+    /// digit of single precision, at least (depth is, and distance behind lenses whose rays do not all go
+    /// [forward](lens::Lens::is_forward)).
     Far,
     /// 0.
     Zero,

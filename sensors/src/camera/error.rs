@@ -146,6 +146,26 @@ pub enum CameraError {
         /// What it would be in a rectified pair.
         expected: String,
     },
+    /// Eyes whose pictures cannot be turned so that both show a point in the same row.
+    #[error("the pictures of these eyes cannot be rectified: {what} is {value}, it must be {expected}")]
+    NotRectifiable {
+        /// Which number.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What is possible.
+        expected: &'static str,
+    },
+    /// Two calibrations that are not those of a left and a right eye.
+    #[error("these are no calibrations of a left and a right eye: {what} is {value}; it must be {expected}")]
+    NotAPair {
+        /// Which number of them.
+        what: &'static str,
+        /// What it is.
+        value: String,
+        /// What it would be of a pair.
+        expected: String,
+    },
     /// Something that is only known of pictures without a lens.
     #[error("{what}: only of a pinhole camera, and this one has the lens {lens}; leave it out, or the lens")]
     PinholeOnly {

@@ -57,4 +57,4 @@ pub use renderer::Renderer;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;
 pub use shutter::{Opened, Shutter, Take};
-pub use stereo::{StereoCamera, StereoCameraCfg, StereoOrigin};
+pub use stereo::{Rectification, StereoCamera, StereoCameraCfg, StereoOrigin};

@@ -6,6 +6,7 @@ use super::ticket::{Stream, Ticket};
 use crate::error::SensorError;
 use crate::noise::{NoiseCfg, check};
 use crate::sampling::Channel;
+use std::collections::BTreeMap;
 
 /// The noise of each channel that has some.
 #[derive(Clone, Debug)]
@@ -102,6 +103,12 @@ impl PictureNoise {
         }
         errors
     }
+}
+
+/// What of some noise there is of a camera with these channels; what is no channel stays, for whoever checks names.
+pub(crate) fn of_channels(noise: &BTreeMap<String, NoiseCfg>, channels: Channels) -> BTreeMap<String, NoiseCfg> {
+    let off = |name: &str| Channels::NAMES.contains(&own_name(name)) && !channels.names().contains(&own_name(name));
+    noise.iter().filter(|(name, _)| !off(name)).map(|(name, noise)| (name.clone(), *noise)).collect()
 }
 
 /// The name of a channel that may be called otherwise; what is no channel stays as it is.

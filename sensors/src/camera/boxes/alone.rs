@@ -1,4 +1,6 @@
 //! Pictures of one thing, as if nothing else were there.
+//!
+//! They are of the instants that the camera's own pictures are of: with a shutter that takes time each row is of its own.
 
 use crate::camera::Shot;
 use crate::camera::channel::{Channels, Frame};
@@ -30,9 +32,9 @@ impl<'a> Alone<'a> {
     ) -> Result<impl Iterator<Item = ([usize; 2], i32)> + '_, CameraError> {
         let Self { camera, row, env, ref mut frame } = *self;
         camera
-            .shot_of(row, |rasterizer, shot| {
+            .shot_of(row, |rasterizer, shot, take| {
                 let scene = hide_others(shot.scene, segment);
-                rasterizer.render(&mut [(Shot { scene: &scene, ..shot }, frame.as_mut())])
+                rasterizer.render_takes(&mut [(Shot { scene: &scene, ..shot }, frame.as_mut())], &[take])
             })
             .map_err(|(_, error)| CameraError::Draw { env, error })?;
         let width = camera.image_shape().1;

@@ -24,12 +24,13 @@ pub struct PixelBox {
 pub struct Box2d {
     /// The segment, see [`Segmentation::segments`].
     pub id: i32,
-    /// Around the pixels that see it; `None` where none does.
+    /// Around the pixels that see it, with a shutter that takes time each row at its own instant; `None` where none does.
     pub tight: Option<PixelBox>,
     /// Around all of it that is in the frustum (between the near and the far plane, within the edges of the picture),
     /// whatever hides it: of shapes and the triangles of meshes, not of pixels; level of detail is not looked at. Exact for
     /// what is wholly in the frustum; what is round and cut is a polyhedron with 256 edges around, inside by 7.5e-5 of its
-    /// radius at most. Behind a lens that bends lines: around the pixels that would see it if it were alone, as
+    /// radius at most. Behind a lens that bends lines, and of a camera whose [shutter](crate::CameraCfg::shutter) takes time:
+    /// around the pixels that would see it if it were alone, each row at its own instant, as
     /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts them. `None` where all of it is outside.
     pub loose: Option<PixelBox>,
     /// How many pixels see it.
@@ -40,14 +41,14 @@ impl Segmentation {
     /// Where the segments of a level are in the picture of environment `env`, those that are in it at all (one of the two
     /// boxes is there), in the order of [`segments`](Self::segments).
     ///
-    /// Behind a lens that bends lines each segment is drawn once more, alone, for its loose box: see
-    /// [`occlusions`](Self::occlusions).
+    /// Behind a lens that bends lines, and with a shutter that takes time, each segment is drawn once more, alone, for its loose
+    /// box: see [`occlusions`](Self::occlusions).
     ///
     /// # Errors
     ///
     /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; behind a lens [`Draw`](crate::CameraError::Draw) where a segment cannot be
-    /// drawn.
+    /// an environment that the camera does not see; where segments are drawn, [`Draw`](crate::CameraError::Draw) for one that
+    /// cannot be.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;
@@ -55,7 +56,7 @@ impl Segmentation {
         for ((v, u), &id) in mask.index_axis(Axis(0), row).indexed_iter() {
             boxes.see(id, [u, v]);
         }
-        if camera.bends_lines() {
+        if camera.bends_lines() || camera.takes_time() {
             let mut alone = Alone::new(camera, row, env);
             for segment in self.segments(level) {
                 for ([u, v], id) in alone.pixels(segment)? {
@@ -65,7 +66,7 @@ impl Segmentation {
             }
             return Ok(boxes.finish());
         }
-        camera.shot_of(row, |rasterizer, shot| {
+        camera.shot_of(row, |rasterizer, shot, _| {
             for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {
                 if matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil)
                     && let Some(extent) = outline(shot.view, instance, pose)

@@ -6,7 +6,8 @@ use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use ndarray::Axis;
 
-/// How much of a segment other things hide in a picture.
+/// How much of a segment other things hide in a picture. Both numbers are of the same instants: with a shutter that takes time each
+/// row is of its own, as the mask is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occlusion {
     /// The segment, see [`Segmentation::segments`].

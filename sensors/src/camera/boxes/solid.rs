@@ -56,7 +56,7 @@ impl Segmentation {
     pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
         let row = camera.row(env)?;
         camera.must_have_captured(row)?;
-        camera.shot_of(row, |rasterizer, shot| {
+        camera.shot_of(row, |rasterizer, shot, _| {
             let drawn =
                 |instance: &Instance| matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil);
             let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));

@@ -119,6 +119,14 @@ macro_rules! imperfections {
                 false $(|| self.$depth.is_some())*
             }
 
+            /// What of it there is of a camera with these channels.
+            pub(crate) fn of_channels(&self, channels: Channels) -> Self {
+                Self {
+                    $($light: self.$light.filter(|_| channels.color),)*
+                    $($depth: self.$depth.filter(|_| channels.depth || channels.distance),)*
+                }
+            }
+
             /// Checks all numbers.
             fn check_numbers(&self) -> Result<(), SensorError> {
                 $(self.$light.as_ref().map_or(Ok(()), OfLight::check)?;)*

@@ -74,12 +74,7 @@ impl Camera {
             if self.draws_markers {
                 marked.push(&captures.markers[place]);
             }
-            let opened = captures.opened(place).and_then(|(poses, parent)| {
-                let camera = self.world_from(look(place).0, Some(parent))?;
-                let before = self.opening.as_ref()?.seconds();
-                Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
-            });
-            takes.push(Take { noise: captures.tickets[place].bits(Stream::PATHS), opened });
+            takes.push(self.take_of(captures, place, look(place).0));
         }
         let result = match self.draws_markers && self.channels.color {
             true => render_marked(rasterizer, &mut jobs, &takes, &marked),
@@ -94,7 +89,10 @@ impl Camera {
             DepthMiss::Far => Some(self.lens.far),
             DepthMiss::Zero => Some(0.0),
         };
-        for (_, frame) in &mut jobs {
+        for (shot, frame) in &mut jobs {
+            if self.depth_miss == DepthMiss::Far {
+                keep_before(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
+            }
             miss.into_iter().for_each(|value| frame.replace_misses(value));
         }
         self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
@@ -102,17 +100,33 @@ impl Camera {
         result
     }
 
-    /// What there is to draw of a row at the captured instant, and what draws it: for whoever needs more than pictures.
+    /// What tells the capture of a place from others, seen from a mount.
+    fn take_of<'a>(&self, captures: &'a Captures, place: usize, mount: &Mount) -> Take<'a> {
+        let opened = captures.opened(place).and_then(|(poses, parent)| {
+            let camera = self.world_from(mount, Some(parent))?;
+            let before = self.opening.as_ref()?.seconds();
+            Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
+        });
+        Take { noise: captures.tickets[place].bits(Stream::PATHS), opened }
+    }
+
+    /// Whether rows of its pictures may be of several instants.
+    pub(in crate::camera) fn takes_time(&self) -> bool {
+        self.opening.is_some()
+    }
+
+    /// What there is to draw of a row as it was captured, and what draws it: for whoever needs more than pictures.
     pub(in crate::camera) fn shot_of<T>(
         &self,
         row: usize,
-        act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>) -> T,
+        act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>, Take<'_>) -> T,
     ) -> T {
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
         let view = &self.view_of(row);
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None })
+        let take = self.take_of(&self.captures, row, self.mounts.row(row));
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None }, take)
     }
 }
 
@@ -172,6 +186,16 @@ impl Stage {
         let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
         let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
         Ok(Self { scene, poses: with(shot.poses), opened: take.opened.as_ref().map(|opened| with(opened.poses)) })
+    }
+}
+
+/// Keeps what was hit nearer than the far plane, whose number means that nothing was: noise ends there. What counts to the far
+/// plane is depth, or distance where rays go aside.
+fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
+    let last = far.next_down();
+    let reach = frame.distance.as_deref_mut().filter(|_| aside);
+    for numbers in frame.depth.as_deref_mut().into_iter().chain(reach) {
+        numbers.iter_mut().filter(|number| number.is_finite()).for_each(|number| *number = number.min(last));
     }
 }
 

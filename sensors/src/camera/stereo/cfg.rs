@@ -5,14 +5,18 @@ use crate::camera::cfg::CameraCfg;
 use crate::camera::channel::Channels;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Extrinsics, Placement, Poses};
+use crate::camera::imperfection::Imperfections;
 use crate::camera::intrinsics::Intrinsics;
 use crate::camera::lens::Lens;
+use crate::camera::picture_noise::of_channels;
 use crate::camera::renderer::Renderer;
 use crate::error::SensorError;
+use crate::noise::NoiseCfg;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use nalgebra::{Translation3, UnitQuaternion};
 use scene::Pose;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Which point of the pair the extrinsics place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -49,6 +53,12 @@ pub struct StereoCameraCfg {
     pub lens_right: Option<Lens>,
     /// What the right eye measures; `None` is what the left one does.
     pub channels_right: Option<Channels>,
+    /// What is not perfect about the right eye, as [`CameraCfg::imperfections`]; `None` is what the left one has, of the channels
+    /// that the right one measures. A projector's [place](crate::camera::imperfection::Holes::baseline) is counted from each
+    /// eye.
+    pub imperfections_right: Option<Imperfections>,
+    /// Noise of the right eye, as [`CameraCfg::noise`]; `None` is the left one's, of the channels that the right one measures.
+    pub noise_right: Option<BTreeMap<String, NoiseCfg>>,
     /// Where the right eye is in the optical frame of the left one (x right, y down, z forward), whatever the convention of
     /// the extrinsics \[m\].
     pub left_to_right_pos: [f64; 3],
@@ -67,6 +77,8 @@ impl Default for StereoCameraCfg {
             intrinsics_right: None,
             lens_right: None,
             channels_right: None,
+            imperfections_right: None,
+            noise_right: None,
             left_to_right_pos: [0.05, 0.0, 0.0],
             left_to_right_rot: UnitQuaternion::identity(),
             origin: StereoOrigin::Middle,
@@ -116,10 +128,14 @@ impl StereoCameraCfg {
             let parent = self.camera.extrinsics.parent.clone();
             Extrinsics { parent, placement, convention: CameraConvention::Ros }
         };
+        let channels = self.channels_right.unwrap_or(self.camera.channels);
+        let (imperfections, noise) = (self.imperfections_right.as_ref(), self.noise_right.as_ref());
         let right = CameraCfg {
             intrinsics: self.intrinsics_right.unwrap_or(self.camera.intrinsics),
             lens: self.lens_right.unwrap_or(self.camera.lens),
-            channels: self.channels_right.unwrap_or(self.camera.channels),
+            channels,
+            imperfections: imperfections.cloned().unwrap_or_else(|| self.camera.imperfections.of_channels(channels)),
+            noise: noise.cloned().unwrap_or_else(|| of_channels(&self.camera.noise, channels)),
             extrinsics: at(left * left_from_right),
             renderer: match self.camera.renderer {
                 Renderer::RayTraced { samples, max_bounces, denoise, seed } => {
@@ -146,13 +162,15 @@ impl SensorCfg for StereoCameraCfg {
 
     /// # Errors
     ///
-    /// A place of the right eye that is none, and what is wrong with either eye as a [`CameraCfg`].
+    /// A place of the right eye that is none, and [`SensorError::Eye`] with what is wrong with either eye as a [`CameraCfg`].
     fn build(&self, context: &SensorContext) -> Result<StereoCamera, SensorError> {
         let [left, right] = self.eyes()?;
         // Noise and dropout are drawn by the name of the sensor: they must not be the same in both eyes. That of paths is by
         // the seed of the renderer, which `eyes` makes another one.
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
-        Ok(StereoCamera::new(left.build(context)?, right.build(&other)?, self.rig()?))
+        let [left, right] = [("left", left.build(context)), ("right", right.build(&other))]
+            .map(|(eye, camera)| camera.map_err(SensorError::of_eye(eye)));
+        Ok(StereoCamera::new(left?, right?, self.rig()?))
     }
 }

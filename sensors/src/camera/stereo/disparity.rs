@@ -1,14 +1,13 @@
 //! How far apart the eyes of a pair see the same point.
 
 use super::sensor::StereoCamera;
-use crate::camera::calibration::CameraInfo;
 use crate::camera::channel::Depth;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
 use ndarray::{Array1, Array3, ArrayView3, Axis};
 
 /// Lengths and angles smaller than this part of the baseline, or this many rad, are rounding.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Disparities, and of which pictures they are.
 #[derive(Clone, Debug, Default)]
@@ -24,8 +23,11 @@ impl StereoCamera {
     /// sees the same point, d = fx b / z with the focal length fx, the baseline b = `left_to_right_pos.x` and the depth z of
     /// the left eye (so that z = fx b / d). The point is at (u - d, v) in the right eye's picture, and at
     /// (u - d + cx_right - cx_left, v) where principal points differ. 0 where nothing was hit, which is where infinitely far
-    /// points are, whatever [`depth_miss`](crate::CameraCfg::depth_miss) says. It is exact, and says nothing of whether the
-    /// right eye sees the point: something may be in the way.
+    /// points are, whatever [`depth_miss`](crate::CameraCfg::depth_miss) says.
+    ///
+    /// It is of the depth that the left eye measures, at every pixel: exact where that is, and with its noise, its holes and its
+    /// imperfections where it has some (so an error of depth e is one of about d e / z of disparity). Nothing is matched: it says
+    /// nothing of whether the right eye sees the point, which something may be in the way of.
     ///
     /// Draws the left eye's pictures if nobody has yet.
     ///
@@ -63,31 +65,10 @@ impl StereoCamera {
         self.left().channels().depth && self.baseline().is_ok()
     }
 
-    /// The calibrations of both eyes in environment `env`, left and right, called `name` and `/left` or `/right`. Rectified
-    /// pictures have the principal points and focal lengths of raw ones. P of the right eye is
-    /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b = `left_to_right_pos.x` \[m\]: it brings points of
-    /// the *left* eye's optical frame into the right eye's picture. Source: ROS, message `sensor_msgs/CameraInfo`.
-    ///
-    /// # Errors
-    ///
-    /// As [`Camera::camera_info`](crate::Camera::camera_info), and [`CameraError::NotRectified`] where the eyes are not
-    /// parallel and side by side, or their intrinsics differ in more than cx.
-    pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
-        let left = self.left().camera_info(&format!("{name}/left"), env)?;
-        let mut right = self.right().camera_info(&format!("{name}/right"), env)?;
-        right.projection_matrix[(0, 3)] = -right.projection_matrix[(0, 0)] * self.side_by_side()?;
-        Ok([left, right])
-    }
-
-    /// Where the right eye is along x \[m\], if there is a disparity.
+    /// Where the right eye is along x \[m\], if there is a disparity: if rows of the pictures of both are the same.
     fn baseline(&self) -> Result<f64, CameraError> {
         self.left().must_be_pinhole("disparity")?;
         self.right().must_be_pinhole("disparity")?;
-        self.side_by_side()
-    }
-
-    /// Where the right eye is along x \[m\], if rows of the pictures of both are the same.
-    fn side_by_side(&self) -> Result<f64, CameraError> {
         let t = self.rig.left_from_right.translation.vector;
         let angle = self.rig.left_from_right.rotation.angle();
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });

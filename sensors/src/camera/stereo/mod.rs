@@ -2,7 +2,10 @@
 
 mod cfg;
 mod disparity;
+mod infos;
+mod rectify;
 mod sensor;
 
 pub use cfg::{StereoCameraCfg, StereoOrigin};
+pub use rectify::Rectification;
 pub use sensor::StereoCamera;

@@ -142,7 +142,7 @@ impl StereoCamera {
     ///
     /// # Errors
     ///
-    /// As [`Camera::set_intrinsics`]; nothing is changed then.
+    /// [`SensorError::Eye`] with those of [`Camera::set_intrinsics`]; nothing is changed then.
     pub fn set_intrinsics(
         &mut self,
         left: &[Intrinsics],
@@ -150,8 +150,8 @@ impl StereoCamera {
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
         self.both(|left_eye, right_eye| {
-            left_eye.set_intrinsics(left, env_ids)?;
-            right_eye.set_intrinsics(right.unwrap_or(left), env_ids)
+            left_eye.set_intrinsics(left, env_ids).map_err(SensorError::of_eye("left"))?;
+            right_eye.set_intrinsics(right.unwrap_or(left), env_ids).map_err(SensorError::of_eye("right"))
         })
     }
 

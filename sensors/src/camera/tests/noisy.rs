@@ -3,8 +3,9 @@
 //! Means of n numbers scatter by sigma / sqrt(n), variances by sqrt(2 / n) of themselves, correlations by 1 / sqrt(n): bounds
 //! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
 
-use super::super::{Camera, CameraCfg, Extrinsics, Placement};
-use super::stage::{BALL, DT, GROUND, SIZE, built, cfg, context, state};
+use super::super::imperfection::{DepthNoise, ReadNoise, ShotNoise};
+use super::super::{Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Lens, Placement, PointFrame, Renderer};
+use super::stage::{BALL, DT, GROUND, SIZE, bits, built, cfg, context, state};
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorContext};
 use ndarray::Axis;
@@ -79,6 +80,39 @@ fn environments_of_other_processes_have_the_same_noise() {
     assert_ne!(errors(&cfg, &whole, 1), errors(&cfg, &part, 1), "the control");
 }
 
+/// So have the imperfections: environment 7 alone looks as it does among eight.
+#[test]
+fn environments_of_other_processes_have_the_same_imperfections() {
+    let imperfections = Imperfections {
+        shot_noise: Some(ShotNoise { electrons: 500.0 }),
+        read_noise: Some(ReadNoise { std: 0.01 }),
+        depth_noise: Some(DepthNoise::NGUYEN),
+        ..Imperfections::default()
+    };
+    let cfg = CameraCfg { imperfections, ..down(&[]) };
+    // What the camera does not see, lamps and the ball, depends on the environment.
+    let at = |envs: usize, step: u64| {
+        let mut state = state(&vec![step; envs]);
+        state.visible.as_mut().unwrap().lights.iter_mut().for_each(|lamp| lamp.direction = [0.0, 0.3, -1.0]);
+        state
+    };
+    let seen = |context: &SensorContext, row: usize| {
+        let mut camera = built(&cfg, context);
+        [1, 2].map(|step| {
+            camera.update(&at(context.num_envs, step)).unwrap();
+            bits(&camera, [row])
+        })
+    };
+    let whole = context(8);
+    let alone = |first_env| seen(&SensorContext { first_env, ..context(1) }, 0);
+    // Not assert_eq: pictures are long.
+    assert!(alone(7) == seen(&whole, 7));
+    // The controls: another environment and another picture look otherwise.
+    assert!(alone(6) != seen(&whole, 7) && alone(6) == seen(&whole, 6));
+    let [first, second] = alone(7);
+    assert!(first != second);
+}
+
 #[test]
 fn biases_stay_until_the_reset_and_walk() {
     let context = context(1);
@@ -128,6 +162,49 @@ fn depths_are_whole_steps_within_what_is_seen() {
         [0.5, 3.0].iter().zip(&mut ends).for_each(|(end, count)| *count += usize::from(depth == end));
     }
     assert!(ends.iter().all(|count| *count > 50), "the control: noise reaches both ends, {ends:?}");
+}
+
+/// Root cause: noise saturates at the far plane, whose depth is what [`DepthMiss::Far`] says where nothing was hit: half of what
+/// was hit there was taken for a miss.
+#[test]
+fn noise_makes_no_miss_of_a_hit() {
+    let context = context(1);
+    let depth_noise = Some(DepthNoise { constant: 0.1, quadratic: 0.0, offset: 0.0 });
+    let spoilt = Imperfections { depth_noise, ..Imperfections::default() };
+    let equidistant = Lens::from_name("equidistant").unwrap();
+    for (lens, noise, imperfections) in [
+        (Lens::default(), vec![("depth", NoiseCfg::white(0.1))], Imperfections::default()),
+        (Lens::default(), vec![], spoilt.clone()),
+        (equidistant, vec![("distance", NoiseCfg::white(0.1))], Imperfections::default()),
+        (equidistant, vec![], spoilt),
+    ] {
+        let renderer = Renderer::FastRayTraced;
+        // Straight down; along the ray what is aside is too far away.
+        let far = if lens.is_pinhole() { 2.01 } else { 2.2 };
+        let cfg = CameraCfg { lens, renderer, imperfections, far, ..down(&noise) };
+        let hits = |camera: &Camera| camera.mask().unwrap().iter().filter(|id| **id != 0).count();
+        let mut counts = Vec::new();
+        for depth_miss in [DepthMiss::Inf, DepthMiss::Far, DepthMiss::Zero] {
+            let camera = built(&CameraCfg { depth_miss, ..cfg.clone() }, &context);
+            let points = camera.point_cloud(0, PointFrame::Camera).unwrap();
+            assert_eq!(points.nrows(), hits(&camera), "{depth_miss:?} {}", lens.name());
+            counts.push(points.nrows());
+            let reach = if lens.is_pinhole() { camera.depth() } else { camera.distance() };
+            let (far, reach) = (cfg.far as f32, reach.unwrap());
+            let misses = reach.iter().zip(camera.mask().unwrap()).filter(|(_, id)| **id == 0);
+            let missed = |x: f32| match depth_miss {
+                DepthMiss::Inf => x == f32::INFINITY,
+                DepthMiss::Far => x == far,
+                DepthMiss::Zero => x == 0.0,
+            };
+            assert!(misses.into_iter().all(|(x, _)| missed(*x)));
+            // The control: noise reaches the far plane at many pixels.
+            let last = reach.iter().filter(|x| x.is_finite() && **x >= far.next_down()).count();
+            assert!(depth_miss == DepthMiss::Zero || last > 100, "{last}");
+        }
+        assert!(counts[0] > 100 && counts.iter().all(|count| *count == counts[0]), "{counts:?}");
+        assert!(lens.is_pinhole() || counts[0] < SIZE[0] * SIZE[1]);
+    }
 }
 
 /// Channels have noise of their own, misses stay misses, and what has no noise is the truth.

@@ -1,7 +1,8 @@
 //! Rolling shutters and motion blur against closed forms.
 
+use super::super::lens::Equidistant;
 use super::super::{Aperture, Before, Camera, CameraCfg, CameraError, Channels, Frame, Opened, RasterCfg, Rasterizer};
-use super::super::{ParallelRasterizer, Renderer, Shot, Shutter, Take};
+use super::super::{LensRays, Optics, ParallelRasterizer, PixelIntrinsics, Renderer, Shot, Shutter, Take};
 use super::determinism::bits;
 use super::stage::{DT, SIZE, ball, built, cfg, context, state};
 use crate::error::SensorError;
@@ -97,6 +98,52 @@ fn a_moving_bar_is_sheared_by_its_speed_times_the_time_of_a_row() {
         let slope = (slopes[HEIGHT - 1] - slopes[0]) / (HEIGHT - 1) as f64;
         assert!((slope - speed * row_time * pixels).abs() < 0.002, "{slope} pixels a row");
     }
+}
+
+/// Behind a lens too each row sees the bar where it is at that row's instant: the ray of the pixel (u, v) of an equidistant lens
+/// is r / f from the axis, r from the principal point, and meets the plane of the bar at z tan(r / f).
+#[test]
+fn rows_behind_a_lens_see_their_own_instant() {
+    let (scene, view) = bar();
+    let (speed, row_time, before, f) = (3.0f64, 0.004, 0.2, 30.0);
+    let shutter = Shutter { row_time, exposure_time: 0.0 };
+    let channels = Channels { color: true, mask: true, depth: true, ..Channels::default() };
+    let (now, then) = (bar_at(0.3), bar_at((0.3 - speed * before) as f32));
+    let [cx, cy] = [WIDTH, HEIGHT].map(|side| 0.5 * side as f64);
+    let pixels = PixelIntrinsics { fx: f, fy: f, cx, cy };
+    let rays = LensRays::new(&Optics::new(Equidistant::default().into(), pixels).unwrap(), [WIDTH, HEIGHT], 1).unwrap();
+    let mut frame = Frame::new(WIDTH, HEIGHT, channels);
+    let view = View { fx: f as f32, fy: f as f32, ..view };
+    let shot = Shot { scene: &scene, poses: &now, view: &view, lights: None, lens: Some(&rays), before: None };
+    let opened = Some(Opened { poses: &then, world_from_camera: view.world_from_camera, before });
+    tracer(16, shutter).render_take(&shot, &Take { noise: 0, opened }, &mut frame.as_mut()).unwrap();
+    let (mask, depth, color) = (frame.mask.unwrap(), frame.depth.unwrap(), frame.color.unwrap());
+    // Whether the bar is at a point of the picture at an instant, and how many pixels from its edge, about.
+    let at = |u: f64, v: f64, late: f64| {
+        let r = (u - cx).hypot(v - cy);
+        let right = f64::from(DEPTH) * (r / f).tan() * (u - cx) / r;
+        let off = (right - (0.3 - speed * late)).abs() - f64::from(HALF);
+        // A pixel beside it is this much of the plane or more.
+        (off < 0.0, off.abs() * f / f64::from(DEPTH))
+    };
+    let (mut seen, mut of_the_stamp) = (0, 0);
+    for (y, x) in (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (y, x))) {
+        let (u, v, k) = (x as f64 + 0.5, y as f64 + 0.5, y * WIDTH + x);
+        let (inside, edge) = at(u, v, (HEIGHT - 1 - y) as f64 * row_time);
+        if edge < 0.01 {
+            continue;
+        }
+        assert_eq!(mask[k], if inside { 3 } else { 0 }, "({x}, {y}): {edge}");
+        assert!(!inside || (depth[k] - DEPTH).abs() < 1e-4, "{}", depth[k]);
+        seen += usize::from(inside);
+        // The control: with the bar where it is at the stamp most rows would be wrong.
+        of_the_stamp += usize::from(inside != at(u, v, 0.0).0);
+        // Paths of a pixel go through its square, half of a pixel to each side of its middle.
+        if edge > 1.0 {
+            assert_eq!(color[4 * k] > 0, inside, "({x}, {y}): {:?}", &color[4 * k..4 * k + 4]);
+        }
+    }
+    assert!(seen > 80 && of_the_stamp > 80, "{seen} {of_the_stamp}");
 }
 
 /// With the exposure e the bar is blurred: its variance is (v e f / z)² / 12 more, and its middle half of that behind.

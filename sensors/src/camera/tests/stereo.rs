@@ -1,10 +1,11 @@
 //! Pairs of eyes, held against cameras that stand alone and against the geometry of pairs.
 
 use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Intrinsics, Lens, Placement,
-    Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
+    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Lens,
+    Placement, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::camera::lens::OpenCvFisheye;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
@@ -13,6 +14,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use ndarray::array;
 use scene::Pose;
 use scene::pose::{from_row, to_row};
+use std::collections::BTreeMap;
 
 const BASELINE: f64 = 0.2;
 
@@ -149,8 +151,14 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
 fn disparity_leads_to_the_same_point_of_the_same_surface() {
     let context = context(2);
     let shifted = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
-    for intrinsics_right in [None, Some(shifted)] {
-        let mut stereo = of(&StereoCameraCfg { intrinsics_right, ..pair() }, &context);
+    for (renderer, intrinsics_right) in [
+        (Renderer::Raster, None),
+        (Renderer::Raster, Some(shifted)),
+        (Renderer::FastRayTraced, None),
+        (Renderer::FastRayTraced, Some(shifted)),
+    ] {
+        let camera = CameraCfg { renderer, ..cfg() };
+        let mut stereo = of(&StereoCameraCfg { camera, intrinsics_right, ..pair() }, &context);
         for steps in [[0, 0], [3, 4]] {
             stereo.refresh(&[0, 1], &state(&steps)).unwrap();
             let (judged, wrong) = reproject(&stereo, &steps, 1.0);
@@ -164,20 +172,26 @@ fn disparity_leads_to_the_same_point_of_the_same_surface() {
     }
 }
 
+/// Of what the left eye measures, noise included, which ends at the far plane: hits have one there too.
 #[test]
 fn disparity_is_the_closed_form_and_zero_on_a_miss() {
     let context = context(2);
-    for depth_miss in [DepthMiss::Inf, DepthMiss::Far, DepthMiss::Zero] {
-        let camera = CameraCfg { depth_miss, ..cfg() };
+    let misses = [DepthMiss::Inf, DepthMiss::Far, DepthMiss::Zero];
+    for (depth_miss, std) in misses.into_iter().flat_map(|miss| [(miss, 0.0), (miss, 0.5)]) {
+        let noise = [("depth".to_string(), NoiseCfg::white(std))].into();
+        let camera = CameraCfg { depth_miss, noise, far: 4.0, ..cfg() };
         let stereo = of(&StereoCameraCfg { camera, ..pair() }, &context);
         let (disparity, depth) = (stereo.disparity().unwrap(), stereo.left().depth().unwrap());
-        let mut misses = 0;
+        let (mut misses, mut last) = (0, 0);
         for ((d, z), id) in disparity.iter().zip(depth).zip(stereo.left().mask().unwrap()) {
             let expected = if *id == 0 { 0.0 } else { (40.0 * BASELINE / f64::from(*z)) as f32 };
             misses += usize::from(*id == 0);
+            last += usize::from(*id != 0 && *z >= 4f32.next_down());
             assert_eq!(*d, expected);
+            assert!(*id == 0 || *d > 0.0);
         }
         assert!(misses > 100, "{misses}");
+        assert!(std == 0.0 || last > 20, "the control: noise reaches the far plane, {last}");
     }
 }
 
@@ -233,6 +247,88 @@ fn noise_is_not_the_same_in_both_eyes() {
     let [left, right] = one_place(CameraCfg { renderer, ..cfg() });
     assert_eq!(left.0, right.0, "depth has no noise of paths");
     assert_ne!(left.1, right.1);
+}
+
+/// Root cause: the right eye took over the left one's noise and imperfections whatever it measures, so that no pair could be built
+/// whose right eye measures less.
+#[test]
+fn an_eye_has_the_faults_of_what_it_measures() {
+    let context = context(1);
+    let [colors, both] = [false, true].map(|depth| Channels { color: true, depth, ..Channels::default() });
+    let of_light = Imperfections { read_noise: Some(ReadNoise { std: 0.05 }), ..Imperfections::default() };
+    let imperfections = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), ..of_light.clone() };
+    let noise = |names: &[&str]| names.iter().map(|name| (name.to_string(), NoiseCfg::white(0.5))).collect();
+    let all_noise = noise(&["distance_to_image_plane", "rgb"]);
+    let camera = CameraCfg { channels: both, imperfections, noise: all_noise, ..cfg() };
+    let cfg = StereoCameraCfg { camera: camera.clone(), channels_right: Some(colors), ..pair() };
+    let stereo = of(&cfg, &context);
+    // The judge is a camera that stands alone where the right eye is, under its name, and has what faults of colours there are.
+    let extrinsics = cfg.eyes().unwrap()[1].extrinsics.clone();
+    let alone = CameraCfg { channels: colors, imperfections: of_light, noise: noise(&["color"]), extrinsics, ..camera };
+    let named = SensorContext { name: "/right".into(), ..context.clone() };
+    let color = |cfg: &CameraCfg| built(cfg, &named).color().unwrap().to_owned();
+    assert_eq!(stereo.right().color().unwrap(), color(&alone));
+    assert!(stereo.left().depth().is_ok() && stereo.right().depth().is_err());
+    // The controls: either fault is seen.
+    let quiet = CameraCfg { noise: BTreeMap::new(), ..alone.clone() };
+    let clean = CameraCfg { imperfections: Imperfections::default(), ..alone };
+    assert!(stereo.right().color().unwrap() != color(&quiet) && stereo.right().color().unwrap() != color(&clean));
+    // Faults of its own.
+    let (noise_right, imperfections_right) = (Some(BTreeMap::new()), Some(clean.imperfections.clone()));
+    let stereo = of(&StereoCameraCfg { noise_right, imperfections_right, ..cfg }, &context);
+    assert_eq!(stereo.right().color().unwrap(), color(&CameraCfg { noise: BTreeMap::new(), ..clean }));
+}
+
+/// Root cause: what was wrong with an eye was said of a camera, whichever of the two it was.
+#[test]
+fn what_is_wrong_with_an_eye_says_which() {
+    let context = context(1);
+    let [colors, depths] = [true, false].map(|color| Channels { color, depth: !color, ..Channels::default() });
+    let of_depth = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), ..Imperfections::default() };
+    let shadows = Imperfections { holes: Some(Holes::default()), ..Imperfections::default() };
+    let camera = CameraCfg { channels: colors, renderer: Renderer::FastRayTraced, ..cfg() };
+    let off = "the camera does not measure depth; it measures color";
+    let bent = "shadows of a projector (holes with a baseline other than 0): only of a pinhole camera, and this one has the lens";
+    let with_shadows = CameraCfg { channels: depths, imperfections: shadows.clone(), ..camera.clone() };
+    let lens_right = Some(fisheye());
+    for (cfg, expected) in [
+        // The left eye has its own faults only, whatever the right one measures.
+        (
+            StereoCameraCfg {
+                camera: CameraCfg { imperfections: of_depth.clone(), ..camera.clone() },
+                channels_right: Some(depths),
+                ..pair()
+            },
+            format!("the left eye: {off}"),
+        ),
+        // What is asked for is not left out.
+        (
+            StereoCameraCfg { camera: camera.clone(), imperfections_right: Some(of_depth.clone()), ..pair() },
+            format!("the right eye: {off}"),
+        ),
+        (
+            StereoCameraCfg { camera: with_shadows.clone(), lens_right, ..pair() },
+            format!("the right eye: {bent} opencv_fisheye"),
+        ),
+    ] {
+        let error = cfg.build(&context).unwrap_err().to_string();
+        assert!(error.starts_with(&expected), "{error}");
+    }
+    // All of them can be had by what is of the right eye.
+    let (channels_right, imperfections_right) = (Some(depths), Some(of_depth));
+    let cfg = StereoCameraCfg { camera, channels_right, imperfections_right, ..pair() };
+    assert!(of(&cfg, &context).right().depth().is_ok());
+    let imperfections_right =
+        Some(Imperfections { holes: Some(Holes { baseline: 0.0, ..Holes::default() }), ..shadows });
+    let cfg = StereoCameraCfg { camera: with_shadows, lens_right, imperfections_right, ..pair() };
+    assert!(of(&cfg, &context).right().depth().is_ok());
+    // As scene files have them.
+    let text = "imperfections_right.holes.baseline = 0.0\nnoise_right.depth.std = 0.01\n[camera]\nchannels = ['depth']";
+    let read: StereoCameraCfg = toml::from_str(text).unwrap();
+    assert_eq!(read.imperfections_right, cfg.imperfections_right);
+    assert_eq!(read.noise_right, Some([("depth".to_string(), NoiseCfg::white(0.01))].into()));
+    assert_eq!(toml::from_str::<StereoCameraCfg>(&toml::to_string(&read).unwrap()).unwrap(), read);
+    assert_eq!(toml::from_str::<StereoCameraCfg>("").unwrap(), StereoCameraCfg::default());
 }
 
 #[test]
@@ -315,7 +411,10 @@ fn what_has_no_disparity_is_said() {
     let bad = StereoCameraCfg { left_to_right_pos: [f64::NAN, 0.0, 0.0], ..pair() };
     assert!(matches!(bad.build(&context), Err(SensorError::Camera(CameraError::Pose { .. }))));
     let bad = StereoCameraCfg { intrinsics_right: lens(0.0, 1.0, 1.0), ..pair() };
-    assert!(matches!(bad.build(&context), Err(SensorError::Camera(CameraError::Lens { .. }))));
+    let error = bad.build(&context).unwrap_err();
+    assert_eq!(error.to_string(), "the right eye: fx of the lens is 0; it must be positive and finite");
+    let SensorError::Eye { eye: "right", error } = error else { panic!("{error}") };
+    assert!(matches!(*error, SensorError::Camera(CameraError::Lens { .. })), "{error}");
 }
 
 /// A fisheye lens, which needs rays.
@@ -402,8 +501,5 @@ fn calibrations_of_a_pair_project_points_of_the_left_eye() {
     }
     let again = crate::camera::CameraInfo::parse(&right.to_yaml(), "right.yaml").unwrap();
     assert_eq!(again, right);
-    let tilted = StereoCameraCfg { left_to_right_pos: [0.1, 0.01, 0.0], ..pair() };
-    let error = of(&tilted, &context).camera_info("head", 0).unwrap_err();
-    assert!(matches!(error, SensorError::Camera(CameraError::NotRectified { .. })), "{error}");
     assert!(stereo.camera_info("head", 2).is_err());
 }

@@ -1,0 +1,84 @@
+//! What recordings say of pairs of eyes.
+
+use super::*;
+use crate::{Recording, Wanted};
+use sensors::StereoCameraCfg;
+use sensors::camera::StereoCamera;
+
+/// A pair of small eyes, the right one turned and askew.
+fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
+    let camera = CameraCfg {
+        width: 16,
+        height: 12,
+        intrinsics: Intrinsics::Pixels { fx: 20.0, fy: 21.0, cx: 8.5, cy: 5.5 },
+        channels: Channels { depth: true, ..Channels::default() },
+        ..CameraCfg::default()
+    };
+    let left_to_right_rot = scene::pose::from_xyz_rpy([0.0; 3], [0.02, -0.1, 0.03]).rotation;
+    StereoCameraCfg { camera, left_to_right_pos, left_to_right_rot, ..StereoCameraCfg::default() }
+}
+
+/// Root cause: R and P of a pair were made of its baseline alone, which a pair that is not parallel was said to have none of: P of its
+/// right eye had no fourth column, R was the identity, and nobody was told.
+#[test]
+fn recorded_calibrations_of_a_pair_rectify_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (archive, messages) = (folder.path().join("run.npz"), folder.path().join("run.mcap"));
+    let mut sim = falling(2);
+    let id: SensorId<StereoCamera> = sim.add_sensor("eyes", toed_in([0.1, 0.01, -0.02])).unwrap();
+    let recorders = [&archive, &messages].map(|path| sim.record(RecorderCfg::new(path)).unwrap());
+    sim.update(1);
+    // Another lens, from then on: in this environment only.
+    let wide = [Intrinsics::Pixels { fx: 15.0, fy: 14.0, cx: 7.0, cy: 6.0 }];
+    sim.sensor_mut(id).unwrap().set_intrinsics(&wide, None, Some(&[1])).unwrap();
+    sim.update(1);
+    let expected = [0, 1].map(|env| sim.sensor(id).unwrap().camera_info("eyes", env).unwrap());
+    for recorder in recorders {
+        assert!(sim.finish_recording(recorder).unwrap().left_out.iter().all(|what| !what.contains("camera_info")));
+    }
+    assert_ne!(expected[0], expected[1]);
+    let recording = Recording::open(&messages).unwrap();
+    for (k, eye) in ["left", "right"].into_iter().enumerate() {
+        for (env, infos) in expected.iter().enumerate() {
+            let (r, p) = (infos[k].rectification_matrix.transpose(), infos[k].projection_matrix.transpose());
+            let topic = format!("/env_{env}/eyes/{eye}/camera_info");
+            let read = |field: &str, count: usize| -> Vec<f64> {
+                let wanted: Vec<Wanted> = (0..count).map(|i| Wanted::new(&topic, format!("{field}[{i}]"))).collect();
+                let last = |samples: &crate::Samples| *samples.values.last().unwrap();
+                recording.samples(&wanted).unwrap().iter().map(last).collect()
+            };
+            assert_eq!((read("r", 9), read("p", 12)), (r.as_slice().to_vec(), p.as_slice().to_vec()), "{topic}");
+        }
+        // Archives count pixels as cameras do.
+        let [r, p] = ["rectification", "projection"].map(|part| array(&archive, &format!("eyes/{eye}/lens/{part}")));
+        let (last_r, last_p) = (&r[r.len() - 9..], &p[p.len() - 12..]);
+        let found = sim.sensor(id).unwrap().rectification(1).unwrap();
+        assert_eq!(last_r, found.rotations[k].transpose().as_slice());
+        assert_eq!(last_p, found.projections[k].transpose().as_slice());
+    }
+    // The control: the baseline is there, and so is the turn.
+    assert!(
+        expected[1][1].projection_matrix[(0, 3)] < -1.0 && expected[1][1].rectification_matrix[(0, 2)].abs() > 0.01
+    );
+}
+
+/// What has no R and P is told, and is recorded as a camera alone.
+#[test]
+fn pairs_that_cannot_be_rectified_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = falling(1);
+    sim.add_sensor("eyes", toed_in([-0.1, 0.0, 0.0])).unwrap();
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(1);
+    let left_out = sim.finish_recording(recorder).unwrap().left_out;
+    for eye in ["left", "right"] {
+        let said =
+            format!("R and P of eyes/{eye}/camera_info (the pictures of these eyes cannot be rectified: how far");
+        assert!(left_out.iter().any(|what| what.starts_with(&said)), "{left_out:?}");
+    }
+    let recording = Recording::open(&path).unwrap();
+    let wanted = ["r[0]", "p[0]", "p[2]", "p[3]"].map(|field| Wanted::new("/env_0/eyes/right/camera_info", field));
+    let found: Vec<f64> = recording.samples(&wanted).unwrap().iter().map(|samples| samples.values[0]).collect();
+    assert_eq!(found, [1.0, 20.0, 8.0, 0.0]);
+}
