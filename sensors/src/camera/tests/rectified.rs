@@ -1,6 +1,6 @@
 //! Calibrations of pairs: against OpenCV's numbers, by the definition of R and P, and there and back.
 
-use super::super::lens::{Equidistant, OpenCv, OpenCvFisheye};
+use super::super::lens::{Equisolid, OpenCv, OpenCvFisheye};
 use super::super::{
     CalibrationError, CameraCfg, CameraError, CameraInfo, DistortionModel, Intrinsics, Lens, Optics, PixelIntrinsics,
     Rectification, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin,
@@ -306,10 +306,10 @@ fn what_cannot_be_rectified_is_said() {
         assert!(!said.contains("disparity") && stereo.disparity().unwrap_err().to_string().contains("disparity"));
     }
     // What ROS has no words for is said as of a camera alone, whatever the eyes' places.
-    let camera = CameraCfg { lens: Equidistant::default().into(), renderer: Renderer::FastRayTraced, ..cfg() };
+    let camera = CameraCfg { lens: Equisolid::default().into(), renderer: Renderer::FastRayTraced, ..cfg() };
     let stereo = built(&StereoCameraCfg { camera, ..pairs()[2].clone() });
     let error = stereo.camera_info("head", 0).unwrap_err();
-    assert!(matches!(error, SensorError::Calibration(CalibrationError::Lens { lens: "equidistant", .. })), "{error}");
+    assert!(matches!(error, SensorError::Calibration(CalibrationError::Lens { lens: "equisolid", .. })), "{error}");
     // How they are rectified is known all the same.
     assert!(stereo.rectification(1).is_ok() && stereo.rectification(2).is_err());
 }
