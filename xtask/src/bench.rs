@@ -194,9 +194,8 @@ fn heading(machine: &str) -> String {
          everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the rival ran in one run, \
          in turns. Numbers are medians of the turns; so is the ratio, which is taken turn by turn and need not be that of the \
          medians. `ratio > 1`: ours is faster. `-`: there is no rival, it was not on the machine, or it has another MuJoCo. \
-         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves. Against an `aim` of `trace`, \
-         and for the other rays there, stands the repetition that a tenth of all are faster than: an aim is about a core that nobody \
-         else uses.\n\n`plain` pictures have one sample per pixel and no shadows, `full` ones four and shadows; `MuJoCo on OSMesa` is \
+         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves. Rows of `trace` in \
+         percent say where the time goes: what the same work takes that leaves something out, in turns with all of it.\n\n`plain` pictures have one sample per pixel and no shadows, `full` ones four and shadows; `MuJoCo on OSMesa` is \
          `mujoco.Renderer` at its best settings, `by hand` the same library with as few passes as there can be. `scans` are \
          height scans, whose rays are parallel; `fans` are rays from one point.\n\nRivals in Python: {}, and \
          the `mujoco` of the row.\n",
