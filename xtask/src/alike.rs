@@ -8,8 +8,9 @@ const DEPTH: f32 = 1e-4;
 /// Neighbours are of one surface where their depths differ by no more than this part.
 const SURFACE: f32 = 0.1;
 
-/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes, and different colours.
-pub(crate) fn check(ours: &Path, other: &Path) -> Result<(), String> {
+/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes, and, where `lit` is whether their renderers
+/// have light of their own each, other pictures.
+pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> {
     let names = |folder: &Path| -> Result<Vec<String>, String> {
         let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
@@ -37,7 +38,7 @@ pub(crate) fn check(ours: &Path, other: &Path) -> Result<(), String> {
         }
     }
     let read = |folder: &Path, name: &String| fs::read(folder.join(name)).map_err(|e| format!("{name}: {e}"));
-    for picture in here.iter().filter(|name| name.ends_with(".png")) {
+    for picture in here.iter().filter(|name| lit && (name.starts_with("color") || name.starts_with("sensor_views"))) {
         if read(ours, picture)? == read(other, picture)? {
             return Err(format!("{picture} of {} and {} are one picture", ours.display(), other.display()));
         }
@@ -136,7 +137,8 @@ mod tests {
         };
         assert_eq!(compare(&seen(&ours), &seen(&folder(0.0, 8, ""))), Ok((4, 0)));
         assert_eq!(compare(&seen(&ours), &seen(&folder(0.001, 8, ""))), Ok((4, 2)));
-        let verdict = |other: tempfile::TempDir| check(ours.path(), other.path());
+        assert_eq!(check(ours.path(), folder(0.0, 8, "ours").path(), false), Ok(()));
+        let verdict = |other: tempfile::TempDir| check(ours.path(), other.path(), true);
         assert_eq!(verdict(folder(0.0002, 8, "other")), Ok(()));
         let said = |other| verdict(other).expect_err("they differ");
         assert!(said(folder(0.001, 8, "other")).contains("differ at 2 of 4 pixels"));
