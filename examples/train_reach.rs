@@ -34,7 +34,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Learns to reach random targets and counts before and after.
 #[derive(Debug, Parser)]
 #[command(name = "train_reach", mut_arg("num_envs", |arg| arg.default_value("256")))]
-struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     launcher: Launcher,
     /// Changes of the policy
@@ -52,7 +52,7 @@ struct Args {
 }
 
 /// Targets that every change is tried on.
-const TARGETS: usize = 8;
+pub(crate) const TARGETS: usize = 8;
 /// The box of targets: its middle and half of its sides \[m\]. The tip starts at (0.54, 0.14, 0.37).
 const MIDDLE: [f64; 3] = [0.5, 0.1, 0.45];
 const HALF: [f64; 3] = [0.12, 0.3, 0.15];
@@ -161,7 +161,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
 }
 
 /// The arm, what it is to do, what it sees and is rewarded for.
-fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<Env> {
+pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<Env> {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         arena_space: args.launcher.arena_space.unwrap_or(1.6),
         ..args.launcher.simulation()?
@@ -346,52 +346,4 @@ fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     let reached: Vec<f64> = rows.iter().map(|row| row[2]).collect();
     let drawn = curve::draw("share of targets reached while trying changes, by iteration", &reached);
     picture::write_png(&out.join("curve.png"), &drawn)
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-mod tests {
-    use super::*;
-    use kinetoscope::env::{EnvError, Finding, Info, Space, Step, check};
-
-    /// Says that nobody knows what was earned.
-    struct Unsure(Env);
-
-    impl VectorEnv for Unsure {
-        type Error = EnvError;
-        type Info = Info;
-
-        fn num_envs(&self) -> usize {
-            self.0.num_envs()
-        }
-
-        fn observation_space(&self) -> &Space {
-            self.0.observation_space()
-        }
-
-        fn action_space(&self) -> &Space {
-            self.0.action_space()
-        }
-
-        fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
-            self.0.reset(mask, seed)
-        }
-
-        fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step, EnvError> {
-            let mut step = self.0.step(actions)?;
-            step.rewards.fill(f64::NAN);
-            Ok(step)
-        }
-    }
-
-    #[test]
-    fn the_task_keeps_what_tasks_promise() {
-        let args = Args::parse_from(["train_reach", "--headless", "--num-envs", "16"]);
-        let mut env = task(&args, Arc::new(AtomicUsize::new(TARGETS))).unwrap();
-        let findings = check(&mut env, 7);
-        assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
-        // The control.
-        let findings = check(&mut Unsure(env), 7);
-        assert!(findings.iter().any(|finding| matches!(finding, Finding::Reward { .. })), "{findings:?}");
-    }
 }

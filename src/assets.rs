@@ -45,16 +45,3 @@ fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetMissing> 
         None => Err(AssetMissing { asset: asset.to_path_buf(), tried }),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shipped_assets_are_found_and_a_miss_lists_the_places() {
-        assert!(path("sr5/SR5.urdf").is_ok_and(|p| p.is_file()));
-        let miss = resolve(Path::new("no/such.urdf"), Some("elsewhere".into()));
-        let text = miss.map_err(|e| e.to_string()).err().unwrap_or_default();
-        assert!(text.contains("elsewhere/no/such.urdf") && text.contains("assets/no/such.urdf"), "{text}");
-    }
-}

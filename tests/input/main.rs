@@ -3,11 +3,15 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accepted;
+mod assets;
 mod configuration;
 mod every_writer;
+mod export;
+mod inspect_robot;
 mod located;
 mod names;
 mod refused;
 mod self_collision;
 mod support;
+mod urdf;
 mod writers;

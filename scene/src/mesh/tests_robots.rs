@@ -23,23 +23,9 @@ impl Random {
     }
 }
 
-/// The folder of robot descriptions: `KINETOSCOPE_ROBOTS`, or `shared/robots` in a folder above this crate.
-pub(super) fn robots() -> Option<PathBuf> {
-    let named = std::env::var_os("KINETOSCOPE_ROBOTS").map(PathBuf::from);
-    let above = || {
-        let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-        here.ancestors().map(|dir| dir.join("shared/robots")).find(|dir| dir.is_dir())
-    };
-    let found = named.or_else(above).filter(|dir| dir.is_dir());
-    if found.is_none() {
-        println!("skipped: no robot descriptions; set KINETOSCOPE_ROBOTS to their folder");
-    }
-    found
-}
-
 /// All files below the robots with an extension, sorted.
 pub(super) fn files(extension: &str) -> Vec<PathBuf> {
-    let mut folders: Vec<PathBuf> = robots().into_iter().collect();
+    let mut folders = vec![testkit::needs::robots_dir()];
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -110,9 +96,10 @@ fn assert_bounds(name: &str, mesh: &TriMesh, lo: [f32; 3], hi: [f32; 3]) {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn anymal_agrees_with_pycollada() {
     let files = files("dae");
-    for (name, triangles, lo, hi) in ANYMAL.into_iter().filter(|_| !files.is_empty()) {
+    for (name, triangles, lo, hi) in ANYMAL.into_iter() {
         let path = files.iter().find(|p| p.ends_with(name)).unwrap();
         let mesh = load(path).unwrap();
         assert_eq!(mesh.triangles.len(), triangles, "{name}");
@@ -136,8 +123,9 @@ fn anymal_agrees_with_pycollada() {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn anymal_base_has_six_materials_in_three_instances() {
-    let Some(robots) = robots() else { return };
+    let robots = testkit::needs::robots_dir();
     let mesh = load(&robots.join("anymal_c_simple_description/meshes/base.dae")).unwrap();
     let counts: Vec<usize> = mesh.parts.iter().map(|p| p.triangles.len()).collect();
     assert_eq!(counts, [234, 329, 2221, 658, 746, 88]);
@@ -152,9 +140,10 @@ fn anymal_base_has_six_materials_in_three_instances() {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn vendor_stl_agrees_with_trimesh() {
     let files = stl_files();
-    for ((name, triangles, vertices), lo, hi) in STL.into_iter().filter(|_| !files.is_empty()) {
+    for ((name, triangles, vertices), lo, hi) in STL.into_iter() {
         let path = files.iter().find(|p| p.ends_with(name)).unwrap();
         let mesh = load(path).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (triangles, vertices), "{name}");

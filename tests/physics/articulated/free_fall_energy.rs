@@ -25,7 +25,7 @@ use crate::law::{law, worse};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::{Point3, Vector3};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What the energy does in a fall, and what the robot weighs \[kg\].
 #[derive(Debug)]
@@ -153,15 +153,9 @@ fn holds() {
 
 /// The formula on ANYbotics' own ANYmal C, where its description is there.
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn holds_for_the_vendors_robot() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let given = std::env::var_os("KINETOSCOPE_ROBOTS").map(PathBuf::from);
-    let folders = given.into_iter().chain(here.ancestors().map(|dir| dir.join("shared/robots")));
-    let mut files = folders.map(|dir| dir.join("anymal_c_simple_description/urdf/anymal.urdf"));
-    let Some(path) = files.find(|path| path.is_file()) else {
-        println!("skipped: the vendor's ANYmal C is not there; set KINETOSCOPE_ROBOTS to the folder of robots");
-        return;
-    };
+    let path = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
     let fall = |cfg| fallen(path.clone(), cfg, 2.0, 0.0, [0.0; 3]);
     let (euler, exact) = (fall(earth()), fall(rk4(earth())));
     assert!((euler.mass - 52.13485).abs() < 1e-5, "{}", euler.mass);

@@ -5,7 +5,6 @@ use super::super::{RenderMesh, Shape, Sphere};
 use super::{Level, MIN_TRIANGLES, chain};
 use crate::mesh::{TriMesh, load};
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
 
 type V = [f64; 3];
 
@@ -119,17 +118,10 @@ fn sphere() -> RenderMesh {
     render(&Shape::from(Sphere { radius: 0.3 }).tessellate(316))
 }
 
-/// A link of the vendor's robot, where it is present: `KINETOSCOPE_ROBOTS`, or `shared/robots` in a folder above.
-fn vendor(link: &str) -> Option<RenderMesh> {
-    let named = std::env::var_os("KINETOSCOPE_ROBOTS").map(std::path::PathBuf::from);
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let above = || here.ancestors().map(|dir| dir.join("shared/robots")).find(|dir| dir.is_dir());
-    let Some(folder) = named.or_else(above).filter(|dir| dir.is_dir()) else {
-        println!("skipped: no robot descriptions; set KINETOSCOPE_ROBOTS to their folder");
-        return None;
-    };
-    let file = folder.join(format!("rokae_description/meshes/xMateSR5/visual/xMateSR5_{link}.stl"));
-    Some(render(&load(&file).unwrap().scaled([0.001; 3])))
+/// A link of the vendor's SR5.
+fn vendor(link: &str) -> RenderMesh {
+    let file = format!("rokae_description/meshes/xMateSR5/visual/xMateSR5_{link}.stl");
+    render(&load(&testkit::needs::robot(&file)).unwrap().scaled([0.001; 3]))
 }
 
 /// How often each directed edge occurs.
@@ -212,9 +204,10 @@ fn bounds_hold_on_a_plate_with_fillets() {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn bounds_hold_on_the_vendors_robot() {
     for link in ["base", "link1"] {
-        let Some(mesh) = vendor(link) else { return };
+        let mesh = vendor(link);
         check(link, &mesh, &[13_000, 9_200, 6_300, 4_300]);
     }
 }

@@ -6,27 +6,11 @@ use crate::visibility::View;
 use scene::mesh::load;
 use scene::shape::Mesh;
 use scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The folder of robot descriptions: `KINETOSCOPE_ROBOTS`, or `shared/robots` in a folder above this crate.
-fn robots() -> Option<PathBuf> {
-    let named = std::env::var_os("KINETOSCOPE_ROBOTS").map(PathBuf::from);
-    let above = || {
-        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        here.ancestors().map(|dir| dir.join("shared/robots")).find(|dir| dir.is_dir())
-    };
-    let found = named.or_else(above).filter(|dir| dir.is_dir());
-    if found.is_none() {
-        println!("skipped: no robot descriptions; set KINETOSCOPE_ROBOTS to their folder");
-    }
-    found
-}
-
 /// So many of the vendor's SR5, one beside the other, on a checkered ground; mask ids count links.
-pub(super) fn sr5(copies: usize) -> Option<(RenderScene, Vec<PoseF32>)> {
-    let folder = robots()?;
-    let meshes = folder.join("rokae_description/meshes/xMateSR5/visual");
+pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
+    let meshes = testkit::needs::robot("rokae_description/urdf/SR5.urdf").join("../../meshes/xMateSR5/visual");
     // The joint frames at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
     let links: [(&str, [f64; 3], [f64; 3]); 7] = [
         ("base", [0.; 3], [0.; 3]),
@@ -57,7 +41,7 @@ pub(super) fn sr5(copies: usize) -> Option<(RenderScene, Vec<PoseF32>)> {
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights[0].direction = [0.1, 0.8, -1.0];
     scene.haze = Some(scene::Haze { color: None, start: 4.0, end: 40.0 });
-    Some((scene, poses))
+    (scene, poses)
 }
 
 /// A camera that sees one of them, or three.
@@ -67,8 +51,9 @@ pub(super) fn sr5_view(copies: usize, size: [usize; 2]) -> View {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn sr5_is_drawn_from_its_own_meshes() {
-    let Some((scene, poses)) = sr5(1) else { return };
+    let (scene, poses) = sr5(1);
     let view = sr5_view(1, [640, 480]);
     let frame = save("sr5", &scene, &poses, &view);
     let mask = frame.mask.unwrap();
@@ -79,8 +64,9 @@ fn sr5_is_drawn_from_its_own_meshes() {
 }
 
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn three_sr5_are_drawn_from_their_own_meshes() {
-    let Some((scene, poses)) = sr5(3) else { return };
+    let (scene, poses) = sr5(3);
     let view = sr5_view(3, [640, 480]);
     let frame = save("three-sr5", &scene, &poses, &view);
     let mask = frame.mask.unwrap();
@@ -91,9 +77,9 @@ fn three_sr5_are_drawn_from_their_own_meshes() {
 
 /// The meshes of ANYmal's base, each with its JPEG texture.
 #[test]
+#[ignore = "needs real robots: cargo xtask test"]
 fn anymal_is_drawn_with_its_textures() {
-    let Some(folder) = robots() else { return };
-    let meshes = folder.join("anymal_c_simple_description/meshes");
+    let meshes = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").join("../../meshes");
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
     let parts: [(&str, [f64; 3], [f64; 3]); 5] = [

@@ -1,0 +1,255 @@
+//! Chromium without a screen, driven over its DevTools protocol: one WebSocket, and JSON.
+
+use serde_json::{Value, json};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use tungstenite::{Message, WebSocket};
+
+/// More than anything here takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(90);
+
+/// A browser of our own, with an empty profile; it ends when it is dropped.
+pub(crate) struct Chromium {
+    process: Child,
+    wire: Mutex<Wire>,
+    _profile: TempDir,
+    _alone: MutexGuard<'static, ()>,
+}
+
+/// One at a time: a machine of two cores draws, steps and shows in each test already.
+static ONE: Mutex<()> = Mutex::new(());
+
+struct Wire {
+    socket: WebSocket<TcpStream>,
+    next: u64,
+    /// What happened while answers were waited for.
+    events: Vec<Value>,
+}
+
+impl Chromium {
+    /// Starts it.
+    pub(crate) fn start(program: &Path) -> Self {
+        let alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let profile = tempfile::tempdir().unwrap();
+        // Its sandbox does not work for root, nor in most containers; the only page it opens is our own.
+        let process = Command::new(program)
+            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
+            .args(["--disable-background-networking", "--disable-extensions", "--mute-audio", "--hide-scrollbars"])
+            .args(["--remote-debugging-port=0", "--window-size=1400,900"])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // It writes where it listens: the port, and the path of its WebSocket.
+        let file = profile.path().join("DevToolsActivePort");
+        let start = Instant::now();
+        let (port, path) = loop {
+            assert!(start.elapsed() < PATIENCE, "Chromium does not start");
+            let text = std::fs::read_to_string(&file).unwrap_or_default();
+            if let Some((port, path)) = text.trim().split_once('\n') {
+                break (port.parse::<u16>().unwrap(), path.trim().to_string());
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = tungstenite::client(format!("ws://127.0.0.1:{port}{path}"), stream).unwrap();
+        Self {
+            process,
+            wire: Mutex::new(Wire { socket, next: 0, events: Vec::new() }),
+            _profile: profile,
+            _alone: alone,
+        }
+    }
+
+    fn wire(&self) -> MutexGuard<'_, Wire> {
+        self.wire.lock().unwrap()
+    }
+
+    /// Opens a page.
+    pub(crate) fn open(&self, url: &str) -> Tab<'_> {
+        let target = self.wire().ask(None, "Target.createTarget", json!({"url": "about:blank"}));
+        let attach = json!({"targetId": target["targetId"], "flatten": true});
+        let session = self.wire().ask(None, "Target.attachToTarget", attach)["sessionId"].as_str().unwrap().to_string();
+        let mut tab = Tab { browser: self, session };
+        for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
+            tab.ask(domain, json!({}));
+        }
+        tab.ask("Page.navigate", json!({"url": url}));
+        tab.wait_until("the page", "document.readyState === 'complete' && document.getElementById('link') !== null");
+        tab
+    }
+}
+
+impl Drop for Chromium {
+    fn drop(&mut self) {
+        // Asked, it ends its helpers too.
+        if let Ok(mut wire) = self.wire.lock() {
+            let _ = wire.socket.send(Message::text(json!({"id": 0, "method": "Browser.close"}).to_string()));
+        }
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(5) {
+            if matches!(self.process.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Wire {
+    /// Asks, and waits for the answer.
+    fn ask(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
+        self.next += 1;
+        let mut message = json!({"id": self.next, "method": method, "params": params});
+        if let Some(session) = session {
+            message["sessionId"] = json!(session);
+        }
+        self.socket.send(Message::text(message.to_string())).unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else { continue };
+            let message: Value = serde_json::from_str(&text).unwrap();
+            if message["id"] == self.next {
+                assert!(message["error"].is_null(), "{method}: {}", message["error"]);
+                return message["result"].clone();
+            }
+            self.events.push(message);
+        }
+    }
+}
+
+/// A page.
+pub(crate) struct Tab<'a> {
+    browser: &'a Chromium,
+    session: String,
+}
+
+impl Tab<'_> {
+    fn ask(&mut self, method: &str, params: Value) -> Value {
+        self.browser.wire().ask(Some(&self.session), method, params)
+    }
+
+    /// The value of an expression in the page.
+    pub(crate) fn evaluate(&mut self, expression: &str) -> Value {
+        let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
+        let answer = self.ask("Runtime.evaluate", params);
+        assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].clone()
+    }
+
+    /// Waits until an expression is true.
+    pub(crate) fn wait_until(&mut self, what: &str, expression: &str) {
+        let start = Instant::now();
+        // While the page is being loaded there is nothing to ask.
+        let wanted = format!("(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()");
+        while self.evaluate(&wanted) != true {
+            assert!(start.elapsed() < PATIENCE, "waited for {what}: {:?}", self.complaints());
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
+    /// Where an element is: left edge, vertical middle, width, height \[CSS pixels\]. It is scrolled into view.
+    pub(crate) fn rectangle(&mut self, element: &str) -> [f64; 4] {
+        let rectangle = self.evaluate(&format!(
+            "(() => {{ const e = {element}; e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
+             const r = e.getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width, r.height]; }})()"
+        ));
+        [0, 1, 2, 3].map(|k| rectangle[k].as_f64().unwrap())
+    }
+
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], pressed: bool, ctrl: bool) {
+        let (buttons, modifiers) = (u8::from(pressed), 2 * u8::from(ctrl));
+        let params = json!({"type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1,
+                            "modifiers": modifiers});
+        self.ask("Input.dispatchMouseEvent", params);
+    }
+
+    /// Clicks on the middle of an element.
+    pub(crate) fn click(&mut self, element: &str) {
+        let [x, y, width, _] = self.rectangle(element);
+        self.drag([x + 0.5 * width, y], [x + 0.5 * width, y]);
+    }
+
+    /// Drags with the mouse.
+    pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
+        self.hold(from, to, false);
+        self.mouse("mouseReleased", to, false, false);
+    }
+
+    /// Drags, with Ctrl pressed or not, and does not let go.
+    pub(crate) fn hold(&mut self, from: [f64; 2], to: [f64; 2], ctrl: bool) {
+        self.mouse("mouseMoved", from, false, ctrl);
+        self.mouse("mousePressed", from, true, ctrl);
+        for k in 1..=5 {
+            let part = f64::from(k) / 5.0;
+            self.mouse("mouseMoved", [0, 1].map(|i| from[i] + part * (to[i] - from[i])), true, ctrl);
+        }
+    }
+
+    /// Lets go.
+    pub(crate) fn let_go(&mut self, at: [f64; 2]) {
+        self.mouse("mouseReleased", at, false, false);
+    }
+
+    /// Chooses in a list.
+    pub(crate) fn choose(&mut self, id: &str, value: &str) {
+        self.evaluate(&format!(
+            "(() => {{ const s = document.getElementById('{id}'); s.value = '{value}'; \
+             s.dispatchEvent(new Event('change')); }})()"
+        ));
+    }
+
+    /// Light or dark, in a window of another size \[CSS pixels\].
+    pub(crate) fn show_as(&mut self, scheme: &str, [width, height]: [u32; 2]) {
+        let feature = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+        self.ask("Emulation.setEmulatedMedia", feature);
+        let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        self.ask("Emulation.setDeviceMetricsOverride", size);
+    }
+
+    /// What is seen, as PNG.
+    pub(crate) fn screenshot(&mut self) -> Vec<u8> {
+        let answer = self.ask("Page.captureScreenshot", json!({"format": "png"}));
+        decode_base64(answer["data"].as_str().unwrap())
+    }
+
+    /// Errors of the page's program, and what its browser did not let it do.
+    pub(crate) fn complaints(&mut self) -> Vec<String> {
+        // What happened before this answer has been told before it.
+        self.ask("Runtime.evaluate", json!({"expression": "0"}));
+        let wire = self.browser.wire();
+        let own = wire.events.iter().filter(|event| event["sessionId"] == self.session.as_str());
+        let bad = own.filter(|event| {
+            event["method"] == "Runtime.exceptionThrown"
+                || event["method"] == "Runtime.consoleAPICalled" && event["params"]["type"] == "error"
+                || event["method"] == "Log.entryAdded" && event["params"]["entry"]["level"] == "error"
+        });
+        bad.map(|event| event["params"].to_string()).collect()
+    }
+}
+
+/// RFC 4648, section 4.
+fn decode_base64(text: &str) -> Vec<u8> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => u32::from(c - b'A'),
+        b'a'..=b'z' => u32::from(c - b'a') + 26,
+        b'0'..=b'9' => u32::from(c - b'0') + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let digits: Vec<u8> = text.bytes().filter(|c| *c != b'=').collect();
+    let bytes = digits.chunks(4).flat_map(|four| {
+        let bits = (0..4).fold(0, |bits, k| bits << 6 | four.get(k).map_or(0, |c| value(*c)));
+        bits.to_be_bytes().into_iter().skip(1).take(four.len() - 1)
+    });
+    bytes.collect()
+}

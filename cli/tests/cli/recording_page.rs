@@ -1,0 +1,93 @@
+//! What docs/recording.md says to type: run as it stands there.
+
+use kinetoscope::prelude::*;
+use kinetoscope::record::Format;
+use std::path::Path;
+use std::process::{Command, Output};
+use testkit::needs::python_readers as python;
+use testkit::worlds::RecordedWorld as World;
+
+const PAGE: &str = include_str!("../../../docs/recording.md");
+
+/// The blocks of a language.
+fn blocks(language: &str) -> Vec<String> {
+    let fence = format!("```{language}\n");
+    PAGE.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_string()).collect()
+}
+
+/// Recordings that are called as those of the page, long enough for its times.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 2);
+    let mut recorders = Vec::new();
+    for (format, end) in Format::all().filter(|(format, _)| !format.is_animation() && format.is_built()) {
+        let path = folder.path().join(if end.is_empty() { "arm".into() } else { format!("arm.{end}") });
+        recorders.push(world.sim.record(RecorderCfg { format: Some(format), ..RecorderCfg::new(path) }).unwrap());
+    }
+    (0..160).for_each(|step| world.step(step));
+    recorders.into_iter().for_each(|recorder| drop(world.sim.finish_recording(recorder).unwrap()));
+    folder
+}
+
+fn told(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+#[test]
+fn the_commands_of_the_page_do_what_it_says() {
+    /// Lines that ask for a display, or for what the page has no file of: other tests run these.
+    const ELSEWHERE: [&str; 4] = [
+        "kinetoscope recover run.mcap",
+        "kinetoscope replay arm.mcap",
+        "kinetoscope replay arm.mcap --serve",
+        "kinetoscope replay run.mcap --verify --scene scene.toml",
+    ];
+    let folder = folder();
+    let program = Path::new(env!("CARGO_BIN_EXE_kinetoscope"));
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(program.parent().unwrap().to_path_buf()).chain(std::env::split_paths(&path));
+    let path = std::env::join_paths(folders).unwrap();
+    let mut elsewhere: Vec<String> =
+        PAGE.contains("`kinetoscope recover run.mcap`").then(|| ELSEWHERE[0].into()).into_iter().collect();
+    let mut run = 0;
+    let blocks = blocks("sh");
+    for line in blocks.iter().flat_map(|block| block.lines()) {
+        let line = line.split(" #").next().unwrap().trim();
+        if let Some(rest) = line.strip_prefix("cargo run --release ") {
+            // Rows of the table of examples run these: here, that there is such an example.
+            let name = rest.split_whitespace().skip_while(|word| *word != "--example").nth(1).unwrap();
+            assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../examples/{name}.rs")).is_file(), "{line}");
+        } else if ELSEWHERE.contains(&line) {
+            elsewhere.push(line.into());
+        } else if !line.is_empty() {
+            let output =
+                Command::new("sh").args(["-c", line]).env("PATH", &path).current_dir(&folder).output().unwrap();
+            assert_eq!(output.status.code(), Some(0), "{line}: {}", told(&output));
+            run += 1;
+        }
+    }
+    elsewhere.sort();
+    assert_eq!((elsewhere, run >= 4), (ELSEWHERE.map(String::from).to_vec(), true), "{run} lines were run");
+    for made in ["joints.svg", "tracking.png", "pictures/replay_0.000s.png", "pictures/replay_1.500s.png"] {
+        assert!(folder.path().join(made).is_file(), "{made}");
+    }
+}
+
+#[test]
+#[ignore = "needs Python readers of recordings: cargo xtask test"]
+fn the_programs_of_the_page_run() {
+    let python = python();
+    let folder = folder();
+    let mut run = 0;
+    for block in blocks("python") {
+        let needs = block.contains("arm.hdf5") && !Format::Hdf5.is_built();
+        // LeRobot brings some gigabytes: read_lerobot.py asks it where it is installed.
+        if needs || block.contains("import LeRobotDataset") {
+            continue;
+        }
+        let output = Command::new(&python).args(["-c", &block]).current_dir(&folder).output().unwrap();
+        assert!(output.status.success() && !output.stdout.is_empty(), "{block}\n{}", told(&output));
+        run += 1;
+    }
+    assert!(run >= 2, "{run} programs were run");
+}

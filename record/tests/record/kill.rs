@@ -1,0 +1,141 @@
+//! Processes that are killed while they record: what was recorded more than a second before can be read, where the file is
+//! written as fast as it is recorded.
+
+use super::support::{World, messages, of};
+use kinetoscope::prelude::*;
+use kinetoscope::record;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::Stdio;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Set in child processes only: the file to record to.
+const FILE: &str = "KINETOSCOPE_TEST_RECORD_TO";
+/// How many processes are killed: 50 where all is checked, else few.
+const KILLS: &str = "KINETOSCOPE_TEST_KILLS";
+/// How many of them are at work at a time: they mostly sleep.
+const AT_A_TIME: u32 = 8;
+
+/// Records until it is killed, and says which steps it has done.
+#[test]
+#[ignore = "runs in a process of its own"]
+fn scenario_records_for_ever() {
+    let Some(path) = std::env::var_os(FILE) else { return };
+    let mut world = World::new(2, 1);
+    // Its life begins before there is a file.
+    writeln!(std::io::stdout(), "\ndone 0").unwrap();
+    world.sim.record(RecorderCfg::new(path)).unwrap();
+    for step in 0.. {
+        world.step(step);
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "done {}", step + 1).unwrap();
+        out.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(4));
+    }
+}
+
+/// Kills a process after so long from its first step on (`begun`), or from before there is a file. Gives the steps that it had done
+/// one second before.
+fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
+    let mut child = testkit::process::command(module_path!(), "scenario_records_for_ever")
+        .env(FILE, path)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let (said, heard) = channel();
+    let reader = std::thread::spawn(move || {
+        for line in lines.map_while(Result::ok) {
+            if let Some(steps) = line.strip_prefix("done ").and_then(|steps| steps.parse::<u64>().ok()) {
+                said.send((Instant::now(), steps)).unwrap();
+            }
+        }
+    });
+    let mut done = vec![heard.recv().unwrap()];
+    while begun && done.iter().all(|(_, steps)| *steps == 0) {
+        done.push(heard.recv().unwrap());
+    }
+    // Whatever it does then, also in the middle of its first line or its file's first bytes.
+    std::thread::sleep(life);
+    let end = Instant::now();
+    // SIGKILL, on Unix.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    reader.join().unwrap();
+    done.extend(heard.try_iter());
+    let old = done.iter().filter(|(time, _)| end.duration_since(*time) >= Duration::from_secs(1));
+    old.map(|(_, steps)| *steps).max().unwrap_or(0)
+}
+
+#[test]
+fn what_is_older_than_a_second_survives_a_kill() {
+    let usual = if std::env::var_os("CI").is_some() { 50 } else { 4 };
+    let kills: u32 = std::env::var(KILLS).ok().and_then(|count| count.parse().ok()).unwrap_or(usual);
+    let folder = tempfile::tempdir().unwrap();
+    let dt = World::new(1, 1).sim.cfg().physics_dt;
+    let next = AtomicU32::new(0);
+    let work = || {
+        loop {
+            let kill = next.fetch_add(1, Ordering::Relaxed);
+            if kill >= kills {
+                return;
+            }
+            kill_once(folder.path(), kill, dt);
+        }
+    };
+    // One that panics is noticed at the end.
+    std::thread::scope(|scope| (0..AT_A_TIME.min(kills)).for_each(|_| drop(scope.spawn(work))));
+    assert_eq!(next.load(Ordering::Relaxed), kills + AT_A_TIME.min(kills), "each of them was killed");
+}
+
+fn kill_once(folder: &Path, kill: u32, dt: f64) {
+    let path = folder.join(format!("{kill}.mcap"));
+    // Another time at every run, anywhere between two flushes.
+    let chance = u64::from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().subsec_micros());
+    // A third of them from the first moments on: while the file is begun, and before anything of it is a second old.
+    let short = kill.is_multiple_of(3);
+    let life = Duration::from_millis(if short { chance % 1200 } else { 1200 + chance % 1000 });
+    let old = kill_after(&path, life, !short);
+    assert!(short || old > 0, "it had done nothing a second before the end");
+    assert!(!path.exists(), "what was killed has not the name of a whole file");
+    assert!(short || path.with_extension("mcap.part").exists());
+    let recovered = match record::recover(&path) {
+        Ok(recovered) => recovered,
+        Err(error) => {
+            // Nothing was a second old, and nothing was whole yet: what there is stays, and is no whole file.
+            let said = error.to_string();
+            let begun = ["there is no whole message", "this is no MCAP file", "entity not found"];
+            assert!(old == 0 && begun.iter().any(|what| said.contains(what)), "step {old}: {said}");
+            assert!(!path.exists());
+            println!("kill {kill} after {life:?}: nothing was written yet");
+            return;
+        }
+    };
+    assert_eq!(recovered.damage, None, "a kill tears the end, and damages nothing");
+    assert!(!path.with_extension("mcap.part").exists());
+    let all = messages(&path);
+    assert_eq!(all.len() as u64, recovered.messages);
+    for env in 0..2 {
+        let states = of(&all, &format!("/env_{env}/arm/joint_states"));
+        let steps: Vec<u64> = states.iter().map(|m| (m.time as f64 / 1e9 / dt).round() as u64).collect();
+        assert!(steps.iter().copied().eq(0..steps.len() as u64), "every step, in order");
+        let last = steps.last().copied().unwrap_or(0);
+        assert!(old == 0 || !steps.is_empty());
+        println!("kill {kill} after {life:?}: step {last} is readable, {old} was done a second before");
+        assert!(last >= old, "step {old} was done a second before the end; the file ends with {last}");
+    }
+}
+
+#[test]
+fn what_is_no_recording_is_not_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    assert!(record::recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
+    std::fs::write(folder.path().join("run.mcap.part"), "something else").unwrap();
+    let error = record::recover(&path).unwrap_err().to_string();
+    assert!(error.contains("nothing of it can be read"), "{error}");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["run.mcap.part"]);
+}

@@ -1,0 +1,35 @@
+//! A solve allocates nothing.
+
+use scene::{Pose, Random};
+use sim::kinematics::{Chain, IkCfg, IkSolver, Posture};
+use sim::urdf::{UrdfCfg, assemble};
+
+#[test]
+fn solving_allocates_nothing() {
+    let urdf = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/arms/seven_axes.urdf");
+    let description = assemble(&UrdfCfg::single(urdf)).unwrap().description;
+    let chain = Chain::new(&description, description.link_id("link8").unwrap(), &Pose::identity()).unwrap();
+    let limits: Vec<[f64; 2]> = description
+        .drivable_joints()
+        .map(|(_, joint)| joint.limit.as_ref().map(|l| [l.lower.unwrap(), l.upper.unwrap()]).unwrap())
+        .collect();
+    let mut random = Random::keyed(3, 0, "targets");
+    let mut positions = || limits.iter().map(|[low, high]| low + (high - low) * random.uniform()).collect::<Vec<f64>>();
+    let targets: Vec<Pose> = (0..20).map(|_| chain.pose(&positions())).collect();
+    let far = Pose::translation(9.0, 0.0, 0.0);
+    let cfg = IkCfg { posture: Some(Posture::at([0.0; 7])), ..Default::default() };
+    let mut solver = IkSolver::new(chain.clone(), limits, cfg).unwrap();
+    let (mut solved, mut starts) = (0, 0);
+    let allocations = allocation_counter::measure(|| {
+        for target in &targets {
+            let found = solver.solve(target, &[0.0; 7]).unwrap();
+            solved += u32::from(found.success);
+            starts += found.seed;
+        }
+        assert!(!solver.solve(&far, &[0.0; 7]).unwrap().success);
+    });
+    assert_eq!(allocations.count_total, 0);
+    assert!(solved >= 19 && starts > 0, "{solved} solved with {starts} further starts");
+    // The control: the counter counts.
+    assert!(allocation_counter::measure(|| drop(chain.clone())).count_total > 0);
+}

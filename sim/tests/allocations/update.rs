@@ -1,0 +1,143 @@
+//! After the first steps, stepping and measuring allocates nothing on the calling thread.
+
+use sensors::camera::{CameraCfg, Extrinsics, Placement};
+use sensors::ray::pattern::Grid;
+use sensors::{
+    ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
+    RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
+};
+use sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+
+/// A pendulum with sensors of its own.
+const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0"/><site name="tip" pos="0.4 0 0"/></body></worldbody>
+  <actuator><motor joint="hinge"/></actuator><sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
+
+/// Four environments with a box that lies and a ball that stands a little off the ground.
+fn world(threads: usize) -> SimulationManager {
+    let mut sim =
+        SimulationManager::new(SimulationManagerCfg { num_envs: 4, threads: Some(threads), ..Default::default() })
+            .unwrap();
+    let at = |x: f64, z: f64| scene::Pose::translation(x, 0.0, z);
+    let box_ = RigidObjectCfg { uid: "box".into(), init_pose: at(0.0, 0.05), ..Default::default() };
+    let shape = ObjectShape::Sphere { radius: 0.1 };
+    let ball = RigidObjectCfg { uid: "ball".into(), init_pose: at(0.5, 0.1), shape, ..Default::default() };
+    sim.add_rigid_object(box_).unwrap();
+    sim.add_rigid_object(ball).unwrap();
+    sim
+}
+
+fn allocations(sim: &mut SimulationManager) -> u64 {
+    sim.update(30);
+    allocation_counter::measure(|| (0..10).for_each(|_| sim.update(1))).count_total
+}
+
+#[test]
+fn updates_allocate_nothing() {
+    for threads in [1, 3] {
+        let mut sim = world(threads);
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, no sensors");
+        let contact =
+            ContactSensorCfg { filters: vec!["ground".into()], track_air_time: true, ..ContactSensorCfg::of("box") };
+        sim.add_sensor("contact", contact).unwrap();
+        let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
+        sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, sensors of numbers");
+        // 10201 rays in each environment, and a camera of 3072: enough for all threads.
+        let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
+        let offset = scene::Pose::translation(0.0, 0.0, 2.0);
+        let scanner = RayCasterCfg { offset, pattern: grid.into(), ..RayCasterCfg::default() };
+        assert!(scanner.requires().contains(Requires::INSTANCES));
+        sim.add_sensor("scanner", scanner).unwrap();
+        sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, rays");
+        // MuJoCo's own sensors and what joints exert, of a part and of a robot; a camera captures what there is to see.
+        sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
+        let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
+        sim.add_sensor("own", MujocoSensorCfg { sensors: None, sampling: sampling() }).unwrap();
+        let frames = vec!["m/tip".into()];
+        let wrench = JointWrenchCfg { links: vec!["m/rod".into()], frames, sampling: sampling(), debug_vis: true };
+        sim.add_sensor("wrench", wrench).unwrap();
+        sim.add_sensor("joints", JointStateCfg { joints: None, sampling: sampling() }).unwrap();
+        sim.add_sensor("actuators", ActuatorStateCfg { actuators: None, sampling: sampling() }).unwrap();
+        let targets = vec![TargetFrameCfg::of(".*")];
+        let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("m/tip", targets) };
+        sim.add_sensor("frames", frames).unwrap();
+        let camera = CameraCfg {
+            width: 64,
+            height: 48,
+            extrinsics: Extrinsics { parent: Some("m/rod".into()), ..Extrinsics::default() },
+            ..CameraCfg::default()
+        };
+        let late = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
+        sim.add_sensor("late", late).unwrap();
+        let camera = sim.add_sensor("camera", camera).unwrap();
+        assert_eq!(allocations(&mut sim), 0, "{threads} threads, every kind of sensor");
+        let captured = sim.sensor(camera).unwrap();
+        assert_eq!((captured.frame_counts()[0], captured.draws()), (40, 0), "it saw all of it, and drew nothing yet");
+    }
+    let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
+    assert_eq!(control, 1, "the control: the counter counts");
+}
+
+/// Pictures that are drawn at every step, each environment by one thread or all threads together on one. What a thread
+/// needs is chance: there are at most 400 updates until twenty in a row allocate nothing.
+#[test]
+fn pictures_allocate_nothing() {
+    for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
+        let mut sim = world(threads);
+        let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
+        let extrinsics = |x: f64| {
+            let placement = Placement::LookAt { eye: [x, -1.0, 0.8], target: [0.2, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
+            Extrinsics { placement, ..Extrinsics::default() }
+        };
+        let all = sim.add_sensor("all", CameraCfg { extrinsics: extrinsics(1.0), ..base.clone() }).unwrap();
+        let some = CameraCfg { extrinsics: extrinsics(-0.5), env_ids: Some(vec![2, 0, 3]), ..base };
+        let some = sim.add_sensor("some", some).unwrap();
+        let mut in_a_row = 0;
+        for _ in 0..400 {
+            let allocations = allocation_counter::measure(|| sim.update(1)).count_total;
+            in_a_row = if allocations == 0 { in_a_row + 1 } else { 0 };
+            if in_a_row == 20 {
+                break;
+            }
+        }
+        assert_eq!(in_a_row, 20, "{threads} threads, {width} x {height}");
+        let (all, some) = (sim.sensor(all).unwrap(), sim.sensor(some).unwrap());
+        // Also at the reset with which they begin.
+        let pictures = 1 + all.frame_counts()[0];
+        assert_eq!((all.draws(), some.draws()), (4 * pictures, 3 * pictures), "they are drawn when they are due");
+    }
+}
+
+/// Actuator models compute and remember without allocating.
+#[test]
+fn actuator_models_allocate_nothing() {
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("robot.urdf");
+    let (mut urdf, mut actuators) = (String::from("<robot name=\"r\"><link name=\"base\"/>"), Vec::new());
+    for (i, model) in sim::ActuatorModel::examples().into_iter().enumerate() {
+        urdf += &format!(
+            "<link name=\"l{i}\"><inertial><mass value=\"1\"/><inertia ixx=\".1\" ixy=\"0\" ixz=\"0\" iyy=\".1\" iyz=\"0\" \
+             izz=\".1\"/></inertial></link><joint name=\"j{i}\" type=\"continuous\"><parent link=\"base\"/>\
+             <child link=\"l{i}\"/><axis xyz=\"0 1 0\"/></joint>"
+        );
+        let model = match model {
+            sim::ActuatorModel::DelayedPd(_) => sim::DelayedPd { delay: 3, max_delay: 0 }.into(),
+            other => other,
+        };
+        actuators.push((format!("j{i}"), model));
+    }
+    std::fs::write(&path, urdf + "</robot>").unwrap();
+    let drive = sim::DriveCfg {
+        actuators,
+        stiffness: 10.0.into(),
+        damping: 1.0.into(),
+        max_effort: Some(50.0.into()),
+        max_velocity: Some(5.0.into()),
+        ..Default::default()
+    };
+    let mut sim = world(1);
+    sim.add_robot(sim::RobotCfg { urdf: sim::UrdfCfg::single(&path), drive, ..Default::default() }).unwrap();
+    assert_eq!(allocations(&mut sim), 0);
+}

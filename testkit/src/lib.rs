@@ -1,0 +1,35 @@
+//! Shared parts of the tests. Only tests depend on this crate.
+//!
+//! | module | provides |
+//! |---|---|
+//! | [`bits`] | bit-for-bit comparison of numbers |
+//! | [`tolerance`] | comparison within a tolerance that carries its derivation |
+//! | [`image_check`] | comparison of images; a failure writes an image of the difference |
+//! | [`refusal`] | tables of mistakes and the errors that they must give |
+//! | [`needs`] | robots, models and programs that only some machines have |
+//! | [`process`] | a test in a process of its own |
+//! | [`urdf`] | URDF snippets |
+//! | [`x_server`] | an X server without a screen |
+//! | [`worlds`] (feature `worlds`) | simulations, robots, objects and cameras |
+//!
+//! Without the feature `worlds` nothing here depends on another crate of the workspace, so that unit tests of every crate
+//! can use it.
+//!
+//! ```
+//! use testkit::tolerance::{Tolerance, assert_close};
+//! let euler = Tolerance::absolute(1e-12, "1000 additions of 1e-3, each rounded by 1e-16");
+//! assert_close("time", &[(0..1000).map(|_| 1e-3).sum::<f64>()], &[1.0], euler);
+//! ```
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+#![forbid(unsafe_code)]
+
+pub mod bits;
+pub mod image_check;
+pub mod needs;
+pub mod process;
+pub mod refusal;
+pub mod tolerance;
+pub mod urdf;
+#[cfg(feature = "worlds")]
+pub mod worlds;
+pub mod x_server;

@@ -1,0 +1,103 @@
+//! Robots, models and programs that only some machines have.
+//!
+//! A test that needs one is marked `#[ignore = "needs ..."]`, so that plain `cargo test` lists it as ignored with the
+//! reason. `cargo xtask test` installs the needs and runs these tests too. A need that is absent then is a failure.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Names the folder of real robots.
+pub const ROBOTS: &str = "KINETOSCOPE_ROBOTS";
+/// Names a Python with readers of recordings (`mcap`, NumPy, Pillow, PyAV, h5py).
+pub const READERS: &str = "KINETOSCOPE_PYTHON_READERS";
+/// Names a Python with MuJoCo 4 and OpenGL.
+pub const RENDERER: &str = "KINETOSCOPE_PYTHON4";
+
+/// Folders that may hold real robots: [`ROBOTS`], `shared/robots` beside the repository or above it, and the one that
+/// `cargo xtask test` fills from PyPI.
+fn robot_folders() -> impl Iterator<Item = PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let above = root.ancestors().skip(1).map(|dir| dir.join("shared/robots"));
+    std::env::var_os(ROBOTS).map(PathBuf::from).into_iter().chain(above).chain([root.join("target/robots")])
+}
+
+/// A folder with URDF files of real robots.
+///
+/// # Panics
+/// If there is none.
+#[must_use]
+pub fn robots_dir() -> PathBuf {
+    robot_folders()
+        .find(|dir| dir.is_dir())
+        .unwrap_or_else(|| panic!("no folder of real robots: run `cargo xtask test`, or set {ROBOTS}"))
+}
+
+/// A file of a real robot, its path relative to the folder of robots.
+///
+/// # Panics
+/// If no folder of robots has it.
+#[must_use]
+pub fn robot(path: &str) -> PathBuf {
+    robot_folders()
+        .map(|dir| dir.join(path))
+        .find(|file| file.is_file())
+        .unwrap_or_else(|| panic!("no folder of real robots has {path}: run `cargo xtask test`, or set {ROBOTS}"))
+}
+
+/// A model that comes with MuJoCo, for example `humanoid/humanoid.xml`, or their folder for an empty path.
+///
+/// # Panics
+/// If the models are not installed.
+#[must_use]
+pub fn sample_model(path: &str) -> PathBuf {
+    let found = Path::new("/usr/share/mujoco/model").join(path);
+    assert!(found.exists(), "{} is absent: apt-get install libmujoco-samples", found.display());
+    found
+}
+
+fn python(variable: &str) -> PathBuf {
+    std::env::var_os(variable)
+        .map(PathBuf::from)
+        .unwrap_or_else(|| panic!("{variable} names no Python: run `cargo xtask test`, which makes one"))
+}
+
+/// The Python that reads recordings.
+///
+/// # Panics
+/// If [`READERS`] is not set.
+#[must_use]
+pub fn python_readers() -> PathBuf {
+    python(READERS)
+}
+
+/// The Python that draws with MuJoCo's own renderer.
+///
+/// # Panics
+/// If [`RENDERER`] is not set.
+#[must_use]
+pub fn python_renderer() -> PathBuf {
+    python(RENDERER)
+}
+
+/// Runs a Python script on a file and parses the JSON that it prints.
+///
+/// # Panics
+/// If the script fails or prints something else.
+#[must_use]
+pub fn read_json(python: &Path, script: &Path, file: &Path) -> serde_json::Value {
+    let output = Command::new(python).arg(script).arg(file).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The browser.
+///
+/// # Panics
+/// If there is none on the search path.
+#[must_use]
+pub fn chromium() -> PathBuf {
+    let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let mut files = names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    files.find(|path| path.is_file()).expect("a browser: apt-get install --no-install-recommends chromium")
+}

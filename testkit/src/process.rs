@@ -1,0 +1,39 @@
+//! A test in a process of its own: for what counts threads, memory and files of the process, sets its variables, or may end
+//! it.
+//!
+//! The scenario is a test marked `#[ignore = "runs in a process of its own"]` that returns at once unless [`is_child`]; the
+//! test that judges it calls [`run`].
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Set in child processes only.
+const VARIABLE: &str = "KINETOSCOPE_TEST_CHILD";
+
+/// True in a process that [`run`] or [`command`] started.
+#[must_use]
+pub fn is_child() -> bool {
+    std::env::var_os(VARIABLE).is_some()
+}
+
+/// The command that runs one test of this binary alone. `module` is `module_path!()` of the test, `test` its name.
+#[must_use]
+pub fn command(module: &str, test: &str) -> Command {
+    // Names of tests lack the name of the binary.
+    let name = module.split_once("::").map_or_else(|| test.to_string(), |(_, path)| format!("{path}::{test}"));
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", &name, "--include-ignored", "--nocapture", "--test-threads=1"]).env(VARIABLE, "1");
+    command
+}
+
+/// Runs one test of this binary in folder `dir` and waits for its end.
+#[must_use]
+pub fn run(module: &str, test: &str, dir: &Path, variables: &[(&str, &str)]) -> Output {
+    command(module, test).current_dir(dir).envs(variables.iter().copied()).output().unwrap()
+}
+
+/// Output as text.
+#[must_use]
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}

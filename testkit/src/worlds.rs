@@ -1,0 +1,214 @@
+//! Simulations, robots, objects and cameras that many tests start from. Poses are in the environment frame \[m\].
+
+use crate::urdf::Files;
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use kinetoscope::sim::env::Env;
+
+/// A configuration with this number of threads.
+#[must_use]
+pub fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() }
+}
+
+/// A configuration with two threads, and without ground and lights.
+#[must_use]
+pub fn empty_cfg(num_envs: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { ground: None, lights: vec![], ..cfg(num_envs, 2) }
+}
+
+/// A configuration of [`empty_cfg`] without gravity.
+#[must_use]
+pub fn weightless_cfg(num_envs: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { gravity: [0.0; 3].into(), ..empty_cfg(num_envs) }
+}
+
+/// A simulation with this configuration.
+///
+/// # Panics
+/// If the configuration is refused.
+#[must_use]
+#[track_caller]
+pub fn sim(cfg: SimulationManagerCfg) -> SimulationManager {
+    SimulationManager::new(cfg).unwrap()
+}
+
+/// An object with its origin at `at`, of the default density.
+#[must_use]
+pub fn object(uid: &str, shape: ObjectShape, [x, y, z]: [f64; 3]) -> RigidObjectCfg {
+    RigidObjectCfg { uid: uid.into(), shape, init_pose: Pose::translation(x, y, z), ..Default::default() }
+}
+
+/// A cube of this side \[m\] and mass \[kg\].
+#[must_use]
+pub fn cube(uid: &str, side: f64, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
+    RigidObjectCfg { mass: Some(mass), ..object(uid, ObjectShape::cube(side), at) }
+}
+
+/// A ball of this radius \[m\] and mass \[kg\].
+#[must_use]
+pub fn ball(uid: &str, radius: f64, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
+    RigidObjectCfg { mass: Some(mass), ..object(uid, ObjectShape::Sphere { radius }, at) }
+}
+
+/// The same object, fixed in the world.
+#[must_use]
+pub fn fixed(object: RigidObjectCfg) -> RigidObjectCfg {
+    RigidObjectCfg { body_type: BodyType::Static, ..object }
+}
+
+/// A robot of one URDF file.
+#[must_use]
+pub fn urdf_robot(uid: &str, urdf: impl AsRef<std::path::Path>) -> RobotCfg {
+    RobotCfg { uid: uid.into(), urdf: UrdfCfg::single(urdf), ..Default::default() }
+}
+
+/// A robot of URDF text, which is written to `{uid}.urdf`.
+pub fn text_robot(files: &Files, uid: &str, urdf: &str) -> RobotCfg {
+    urdf_robot(uid, files.write(&format!("{uid}.urdf"), urdf))
+}
+
+/// A robot of MJCF text.
+#[must_use]
+pub fn mjcf_robot(uid: &str, mjcf: &str) -> RobotCfg {
+    RobotCfg { uid: uid.into(), mjcf: Some(MjcfFile::text(mjcf)), ..Default::default() }
+}
+
+/// The same robot without drives.
+#[must_use]
+pub fn passive(robot: RobotCfg) -> RobotCfg {
+    RobotCfg { drive: DriveCfg { drive_type: DriveType::None, ..Default::default() }, ..robot }
+}
+
+/// Gains for all joints.
+#[must_use]
+pub fn gains(stiffness: f64, damping: f64) -> DriveCfg {
+    DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..Default::default() }
+}
+
+/// The bundled arm of six joints.
+///
+/// # Panics
+/// If the assets are missing.
+#[must_use]
+pub fn sr5(uid: &str) -> RobotCfg {
+    urdf_robot(uid, assets::path("sr5/SR5.urdf").unwrap())
+}
+
+/// The bundled arm with the bundled hand.
+///
+/// # Panics
+/// If the assets are missing.
+#[must_use]
+pub fn arm_and_hand(uid: &str) -> RobotCfg {
+    let part = |name, file| ComponentCfg::new(name, assets::path(file).unwrap());
+    let components = vec![part("arm", "sr5/SR5.urdf"), part("hand", "revo1_left/revo1_left.urdf")];
+    RobotCfg { uid: uid.into(), urdf: UrdfCfg { components, ..Default::default() }, ..Default::default() }
+}
+
+/// A batch of one row.
+#[must_use]
+pub fn row<const K: usize>(values: [f64; K]) -> Array2<f64> {
+    Array2::from_shape_fn((1, K), |(_, k)| values[k])
+}
+
+/// A camera at `eye` that looks at `target`, z up, with a vertical field of view of 0.9 rad.
+#[must_use]
+pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], channels: Channels) -> CameraCfg {
+    let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
+    CameraCfg {
+        width,
+        height,
+        channels,
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        extrinsics: Extrinsics { placement, ..Extrinsics::default() },
+        ..CameraCfg::default()
+    }
+}
+
+/// Bits of everything that decides the next step of an environment, of the efforts, and the number of contacts.
+#[must_use]
+pub fn bits_of(env: &Env) -> Vec<u64> {
+    let data = env.data();
+    [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), &env.drives.position, &env.drives.effort]
+        .into_iter()
+        .flatten()
+        .map(|x| x.to_bits())
+        .chain([data.contact().len() as u64])
+        .collect()
+}
+
+/// [`bits_of`] each environment of a simulation.
+#[must_use]
+pub fn all_bits(sim: &SimulationManager) -> Vec<Vec<u64>> {
+    let mut bits = Vec::new();
+    sim.batch().for_each(|_, env| bits.push(bits_of(env)));
+    bits
+}
+
+/// A simulation to record: an arm that moves, a cube, a camera, an IMU and a sensor of joints.
+#[derive(Debug)]
+pub struct RecordedWorld {
+    /// The simulation.
+    pub sim: SimulationManager,
+    /// The bundled arm.
+    pub arm: RobotId,
+    /// A cube of 0.1 m.
+    pub cube: ObjectId,
+    /// A camera of 32x24 pixels with color, depth and mask.
+    pub camera: SensorId<Camera>,
+    /// An IMU on the cube.
+    pub imu: SensorId<Imu>,
+    /// The joints of the arm, at every step.
+    pub joints: SensorId<JointState>,
+}
+
+impl RecordedWorld {
+    /// Steps between two images.
+    pub const IMAGE_EVERY: u32 = 5;
+    /// Steps between two measurements of the IMU.
+    pub const IMU_EVERY: u32 = 2;
+
+    /// Builds it.
+    ///
+    /// # Panics
+    /// If a part of it is refused.
+    #[must_use]
+    pub fn new(num_envs: usize, threads: usize) -> Self {
+        let cfg = cfg(num_envs, threads);
+        let dt = cfg.physics_dt;
+        let mut sim = sim(cfg);
+        let arm = sim.add_robot(sr5("arm")).unwrap();
+        let cube = sim.add_rigid_object(object("cube", ObjectShape::cube(0.1), [0.0; 3])).unwrap();
+        sim.rigid_object_mut(cube).write_pose(&row([0.6, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0]), None).unwrap();
+        let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
+        let mut camera = CameraCfg {
+            width: 32,
+            height: 24,
+            channels,
+            intrinsics: Intrinsics::Fovy { radians: 0.9 },
+            ..CameraCfg::default()
+        };
+        camera.update_period = f64::from(Self::IMAGE_EVERY) * dt;
+        let camera = sim.add_sensor("camera", camera).unwrap();
+        let placed =
+            sim.sensor_mut(camera).unwrap().look_at(&[[1.0, 0.6, 0.5]], &[[0.6, 0.2, 0.2]], &[[0.0, 0.0, 1.0]], None);
+        placed.unwrap();
+        let sampling = SamplingCfg::every(f64::from(Self::IMU_EVERY) * dt);
+        let imu = sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("cube") }).unwrap();
+        let joints = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+        Self { sim, arm, cube, camera, imu, joints }
+    }
+
+    /// Targets that change at every step, in each environment differently, and one step.
+    ///
+    /// # Panics
+    /// If the targets are refused.
+    pub fn step(&mut self, step: u32) {
+        let (envs, dof) = (self.sim.num_envs(), self.sim.robot(self.arm).dof());
+        let target = |(env, joint)| 0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin();
+        let targets = Array2::from_shape_fn((envs, dof), target);
+        self.sim.robot_mut(self.arm).set_qpos(&targets, None, None).unwrap();
+        self.sim.update(1);
+    }
+}

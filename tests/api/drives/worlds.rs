@@ -1,0 +1,355 @@
+//! Worlds for the drive laws: URDF chains written from a few numbers, loaded through the public API.
+//!
+//! Nothing here judges anything; the laws, derivations and tolerances stand at the top of each test file.
+
+use kinetoscope::ndarray::Array2;
+use kinetoscope::prelude::*;
+use kinetoscope::sim;
+use kinetoscope::sim::dynamics::{Configuration, Kinematics, MimicPositions};
+use kinetoscope::sim::env::{Env, EnvStatus};
+use kinetoscope::sim::mj;
+use nalgebra::{DVector, Vector3};
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+pub(crate) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
+/// One joint and the link it moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub(crate) name: String,
+    pub(crate) kind: &'static str,
+    pub(crate) parent: String,
+    pub(crate) origin: [f64; 3],
+    pub(crate) axis: [f64; 3],
+    /// Attributes of `<limit>`.
+    pub(crate) limit: String,
+    pub(crate) damping: f64,
+    pub(crate) friction: f64,
+    pub(crate) mimic: Option<(String, f64)>,
+    pub(crate) mass: f64,
+    pub(crate) com: [f64; 3],
+    /// Moments about the centre of mass.
+    pub(crate) inertia: [f64; 3],
+    /// Content of `<collision>`.
+    pub(crate) collision: String,
+}
+
+impl Joint {
+    /// A joint without limits that moves a point-like mass; hangs from `base`.
+    pub(crate) fn new(name: &str, kind: &'static str) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            parent: "base".into(),
+            origin: [0.0; 3],
+            axis: [0.0, 1.0, 0.0],
+            limit: String::new(),
+            damping: 0.0,
+            friction: 0.0,
+            mimic: None,
+            mass: 1.0,
+            com: [0.0; 3],
+            inertia: [1e-3; 3],
+            collision: String::new(),
+        }
+    }
+
+    /// A hinge about y whose moment of inertia about its axis is `moment`, weightless under gravity.
+    pub(crate) fn wheel(name: &str, moment: f64) -> Self {
+        Self { inertia: [moment; 3], mass: 0.01, ..Self::new(name, "continuous") }
+    }
+
+    /// A hinge about y with a mass at `length` along x: gravity (0, 0, -g) turns it with `m g length cos q`.
+    pub(crate) fn lever(name: &str, mass: f64, length: f64, moment: f64) -> Self {
+        Self { mass, com: [length, 0.0, 0.0], inertia: [moment; 3], ..Self::new(name, "continuous") }
+    }
+
+    /// A slide along x of `mass`, with ends that are far away.
+    pub(crate) fn slide(name: &str, mass: f64) -> Self {
+        Self { mass, axis: [1.0, 0.0, 0.0], ..Self::new(name, "prismatic") }.range(-1e3, 1e3).effort(0.0)
+    }
+
+    pub(crate) fn after(self, parent: &Joint, origin: [f64; 3]) -> Self {
+        Self { parent: parent.link(), origin, ..self }
+    }
+
+    pub(crate) fn effort(self, effort: f64) -> Self {
+        Self { limit: format!("{} effort=\"{effort}\" velocity=\"100\"", self.limit), ..self }
+    }
+
+    pub(crate) fn range(self, lower: f64, upper: f64) -> Self {
+        let kind = if self.kind == "continuous" { "revolute" } else { self.kind };
+        Self { kind, limit: format!("lower=\"{lower}\" upper=\"{upper}\" {}", self.limit), ..self }
+    }
+
+    pub(crate) fn link(&self) -> String {
+        format!("{}_link", self.name)
+    }
+}
+
+/// The joints as URDF, `base` being the root.
+pub(crate) fn urdf(joints: &[Joint]) -> String {
+    let v = |x: [f64; 3]| format!("{} {} {}", x[0], x[1], x[2]);
+    let mut out = String::from("<robot name=\"test\"><link name=\"base\"/>\n");
+    for j in joints {
+        let [ixx, iyy, izz] = j.inertia;
+        let _ = writeln!(
+            out,
+            "<link name=\"{}\"><inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{ixx}\" iyy=\"{iyy}\" \
+             izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>{}</link>",
+            j.link(),
+            v(j.com),
+            j.mass,
+            j.collision,
+        );
+        let _ = write!(
+            out,
+            "<joint name=\"{}\" type=\"{}\"><parent link=\"{}\"/><child link=\"{}\"/><origin xyz=\"{}\"/>\
+             <axis xyz=\"{}\"/>",
+            j.name,
+            j.kind,
+            j.parent,
+            j.link(),
+            v(j.origin),
+            v(j.axis)
+        );
+        if !j.limit.is_empty() {
+            let _ = write!(out, "<limit {}/>", j.limit);
+        }
+        if j.damping != 0.0 || j.friction != 0.0 {
+            let _ = write!(out, "<dynamics damping=\"{}\" friction=\"{}\"/>", j.damping, j.friction);
+        }
+        if let Some((driver, multiplier)) = &j.mimic {
+            let _ = write!(out, "<mimic joint=\"{driver}\" multiplier=\"{multiplier}\"/>");
+        }
+        out.push_str("</joint>\n");
+    }
+    out + "</robot>\n"
+}
+
+/// One robot in one environment.
+#[derive(Debug)]
+pub(crate) struct World {
+    pub(crate) sim: SimulationManager,
+    pub(crate) robot: RobotId,
+    _files: tempfile::TempDir,
+}
+
+/// 100 Hz, one thread, no ground, `gravity`.
+pub(crate) fn manager(gravity: Vector3<f64>) -> SimulationManagerCfg {
+    SimulationManagerCfg { gravity, ground: None, lights: Vec::new(), threads: Some(1), ..Default::default() }
+}
+
+pub(crate) fn weightless() -> SimulationManagerCfg {
+    manager(Vector3::zeros())
+}
+
+pub(crate) fn earth() -> SimulationManagerCfg {
+    manager(EARTH)
+}
+
+pub(crate) fn at_dt(dt: f64, cfg: SimulationManagerCfg) -> SimulationManagerCfg {
+    SimulationManagerCfg { physics_dt: dt, ..cfg }
+}
+
+pub(crate) fn gains(kp: f64, kd: f64) -> DriveCfg {
+    DriveCfg { stiffness: kp.into(), damping: kd.into(), ..Default::default() }
+}
+
+/// A robot of `joints`.
+pub(crate) fn world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> World {
+    try_world(joints, drive, cfg).unwrap_or_else(|e| panic!("{e}"))
+}
+
+pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> Result<World, Box<Error>> {
+    let files = tempfile::tempdir().unwrap();
+    let path = files.path().join("robot.urdf");
+    std::fs::write(&path, urdf(joints)).unwrap();
+    let mut sim = SimulationManager::new(cfg)?;
+    let robot = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(&path), drive, ..Default::default() })?;
+    Ok(World { sim, robot, _files: files })
+}
+
+/// A robot of any configuration.
+pub(crate) fn load(cfg: RobotCfg, manager: SimulationManagerCfg) -> World {
+    let files = tempfile::tempdir().unwrap();
+    let mut sim = SimulationManager::new(manager).unwrap_or_else(|e| panic!("{e}"));
+    let robot = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{e}"));
+    World { sim, robot, _files: files }
+}
+
+impl World {
+    pub(crate) fn view(&self) -> sim::Robot<'_> {
+        self.sim.robot(self.robot)
+    }
+
+    pub(crate) fn q(&self) -> Vec<f64> {
+        self.view().get_qpos().row(0).to_vec()
+    }
+
+    pub(crate) fn v(&self) -> Vec<f64> {
+        self.view().get_qvel().row(0).to_vec()
+    }
+
+    pub(crate) fn effort(&self) -> Vec<f64> {
+        self.view().get_qf().row(0).to_vec()
+    }
+
+    pub(crate) fn limits(&self) -> Vec<f64> {
+        self.view().qf_limits().row(0).to_vec()
+    }
+
+    pub(crate) fn target(&self) -> Vec<f64> {
+        self.view().get_target_qpos().row(0).to_vec()
+    }
+
+    /// Position targets of all joints.
+    pub(crate) fn aim(&mut self, targets: &[f64]) {
+        self.sim.robot_mut(self.robot).set_qpos(&row(targets), None, None).unwrap();
+    }
+
+    pub(crate) fn step(&mut self, steps: u32) {
+        self.sim.update(steps);
+    }
+
+    /// A copy of the environment, to step by hand below the public API.
+    pub(crate) fn env(&self) -> Env {
+        let (model, drives, qpos, qvel) = self.sim.batch().read(0, |env| {
+            let data = env.data();
+            (data.model().clone(), env.drives.clone(), data.qpos().to_vec(), data.qvel().to_vec())
+        });
+        let mut env = Env::new(&model, &Arc::clone(drives.table())).unwrap();
+        env.drives = drives;
+        env.write(|data| {
+            data.qpos_mut().copy_from_slice(&qpos);
+            data.qvel_mut().copy_from_slice(&qvel);
+        });
+        env
+    }
+
+    /// No environment diverged and MuJoCo raised no warning.
+    #[track_caller]
+    pub(crate) fn assert_well(&self) {
+        assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
+        let counts = self.sim.warning_counts();
+        assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
+        assert!(self.q().iter().chain(&self.v()).all(|x| x.is_finite()));
+    }
+
+    /// Gravity's load on every drive at the present positions: the joint's own torque plus those of its followers,
+    /// each times its ratio (virtual work of `q_f = m q`).
+    pub(crate) fn load_by_gravity(&self, gravity: &Vector3<f64>) -> Vec<f64> {
+        let view = self.view();
+        let mut at = Configuration::zero(view.description());
+        at.joint_positions = self.q();
+        at.mimic = MimicPositions::AsGiven;
+        let kinematics = Kinematics::new(view.description(), &at).unwrap();
+        let torque = kinematics.gravity_torque(gravity);
+        let own: Vec<f64> =
+            view.description().drivable_joints().map(|(id, _)| torque[kinematics.columns(id).start]).collect();
+        let mut load = vec![0.0; own.len()];
+        for (i, (driver, multiplier, _)) in view.mimic_drivers().into_iter().enumerate() {
+            load[driver.0] += multiplier * own[i];
+        }
+        load
+    }
+
+    /// Mass matrix and bias force at a state, computed by `sim::dynamics` from the URDF.
+    pub(crate) fn dynamics(
+        &self,
+        q: &[f64],
+        v: &[f64],
+        gravity: &Vector3<f64>,
+    ) -> (nalgebra::DMatrix<f64>, DVector<f64>) {
+        let view = self.view();
+        let mut at = Configuration::zero(view.description());
+        at.joint_positions = q.to_vec();
+        let kinematics = Kinematics::new(view.description(), &at).unwrap();
+        (kinematics.mass_matrix(), kinematics.bias_force(&DVector::from_column_slice(v), gravity))
+    }
+}
+
+pub(crate) fn row(values: &[f64]) -> Array2<f64> {
+    Array2::from_shape_vec((1, values.len()), values.to_vec()).unwrap()
+}
+
+/// Sets velocities of an environment made by hand.
+pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
+    env.write(|data| {
+        data.qpos_mut().copy_from_slice(q);
+        data.qvel_mut().copy_from_slice(v);
+    });
+}
+
+#[track_caller]
+pub(crate) fn step(env: &mut Env) {
+    env.step(1);
+    assert_eq!(*env.status(), EnvStatus::Running);
+}
+
+/// `found` is `expected` within `tolerance`, relative where the number is larger than 1.
+#[track_caller]
+pub(crate) fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    let error = (found - expected).abs() / expected.abs().max(1.0);
+    assert!(error <= tolerance, "{what}: {found:.12e}, expected {expected:.12e}: off by {error:.1e} > {tolerance:.0e}");
+}
+
+/// Compiles MJCF for stepping with plain MuJoCo.
+pub(crate) fn plain(xml: &str) -> mj::Data {
+    let compiled = mj::compile(xml, &[]).unwrap_or_else(|e| panic!("{e}\n{xml}"));
+    mj::Data::new(&compiled.into_model()).unwrap()
+}
+
+/// Six links of 6 to 1 kg and four fingers of three links of 20, 15 and 10 g, with the effort limits of such an arm
+/// (150 N m down to 28) and hand (2 N m). No dry friction, no damping, no rotor inertia.
+pub(crate) fn arm_and_hand() -> Vec<Joint> {
+    // Name, height above the one before, axis, mass, moments, height of the centre of mass, effort limit.
+    type Row = (&'static str, f64, [f64; 3], f64, [f64; 3], f64, f64);
+    let arm: [Row; 6] = [
+        ("a1", 0.15, [0.0, 0.0, 1.0], 6.0, [0.03, 0.03, 0.02], 0.05, 150.0),
+        ("a2", 0.18, [0.0, 1.0, 0.0], 5.5, [0.08, 0.08, 0.012], 0.2, 150.0),
+        ("a3", 0.4, [0.0, 1.0, 0.0], 3.5, [0.04, 0.04, 0.006], 0.15, 100.0),
+        ("a4", 0.35, [0.0, 0.0, 1.0], 2.0, [0.006, 0.006, 0.004], 0.03, 28.0),
+        ("a5", 0.10, [0.0, 1.0, 0.0], 1.5, [0.005, 0.005, 0.003], 0.02, 28.0),
+        ("a6", 0.09, [0.0, 0.0, 1.0], 1.0, [0.005, 0.005, 0.002], 0.01, 28.0),
+    ];
+    let mut joints: Vec<Joint> = Vec::new();
+    for (name, z, axis, mass, inertia, com, effort) in arm {
+        let joint = Joint { mass, inertia, com: [0.0, 0.0, com], axis, ..Joint::new(name, "continuous") };
+        let joint = Joint { origin: [0.0, 0.0, z], ..joint }.range(-3.0, 3.0).effort(effort);
+        let parent = joints.last().map_or("base".into(), Joint::link);
+        joints.push(Joint { parent, ..joint });
+    }
+    let wrist = joints[5].link();
+    for (k, x) in [-0.03, -0.01, 0.01, 0.03].into_iter().enumerate() {
+        let mut parent = wrist.clone();
+        let mut origin = [x, 0.0, 0.145];
+        for (s, (length, mass)) in [(0.04, 0.020), (0.03, 0.015), (0.025, 0.010_f64)].into_iter().enumerate() {
+            // A rod of radius 8 mm.
+            let across = mass * (length * length / 12.0 + 0.008 * 0.008 / 4.0);
+            let joint = Joint {
+                parent,
+                origin,
+                axis: [1.0, 0.0, 0.0],
+                mass,
+                com: [0.0, 0.0, length / 2.0],
+                inertia: [across, across, mass * 0.008 * 0.008 / 2.0],
+                ..Joint::new(&format!("h{k}{s}"), "continuous")
+            };
+            parent = joint.link();
+            origin = [0.0, 0.0, length];
+            joints.push(joint.range(-0.3, 1.6).effort(2.0));
+        }
+    }
+    joints
+}
+
+/// The tutorial's gains.
+pub(crate) fn tutorial_gains() -> DriveCfg {
+    DriveCfg {
+        stiffness: [("a.*", 1e4), ("h.*", 1e3)].into(),
+        damping: [("a.*", 1e3), ("h.*", 1e2)].into(),
+        ..Default::default()
+    }
+}

@@ -1,0 +1,253 @@
+//! Near positions in which a direction is lost: where neighbouring targets have neighbouring solutions, those are found.
+
+use crate::kinematics::robots::*;
+use kinetoscope::ndarray::{Array2, ArrayView2};
+use kinetoscope::prelude::*;
+use kinetoscope::scene::Random;
+use kinetoscope::scene::pose::to_row;
+use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// How far JOINT5 is from where a direction is lost \[rad\].
+const NEAR: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-4, -1e-4, 1e-2, -1e-2];
+/// What targets are away \[m\], \[rad\].
+const AWAY: (f64, f64) = (1e-3, 2e-3);
+
+/// Solvers that have one start, and the usual number.
+fn solvers() -> [IkCfg; 2] {
+    [IkCfg { num_seeds: 1, ..IkCfg::default() }, IkCfg::default()]
+}
+
+fn rows(pose: &Pose) -> Array2<f64> {
+    Array2::from_shape_vec((1, 7), to_row(pose).to_vec()).unwrap()
+}
+
+fn row(q: &[f64]) -> Array2<f64> {
+    Array2::from_shape_vec((1, q.len()), q.to_vec()).unwrap()
+}
+
+fn largest(a: ArrayView2<'_, f64>, b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn jacobian(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Matrix6<f64> {
+    let jacobian = robot.jacobian(tip, Some(row(q).view()), None).unwrap();
+    Matrix6::from_fn(|i, k| jacobian[(0, i, k)])
+}
+
+/// A shoulder, an elbow and three axes through one point. With the last but one at zero, the two beside it are one line, and
+/// the tool turns about no axis that is square to both that line and the axis between.
+fn spherical_wrist() -> (tempfile::TempDir, SimulationManager, RobotId) {
+    let of = |name, between, xyz, axis| joint(name, "continuous", between, xyz, axis, "");
+    let joints = [
+        of("j1", ["foot", "a"], "0 0 0.3", "0 0 1"),
+        of("j2", ["a", "b"], "0 0 0", "0 1 0"),
+        of("j3", ["b", "c"], "0 0 0.4", "0 1 0"),
+        of("j4", ["c", "d"], "0 0 0.2", "0 0 1"),
+        of("j5", ["d", "e"], "0 0 0.2", "0 1 0"),
+        of("j6", ["e", "f"], "0 0 0", "0 0 1"),
+    ];
+    let dir = written(&["foot", "a", "b", "c", "d", "e", "f"], &joints);
+    let (sim, id) = simulation(1, arm(dir.path().join("r.urdf")));
+    (dir, sim, id)
+}
+
+/// The tilt of the tool's axis against the forearm is a vector whose length is j5 and whose direction turns with j4. A turn
+/// of the tool by delta at the angle phi to the axis of j5 adds (delta cos phi, delta sin phi) to (j5, 0): j4 turns by the
+/// angle between, or, with j5 of the other sign, by the rest of half a turn. The nearer of both is found, unless they are
+/// nearly alike (both within 0.27 of a right angle, which is 1.57): then either. The other joints turn by delta at most, j6 as
+/// j4. What the rotation is off by at the end, e, is an angle of asin(e / length of the new tilt) at j4; tilts of 2e-3 and
+/// 1e-2 bend this by less than 1e-3.
+#[test]
+fn a_spherical_wrist_turns_no_further_than_it_has_to() {
+    let (_dir, sim, id) = spherical_wrist();
+    let robot = sim.robot(id);
+    let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
+    let delta = AWAY.1;
+    for near in NEAR {
+        let q = [0.3, 0.4, 1.1, 0.5, near, -0.4];
+        let start = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        let center = start * nalgebra::Point3::new(0.0, 0.0, -0.1);
+        let at_zero = jacobian(&robot, tip, &[q[0], q[1], q[2], q[3], 0.0, q[5]]);
+        let [along, between] = [3, 4].map(|k| at_zero.fixed_view::<3, 1>(3, k).into_owned());
+        for step in 0..24 {
+            let phi = f64::from(step) * PI / 12.0;
+            let (tilt, side) = (near + delta * phi.cos(), delta * phi.sin());
+            // Where the new tilt is none, any j4 will do.
+            let length = tilt.hypot(side);
+            if length < 1e-4 {
+                continue;
+            }
+            let nearer = if tilt == 0.0 { FRAC_PI_2 } else { (side / tilt).atan().abs() };
+            let most = if nearer > 1.3 { PI - nearer } else { nearer } + delta;
+            let axis = phi.cos() * between - phi.sin() * between.cross(&along);
+            let turn = UnitQuaternion::from_scaled_axis(delta * axis);
+            let about = Pose::from_parts(
+                (center.coords + turn * (start.translation.vector - center.coords)).into(),
+                turn * start.rotation,
+            );
+            for cfg in solvers() {
+                let found = robot.compute_ik(&about, tip, &cfg, Some(row(&q).view()), None).unwrap();
+                let what = format!("j5 at {near}, phi {phi:.2}, {} seeds: {found:?}", cfg.num_seeds);
+                assert!(found.success[0] && found.seed[0] == 0, "{what}");
+                let slack = (found.rotation_error[0] / length).min(1.0).asin() + 1e-3;
+                assert!(largest(found.qpos.view(), &q) <= most + slack, "at most {most}: {what}");
+                // The start is no solution.
+                assert!(found.iterations[0] > 0, "{what}");
+            }
+        }
+    }
+}
+
+/// Bent, with the axes of JOINT4 and JOINT6 parallel where `last` is zero, and with that of JOINT5 parallel to those of JOINT2
+/// and JOINT3.
+fn bent(near: f64) -> [f64; 6] {
+    [0.3, 0.3, -1.5, 0.0, near, 0.4]
+}
+
+/// A neighbour at joint positions `from + s * way`, with the largest `s` up to 0.3 for which the frame is not farther away than
+/// asked.
+fn neighbour(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
+    let fk = |s: f64| {
+        let q: Vec<f64> = from.iter().zip(way).map(|(q, w)| q + s * w).collect();
+        let at = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        (q, at)
+    };
+    let (_, start) = fk(0.0);
+    let is_near = |s: f64| {
+        let (far, turned) = errors(&fk(s).1, &start);
+        far <= AWAY.0 && turned <= AWAY.1
+    };
+    let (mut low, mut high) = (0.0, 0.3);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if is_near(middle) { low = middle } else { high = middle }
+    }
+    fk(low)
+}
+
+/// What is lost is a fold: along the way n of the joints that moves the frame least, where the frame is in the lost direction is
+/// a parabola. A target beside it has two solutions, about as far from its vertex as each other, or none. Targets here are
+/// made of a solution; going down leads to it, or to the other, which is no farther from the start than twice as far. One
+/// start is enough for all of them.
+#[test]
+fn neighbours_of_a_position_without_a_direction_are_found_nearby() {
+    let (sim, id) = simulation(1, sr5());
+    let robot = sim.robot(id);
+    let tip = Tip::of_part("arm").at("ee_link");
+    let svd = jacobian(&robot, tip, &bent(0.0)).svd(false, true);
+    // Metres and radians for radians: a direction is lost, and only one.
+    assert!(svd.singular_values[5] < 1e-9 && svd.singular_values[4] > 0.05, "{:?}", svd.singular_values);
+    let least = svd.v_t.unwrap().row(5).transpose();
+    let mut farthest = 0.0_f64;
+    for near in NEAR {
+        let q = bent(near);
+        for k in 0..40_u64 {
+            let random = |j: usize| 2.0 * Random::keyed(5, k, &j.to_string()).uniform() - 1.0;
+            let way = match k {
+                0 => least,
+                1 => -least,
+                _ => (Vector6::from_fn(|j, _| random(j)) * 0.01 + least * random(7)).normalize(),
+            };
+            let (there, target) = neighbour(&robot, tip, &q, &way);
+            let away = largest(row(&there).view(), &q);
+            farthest = farthest.max(away);
+            for cfg in solvers() {
+                let found = robot.compute_ik(&target, tip, &cfg, Some(row(&q).view()), None).unwrap();
+                let what = format!("JOINT5 at {near:e}, way {k}, a solution at {away}: {found:?}");
+                assert!(found.success[0] && found.seed[0] == 0, "{what}");
+                assert!(largest(found.qpos.view(), &q) <= 2.0 * away + 1e-4, "{what}");
+            }
+        }
+    }
+    // JOINT4 and JOINT6 turn far for what the frame moves: the axes are 0.136 m apart, 0.136 t² / 2 is 1 mm at t = 0.12.
+    assert!((0.08..0.15).contains(&farthest), "{farthest}");
+}
+
+/// Of targets in any direction some have no solution nearby: on the side to which the arm does not bend. One start says so;
+/// more starts find one, which may be another posture of the arm. What one start finds is within twice the 0.12 rad of the
+/// fold, and more starts give the same.
+#[test]
+fn where_nothing_is_nearby_only_more_starts_go_far() {
+    let (sim, id) = simulation(1, sr5());
+    let robot = sim.robot(id);
+    let tip = Tip::of_part("arm").at("ee_link");
+    let (mut nearby, mut far_away) = (0, 0);
+    for near in NEAR {
+        let q = bent(near);
+        let start = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        for k in 0..12 {
+            let axis = |k: usize| Vector3::ith(k % 3, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
+            let turn = UnitQuaternion::from_scaled_axis(AWAY.1 * axis(k));
+            let at = start.translation.vector + AWAY.0 * axis(k / 2 + k);
+            let target = Pose::from_parts(at.into(), turn * start.rotation);
+            let [one, many] =
+                solvers().map(|cfg| robot.compute_ik(&target, tip, &cfg, Some(row(&q).view()), None).unwrap());
+            assert!(many.success[0], "{near:e}, {k}: {many:?}");
+            if one.success[0] {
+                nearby += 1;
+                assert!(largest(one.qpos.view(), &q) < 0.25 && many.qpos == one.qpos, "{near:e}, {k}: {one:?}");
+            } else {
+                // Beside the edge of what is near a target may be within the tolerances of it.
+                far_away += usize::from(largest(many.qpos.view(), &q) > 0.5);
+            }
+        }
+    }
+    assert!(nearby > 20 && far_away > 0, "{nearby} {far_away}");
+}
+
+/// Poses between two ends, solved one after the other, each from the one before: the longest step of a joint.
+fn follow(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
+    let [from, to] = ends.map(|q| pose(robot.compute_fk(&row(q), tip, None).unwrap().row(0)));
+    let (mut q, mut longest) = (ends[0].to_vec(), 0.0_f64);
+    for step in 1..=100 {
+        let target = from.lerp_slerp(&to, f64::from(step) / 100.0);
+        let found = robot.compute_ik(&target, tip, &IkCfg::default(), Some(row(&q).view()), None).unwrap();
+        assert!(found.success[0] && found.seed[0] == 0, "step {step}: {found:?}");
+        longest = longest.max(largest(found.qpos.view(), &q));
+        q = found.qpos.row(0).to_vec();
+    }
+    longest
+}
+
+/// JOINT5 goes through zero with the other joints where they are at both ends: the bundled arm follows it by 6 mrad in each of
+/// 100 steps, and by less than three times that. A spherical wrist that does not meet the singular position to the last bit
+/// has to turn by half a turn on the way: no step is more than it has to be, a right angle or what is left of half a turn.
+#[test]
+fn lines_lead_through_positions_without_a_direction() {
+    let (sim, id) = simulation(1, sr5());
+    let tip = Tip::of_part("arm").at("ee_link");
+    for [from, to] in [[-0.3, 0.3], [0.3, -0.3]] {
+        let longest = follow(&sim.robot(id), tip, [&bent(from), &bent(to)]);
+        assert!((0.006..0.018).contains(&longest), "{longest}");
+    }
+    let (_dir, sim, id) = spherical_wrist();
+    let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
+    for j4 in [0.5, 0.55] {
+        let ends = [&[0.3, 0.4, 1.1, 0.5, -0.3, -0.4][..], &[0.3, 0.4, 1.1, j4, 0.3, -0.4]];
+        let longest = follow(&sim.robot(id), tip, ends);
+        assert!(longest < PI - 1.3 + 0.01, "{longest}");
+    }
+}
+
+/// Half a turn is where the way round is not told from the way back: of the base, and of each axis of the wrist, whose other joints
+/// stay. Each of these targets has a solution: that half a turn.
+#[test]
+fn a_target_half_a_turn_away_is_reached() {
+    let (mut sim, id) = simulation(1, sr5());
+    let tip = Tip::of_part("arm").at("ee_link");
+    let q = [0.3, 0.3, -1.5, 0.2, 0.6, 0.4];
+    let start = pose(sim.robot(id).compute_fk(&row(&q), tip, None).unwrap().row(0));
+    for joint in [0, 3, 4, 5] {
+        let mut there = q;
+        there[joint] -= PI;
+        let target = pose(sim.robot(id).compute_fk(&row(&there), tip, None).unwrap().row(0));
+        assert!((start.rotation.angle_to(&target.rotation) - PI).abs() < 1e-6);
+        let found = sim.robot(id).compute_ik(&target, tip, &IkCfg::default(), Some(row(&q).view()), None).unwrap();
+        assert!(found.success[0], "joint {joint}: {found:?}");
+        sim.robot_mut(id).write_qpos(&found.qpos, None, None).unwrap();
+        let (far, turned) = apart(&sim.robot(id).link_pose("ee_link").unwrap(), &rows(&target));
+        assert!(far <= 1e-4 && turned <= 1e-3, "joint {joint}: {far} {turned}");
+        assert!(largest(found.qpos.view(), &q) > 1.0, "the control: it went somewhere");
+    }
+}

@@ -1,0 +1,10 @@
+//! Scenes that are declared: from Rust, from files, and the same from both.
+
+mod file_errors;
+mod kinds;
+mod look_up;
+mod parts;
+mod quadruped;
+mod round_trip;
+mod terrain;
+mod yaml;

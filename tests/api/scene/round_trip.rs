@@ -1,0 +1,144 @@
+//! A scene that is written and read again is the same scene.
+
+use crate::scene::quadruped::{declared, says};
+use kinetoscope::ndarray::array;
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::RayCasterCfg;
+use kinetoscope::sensors::ray::pattern::Lidar;
+
+/// Every kind of entity, with numbers that need all their digits.
+fn every_kind() -> SceneCfg {
+    let third = 1.0 / 3.0;
+    let noise = NoiseCfg { std: third, bias_std: 1e-300, ..Default::default() };
+    let sampling = SamplingCfg { noise: [("lin_acc_b".to_string(), noise)].into(), ..SamplingCfg::every(0.02) };
+    let rotation = nalgebra::UnitQuaternion::from_euler_angles(0.1, 0.2, third);
+    let offset = Pose::from_parts([third, 0.0, -0.0].into(), rotation);
+    let object = RigidObjectCfg {
+        init_pose: offset,
+        shape: ObjectShape::Capsule { radius: third, length: 0.1 },
+        friction: Some([third, 0.0, 0.1]),
+        ..Default::default()
+    };
+    let motors = DriveCfg {
+        actuators: vec![
+            (".*KFE".into(), DcMotor { saturation_effort: third }.into()),
+            (".*HAA".into(), DelayedPd { delay: 2, max_delay: 5 }.into()),
+            (".*HFE".into(), IdealPd {}.into()),
+        ],
+        max_velocity: Some(third.into()),
+        ..Default::default()
+    };
+    let urdf = UrdfCfg::single(assets::path("quadruped/quadruped.urdf").unwrap());
+    let second = RobotCfg { urdf, drive: motors, soft_limit_factor: third, ..Default::default() };
+    declared()
+        .with("second", second)
+        .with("object", object)
+        .with("imu", ImuCfg { offset, sampling, gravity_bias: Some([0.0, third, 0.0].into()), ..ImuCfg::on("base") })
+        .with(
+            "frames",
+            FrameTransformerCfg::from("base", vec![TargetFrameCfg { offset, ..TargetFrameCfg::of("object") }]),
+        )
+        .with("joints", JointStateCfg { joints: Some(vec!["LF.*".into()]), ..Default::default() })
+        .with("wrench", JointWrenchCfg { links: vec!["LF_SHANK".into()], ..Default::default() })
+        .with("hills", TerrainCfg { heights: array![[third, -0.0], [1e-300, 0.1]], ..Default::default() })
+        .with(
+            "late camera",
+            CameraCfg {
+                latency_steps: 3,
+                noise: [("depth".to_string(), NoiseCfg::white(third))].into(),
+                imperfections: Imperfections { depth_noise: Some(Default::default()), ..Default::default() },
+                ..Default::default()
+            },
+        )
+        .with("eye", RayCasterCameraCfg { max_distance: third, ..Default::default() })
+        .with(
+            "lidar",
+            RayCasterCfg {
+                pattern: Lidar { horizontal_resolution_deg: third, ..Default::default() }.into(),
+                max_distance: f64::INFINITY,
+                ..Default::default()
+            },
+        )
+}
+
+fn again(cfg: &SceneCfg) -> SceneCfg {
+    let types = EntityTypes::default();
+    SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "elsewhere/scene.toml", &types).unwrap()
+}
+
+/// `Debug` writes every number with as many digits as tell it from all others.
+#[test]
+fn what_is_written_is_read_again() {
+    for cfg in [SceneCfg::default(), declared(), every_kind()] {
+        let read = again(&cfg);
+        assert_eq!(format!("{read:#?}"), format!("{:#?}", again(&read)));
+        assert_eq!(read.simulation, cfg.simulation);
+        assert_eq!(read.keys().collect::<Vec<_>>(), cfg.keys().collect::<Vec<_>>());
+        for ((name, read), (_, cfg)) in read.entities.iter().zip(&cfg.entities) {
+            // The uid is the name, whatever stood there.
+            let cfg = match cfg.clone() {
+                EntityCfg::Robot(robot) => RobotCfg { uid: name.clone(), ..*robot }.into(),
+                EntityCfg::RigidObject(object) => RigidObjectCfg { uid: name.clone(), ..*object }.into(),
+                EntityCfg::Terrain(terrain) => TerrainCfg { uid: name.clone(), ..*terrain }.into(),
+                other => other,
+            };
+            assert_eq!(format!("{read:#?}"), format!("{cfg:#?}"));
+        }
+    }
+}
+
+#[test]
+fn what_was_written_moves_the_same() {
+    let expected = says(&mut InteractiveScene::new(declared()).unwrap(), 20);
+    assert_eq!(says(&mut InteractiveScene::new(again(&declared())).unwrap(), 20), expected);
+}
+
+#[test]
+fn a_seed_that_toml_has_not_is_an_error() {
+    let cfg = SceneCfg::new(SimulationManagerCfg { seed: u64::MAX, ..Default::default() });
+    let message = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
+    assert!(message.contains("simulation"), "{message}");
+}
+
+/// A value of TOML as lines of YAML, tables and lists below their keys.
+fn yaml(value: &toml::Value, indent: usize, out: &mut String) {
+    use std::fmt::Write as _;
+    let space = " ".repeat(indent);
+    match value {
+        toml::Value::Table(table) if !table.is_empty() => {
+            for (key, value) in table {
+                write!(out, "\n{space}{key:?}:").unwrap();
+                yaml(value, indent + 2, out);
+            }
+        }
+        toml::Value::Array(list) if !list.is_empty() => {
+            for value in list {
+                write!(out, "\n{space}-").unwrap();
+                yaml(value, indent + 2, out);
+            }
+        }
+        toml::Value::Table(_) => out.push_str(" {}"),
+        toml::Value::Array(_) => out.push_str(" []"),
+        toml::Value::Float(x) if x.is_infinite() => out.push_str(" .inf"),
+        toml::Value::Float(x) => write!(out, " {x:?}").unwrap(),
+        toml::Value::Integer(x) => write!(out, " {x}").unwrap(),
+        toml::Value::Boolean(x) => write!(out, " {x}").unwrap(),
+        toml::Value::String(text) => write!(out, " {text:?}").unwrap(),
+        toml::Value::Datetime(_) => panic!("no scene has a date"),
+    }
+}
+
+/// The same scene in YAML's words is the same scene.
+#[test]
+fn scenes_are_read_from_yaml_too() {
+    let types = EntityTypes::default();
+    for cfg in [SceneCfg::default(), declared(), every_kind()] {
+        let text = cfg.to_toml(&types).unwrap();
+        let mut in_yaml = String::new();
+        yaml(&toml::Value::Table(text.parse().unwrap()), 0, &mut in_yaml);
+        let read =
+            SceneCfg::from_yaml(&in_yaml, "elsewhere/scene.yaml", &types).unwrap_or_else(|e| panic!("{e}\n{in_yaml}"));
+        let without_places = |cfg: SceneCfg| format!("{:#?}", SceneCfg { sources: Default::default(), ..cfg });
+        assert_eq!(without_places(read), without_places(again(&cfg)));
+    }
+}

@@ -1,7 +1,0 @@
-//! `SimulationManager::dump`: what is written loads in plain MuJoCo, is the same robot, and is the same text every time.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod composite;
-mod dump;
-mod golden;
-mod robots;

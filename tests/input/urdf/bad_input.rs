@@ -1,0 +1,292 @@
+//! Bad URDF files: each gives a typed error that names the place, the element, and what would be right.
+
+use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::urdf::{UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str};
+use std::path::Path;
+
+type Check = fn(&UrdfError) -> bool;
+
+macro_rules! is {
+    ($variant:ident) => {
+        (|e: &UrdfError| matches!(e, UrdfError::$variant { .. })) as Check
+    };
+}
+
+fn parse(text: &str) -> Result<UrdfFile, UrdfError> {
+    parse_str(text, Path::new("robot.urdf"))
+}
+
+/// A robot whose line 2 is `body` and which has the links `a`, `b`.
+fn robot(body: &str) -> String {
+    format!("<robot name=\"r\">\n{body}\n<link name=\"a\"/><link name=\"b\"/></robot>")
+}
+
+/// A joint from `a` to `b` at line 2.
+fn joint(attributes: &str, body: &str) -> String {
+    robot(&format!("<joint name=\"j\" {attributes}>{body}<parent link=\"a\"/><child link=\"b\"/></joint>"))
+}
+
+fn revolute(body: &str) -> String {
+    joint("type=\"revolute\"", body)
+}
+
+/// A robot with one link `l`, whose content is at line 2.
+fn link(body: &str) -> String {
+    format!("<robot name=\"r\"><link name=\"l\">\n{body}\n</link></robot>")
+}
+
+fn shape(geometry: &str) -> String {
+    link(&format!("<visual><geometry>{geometry}</geometry></visual>"))
+}
+
+const INERTIA: &str = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
+const LIMIT: &str = "<limit lower=\"-1\" upper=\"1\" effort=\"5\" velocity=\"1\"/>";
+
+#[test]
+fn every_mistake_has_a_typed_error_with_place_and_remedy() {
+    let three = |tail: &str| {
+        format!(
+            "<robot name=\"r\">\n<joint name=\"j1\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\n\
+             {tail}\n<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/></robot>"
+        )
+    };
+    let mimic = |one: &str, two: &str| {
+        let joint = |name: &str, parent: &str, child: &str, follows: &str| {
+            let mimic = if follows.is_empty() { String::new() } else { format!("<mimic joint=\"{follows}\"/>") };
+            format!(
+                "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{LIMIT}\
+                 {mimic}</joint>"
+            )
+        };
+        format!(
+            "<robot name=\"r\">\n{}\n{}\n<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/></robot>",
+            joint("j1", "a", "b", one),
+            joint("j2", "b", "c", two)
+        )
+    };
+    let origin = |o: &str| link(&format!("<visual><origin {o}/><geometry><sphere radius=\"1\"/></geometry></visual>"));
+    let inertial = |i: &str| link(&format!("<inertial>{i}</inertial>"));
+    let mass = |m: &str| inertial(&format!("<mass value=\"{m}\"/>{INERTIA}"));
+
+    let cases: Vec<(&str, String, Check, &[&str])> = vec![
+        // Numbers.
+        ("word", origin("xyz=\"1 x 2\""), is!(Number), &["robot.urdf:2: <origin xyz=\"1 x 2\">: \"x\" is not a number; xyz needs three numbers, such as \"0 0 0.1\""]),
+        ("too few", origin("xyz=\"1 2\""), is!(Number), &[":2:", "there are two; xyz needs three"]),
+        ("too many", origin("rpy=\"1 2 3 4\""), is!(Number), &[":2:", "<origin rpy=\"1 2 3 4\">", "there are four"]),
+        ("none", origin("xyz=\"\""), is!(Number), &[":2:", "there are no; xyz needs three"]),
+        ("comma", origin("xyz=\"1,5 0 0\""), is!(Number), &["\"1,5\" is not a number (use a decimal point"]),
+        ("nan", origin("xyz=\"0 nan 0\""), is!(Number), &[":2:", "\"nan\" is not finite"]),
+        ("inf", origin("rpy=\"0 0 inf\""), is!(Number), &["\"inf\" is not finite"]),
+        ("overflow", origin("rpy=\"0 0 1e999\""), is!(Number), &["\"1e999\" is not finite"]),
+        ("mass word", mass("heavy"), is!(Number), &["<mass value=\"heavy\">", "value needs one number"]),
+        ("limit word", revolute("<limit lower=\"low\"/>"), is!(Number), &[":2: <limit lower=\"low\">"]),
+        ("both rotations", origin("rpy=\"0 0 0\" quat_xyzw=\"0 0 0 1\""), is!(Value), &["quat_xyzw and rpy"]),
+        ("zero quaternion", origin("quat_xyzw=\"0 0 0 0\""), is!(Value), &["0 0 0 1"]),
+        // Mass.
+        ("negative mass", mass("-1"), is!(Value), &["robot.urdf:2: link \"l\": <mass value=\"-1\">: value is negative"]),
+        ("nan mass", mass("NaN"), is!(Number), &[":2:", "not finite"]),
+        ("no mass", inertial(INERTIA), is!(ElementMissing), &[":2: link \"l\": <inertial> has no <mass>", "<mass value="]),
+        ("no inertia", inertial("<mass value=\"1\"/>"), is!(ElementMissing), &["has no <inertia>", "<inertia ixx="]),
+        ("no mass value", inertial(&format!("<mass/>{INERTIA}")), is!(AttributeMissing), &["<mass> has no value"]),
+        ("no ixy", inertial("<mass value=\"1\"/><inertia ixx=\"1\"/>"), is!(AttributeMissing), &["<inertia> has no ixy"]),
+        ("two inertials", inertial(&format!("<mass value=\"1\"/>{INERTIA}</inertial><inertial>")), is!(ElementRepeated), &[":2: link \"l\": a second <inertial>, the first is at robot.urdf:2"]),
+        // Shapes.
+        ("box", shape("<box size=\"1 0 1\"/>"), is!(Value), &["<box size=\"1 0 1\">", "positive"]),
+        ("sphere", shape("<sphere radius=\"-1\"/>"), is!(Value), &["radius must be positive"]),
+        ("cylinder", shape("<cylinder radius=\"1\" length=\"0\"/>"), is!(Value), &["length must be positive"]),
+        ("no radius", shape("<cylinder length=\"1\"/>"), is!(AttributeMissing), &["<cylinder> has no radius"]),
+        ("shape", shape("<cilinder/>"), is!(ShapeUnknown), &["<cilinder>", "candidates: \"cylinder\""]),
+        ("two shapes", shape("<box size=\"1 1 1\"/><sphere radius=\"1\"/>"), is!(ElementRepeated), &["one <geometry>"]),
+        ("no shape", shape(""), is!(ElementMissing), &["<sphere>"]),
+        ("no geometry", link("<collision/>"), is!(ElementMissing), &["<collision> has no <geometry>"]),
+        ("mesh name", shape("<mesh filename=\" \"/>"), is!(MeshUnnamed), &[":2: link \"l\"", "meshes/part.stl"]),
+        ("no mesh name", shape("<mesh/>"), is!(AttributeMissing), &["<mesh> has no filename"]),
+        ("scale", shape("<mesh filename=\"a\" scale=\"0.001\"/>"), is!(Number), &["there is one", "0.001 0.001 0.001"]),
+        ("zero scale", shape("<mesh filename=\"a\" scale=\"1 0 1\"/>"), is!(Value), &["scale must not be zero"]),
+        // Names.
+        ("unnamed link", "<robot name=\"r\">\n<link/></robot>".to_owned(), is!(AttributeMissing), &[":2:", "<link> has no name"]),
+        ("control character", "<robot><link name=\"a&#1;\"/></robot>".to_owned(), is!(Xml), &["robot.urdf:1: column"]),
+        ("line break in name", "<robot><link name=\"a&#10;b\"/></robot>".to_owned(), is!(Value), &["control character"]),
+        ("duplicate link", robot("<link name=\"a\"/>"), is!(NameRepeated), &["robot.urdf:3: a second link named \"a\", the first is at robot.urdf:2"]),
+        ("duplicate joint", three("<joint name=\"j1\" type=\"fixed\"><parent link=\"b\"/><child link=\"c\"/></joint>"), is!(NameRepeated), &["robot.urdf:3: a second joint named \"j1\"", "robot.urdf:2"]),
+        ("materials", robot("<material name=\"m\"><color rgba=\"1 1 1 1\"/></material><material name=\"m\"><color rgba=\"0 0 0 1\"/></material>"), is!(NameRepeated), &["material", "\"m\""]),
+        // The tree.
+        ("no links", "<robot name=\"r\">\n</robot>".to_owned(), is!(NoLinks), &["robot.urdf:1", "<link>"]),
+        ("no parent", "<robot>\n<joint name=\"j\" type=\"fixed\"><child link=\"b\"/></joint></robot>".to_owned(), is!(ElementMissing), &[":2: joint \"j\": <joint> has no <parent>"]),
+        ("unnamed parent", robot("<joint name=\"j\" type=\"fixed\"><parent/><child link=\"b\"/></joint>"), is!(AttributeMissing), &["<parent> has no link"]),
+        ("dangling parent", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"A\"/><child link=\"b\"/></joint>"), is!(LinkUnknown), &["robot.urdf:2: joint \"j\": parent link \"A\" does not exist; candidates: \"a\", \"b\""]),
+        ("dangling child", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/>\n<child link=\"bb\"/></joint>"), is!(LinkUnknown), &["robot.urdf:3: joint \"j\": child link \"bb\"", "\"b\""]),
+        ("two parents", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"c\"/><child link=\"b\"/></joint>"), is!(TwoParents), &["robot.urdf:3: joint \"j2\" has child \"b\"", "\"j1\" at robot.urdf:2"]),
+        ("cycle", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint>"), is!(Cycle), &["robot.urdf:2: joint \"j1\" closes a circle of links: \"b\" -> \"a\" -> \"b\""]),
+        ("own parent", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"b\"/><child link=\"b\"/></joint>"), is!(Cycle), &["\"b\" -> \"b\""]),
+        ("no root", "<robot>\n<link name=\"a\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"a\"/></joint></robot>".to_owned(), is!(Cycle), &[":2: joint \"j\""]),
+        ("several roots", robot(""), is!(SeveralRoots), &["2 links have no parent joint", "\"a\" (robot.urdf:3), \"b\" (robot.urdf:3)"]),
+        // Joints.
+        ("joint type", joint("type=\"revolut\"", ""), is!(JointTypeUnknown), &["robot.urdf:2: joint \"j\": there is no type \"revolut\"; candidates: \"revolute\""]),
+        ("spherical", joint("type=\"spherical\"", ""), is!(JointTypeUnknown), &["\"spherical\""]),
+        ("no type", joint("", ""), is!(AttributeMissing), &["joint \"j\": <joint> has no type"]),
+        ("no limit", revolute(""), is!(LimitMissing), &["robot.urdf:2: joint \"j\" is revolute and has no <limit>; add <limit lower=", "continuous"]),
+        ("no limit 2", joint("type=\"prismatic\"", ""), is!(LimitMissing), &["prismatic"]),
+        ("effort", revolute("<limit effort=\"-1\"/>"), is!(Value), &["effort must not be negative"]),
+        ("velocity", revolute("<limit velocity=\"-1\"/>"), is!(Value), &["velocity must not be negative"]),
+        ("damping", revolute(&format!("{LIMIT}<dynamics damping=\"-1\"/>")), is!(Value), &["damping must not be negative"]),
+        ("zero axis", revolute(&format!("{LIMIT}<axis xyz=\"0 0 0\"/>")), is!(Value), &[":2: joint \"j\": <axis xyz=\"0 0 0\">", "0 0 1"]),
+        ("no axis", revolute(&format!("{LIMIT}<axis/>")), is!(AttributeMissing), &["<axis> has no xyz"]),
+        ("mimic missing", mimic("", "jX"), is!(MimicUnknown), &["robot.urdf:3: joint \"j2\" mimics \"jX\", which does not exist; candidates: \"j1\""]),
+        ("mimic itself", mimic("", "j2"), is!(MimicCycle), &["robot.urdf:3: joint \"j2\" mimics itself: \"j2\" -> \"j2\""]),
+        ("mimic circle", mimic("j2", "j1"), is!(MimicCycle), &["robot.urdf:2: joint \"j1\" mimics itself: \"j1\" -> \"j2\" -> \"j1\""]),
+        // Documents.
+        ("empty", String::new(), is!(FileEmpty), &["robot.urdf: is empty", "<robot name="]),
+        ("blank", " \n\u{feff}".to_owned(), is!(Xml), &["robot.urdf:"]),
+        ("bom only", "\u{feff}\n".to_owned(), is!(FileEmpty), &["is empty"]),
+        ("unclosed", "<robot>\n<link name=\"a\">".to_owned(), is!(Xml), &["robot.urdf:2: column"]),
+        ("wrong tag", "<robot>\n<link name=\"a\"></lnk></robot>".to_owned(), is!(Xml), &["robot.urdf:2: column 16"]),
+        ("attribute twice", "<robot>\n<link name=\"a\" name=\"b\"/></robot>".to_owned(), is!(Xml), &["robot.urdf:2"]),
+        ("mjcf", "\n<mujoco/>".to_owned(), is!(WrongRoot), &["robot.urdf:2: the root element is <mujoco>", "MJCF"]),
+        ("sdf", "<sdf/>".to_owned(), is!(WrongRoot), &["<sdf>", "URDF"]),
+        ("other root", "<Robot/>".to_owned(), is!(WrongRoot), &["<Robot>", "<robot name="]),
+        ("xacro element", "<robot xmlns:xacro=\"http://wiki.ros.org/xacro\">\n<xacro:macro name=\"m\"/></robot>".to_owned(), is!(Xacro), &["robot.urdf:2: <xacro:macro>", "xacro file.xacro > file.urdf"]),
+        ("xacro unbound", "<robot>\n<xacro:macro name=\"m\"/></robot>".to_owned(), is!(Xacro), &["robot.urdf:2", "xacro file.xacro"]),
+        ("xacro expression", origin("xyz=\"0 0 ${h}\""), is!(Xacro), &["robot.urdf:2: <origin xyz=\"0 0 ${h}\">"]),
+        ("doctype", "<?xml version=\"1.0\"?>\n<!DOCTYPE robot SYSTEM \"file:///etc/passwd\"><robot/>".to_owned(), is!(Doctype), &["robot.urdf:2", "<!DOCTYPE>"]),
+        ("bomb", format!("<!DOCTYPE z [<!ENTITY a \"{}\"><!ENTITY b \"&a;&a;&a;&a;\">]><robot name=\"&b;\"/>", "x".repeat(1000)), is!(Doctype), &["robot.urdf:1"]),
+        ("entity", "<robot name=\"&undefined;\"/>".to_owned(), is!(Xml), &["robot.urdf:1: column"]),
+    ];
+    for (what, text, is_right, needles) in &cases {
+        let error = parse(text).expect_err(what);
+        let message = error.to_string();
+        assert!(is_right(&error), "{what}: {error:?}");
+        for needle in *needles {
+            assert!(message.contains(needle), "{what}: \"{needle}\" is not in: {message}");
+        }
+        assert!(message.contains("robot.urdf"), "{what}: {message}");
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, bytes: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let error = parse_file(&dir.path().join("nothing.urdf")).unwrap_err();
+    assert!(matches!(error, UrdfError::FileMissing { .. }) && error.to_string().contains("nothing.urdf"), "{error}");
+    file("arm.urdf", b"<robot/>");
+    let error = parse_file(dir.path()).unwrap_err();
+    assert!(matches!(error, UrdfError::FileIsFolder { .. }) && error.to_string().contains("arm.urdf"), "{error}");
+    let error = parse_file(&file("latin1.urdf", b"<robot>\n<link name=\"\xe9\"/></robot>")).unwrap_err();
+    let text = error.to_string();
+    assert!(matches!(error, UrdfError::Encoding { .. }) && text.contains("latin1.urdf:2: byte 0xe9"), "{text}");
+    let error = parse_file(&file("utf16.urdf", b"\xff\xfe<\0r\0")).unwrap_err().to_string();
+    assert!(error.contains("UTF-16") && error.contains("UTF-8"), "{error}");
+    let error = parse_file(&file("empty.urdf", b"")).unwrap_err();
+    assert!(matches!(error, UrdfError::FileEmpty { .. }));
+    assert!(parse_file(&file("bom.urdf", b"\xef\xbb\xbf<robot name=\"r\"><link name=\"a\"/></robot>")).is_ok());
+}
+
+#[test]
+fn files_named_by_a_robot_must_exist() {
+    let dir = tempfile::tempdir().unwrap();
+    let assemble_with = |element: &str, uri: &str| {
+        let path = dir.path().join("robot.urdf");
+        let mesh = format!("<{element}><geometry><mesh filename=\"{uri}\"/></geometry></{element}>");
+        std::fs::write(&path, link(&mesh)).unwrap();
+        assemble(&UrdfCfg::single(path))
+    };
+    let cases: [(&str, Check, &[&str]); 5] = [
+        ("meshes/a.stl", is!(MeshMissing), &["meshes/a.stl\" does not exist; looked at:\n"]),
+        ("../../../b.stl", is!(MeshMissing), &["b.stl"]),
+        (
+            "package://not_there/c.stl",
+            is!(PackageUnknown),
+            &["package \"not_there\"", "UrdfCfg::packages", "looked at:"],
+        ),
+        ("https://example.com/d.stl", is!(UriUnsupported), &["https:// is not supported; use package://"]),
+        ("package://x", is!(UriUnsupported), &["package://name_of_package/"]),
+    ];
+    for (uri, is_right, needles) in cases {
+        let error = assemble_with("collision", uri).expect_err(uri);
+        let message = error.to_string();
+        assert!(is_right(&error), "{uri}: {error:?}");
+        assert!(message.contains("robot.urdf:2: link \"l\":"), "{message}");
+        assert!(needles.iter().all(|n| message.contains(n)), "{message}");
+        let assembly = assemble_with("visual", uri).expect(uri);
+        assert_eq!(assembly.diagnostics.len(), 1);
+        let warning = &assembly.diagnostics[0];
+        assert_eq!(warning.kind, DiagnosticKind::VisualMeshMissing);
+        assert!(warning.to_string().contains("robot.urdf:2: link \"l\": visual mesh"), "{warning}");
+    }
+}
+
+#[test]
+fn what_is_odd_but_usable_is_a_warning() {
+    let kinds = |text: &str| parse(text).unwrap().diagnostics.iter().map(|d| d.kind).collect::<Vec<_>>();
+    let file = parse(&revolute("\n<limit lower=\"1\" upper=\"-1\" effort=\"5\" velocity=\"2\"/>")).unwrap();
+    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::LimitIgnored);
+    assert!(file.diagnostics[0].to_string().starts_with("robot.urdf:3: joint \"j\": lower limit 1 is above"));
+    let limit = file.joints[0].limit.as_ref().unwrap();
+    assert!(!limit.lower && !limit.upper && limit.effort && limit.velocity);
+
+    for effort in ["", "effort=\"0\""] {
+        assert_eq!(kinds(&revolute(&format!("<limit {effort}/>"))), [DiagnosticKind::EffortUnlimited]);
+    }
+    assert_eq!(kinds(&joint("type=\"continuous\"", "")), [DiagnosticKind::EffortUnlimited]);
+    for quiet in ["fixed", "floating", "planar"] {
+        assert_eq!(kinds(&joint(&format!("type=\"{quiet}\""), "")), []);
+    }
+    // Exporters write a zero axis and a limit for fixed joints.
+    assert_eq!(kinds(&joint("type=\"fixed\"", "<axis xyz=\"0 0 0\"/><limit effort=\"0\"/>")), []);
+
+    let file = parse(&revolute(&format!("{LIMIT}<axis xyz=\"0 3 4\"/>"))).unwrap();
+    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::AxisNormalized);
+    assert_eq!(file.robot.joints[0].axis.xyz.0, [0.0, 0.6, 0.8]);
+    assert_eq!(kinds(&revolute(&format!("{LIMIT}<axis xyz=\"0 0 1.0001\"/>"))), []);
+    assert_eq!(kinds(&revolute(&format!("{LIMIT}<axis xyz=\"0 0 1e300\"/>"))), [DiagnosticKind::AxisNormalized]);
+
+    let in_fixed = |body: &str| joint("type=\"fixed\"", body);
+    let fixed = in_fixed("");
+    let with = |body: &str| fixed.replacen('\n', &format!("\n{body}"), 1);
+    assert_eq!(kinds(&with("<sensors/>")), [DiagnosticKind::ElementIgnored]);
+    assert_eq!(kinds(&with("<gazebo reference=\"a\"/><mujoco/><ros2_control/>")), []);
+    assert_eq!(kinds(&with("<transmission name=\"t\"><joint name=\"j\"/></transmission>")), []);
+    let file = parse(&with("<transmission name=\"t\"><joint name=\"jj\"/></transmission>")).unwrap();
+    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::ReferenceUnknown);
+    assert!(file.diagnostics[0].message.contains("<transmission name=\"t\"> names joint \"jj\""));
+    assert_eq!(kinds(&in_fixed("<mimic joint=\"j\"/>")), [DiagnosticKind::ElementIgnored]);
+
+    let looks = |materials: &str| {
+        let visual = "<visual><geometry><box size=\"1 1 1\"/></geometry><material name=\"m\"/></visual>";
+        format!("<robot>{materials}<link name=\"l\">{visual}{visual}</link></robot>")
+    };
+    assert_eq!(kinds(&looks("")), [DiagnosticKind::MaterialUndefined]);
+    let grey = "<material name=\"m\"><color rgba=\"1 1 1 1\"/></material>";
+    assert_eq!(kinds(&looks(&format!("{grey}{grey}"))), []);
+    assert_eq!(kinds(&looks(&grey.replace("1 1 1 1", "255 0 0 1"))), [DiagnosticKind::ColorClamped]);
+    let file = parse(&link("<colision/><self_filter/>")).unwrap();
+    assert_eq!(file.diagnostics.len(), 1);
+    assert!(file.diagnostics[0].message.contains("<colision> is not read and was ignored (<collision>?)"));
+}
+
+#[test]
+fn absent_is_not_zero() {
+    let file = parse(&revolute("<limit lower=\"0\" effort=\"0\"/>")).unwrap();
+    let limit = file.joints[0].limit.as_ref().unwrap();
+    assert!(limit.lower && !limit.upper && limit.effort && !limit.velocity);
+    assert!(file.links.iter().all(|l| l.inertial.is_none()));
+    assert!(file.joints[0].mimic.is_none() && !file.joints[0].damping);
+    let file = parse(&link("\n<inertial><mass value=\"0\"/><inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/></inertial>")).unwrap();
+    assert_eq!(file.links[0].inertial.as_ref().unwrap().line, 3);
+}
+
+#[test]
+fn namespaces_comments_and_capsules_are_fine() {
+    let text = "<?xml version=\"1.0\"?>\n<!-- c --><robot name=\"r &amp; s\" xmlns=\"http://ros.org\" xmlns:xacro=\"http://xacro\" \
+                xmlns:g=\"http://g\" version=\"1.1\"><g:link/><link name=\"a&lt;'&quot;\"><!-- c --><visual>\
+                <origin quat_xyzw=\"0 0 1 1\"/><geometry><capsule radius=\".5\" length=\"+1.\"/></geometry></visual></link></robot>";
+    let file = parse(text).unwrap();
+    assert_eq!((file.robot.name.as_str(), file.robot.links[0].name.as_str()), ("r & s", "a<'\""));
+    assert!((file.robot.links[0].visual[0].origin.rpy[2] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    assert!(file.diagnostics.is_empty());
+}

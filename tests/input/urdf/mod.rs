@@ -1,0 +1,6 @@
+//! URDF files, good, bad and hostile.
+
+mod assembly;
+mod bad_input;
+mod robots;
+mod robustness;

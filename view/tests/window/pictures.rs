@@ -1,0 +1,98 @@
+//! Pictures of the window for the documentation, as a window draws them: written to the folder that the variable
+//! `KINETOSCOPE_SCREENSHOTS` names, and nowhere without it.
+
+use scene::Pose;
+use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use sim::{DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use view::window::{App, Input, Key, Modifiers};
+use view::{Canvas, Eye, Shown, Viewing, Wants};
+
+const SIZE: [usize; 2] = [960, 540];
+
+/// Sixteen arms that have lifted themselves, each beside a cube.
+fn arms() -> SimulationManager {
+    let cfg = SimulationManagerCfg { num_envs: 16, physics_dt: 0.01, arena_space: 2.0, ..Default::default() };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/sr5/SR5.urdf");
+    let drive = DriveCfg { stiffness: [(".*", 1e4)].into(), damping: [(".*", 1e3)].into(), ..Default::default() };
+    let robot = RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(urdf), drive, ..Default::default() };
+    let robot = sim.add_robot(robot).unwrap();
+    sim.add_rigid_object(RigidObjectCfg {
+        uid: "cube".into(),
+        shape: ObjectShape::cube(0.15),
+        init_pose: Pose::translation(0.55, 0.25, 0.075),
+        rgba: [0.8, 0.2, 0.15, 1.0],
+        ..Default::default()
+    })
+    .unwrap();
+    let camera = CameraCfg {
+        width: 320,
+        height: 240,
+        intrinsics: Intrinsics::Fovy { radians: 0.9 },
+        extrinsics: Extrinsics {
+            placement: Placement::LookAt { eye: [1.1, -0.5, 0.7], target: [0.45, 0.15, 0.2], up: [0.0, 0.0, 1.0] },
+            ..Extrinsics::default()
+        },
+        channels: Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() },
+        ..CameraCfg::default()
+    };
+    sim.add_sensor("camera", camera).unwrap();
+    let target = ndarray::arr2(&[[0.3, 0.5, -1.4, 0.3, -0.5, 0.0]]);
+    sim.robot_mut(robot).set_qpos(&target, None, None).unwrap();
+    sim.update(150);
+    sim
+}
+
+#[test]
+fn the_window_as_the_documentation_shows_it() {
+    let mut sim = arms();
+    let viewer = sim.viewer(Wants { contacts: Some(Shown::All), ..Wants::default() });
+    let snapshot = viewer.newest().unwrap();
+    let near = Eye::looking([1.5, -1.0, 1.0], [0.2, 0.1, 0.4]).unwrap();
+    let draw_with = |name: &str, keys: &[Key], eye: Option<Eye>, click: Option<[f64; 2]>| {
+        let mut app = App::new(SIZE, 2);
+        app.show(std::sync::Arc::clone(&snapshot));
+        keys.iter().for_each(|key| app.handle(Input::Press(*key)));
+        if let Some(eye) = eye {
+            let origin = snapshot.envs[0].origin;
+            app.look_from(Eye { target: [0, 1, 2].map(|k| eye.target[k] + origin[k]), ..eye });
+        }
+        if let Some(at) = click {
+            app.handle(Input::ButtonPress(1, at, Modifiers::default()));
+            app.handle(Input::ButtonRelease(1, at));
+            assert!(app.picked().is_some_and(|picked| picked.name.contains("arm")), "{:?}", app.picked());
+        }
+        let mut canvas = Canvas::default();
+        app.draw(&mut canvas, Instant::now());
+        if let Some(folder) = std::env::var_os("KINETOSCOPE_SCREENSHOTS") {
+            std::fs::write(PathBuf::from(folder).join(name), canvas.to_png().unwrap()).unwrap();
+        }
+        canvas
+    };
+    let draw = |name: &str, keys: &[Key], eye: Option<Eye>| draw_with(name, keys, eye, None);
+    let unlike = |a: &Canvas, b: &Canvas| a.bytes().chunks(4).zip(b.bytes().chunks(4)).filter(|(a, b)| a != b).count();
+    // Down and up again: the first environment, alone.
+    let one = [Key::PageDown, Key::PageUp];
+    let with = |more: &[Key]| [&one[..], more].concat();
+    let grid = draw("window_grid.png", &[], None);
+    let plain = draw("window_one.png", &one, Some(near));
+    let selected = draw_with("window.png", &one, Some(near), Some([410.0, 245.0]));
+    assert!(unlike(&selected, &plain) > 2_000, "{}", unlike(&selected, &plain));
+    let overlays = ['c', 'f', 'j', 'm', 't'].map(Key::Char);
+    let overlays = draw("window_overlays.png", &with(&overlays), Some(near));
+    let sliders = draw("window_sliders.png", &with(&[Key::Tab]), Some(near));
+    let help = draw("window_help.png", &[Key::F1], None);
+    let panel = draw("window_panel.png", &with(&[Key::Char('i')]), Some(near));
+    // Two pictures of 160 pixels beside each other, and two below.
+    assert!((30_000..90_000).contains(&unlike(&panel, &plain)), "{}", unlike(&panel, &plain));
+    assert!(unlike(&grid, &plain) > 100_000 && unlike(&grid, &help) > 50_000);
+    assert!(unlike(&overlays, &plain) > 2_000, "{}", unlike(&overlays, &plain));
+    // 210 pixels of each row, all of them shaded.
+    assert!(unlike(&sliders, &plain) > 100 * SIZE[1], "{}", unlike(&sliders, &plain));
+    // In the grid there are sixteen red cubes: from right to left more than a third of the picture.
+    let red = |x: usize, y: usize| grid.pixel(x, y).is_some_and(|p| p[0] > 100 && p[1] < p[0] / 2);
+    let columns: Vec<usize> = (0..SIZE[0]).filter(|&x| (80..SIZE[1]).any(|y| red(x, y))).collect();
+    assert!(columns[columns.len() - 1] - columns[0] > SIZE[0] / 3, "{columns:?}");
+}
