@@ -52,3 +52,16 @@ pub fn assert_refused<S, F: PartialEq>(state: &mut S, rows: &[Refusal<S>], finge
     }
     assert!(findings.is_empty(), "{} of {} rows:\n  {}", findings.len(), rows.len(), findings.join("\n  "));
 }
+
+/// Asserts that a result is an error whose variant and fields, as `Debug` shows them, contain `kind`, and whose message
+/// contains each of `parts`.
+///
+/// # Panics
+/// If it is not; the message shows what came instead.
+#[track_caller]
+pub fn assert_error<T, E: Debug + Display>(result: Result<T, E>, kind: &str, parts: &[&str]) {
+    let Err(error) = result else { panic!("accepted, expected {kind} {parts:?}") };
+    let (shown, text) = (format!("{error:?}"), error.to_string());
+    assert!(shown.contains(kind), "{shown} is not {kind}");
+    assert!(parts.iter().all(|part| text.contains(part)), "{text:?} lacks one of {parts:?}");
+}

@@ -212,3 +212,21 @@ impl RecordedWorld {
         self.sim.update(1);
     }
 }
+
+/// The pose in a row of a batch of poses.
+#[must_use]
+pub fn pose_in(poses: &Array2<f64>, row: usize) -> Pose {
+    kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| poses[(row, k)]))
+}
+
+/// Distance \[m\] and angle \[rad\] between two poses.
+#[must_use]
+pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
+    ((a.translation.vector - b.translation.vector).norm(), a.rotation.angle_to(&b.rotation))
+}
+
+/// The number of diagnostics whose text contains all of these words.
+#[must_use]
+pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
+    sim.diagnostics().iter().map(ToString::to_string).filter(|text| words.iter().all(|word| text.contains(word))).count()
+}
