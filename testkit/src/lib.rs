@@ -9,17 +9,12 @@
 //! | [`needs`] | robots, models and programs that only some machines have |
 //! | [`process`] | a test in a process of its own |
 //! | [`urdf`] | URDF snippets |
-//! | [`x_server`] | an X server without a screen |
+//! | [`wait`] | waiting for what another thread or process does |
+//! | [`x_server`] (feature `x_server`) | an X server without a screen |
 //! | [`worlds`] (feature `worlds`) | simulations, robots, objects and cameras |
 //!
-//! Without the feature `worlds` nothing here depends on another crate of the workspace, so that unit tests of every crate
+//! Without its features nothing here depends on another crate of the workspace, so that unit tests of every crate
 //! can use it.
-//!
-//! ```
-//! use testkit::tolerance::{Tolerance, assert_close};
-//! let euler = Tolerance::absolute(1e-12, "1000 additions of 1e-3, each rounded by 1e-16");
-//! assert_close("time", &[(0..1000).map(|_| 1e-3).sum::<f64>()], &[1.0], euler);
-//! ```
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![forbid(unsafe_code)]
 
@@ -30,6 +25,8 @@ pub mod process;
 pub mod refusal;
 pub mod tolerance;
 pub mod urdf;
+pub mod wait;
 #[cfg(feature = "worlds")]
 pub mod worlds;
+#[cfg(feature = "x_server")]
 pub mod x_server;

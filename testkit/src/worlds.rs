@@ -230,3 +230,25 @@ pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
 pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
     sim.diagnostics().iter().map(ToString::to_string).filter(|text| words.iter().all(|word| text.contains(word))).count()
 }
+
+/// The pose in row `env` of a batch of poses.
+#[must_use]
+pub fn pose(rows: &Array2<f64>, env: usize) -> Pose {
+    kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| rows[(env, k)]))
+}
+
+/// Extrinsics of a camera without a parent at `eye` that looks at `target`, z up.
+#[must_use]
+pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Extrinsics {
+    let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
+    Extrinsics { placement, ..Extrinsics::default() }
+}
+
+/// The mask id of an object.
+///
+/// # Panics
+/// If no object has this name.
+#[must_use]
+pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
+    sim.mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
+}

@@ -2,6 +2,8 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt as _, EventMask, ImageFormat};
 use x11rb::rust_connection::RustConnection;
 
 /// An X server without a screen; it ends with the value.
@@ -53,4 +55,29 @@ impl Drop for Display {
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
+}
+
+/// A part of the screen, row by row: red, green and blue.
+///
+/// # Panics
+/// If the server does not answer.
+#[must_use]
+pub fn screenshot(connection: &RustConnection, corner: [usize; 2], size: [usize; 2]) -> Vec<[u8; 3]> {
+    let root = connection.setup().roots[0].root;
+    let ([x, y], [width, height]) = (corner.map(|n| n as i16), size.map(|n| n as u16));
+    let image = connection.get_image(ImageFormat::Z_PIXMAP, root, x, y, width, height, !0).unwrap();
+    // Pixels of 24 bits: blue, green, red, nothing.
+    image.reply().unwrap().data.chunks_exact(4).map(|p| [p[2], p[1], p[0]]).collect()
+}
+
+/// Closes a window as window managers do it.
+///
+/// # Panics
+/// If the server does not answer.
+pub fn close(connection: &RustConnection, window: u32) {
+    let atom = |name: &[u8]| connection.intern_atom(false, name).unwrap().reply().unwrap().atom;
+    let data = [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0];
+    let event = ClientMessageEvent::new(32, window, atom(b"WM_PROTOCOLS"), data);
+    connection.send_event(false, window, EventMask::NO_EVENT, event).unwrap();
+    connection.flush().unwrap();
 }
