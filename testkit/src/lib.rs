@@ -8,6 +8,7 @@
 //! | [`refusal`] | tables of mistakes and the errors that they must give |
 //! | [`needs`] | robots, models and programs that only some machines have |
 //! | [`process`] | a test in a process of its own |
+//! | [`svg`] | plots in SVG, read back |
 //! | [`urdf`] | URDF snippets |
 //! | [`wait`] | waiting for what another thread or process does |
 //! | [`x_server`] (feature `x_server`) | an X server without a screen |
@@ -23,6 +24,7 @@ pub mod image_check;
 pub mod needs;
 pub mod process;
 pub mod refusal;
+pub mod svg;
 pub mod tolerance;
 pub mod urdf;
 pub mod wait;
