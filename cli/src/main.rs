@@ -6,6 +6,7 @@ mod convert;
 mod excerpt;
 mod interrupt;
 mod model;
+mod names;
 mod picture;
 mod plot;
 mod progress;

@@ -1,5 +1,6 @@
 //! `kinetoscope plot`: numbers of a recording over time, as a picture.
 
+use crate::names::{fits, grouped};
 use crate::{Ending, Result};
 use kinetoscope::record::{RecordedTopic, Recording, Wanted};
 use kinetoscope::view::plot::{Plot, Series};
@@ -124,44 +125,6 @@ fn list(recording: &Recording, topics: &[&RecordedTopic]) {
     }
 }
 
-/// Names that differ in their brackets only are one: `position[J1, J2]`, `data[0..11]`.
-fn grouped(fields: &[String]) -> Vec<String> {
-    let mut groups: Vec<((&str, &str), Vec<&str>)> = Vec::new();
-    for field in fields {
-        let parts = field.split_once('[').and_then(|(before, rest)| Some((before, rest.rsplit_once(']')?)));
-        let (key, of) = match parts {
-            Some((before, (of, after))) => ((before, after), Some(of)),
-            None => ((field.as_str(), ""), None),
-        };
-        match groups.iter_mut().find(|(known, keys)| *known == key && keys.is_empty() == of.is_none()) {
-            Some((_, keys)) => keys.extend(of),
-            None => groups.push((key, of.into_iter().collect())),
-        }
-    }
-    let text = |((before, after), keys): ((&str, &str), Vec<&str>)| {
-        let numbered = keys.len() > 2 && keys.iter().enumerate().all(|(k, key)| key.parse() == Ok(k));
-        match &keys[..] {
-            [] => before.to_string(),
-            keys if numbered => format!("{before}[0..{}]{after}", keys.len() - 1),
-            keys => format!("{before}[{}]{after}", keys.join(", ")),
-        }
-    };
-    groups.into_iter().map(text).collect()
-}
-
-/// Whether a name is as a pattern says, in which `*` stands for any letters.
-fn fits(pattern: &str, name: &str) -> bool {
-    let mut parts = pattern.split('*');
-    let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else { return false };
-    let mut parts: Vec<&str> = parts.collect();
-    let Some(last) = parts.pop() else { return rest.is_empty() };
-    for part in parts {
-        let Some(at) = rest.find(part) else { return false };
-        rest = &rest[at + part.len()..];
-    }
-    rest.ends_with(last)
-}
-
 /// What a field is without saying of what.
 fn stem(field: &str) -> &str {
     field.split('[').next().unwrap_or(field)
@@ -175,31 +138,4 @@ fn with_unit(stem: &str) -> String {
         _ => "",
     };
     format!("{stem}{unit}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stars_stand_for_anything() {
-        for (pattern, name, expected) in [
-            ("position[J1]", "position[J1]", true),
-            ("position[J1]", "position[J12]", false),
-            ("position[*]", "position[J1]", true),
-            ("*[J1]", "velocity[J1]", true),
-            ("pos*J*]", "position[J1]", true),
-            ("*", "", true),
-            ("", "x", false),
-            ("a*a", "a", false),
-        ] {
-            assert_eq!(fits(pattern, name), expected, "{pattern} {name}");
-        }
-    }
-
-    #[test]
-    fn lists_are_short() {
-        let fields = ["a", "p[x]", "p[y]", "d[0]", "d[1]", "d[2]", "t[l].x", "t[r].x", "t[l].y"].map(String::from);
-        assert_eq!(grouped(&fields), ["a", "p[x, y]", "d[0..2]", "t[l, r].x", "t[l].y"]);
-    }
 }

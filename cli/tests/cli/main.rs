@@ -7,15 +7,16 @@ mod plots;
 mod recording_page;
 mod replays;
 mod serve;
-mod serve_leaks;
 mod support;
 mod view;
-mod windows;
 
 // Modules of the command with unit tests of their own: they run here, so that the command needs no second test binary.
 #[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/excerpt.rs"]
 mod excerpt;
+#[allow(dead_code, reason = "only its tests are run")]
+#[path = "../../src/names.rs"]
+mod names;
 #[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/progress.rs"]
 mod progress;

@@ -1,11 +1,10 @@
-//! What docs/recording.md says to type: run as it stands there.
+//! Commands and programs of docs/recording.md, run as they stand there.
 
 use kinetoscope::prelude::*;
 use kinetoscope::record::Format;
 use std::path::Path;
 use std::process::{Command, Output};
-use testkit::needs::python_readers as python;
-use testkit::worlds::RecordedWorld as World;
+use testkit::worlds::RecordedWorld;
 
 const PAGE: &str = include_str!("../../../docs/recording.md");
 
@@ -15,10 +14,10 @@ fn blocks(language: &str) -> Vec<String> {
     PAGE.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_string()).collect()
 }
 
-/// Recordings that are called as those of the page, long enough for its times.
+/// Recordings with the names of the page, long enough for its times.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let mut world = World::new(1, 2);
+    let mut world = RecordedWorld::new(1, 2);
     let mut recorders = Vec::new();
     for (format, end) in Format::all().filter(|(format, _)| !format.is_animation() && format.is_built()) {
         let path = folder.path().join(if end.is_empty() { "arm".into() } else { format!("arm.{end}") });
@@ -29,13 +28,13 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-fn told(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
 #[test]
-fn the_commands_of_the_page_do_what_it_says() {
-    /// Lines that ask for a display, or for what the page has no file of: other tests run these.
+fn commands() {
+    /// Lines that ask for a display, or for a file that the page does not make: other tests run these.
     const ELSEWHERE: [&str; 4] = [
         "kinetoscope recover run.mcap",
         "kinetoscope replay arm.mcap",
@@ -50,11 +49,10 @@ fn the_commands_of_the_page_do_what_it_says() {
     let mut elsewhere: Vec<String> =
         PAGE.contains("`kinetoscope recover run.mcap`").then(|| ELSEWHERE[0].into()).into_iter().collect();
     let mut run = 0;
-    let blocks = blocks("sh");
-    for line in blocks.iter().flat_map(|block| block.lines()) {
+    for line in blocks("sh").iter().flat_map(|block| block.lines()) {
         let line = line.split(" #").next().unwrap().trim();
         if let Some(rest) = line.strip_prefix("cargo run --release ") {
-            // Rows of the table of examples run these: here, that there is such an example.
+            // The table of examples runs these; here, the example exists.
             let name = rest.split_whitespace().skip_while(|word| *word != "--example").nth(1).unwrap();
             assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../examples/{name}.rs")).is_file(), "{line}");
         } else if ELSEWHERE.contains(&line) {
@@ -62,7 +60,7 @@ fn the_commands_of_the_page_do_what_it_says() {
         } else if !line.is_empty() {
             let output =
                 Command::new("sh").args(["-c", line]).env("PATH", &path).current_dir(&folder).output().unwrap();
-            assert_eq!(output.status.code(), Some(0), "{line}: {}", told(&output));
+            assert_eq!(output.status.code(), Some(0), "{line}: {}", printed(&output));
             run += 1;
         }
     }
@@ -75,19 +73,16 @@ fn the_commands_of_the_page_do_what_it_says() {
 
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
-fn the_programs_of_the_page_run() {
-    let python = python();
+fn programs() {
+    let python = testkit::needs::python_readers();
     let folder = folder();
-    let mut run = 0;
-    for block in blocks("python") {
-        let needs = block.contains("arm.hdf5") && !Format::Hdf5.is_built();
-        // LeRobot brings some gigabytes: read_lerobot.py asks it where it is installed.
-        if needs || block.contains("import LeRobotDataset") {
-            continue;
-        }
-        let output = Command::new(&python).args(["-c", &block]).current_dir(&folder).output().unwrap();
-        assert!(output.status.success() && !output.stdout.is_empty(), "{block}\n{}", told(&output));
-        run += 1;
+    // LeRobot brings some gigabytes: read_lerobot.py asks it where it is installed.
+    let absent =
+        |block: &str| block.contains("arm.hdf5") && !Format::Hdf5.is_built() || block.contains("import LeRobotDataset");
+    let blocks: Vec<_> = blocks("python").into_iter().filter(|block| !absent(block)).collect();
+    for block in &blocks {
+        let output = Command::new(&python).args(["-c", block]).current_dir(&folder).output().unwrap();
+        assert!(output.status.success() && !output.stdout.is_empty(), "{block}\n{}", printed(&output));
     }
-    assert!(run >= 2, "{run} programs were run");
+    assert!(blocks.len() >= 2, "{} programs were run", blocks.len());
 }

@@ -1,10 +1,10 @@
 //! `kinetoscope replay`: what it draws, what it serves, and how it verifies.
 
-use super::support::{Running, command, kinetoscope, said, until};
-use super::windows::{Display, SIZE, close, colors, screenshot, window_of};
-use kinetoscope::ndarray::array;
+use super::support::{Running, Shell, colors, red, window_of};
+use kinetoscope::ndarray::{Array3, array};
 use kinetoscope::prelude::*;
-use std::path::{Path, PathBuf};
+use testkit::wait;
+use testkit::x_server::{Display, close, screenshot};
 
 const SCENE: &str = r#"
 [simulation]
@@ -18,142 +18,115 @@ mjcf.text = '''<mujoco><option timestep="0.01"/><worldbody><body name="cart" pos
   <geom type="sphere" size="0.2" mass="1" rgba="0.9 0 0 1"/></body></worldbody></mujoco>'''
 "#;
 
-/// A cart on a spring, written to a scene file.
-fn scene(folder: &Path) -> (InteractiveScene, String) {
-    let path = folder.join("cart.toml");
-    std::fs::write(&path, SCENE).unwrap();
-    (InteractiveScene::from_file(&path).unwrap(), path.to_str().unwrap().to_owned())
+/// A folder with `cart.toml`: a cart on a spring.
+fn shell() -> Shell {
+    Shell::with(&[("cart.toml", SCENE)])
 }
 
-/// Where the red of a picture is, in the middle \[pixels\], and how many pixels it has.
-fn red(image: &image::RgbImage) -> ([f64; 2], usize) {
-    let red = image.enumerate_pixels().filter(|(.., p)| p[0] > 90 && p[1] < 60 && p[2] < 60);
-    let (sum, count) =
-        red.fold(([0.0; 2], 0), |([sx, sy], n), (x, y, _)| ([sx + f64::from(x), sy + f64::from(y)], n + 1));
-    (sum.map(|s| s / (count.max(1) as f64)), count)
+/// Records the scene, with the cart at `start`, to each of these files.
+fn record(shell: &Shell, start: f64, cfgs: &[RecorderCfg], run: impl FnOnce(&mut SimulationManager, RobotId)) {
+    let mut scene = InteractiveScene::from_file(shell.path("cart.toml")).unwrap();
+    let sim = scene.sim_mut();
+    let cart = sim.robot_id("cart").unwrap();
+    if start != 0.0 {
+        sim.robot_mut(cart).write_qpos(&array![[start]], None, None).unwrap();
+    }
+    let recorders: Vec<_> = cfgs.iter().map(|cfg| sim.record(cfg.clone()).unwrap()).collect();
+    run(sim, cart);
+    recorders.into_iter().for_each(|recorder| drop(sim.finish_recording(recorder).unwrap()));
 }
 
+/// Images of a recording show what the simulation showed at that time.
 #[test]
-fn pictures_of_a_recording_are_those_of_the_simulation_at_that_time() {
-    let folder = tempfile::tempdir().unwrap();
+fn images() {
+    let shell = shell();
     for name in ["run.mcap", "run.npz"] {
-        let (mut scene, _) = scene(folder.path());
-        let sim = scene.sim_mut();
-        let cart = sim.robot_id("cart").unwrap();
-        sim.robot_mut(cart).write_qpos(&array![[0.8]], None, None).unwrap();
-        let path = folder.path().join(name);
-        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
-        let cfg = ScreenshotCfg { size: [320, 200], eye: Some(sim.overview_eye()), ..ScreenshotCfg::default() };
         let mut expected = Vec::new();
-        for _ in 0..2 {
-            let canvas = sim.picture_of_stage(&cfg).unwrap();
-            let rgb = canvas.bytes().as_chunks::<4>().0.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
-            expected.push(red(&image::RgbImage::from_raw(320, 200, rgb).unwrap()));
-            sim.update(45);
-        }
-        sim.finish_recording(recorder).unwrap();
-        let out = folder.path().join(format!("{name}.pictures"));
-        let at = ["replay", path.to_str().unwrap(), "--out", out.to_str().unwrap(), "--at", "0,0.45"];
-        let (said, err, code) = said(&kinetoscope(&[&at[..], &["--width", "320", "--height", "200"]].concat()));
-        assert_eq!((err.as_str(), code), ("", 0), "{said}");
+        record(&shell, 0.8, &[RecorderCfg::new(shell.path(name))], |sim, _| {
+            let cfg = ScreenshotCfg { size: [320, 200], eye: Some(sim.overview_eye()), ..ScreenshotCfg::default() };
+            for _ in 0..2 {
+                let canvas = sim.picture_of_stage(&cfg).unwrap();
+                let rgb = canvas.bytes().as_chunks::<4>().0.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+                expected.push(red(&image::RgbImage::from_raw(320, 200, rgb).unwrap()));
+                sim.update(45);
+            }
+        });
+        let out = format!("{name}.images");
+        let said = shell.ok(&format!("replay {name} --out {out} --at 0,0.45 --width 320 --height 200"));
         let found = ["replay_0.000s.png", "replay_0.450s.png"].map(|file| {
             assert!(said.contains(file), "{said}");
-            red(&image::open(out.join(file)).unwrap().to_rgb8())
+            red(&shell.image(&format!("{out}/{file}")))
         });
-        for ((place, count), (expected, pixels)) in found.iter().zip(&expected) {
+        for ((count, place), (pixels, expected)) in found.iter().zip(&expected) {
             // The same ball at the same place; edges may be shaded otherwise.
             assert!(*pixels > 150 && count.abs_diff(*pixels) <= pixels / 20, "{count} instead of {pixels}");
             assert!((0..2).all(|k| (place[k] - expected[k]).abs() < 0.5), "{name}: {place:?} instead of {expected:?}");
         }
         // The control: half a swing later it is elsewhere.
-        assert!((found[0].0[0] - found[1].0[0]).abs() > 20.0, "{found:?}");
+        assert!((found[0].1[0] - found[1].1[0]).abs() > 20.0, "{found:?}");
     }
 }
 
 #[test]
-fn verification_says_whether_and_where_it_differs() {
-    let folder = tempfile::tempdir().unwrap();
-    let (mut good, file) = scene(folder.path());
-    let [path, pushed, mcap] = ["run.npz", "pushed.npz", "run.mcap"].map(|name| folder.path().join(name));
-    let recorders = [&path, &mcap].map(|path| good.sim_mut().record(RecorderCfg::new(path)).unwrap());
-    good.update(50);
-    for recorder in recorders {
-        good.sim_mut().finish_recording(recorder).unwrap();
-    }
-    let (mut other, _) = scene(folder.path());
-    let sim = other.sim_mut();
-    let cart = sim.robot_id("cart").unwrap();
-    let recorder = sim.record(RecorderCfg::new(&pushed)).unwrap();
-    sim.update(20);
-    let force = kinetoscope::ndarray::Array3::from_shape_fn((1, 1, 3), |(.., axis)| if axis == 1 { 5.0 } else { 0.0 });
-    sim.robot_mut(cart)
-        .set_external_wrench(&force, &(0.0 * &force), WrenchFrame::World, Some(&[LinkId(1)]), None)
-        .unwrap();
-    sim.update(20);
-    sim.finish_recording(recorder).unwrap();
-    let verify = |path: &Path| said(&kinetoscope(&["replay", path.to_str().unwrap(), "--verify", "--scene", &file]));
-    for path in [&path, &mcap] {
-        let (out, err, code) = verify(path);
-        assert_eq!((err.as_str(), code), ("", 0), "{out}");
+fn verification() {
+    let shell = shell();
+    record(&shell, 0.0, &["run.npz", "run.mcap"].map(|name| RecorderCfg::new(shell.path(name))), |sim, _| {
+        sim.update(50);
+    });
+    record(&shell, 0.0, &[RecorderCfg::new(shell.path("pushed.npz"))], |sim, cart| {
+        sim.update(20);
+        let (force, link) = (Array3::from_shape_vec((1, 1, 3), vec![0.0, 5.0, 0.0]).unwrap(), LinkId(1));
+        let mut cart = sim.robot_mut(cart);
+        cart.set_external_wrench(&force, &(0.0 * &force), WrenchFrame::World, Some(&[link]), None).unwrap();
+        drop(cart);
+        sim.update(20);
+    });
+    for file in ["run.npz", "run.mcap"] {
+        let out = shell.ok(&format!("replay {file} --verify --scene cart.toml"));
         assert!(out.contains("the same in 50 steps"), "{out}");
     }
-    let (out, err, code) = verify(&pushed);
+    let (out, err, code) = shell.run("replay pushed.npz --verify --scene cart.toml");
     assert_eq!((err.as_str(), code), ("", 1), "{out}");
     assert!(out.contains("first different at step 21 in environment 0: cart/joint_states/"), "{out}");
-    let (_, err, code) = verify(Path::new(&file));
-    assert!(code == 2 && err.contains("NumPy archive"), "{err}");
-    let (_, err, code) = said(&kinetoscope(&["replay", path.to_str().unwrap(), "--verify"]));
-    assert!(code == 2 && err.contains("--scene"), "{err}");
+    shell.assert_refused(&[
+        ("replay cart.toml --verify --scene cart.toml", "NumPy archive"),
+        ("replay run.npz --verify", "--scene"),
+    ]);
 }
 
 #[test]
-fn it_is_served_and_what_cannot_be_shown_is_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let (mut scene, file) = scene(folder.path());
-    let [path, bare] = ["run.mcap", "bare.mcap"].map(|name| folder.path().join(name));
-    let cfgs = [RecorderCfg::new(&path), RecorderCfg { scene: false, ..RecorderCfg::new(&bare) }];
-    let recorders = cfgs.map(|cfg| scene.sim_mut().record(cfg).unwrap());
-    scene.update(20);
-    for recorder in recorders {
-        scene.sim_mut().finish_recording(recorder).unwrap();
-    }
-    let [path, bare] = [&path, &bare].map(|path| path.to_str().unwrap());
-    let serve = ["--serve", "127.0.0.1:0", "--seconds", "0.5"];
-    for args in [[&["replay", path], &serve[..]].concat(), [&["replay", bare, "--scene", &file], &serve[..]].concat()] {
-        let (out, err, code) = said(&kinetoscope(&args));
-        assert_eq!((err.as_str(), code), ("", 0), "{out}");
+fn pages_and_refusals() {
+    let shell = shell();
+    let [path, bare] = ["run.mcap", "bare.mcap"].map(|name| RecorderCfg::new(shell.path(name)));
+    record(&shell, 0.0, &[path, RecorderCfg { scene: false, ..bare }], |sim, _| sim.update(20));
+    for line in ["replay run.mcap", "replay bare.mcap --scene cart.toml"] {
+        let out = shell.ok(&format!("{line} --serve 127.0.0.1:0 --seconds 0.5"));
         assert!(out.contains("http://127.0.0.1:"), "{out}");
     }
-    let out = folder.path().join("out");
-    let out = out.to_str().unwrap();
-    for (args, words) in [
-        (vec!["replay", bare], "does not hold its scene"),
-        (vec!["replay", path], "DISPLAY"),
-        (vec!["replay", path, "--out", out, "--at", "9"], "from 0 s to 0.2"),
-        (vec!["replay", path, "--out", out], "--at"),
-        (vec!["replay", path, "--serve", "nowhere"], "nowhere"),
-        (vec!["replay", path, "--seconds", "nan"], "--seconds"),
-        (vec!["replay", "no_such.mcap"], "no_such.mcap"),
-        (vec!["replay", path, "--scene", "no_such.toml"], "no_such.toml"),
-    ] {
-        let (out, err, code) = said(&kinetoscope(&args));
-        assert_eq!(code, 2, "{args:?}: {out}{err}");
-        assert!(err.contains(words), "{args:?}: {err}");
-    }
+    shell.assert_refused(&[
+        ("replay bare.mcap", "does not hold its scene"),
+        ("replay run.mcap", "DISPLAY"),
+        ("replay run.mcap --out out --at 9", "from 0 s to 0.2"),
+        ("replay run.mcap --out out", "--at"),
+        ("replay run.mcap --serve nowhere", "nowhere"),
+        ("replay run.mcap --seconds nan", "--seconds"),
+        ("replay no_such.mcap", "no_such.mcap"),
+        ("replay run.mcap --scene no_such.toml", "no_such.toml"),
+    ]);
+    let mut running = Running::start(&mut shell.command("replay run.mcap --serve 127.0.0.1:0"));
+    assert!(running.line().contains("Ctrl+C ends it"));
+    running.interrupt();
+    assert_eq!(running.ended().code(), Some(0));
 }
 
-/// What is left out of a recording is a warning, and the exit code says so.
+/// A topic that is left out is a warning, and the exit code is 1.
 #[test]
-fn a_recording_of_which_something_is_left_out_ends_with_1() {
-    let folder = tempfile::tempdir().unwrap();
-    let (mut scene, file) = scene(folder.path());
-    let [path, torn] = ["run.mcap", "torn.mcap"].map(|name| folder.path().join(name));
-    let recorder = scene.sim_mut().record(RecorderCfg::new(&path)).unwrap();
-    scene.update(20);
-    scene.sim_mut().finish_recording(recorder).unwrap();
-    // As somebody else might write it: besides, a topic whose messages are cut.
-    let bytes = std::fs::read(&path).unwrap();
-    let mut writer = mcap::Writer::new(std::fs::File::create(&torn).unwrap()).unwrap();
+fn torn_topic() {
+    let shell = shell();
+    record(&shell, 0.0, &[RecorderCfg::new(shell.path("run.mcap"))], |sim, _| sim.update(20));
+    // As another program might write it, with a topic whose messages are cut.
+    let bytes = std::fs::read(shell.path("run.mcap")).unwrap();
+    let mut writer = mcap::Writer::new(std::fs::File::create(shell.path("torn.mcap")).unwrap()).unwrap();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         writer.write(&message).unwrap();
@@ -165,70 +138,48 @@ fn a_recording_of_which_something_is_left_out_ends_with_1() {
     }
     writer.finish().unwrap();
     drop(writer);
-    let [path, torn] = [&path, &torn].map(|path| path.to_str().unwrap());
-    for (file_of, code_of, words) in [(path, 0, ""), (torn, 1, "/env_0/torn is left out")] {
-        let out = folder.path().join(format!("pictures{code_of}"));
-        let show = ["replay", file_of, "--scene", &file, "--out", out.to_str().unwrap(), "--at", "0.1"];
-        let serve = ["replay", file_of, "--scene", &file, "--serve", "127.0.0.1:0", "--seconds", "0.3"];
-        for args in [&show[..], &serve[..], &["plot", file_of][..]] {
-            let (out, err, code) = said(&kinetoscope(args));
-            assert_eq!(code, code_of, "{args:?}: {out}{err}");
-            assert!(err.contains(words), "{args:?}: {err}");
+    for (file, expected, words) in [("run.mcap", 0, ""), ("torn.mcap", 1, "/env_0/torn is left out")] {
+        for line in [
+            format!("replay {file} --scene cart.toml --out images{expected} --at 0.1"),
+            format!("replay {file} --scene cart.toml --serve 127.0.0.1:0 --seconds 0.3"),
+            format!("plot {file}"),
+        ] {
+            let (out, err, code) = shell.run(&line);
+            assert!(code == expected && err.contains(words), "{line}: {code} {out}{err}");
         }
     }
 }
 
-/// A cart that swings for a second: the file, and the folder that holds it.
-fn swing() -> (tempfile::TempDir, String) {
-    let folder = tempfile::tempdir().unwrap();
-    let (mut scene, _) = scene(folder.path());
-    let sim = scene.sim_mut();
-    let cart = sim.robot_id("cart").unwrap();
-    sim.robot_mut(cart).write_qpos(&array![[0.8]], None, None).unwrap();
-    let path = folder.path().join("swing.mcap");
-    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
-    sim.update(100);
-    sim.finish_recording(recorder).unwrap();
-    (folder, path.to_str().unwrap().to_owned())
-}
+const SIZE: [usize; 2] = [960, 540];
 
-#[test]
-fn ctrl_c_is_a_good_end_of_a_page() {
-    let (_folder, path) = swing();
-    let mut running = Running::start(&mut command(&["replay", &path, "--serve", "127.0.0.1:0"]));
-    assert!(running.line().contains("Ctrl+C ends it"));
-    running.interrupt();
-    assert_eq!(running.ended().code(), Some(0));
-}
-
-/// Where the mark of the time line is: the middle column of what is bright yellow in the lowest rows of the window.
-fn mark(picture: &[[u8; 3]]) -> Option<f64> {
+/// The mark of the time line: the middle column of what is bright yellow in the lowest rows of the window.
+fn mark(image: &[[u8; 3]]) -> Option<f64> {
     let [width, height] = SIZE;
-    let bright = |column: &usize| (height - 14..height - 2).all(|row| picture[row * width + column] == [255, 210, 60]);
+    let bright = |column: &usize| (height - 14..height - 2).all(|row| image[row * width + column] == [255, 210, 60]);
     let columns: Vec<usize> = (0..width).filter(bright).collect();
     (columns.len() == 3).then(|| columns[1] as f64)
 }
 
 #[test]
 #[ignore = "needs Xvfb: cargo xtask test"]
-fn a_window_shows_a_recording_with_its_time_line_until_it_is_closed() {
+fn window() {
     let mut display = Display::start("1280x800");
-    let (_folder, path) = swing();
-    let connection = display.connect();
+    let (shell, connection) = (shell(), display.connect());
+    record(&shell, 0.8, &[RecorderCfg::new(shell.path("swing.mcap"))], |sim, _| sim.update(100));
+    let shown = || screenshot(&connection, [0, 0], SIZE);
     let start = || {
-        let mut running = Running::start(command(&["replay", &path]).env("DISPLAY", &display.name));
+        let mut running = Running::start(shell.command("replay swing.mcap").env("DISPLAY", &display.name));
         assert!(running.line().contains("swing.mcap"));
-        let window = until("a window", || window_of(&connection, "swing.mcap"));
-        until("the recording is drawn", || (colors(&connection) > 50).then_some(()));
+        let window = wait::some("a window", || window_of(&connection, "swing.mcap"));
+        wait::until("the recording is drawn", || colors(shown()) > 50);
         (running, window)
     };
     let (mut running, window) = start();
     // It holds at the end, where the mark is at the right end of the line: 70 pixels from the side.
-    until("the end", || mark(&screenshot(&connection)).filter(|mark| (*mark - (SIZE[0] as f64 - 70.0)).abs() < 2.0));
+    wait::until("the end", || mark(&shown()).is_some_and(|mark| (mark - (SIZE[0] as f64 - 70.0)).abs() < 2.0));
     if let Some(folder) = std::env::var_os("KINETOSCOPE_SCREENSHOTS") {
-        let bytes = screenshot(&connection).concat();
-        let picture = image::RgbImage::from_raw(SIZE[0] as u32, SIZE[1] as u32, bytes).unwrap();
-        picture.save(PathBuf::from(folder).join("replay_window.png")).unwrap();
+        let image = image::RgbImage::from_raw(SIZE[0] as u32, SIZE[1] as u32, shown().concat()).unwrap();
+        image.save(std::path::Path::new(&folder).join("replay_window.png")).unwrap();
     }
     assert!(running.0.try_wait().unwrap().is_none(), "it does not end by itself");
     close(&connection, window);
@@ -236,7 +187,7 @@ fn a_window_shows_a_recording_with_its_time_line_until_it_is_closed() {
     let (mut running, _) = start();
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
-    // The display is lost: that is an end, not a good one.
+    // A lost display ends it, with an error.
     let (mut running, _) = start();
     display.server.kill().unwrap();
     assert_eq!(running.ended().code(), Some(2));

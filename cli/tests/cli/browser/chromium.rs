@@ -7,12 +7,13 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use testkit::wait;
 use tungstenite::{Message, WebSocket};
 
-/// More than anything here takes on a busy machine.
+/// The longest wait on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// A browser of our own, with an empty profile; it ends when it is dropped.
+/// A browser with an empty profile; it ends when it is dropped.
 pub(crate) struct Chromium {
     process: Child,
     wire: Mutex<Wire>,
@@ -26,12 +27,11 @@ static ONE: Mutex<()> = Mutex::new(());
 struct Wire {
     socket: WebSocket<TcpStream>,
     next: u64,
-    /// What happened while answers were waited for.
+    /// Events that came while answers were waited for.
     events: Vec<Value>,
 }
 
 impl Chromium {
-    /// Starts it.
     pub(crate) fn start(program: &Path) -> Self {
         let alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
@@ -49,31 +49,22 @@ impl Chromium {
             .unwrap();
         // It writes where it listens: the port, and the path of its WebSocket.
         let file = profile.path().join("DevToolsActivePort");
-        let start = Instant::now();
-        let (port, path) = loop {
-            assert!(start.elapsed() < PATIENCE, "Chromium does not start");
+        let (port, path) = wait::some("Chromium", || {
             let text = std::fs::read_to_string(&file).unwrap_or_default();
-            if let Some((port, path)) = text.trim().split_once('\n') {
-                break (port.parse::<u16>().unwrap(), path.trim().to_string());
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+            text.trim().split_once('\n').map(|(port, path)| (port.parse::<u16>().unwrap(), path.trim().to_string()))
+        });
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let (socket, _) = tungstenite::client(format!("ws://127.0.0.1:{port}{path}"), stream).unwrap();
-        Self {
-            process,
-            wire: Mutex::new(Wire { socket, next: 0, events: Vec::new() }),
-            _profile: profile,
-            _alone: alone,
-        }
+        let wire = Mutex::new(Wire { socket, next: 0, events: Vec::new() });
+        Self { process, wire, _profile: profile, _alone: alone }
     }
 
     fn wire(&self) -> MutexGuard<'_, Wire> {
         self.wire.lock().unwrap()
     }
 
-    /// Opens a page.
+    /// Opens a page, with the functions of [`super::TOOLS`].
     pub(crate) fn open(&self, url: &str) -> Tab<'_> {
         let target = self.wire().ask(None, "Target.createTarget", json!({"url": "about:blank"}));
         let attach = json!({"targetId": target["targetId"], "flatten": true});
@@ -82,8 +73,9 @@ impl Chromium {
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             tab.ask(domain, json!({}));
         }
+        tab.ask("Page.addScriptToEvaluateOnNewDocument", json!({"source": super::TOOLS}));
         tab.ask("Page.navigate", json!({"url": url}));
-        tab.wait_until("the page", "document.readyState === 'complete' && document.getElementById('link') !== null");
+        tab.wait_until("the page", "document.readyState === 'complete' && $('link') !== null");
         tab
     }
 }
@@ -146,7 +138,13 @@ impl Tab<'_> {
         answer["result"]["value"].clone()
     }
 
+    /// The value of an expression that is a number.
+    pub(crate) fn number(&mut self, expression: &str) -> f64 {
+        self.evaluate(expression).as_f64().unwrap()
+    }
+
     /// Waits until an expression is true.
+    #[track_caller]
     pub(crate) fn wait_until(&mut self, what: &str, expression: &str) {
         let start = Instant::now();
         // While the page is being loaded there is nothing to ask.
@@ -157,7 +155,7 @@ impl Tab<'_> {
         }
     }
 
-    /// Where an element is: left edge, vertical middle, width, height \[CSS pixels\]. It is scrolled into view.
+    /// Left edge, vertical middle, width and height of an element \[CSS pixels\]. It is scrolled into view.
     pub(crate) fn rectangle(&mut self, element: &str) -> [f64; 4] {
         let rectangle = self.evaluate(&format!(
             "(() => {{ const e = {element}; e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
@@ -182,7 +180,7 @@ impl Tab<'_> {
     /// Drags with the mouse.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.hold(from, to, false);
-        self.mouse("mouseReleased", to, false, false);
+        self.let_go(to);
     }
 
     /// Drags, with Ctrl pressed or not, and does not let go.
@@ -195,17 +193,13 @@ impl Tab<'_> {
         }
     }
 
-    /// Lets go.
     pub(crate) fn let_go(&mut self, at: [f64; 2]) {
         self.mouse("mouseReleased", at, false, false);
     }
 
     /// Chooses in a list.
     pub(crate) fn choose(&mut self, id: &str, value: &str) {
-        self.evaluate(&format!(
-            "(() => {{ const s = document.getElementById('{id}'); s.value = '{value}'; \
-             s.dispatchEvent(new Event('change')); }})()"
-        ));
+        self.evaluate(&format!("$('{id}').value = '{value}'; $('{id}').dispatchEvent(new Event('change'))"));
     }
 
     /// Light or dark, in a window of another size \[CSS pixels\].
@@ -216,7 +210,7 @@ impl Tab<'_> {
         self.ask("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// What is seen, as PNG.
+    /// The visible part of the page, as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let answer = self.ask("Page.captureScreenshot", json!({"format": "png"}));
         decode_base64(answer["data"].as_str().unwrap())
@@ -224,7 +218,7 @@ impl Tab<'_> {
 
     /// Errors of the page's program, and what its browser did not let it do.
     pub(crate) fn complaints(&mut self) -> Vec<String> {
-        // What happened before this answer has been told before it.
+        // Events before this answer come before it.
         self.ask("Runtime.evaluate", json!({"expression": "0"}));
         let wire = self.browser.wire();
         let own = wire.events.iter().filter(|event| event["sessionId"] == self.session.as_str());

@@ -1,15 +1,19 @@
-//! Those with bad manners are refused: no panic, no memory, and the next one is served.
+//! Clients with bad manners: no panic, no memory, no thread and no file is left, and the next one is served.
 
-use crate::serve::running::Running;
-use crate::serve::visitor::{Visitor, connect, say, status, status_of};
-use std::fmt::Write as _;
-use std::io::{Read, Write};
-use std::time::Duration;
+use super::running::Running;
+use super::visitor::{Visitor, say, status, status_of};
+use kinetoscope::prelude::*;
+use std::io::Write;
+use std::net::TcpStream;
+use testkit::process;
+use testkit::wait::{self, threads_and_files};
+use testkit::worlds::{cfg, cube};
+use tungstenite::Message;
 
 #[test]
-fn garbage_is_refused() {
+fn garbage() {
     let running = Running::start(1);
-    // A pseudo-random sequence of every byte, a TLS greeting, and requests that are none.
+    // A pseudo-random sequence of every byte, a TLS greeting, and malformed requests.
     let noise: Vec<u8> = (0..4096_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let tls = [&b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..], &noise].concat();
     for bytes in [
@@ -29,47 +33,14 @@ fn garbage_is_refused() {
     assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
 }
 
-#[test]
-fn huge_heads_are_refused_early() {
-    let running = Running::start(1);
-    let before = resident();
-    let long = "x".repeat(64 << 20);
-    let answer = say(running.address, format!("GET /{long} HTTP/1.1\r\nHost: localhost\r\n\r\n").as_bytes());
-    assert_eq!(status_of(&answer), 431, "a line");
-    let answer =
-        say(running.address, format!("GET / HTTP/1.1\r\nHost: localhost\r\nCookie: {long}\r\n\r\n").as_bytes());
-    assert_eq!(status_of(&answer), 431, "a header");
-    let mut many = String::from("GET / HTTP/1.1\r\nHost: localhost\r\n");
-    for k in 0..500 {
-        let _ = write!(many, "A{k}: b\r\n");
-    }
-    assert_eq!(status_of(&say(running.address, (many + "\r\n").as_bytes())), 431, "many headers");
-    drop(long);
-    // The 64 MB are ours, and were freed; of them nothing may be kept. Other tests in this process draw pictures.
-    let grown = resident().saturating_sub(before);
-    assert!(grown < 100 << 20, "{} MB", grown >> 20);
-    assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
-}
-
-/// Memory of this process \[bytes\].
-fn resident() -> usize {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
-    line.trim().trim_end_matches(" kB").parse::<usize>().unwrap() << 10
-}
-
 /// A frame as a browser sends it, masked with zeros.
 fn frame(first: u8, payload: &[u8]) -> Vec<u8> {
     let mut bytes = vec![first];
     match payload.len() {
         short @ 0..=125 => bytes.push(0x80 | short as u8),
-        middle @ 126..=0xffff => {
-            bytes.push(0x80 | 126);
-            bytes.extend((middle as u16).to_be_bytes());
-        }
         long => {
-            bytes.push(0x80 | 127);
-            bytes.extend((long as u64).to_be_bytes());
+            bytes.push(0x80 | 126);
+            bytes.extend(u16::try_from(long).unwrap().to_be_bytes());
         }
     }
     bytes.extend([0; 4]);
@@ -77,15 +48,14 @@ fn frame(first: u8, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Sends bytes on an open WebSocket; gives the code with which it is closed.
+/// Sends bytes on an open WebSocket; returns the code with which it is closed.
 fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
-    let mut visitor = Visitor::enter(running);
-    let stream = visitor.socket.get_mut();
+    let mut visitor = Visitor::enter(running.address);
     // Refused early, the rest cannot be written.
-    let _ = stream.write_all(bytes);
+    let _ = visitor.socket.get_mut().write_all(bytes);
     loop {
         match visitor.socket.read() {
-            Ok(tungstenite::Message::Close(frame)) => return frame.map(|frame| frame.code.into()),
+            Ok(Message::Close(frame)) => return frame.map(|frame| frame.code.into()),
             Ok(_) => {}
             Err(_) => return None,
         }
@@ -93,11 +63,11 @@ fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
 }
 
 #[test]
-fn frames_that_are_none_close_the_socket() {
+fn malformed_frames() {
     let running = Running::start(1);
     // Announces 2^62 bytes.
     let huge = [&[0x81, 0xff][..], &(1_u64 << 62).to_be_bytes(), &[0; 4], b"{"].concat();
-    let fragments = [frame(0x01, &[b' '; 8000]), frame(0x00, &[b' '; 8000]), frame(0x00, &[b' '; 8000])].concat();
+    let fragments = [0x01, 0x00, 0x00].map(|first| frame(first, &[b' '; 8000])).concat();
     for (what, bytes, code) in [
         ("a huge frame", huge, 1009),
         ("a large frame", frame(0x81, &[b' '; 20_000]), 1009),
@@ -107,32 +77,100 @@ fn frames_that_are_none_close_the_socket() {
         ("not masked", vec![0x81, 0x02, b'{', b'}'], 1002),
         ("an unknown kind", frame(0x83, b"abc"), 1002),
         ("reserved bits", frame(0xf1, b"abc"), 1002),
+        ("goodbye", frame(0x88, &1000_u16.to_be_bytes()), 1000),
     ] {
         assert_eq!(closed_with(&running, &bytes), Some(code), "{what}");
     }
-    // One that says goodbye is answered.
-    assert_eq!(closed_with(&running, &frame(0x88, &1000_u16.to_be_bytes())), Some(1000));
-    Visitor::enter(&running).wait_state("served as before", |_| true);
-    crate::serve::running::wait_until("nobody is left", || running.viewers() == 0);
+    Visitor::enter(running.address).wait_state("served as before", |_| true);
+    wait::until("no viewer is left", || running.viewers() == 0);
+}
+
+/// Runs a scenario in a process of its own.
+fn assert_passes(test: &str) {
+    let output = process::run(module_path!(), test, &std::env::temp_dir(), &[]);
+    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| process::text(bytes));
+    assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");
 }
 
 #[test]
-fn a_flood_of_connections_leaves_room_for_viewers() {
-    let running = Running::start(1);
-    let mut viewer = Visitor::enter(&running);
-    // More than the server takes at a time; they say nothing until their time is up.
-    let silent: Vec<_> = (0..120).map(|_| connect(running.address)).collect();
-    viewer.wait_state("the viewer is served", |state| state["viewers"] == 1);
-    drop(silent);
-    crate::serve::running::wait_until("there is room again", || {
-        status(running.address, "/", &["Host: localhost"]) == 200
-    });
-    // And nothing is said to those who leave at once.
-    for _ in 0..20 {
-        connect(running.address).shutdown(std::net::Shutdown::Both).unwrap();
+fn huge_heads() {
+    assert_passes("huge_heads_scenario");
+}
+
+/// In a process of its own: it measures memory.
+#[test]
+#[ignore = "runs in a process of its own"]
+fn huge_heads_scenario() {
+    /// Memory of this process \[bytes\].
+    fn resident() -> usize {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+        line.trim().trim_end_matches(" kB").parse::<usize>().unwrap() << 10
     }
-    let mut half = connect(running.address);
-    half.shutdown(std::net::Shutdown::Write).unwrap();
-    half.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    assert_eq!(half.read(&mut [0; 16]).unwrap(), 0);
+    if !process::is_child() {
+        return;
+    }
+    let running = Running::start(1);
+    let before = resident();
+    let long = "x".repeat(64 << 20);
+    let headers: String = (0..500).map(|k| format!("A{k}: b\r\n")).collect();
+    for (what, head) in [
+        ("a line", format!("GET /{long} HTTP/1.1\r\nHost: localhost\r\n\r\n")),
+        ("a header", format!("GET / HTTP/1.1\r\nHost: localhost\r\nCookie: {long}\r\n\r\n")),
+        ("many headers", format!("GET / HTTP/1.1\r\nHost: localhost\r\n{headers}\r\n")),
+    ] {
+        assert_eq!(status_of(&say(running.address, head.as_bytes())), 431, "{what}");
+    }
+    drop(long);
+    // The texts of 64 MB are freed; the server may keep nothing of them.
+    let grown = resident().saturating_sub(before);
+    assert!(grown < 100 << 20, "{} MB", grown >> 20);
+    assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
+}
+
+#[test]
+fn leaks() {
+    assert_passes("leaks_scenario");
+}
+
+/// Viewers that vanish leave nothing behind, nor does the end of the simulation. In a process of its own: it counts threads
+/// and files.
+#[test]
+#[ignore = "runs in a process of its own"]
+fn leaks_scenario() {
+    if !process::is_child() {
+        return;
+    }
+    let bare = threads_and_files();
+    let more_than = |than: [usize; 2]| threads_and_files().iter().zip(than).all(|(now, then)| *now > then);
+    let mut sim = SimulationManager::new(cfg(1, 1)).unwrap();
+    sim.add_rigid_object(cube("cube", 0.2, 1.0, [0.0, 0.0, 0.5])).unwrap();
+    let served = sim.serve("127.0.0.1:0").unwrap();
+    sim.update(10);
+    let before = threads_and_files();
+    assert!(more_than(bare), "a server has a thread and a socket: {bare:?} and {before:?}");
+    for k in 0..20 {
+        let mut visitor = Visitor::enter(served.address());
+        visitor.socket.send(Message::text(r#"{"do":"size","width":320,"height":180}"#)).unwrap();
+        sim.update(5);
+        // Some vanish at once, some in the middle of an image.
+        for _ in 0..k % 4 {
+            let _ = visitor.socket.read();
+        }
+        assert!(k != 7 || more_than(before), "a viewer has a thread and a socket");
+        // No goodbye: unread messages make the system reset the connection.
+        drop(visitor);
+    }
+    wait::until("viewers are gone", || served.viewers() == 0);
+    wait::until("as before the viewers", || threads_and_files() == before);
+    sim.update(10);
+
+    // A viewer that is there when the simulation ends is sent away.
+    let mut visitor = Visitor::enter(served.address());
+    wait::until("it is there", || served.viewers() == 1);
+    drop(sim);
+    while visitor.socket.read().is_ok() {}
+    drop(visitor);
+    wait::until("as before the simulation", || threads_and_files() == bare);
+    assert!(TcpStream::connect(served.address()).is_err(), "the port is closed");
 }

@@ -1,11 +1,9 @@
-//! The browser view without a browser: who is let in, what viewers get and may do, and what those with bad manners cannot.
+//! The browser view without a browser: access, images, commands, several viewers, and clients with bad manners.
 
-mod door;
+mod access;
 mod hostile;
-mod pictures;
-mod recordings;
+mod images;
 pub(crate) mod running;
-mod selecting;
 mod several;
 mod steering;
-mod visitor;
+pub(crate) mod visitor;

@@ -1,18 +1,20 @@
-//! A simulation that steps on a thread of its own while it is served.
+//! A simulation that steps on a thread of its own while it is served, and a recording that is played.
 
-use kinetoscope::ndarray::Array2;
+use kinetoscope::RecordedFilm;
+use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::record::{Film, Recording};
+use kinetoscope::view::control::{Play, Speed};
 use kinetoscope::view::{Command, Viewer, Viewing, Wants};
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use testkit::wait;
+use testkit::worlds::{camera, cfg, cube, gains, sr5};
 
-/// Bundled arm of six driven joints.
-pub(crate) const ARM: &str = "sr5/SR5.urdf";
-
-/// How it stands, as the program that steps sees it.
+/// The state of the simulation, as the program that steps it has it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Now {
     pub(crate) steps: u64,
@@ -28,58 +30,26 @@ pub(crate) struct Running {
     served: Served,
     now: Arc<Mutex<Now>>,
     stop: Arc<AtomicBool>,
-    /// Lets it go on where somebody paused it.
+    /// A viewer beside the browsers.
     pub(crate) key: Viewer,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The arm beside a red cube, with a camera that looks at both, `num_envs` times.
+/// The bundled arm of six driven joints beside a red cube of 0.4 m and 1 kg, with a camera that looks at both.
 pub(crate) fn scene(num_envs: usize) -> SimulationManager {
-    let mut sim = SimulationManager::new(SimulationManagerCfg {
-        num_envs,
-        physics_dt: 0.005,
-        threads: Some(1),
-        arena_space: 3.0,
-        ..Default::default()
-    })
-    .unwrap();
-    sim.add_robot(RobotCfg {
-        uid: "arm".into(),
-        urdf: UrdfCfg { components: vec![ComponentCfg::new("arm", assets::path(ARM).unwrap())], ..Default::default() },
-        drive: DriveCfg { stiffness: 1e4.into(), damping: 1e3.into(), ..Default::default() },
-        ..Default::default()
-    })
-    .unwrap();
-    sim.add_rigid_object(RigidObjectCfg {
-        uid: "cube".into(),
-        shape: ObjectShape::cube(0.4),
-        mass: Some(1.0),
-        init_pose: Pose::translation(0.7, 0.0, 0.2),
-        rgba: [0.9, 0.05, 0.05, 1.0],
-        ..Default::default()
-    })
-    .unwrap();
-    sim.add_sensor(
-        "eye",
-        CameraCfg {
-            width: 64,
-            height: 48,
-            intrinsics: Intrinsics::Fovy { radians: 1.0 },
-            extrinsics: Extrinsics {
-                parent: None,
-                placement: Placement::LookAt { eye: [2.0, 1.0, 1.2], target: [0.4, 0.0, 0.2], up: [0.0, 0.0, 1.0] },
-                ..Default::default()
-            },
-            channels: Channels { color: true, depth: true, mask: true, normal: true, ..Default::default() },
-            ..Default::default()
-        },
-    )
-    .unwrap();
+    let cfg = SimulationManagerCfg { physics_dt: 0.005, arena_space: 3.0, ..cfg(num_envs, 1) };
+    let mut sim = SimulationManager::new(cfg).unwrap();
+    sim.add_robot(RobotCfg { drive: gains(1e4, 1e3), ..sr5("arm") }).unwrap();
+    let cube = cube("cube", 0.4, 1.0, [0.7, 0.0, 0.2]);
+    sim.add_rigid_object(RigidObjectCfg { rgba: [0.9, 0.05, 0.05, 1.0], ..cube }).unwrap();
+    let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Default::default() };
+    let eye = camera([64, 48], [2.0, 1.0, 1.2], [0.4, 0.0, 0.2], channels);
+    sim.add_sensor("eye", CameraCfg { intrinsics: Intrinsics::Fovy { radians: 1.0 }, ..eye }).unwrap();
     sim
 }
 
 impl Running {
-    /// Serves [`scene`] where a free port is.
+    /// Serves [`scene`] on a free port.
     pub(crate) fn start(num_envs: usize) -> Self {
         Self::start_at(num_envs, "127.0.0.1:0", ServeCfg::default())
     }
@@ -110,7 +80,6 @@ impl Running {
         Self { url: served.url().into(), address: served.address(), served, now, stop, key, thread: Some(thread) }
     }
 
-    /// How it stands.
     pub(crate) fn now(&self) -> Now {
         self.now.lock().unwrap().clone()
     }
@@ -120,23 +89,22 @@ impl Running {
         self.now.lock().unwrap().longest_step = 0.0;
     }
 
-    /// Viewers there are.
+    /// Number of viewers.
     pub(crate) fn viewers(&self) -> usize {
         self.served.viewers()
     }
 
     /// Waits until something holds.
+    #[track_caller]
     pub(crate) fn wait_until(&self, what: &str, holds: impl Fn(&Now) -> bool) {
-        wait_until(what, || holds(&self.now()));
+        wait::until(what, || holds(&self.now()));
     }
-}
 
-/// Waits until something holds; a minute is more than anything here takes on a busy machine.
-pub(crate) fn wait_until(what: &str, holds: impl Fn() -> bool) {
-    let start = Instant::now();
-    while !holds() {
-        assert!(start.elapsed() < Duration::from_secs(60), "waited for a minute: {what}");
-        std::thread::sleep(Duration::from_millis(5));
+    /// Waits for some steps more.
+    #[track_caller]
+    pub(crate) fn wait_for_steps(&self, more: u64) {
+        let before = self.now().steps;
+        self.wait_until("it steps", |now| now.steps > before + more);
     }
 }
 
@@ -147,4 +115,33 @@ impl Drop for Running {
         let ended = self.thread.take().unwrap().join();
         assert!(ended.is_ok() || std::thread::panicking(), "the simulation's thread panicked");
     }
+}
+
+/// Plays a recording of half a second, in which the cube of [`scene`] falls from `height`, for as long as `watch` takes.
+pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send) {
+    struct Ends<'a>(&'a AtomicBool);
+    impl Drop for Ends<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Release);
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fall.mcap");
+    let mut sim = scene(1);
+    let cube = sim.rigid_object_id("cube").unwrap();
+    sim.rigid_object_mut(cube).write_pose(&array![[0.7, 0.0, height, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
+    let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
+    sim.update(100);
+    sim.finish_recording(recorder).unwrap();
+    let (film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+    let served = sim.serve_with("127.0.0.1:0", ServeCfg { speed: Some(Speed::REAL), ..ServeCfg::default() }).unwrap();
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let _ends = Ends(&over);
+            watch(served.address(), served.url());
+        });
+        sim.play(&mut RecordedFilm(film), &mut || !over.load(Ordering::Acquire)).unwrap();
+    });
+    served.close(&mut sim).unwrap();
 }

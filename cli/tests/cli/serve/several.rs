@@ -1,12 +1,13 @@
-//! Several viewers at once, and those who do not read.
+//! Several viewers at once, slow ones among them.
 
-use crate::serve::running::{Running, wait_until};
-use crate::serve::visitor::{Visitor, connect};
+use super::running::Running;
+use super::visitor::{Visitor, connect, say, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Command, Speed};
 use serde_json::json;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::time::{Duration, Instant};
+use testkit::wait;
 use tungstenite::Message;
 
 /// A step of this scene takes less than a millisecond; a viewer that does not read is given up after five seconds. A
@@ -14,49 +15,47 @@ use tungstenite::Message;
 const LONGEST_STEP: f64 = 2.0;
 
 #[test]
-fn each_viewer_has_its_own_view() {
+fn own_views() {
     let running = Running::start(2);
-    let mut visitors: Vec<Visitor> = (0..3).map(|_| Visitor::enter(&running)).collect();
+    let mut visitors: Vec<Visitor> = (0..3).map(|_| Visitor::enter(running.address)).collect();
     for (k, visitor) in (0u32..).zip(&mut visitors) {
         visitor.ask(json!({"do": "size", "width": 160 + 16 * k, "height": 90}));
-        visitor.ask(json!({"do": "environment", "env": if k == 0 { None } else { Some(k - 1) }}));
+        visitor.ask(json!({"do": "environment", "env": k.checked_sub(1)}));
     }
     for (k, visitor) in (0u32..).zip(&mut visitors) {
-        visitor.wait_picture("stage", |_, picture| picture.dimensions() == (160 + 16 * k, 90));
-        let env = if k == 0 { json!(null) } else { json!(k - 1) };
+        visitor.wait_image("stage", |_, image| image.dimensions() == (160 + 16 * k, 90));
+        let env = json!(k.checked_sub(1));
         visitor.wait_state("its environment", |state| state["environment"] == env && state["viewers"] == 3);
     }
     assert_eq!(running.viewers(), 3);
     drop(visitors);
-    wait_until("they are gone", || running.viewers() == 0);
+    wait::until("they are gone", || running.viewers() == 0);
 }
 
 #[test]
-fn there_are_no_more_viewers_than_may_be() {
+fn max_viewers() {
     let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { max_viewers: 2, ..Default::default() });
-    let (first, _second) = (Visitor::enter(&running), Visitor::enter(&running));
+    let (first, _second) = (Visitor::enter(running.address), Visitor::enter(running.address));
     let third = tungstenite::client(format!("ws://{}/live", running.address), connect(running.address));
     let Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) = third else {
-        panic!("there is no place for a third")
+        panic!("a third viewer is accepted")
     };
     assert_eq!(answer.status().as_u16(), 503);
     drop(first);
-    wait_until("a place is free", || running.viewers() < 2);
-    Visitor::enter(&running).wait_state("any", |_| true);
+    wait::until("a place is free", || running.viewers() < 2);
+    Visitor::enter(running.address).wait_state("any", |_| true);
 }
 
+/// A viewer that does not read slows neither the simulation nor another viewer.
 #[test]
-fn a_viewer_that_reads_nothing_slows_nobody() {
+fn slow_viewers() {
     let running = Running::start(1);
-    let mut alive = Visitor::enter(&running);
-    let dead = Visitor::enter(&running);
-    // This one talks without end and reads no answer: they fill the buffers of both sides.
-    let greedy = Visitor::enter(&running);
+    let [mut alive, dead, mut greedy] = [(); 3].map(|()| Visitor::enter(running.address));
     alive.wait_state("three", |state| state["viewers"] == 3);
     running.forget_longest_step();
     let before = running.now().steps;
+    // This one talks without end and reads no answer, which fills the buffers of both sides.
     let talk = std::thread::spawn(move || {
-        let mut greedy = greedy;
         let mut said = 0_u32;
         while greedy.socket.send(Message::text(r#"{"do":"nothing"}"#)).is_ok() {
             said += 1;
@@ -67,7 +66,7 @@ fn a_viewer_that_reads_nothing_slows_nobody() {
     let start = Instant::now();
     while running.viewers() > 1 {
         assert!(start.elapsed() < Duration::from_secs(90), "{} viewers", running.viewers());
-        alive.wait_picture("stage", |_, _| true);
+        alive.wait_image("stage", |_, _| true);
     }
     assert!(talk.join().unwrap() > 1000, "buffers take more than a few answers");
     let given_up_after = start.elapsed();
@@ -79,52 +78,64 @@ fn a_viewer_that_reads_nothing_slows_nobody() {
     drop(dead);
 }
 
+/// A viewer that pauses and leaves does not hold the simulation for ever; one that comes back at once finds it held.
 #[test]
-fn who_pauses_and_leaves_does_not_hold_the_simulation_for_ever() {
+fn pause_of_browser() {
     let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
-    visitor.ask(json!({"do": "pause"}));
-    visitor.wait_state("paused", |state| state["paused"] == true);
+    let mut visitor = Visitor::enter(running.address);
+    visitor.pause();
     drop(visitor);
-    // Somebody who comes back at once finds it as it was.
-    wait_until("nobody is there", || running.viewers() == 0);
+    wait::until("no viewer is left", || running.viewers() == 0);
     std::thread::sleep(Duration::from_secs(1));
-    let mut again = Visitor::enter(&running);
+    let mut again = Visitor::enter(running.address);
     again.wait_state("still paused", |state| state["paused"] == true);
-    let held = running.now().steps;
     drop(again);
-    running.wait_until("it goes on by itself", |now| now.steps > held + 20);
+    running.wait_for_steps(20);
 }
 
+/// A pause of the program, as a window makes it, stays when the browsers leave; their own settings do not.
 #[test]
-fn a_pause_that_no_browser_made_stays_when_the_browsers_leave() {
-    let running =
-        Running::start_at(1, "127.0.0.1:0", ServeCfg { speed: Some(Speed::Times(3.0)), ..ServeCfg::default() });
+fn pause_of_program() {
+    let cfg = ServeCfg { speed: Some(Speed::Times(3.0)), ..ServeCfg::default() };
+    let running = Running::start_at(1, "127.0.0.1:0", cfg);
     let run = || running.key.newest().unwrap().run.clone();
-    // As a window does it.
     running.key.send(Command::Pause);
-    wait_until("it is held", || run().paused);
-    let mut visitor = Visitor::enter(&running);
+    wait::until("it is held", || run().paused);
+    let mut visitor = Visitor::enter(running.address);
     visitor.ask(json!({"do": "speed", "factor": 0.5}));
     visitor.wait_state("slower", |state| state["speed"] == 0.5);
     visitor.ask(json!({"do": "step"}));
     let steps = run().steps;
     visitor.wait_state("a step", |state| state["steps"].as_u64() > Some(steps) && state["paused"] == true);
-    let held = steps + 1;
     drop(visitor);
-    wait_until("what the browser did is undone", || run().speed == Speed::Times(3.0));
-    assert!(run().paused && run().steps == held, "{:?}", run());
+    wait::until("the settings of the browser are undone", || run().speed == Speed::Times(3.0));
+    assert!(run().paused && run().steps == steps + 1, "{:?}", run());
     running.key.send(Command::Resume);
-    let before = running.now().steps;
-    running.wait_until("it goes on", |now| now.steps > before + 20);
+    running.wait_for_steps(20);
 }
 
+/// More connections than the server takes at a time leave room for viewers; silent ones are closed.
 #[test]
-fn a_connection_that_says_nothing_is_closed() {
+fn silent_connections() {
     let running = Running::start(1);
     let mut silent = connect(running.address);
     silent.write_all(b"GET / HTTP/1.1\r\nHost: loc").unwrap();
     let mut answer = String::new();
-    std::io::Read::read_to_string(&mut silent, &mut answer).unwrap();
-    assert_eq!(crate::serve::visitor::status_of(&answer), 408, "{answer}");
+    silent.read_to_string(&mut answer).unwrap();
+    assert_eq!(status_of(&answer), 408, "{answer}");
+
+    let mut viewer = Visitor::enter(running.address);
+    let silent: Vec<_> = (0..120).map(|_| connect(running.address)).collect();
+    viewer.wait_state("the viewer is served", |state| state["viewers"] == 1);
+    drop(silent);
+    let get = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    wait::until("there is room again", || status_of(&say(running.address, get)) == 200);
+    // Nothing is said to those who leave at once.
+    for _ in 0..20 {
+        connect(running.address).shutdown(std::net::Shutdown::Both).unwrap();
+    }
+    let mut half = connect(running.address);
+    half.shutdown(std::net::Shutdown::Write).unwrap();
+    half.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    assert_eq!(half.read(&mut [0; 16]).unwrap(), 0);
 }

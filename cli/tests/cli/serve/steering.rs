@@ -1,22 +1,28 @@
-//! What viewers may do to the simulation.
+//! Commands of viewers: targets, pause, speed, selection, the spring, and recordings.
 
-use crate::serve::running::Running;
-use crate::serve::visitor::{Came, Visitor};
+use super::running::{Running, play_fall};
+use super::visitor::{Came, Visitor};
+use crate::support::red;
 use kinetoscope::prelude::*;
 use serde_json::{Value, json};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Weight of the cube \[N\]: 1 kg.
+const WEIGHT: f64 = 9.81;
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().map(|all| all.iter().map(|x| x.as_f64().unwrap()).collect()).unwrap_or_default()
+}
 
 #[test]
-fn the_contents_say_what_there_is() {
+fn contents() {
     let running = Running::start(2);
-    let mut visitor = Visitor::enter(&running);
-    let contents = visitor.wait("contents", |came| match came {
+    let contents = Visitor::enter(running.address).wait("contents", |came| match came {
         Came::Contents(contents) => Some(contents),
         _ => None,
     });
-    assert_eq!(contents["environments"], 2);
-    assert_eq!(contents["cameras"], json!(["eye"]));
+    assert_eq!((&contents["environments"], &contents["cameras"]), (&json!(2), &json!(["eye"])));
     let joints = contents["robots"][0]["joints"].as_array().unwrap();
     assert_eq!(contents["robots"][0]["name"], "arm");
     let names: Vec<&str> = joints.iter().map(|joint| joint["name"].as_str().unwrap()).collect();
@@ -25,45 +31,37 @@ fn the_contents_say_what_there_is() {
     assert!(joints.iter().all(|j| j["lower"].as_f64().unwrap() < j["upper"].as_f64().unwrap()), "{joints:?}");
 }
 
+/// A slider moves its joint in the chosen environments, and no other; the state says so.
 #[test]
-fn a_slider_moves_its_joint_and_no_other() {
+fn targets() {
     let running = Running::start(2);
-    let mut visitor = Visitor::enter(&running);
+    let mut visitor = Visitor::enter(running.address);
     visitor.ask(json!({"do": "environment", "env": 1}));
     visitor.wait_state("environment 1", |state| state["environment"] == 1);
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": 0.8}));
     // Gains of 1e4 / 1e3 hold a joint with a vertical axis to less than a milliradian once it is there; 0.02 is a part of
     // the way of 0.8.
-    running
-        .wait_until("the joint comes to its target", |now| now.steps > 0 && (now.positions[(1, 0)] - 0.8).abs() < 0.02);
+    running.wait_until("its target", |now| now.steps > 0 && (now.positions[(1, 0)] - 0.8).abs() < 0.02);
     // In the other environment, at its start; the arm's own weight bends other joints by their gains only.
     let now = running.now();
     assert!(now.positions[(0, 0)].abs() < 0.02, "{:?}", now.positions);
     assert!(now.positions.row(1).iter().skip(1).all(|q| q.abs() < 0.05), "{:?}", now.positions);
-    // The page is told the same.
-    let state = visitor.wait_state("the state says so", |state| {
-        state["robots"][0]["positions"][0].as_f64().is_some_and(|q| (q - 0.8).abs() < 0.02)
-    });
+    let near = |state: &Value, joint: usize, target: f64| {
+        state["robots"][0]["positions"][joint].as_f64().is_some_and(|q| (q - target).abs() < 0.02)
+    };
+    let state = visitor.wait_state("the state says so", |state| near(state, 0, 0.8));
     let row = &state["robots"][0];
     assert!((row["targets"][0].as_f64().unwrap() - 0.8).abs() < 1e-12, "{row}");
     assert!(row["efforts"].as_array().unwrap().iter().all(Value::is_number), "{row}");
     // All environments at once.
     visitor.ask(json!({"do": "environment", "env": null}));
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": -0.5}));
-    running.wait_until("both joints come to their target", |now| {
-        now.positions.column(0).iter().all(|q| (q + 0.5).abs() < 0.02)
-    });
-}
+    running.wait_until("both targets", |now| now.positions.column(0).iter().all(|q| (q + 0.5).abs() < 0.02));
 
-#[test]
-fn the_efforts_are_those_that_hold_the_arm_up() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
-    // Leaned forward, the second joint carries everything above it.
+    // Efforts hold the arm up: leaned forward, the second joint carries everything above it.
+    visitor.ask(json!({"do": "environment", "env": 0}));
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT2", "value": 0.9}));
-    visitor.wait_state("the arm leans", |state| {
-        state["robots"][0]["positions"][1].as_f64().is_some_and(|q| (q - 0.9).abs() < 0.02)
-    });
+    visitor.wait_state("the arm leans", |state| near(state, 1, 0.9));
     // The drive's law at rest: effort = kp (target - position), kp = 1e4 N m/rad.
     let state = visitor.wait_state("it is at rest", |state| {
         let row = &state["robots"][0];
@@ -75,13 +73,11 @@ fn the_efforts_are_those_that_hold_the_arm_up() {
 }
 
 #[test]
-fn pause_pauses_and_a_step_is_a_step() {
+fn pause_step_and_reset() {
     let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
+    let mut visitor = Visitor::enter(running.address);
     running.wait_until("it steps", |now| now.steps > 20);
-    visitor.ask(json!({"do": "pause"}));
-    let state = visitor.wait_state("paused", |state| state["paused"] == true);
-    let held = state["steps"].as_u64().unwrap();
+    let held = visitor.pause()["steps"].as_u64().unwrap();
     std::thread::sleep(Duration::from_millis(400));
     // The program sees the step that holds only when it goes on.
     let before = running.now().steps;
@@ -94,42 +90,35 @@ fn pause_pauses_and_a_step_is_a_step() {
     visitor.ask(json!({"do": "play"}));
     running.wait_until("it goes on", |now| now.steps > before + 20);
     visitor.wait_state("the state says so", |state| state["paused"] == false);
-}
 
-#[test]
-fn a_reset_begins_anew() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
     visitor.wait_state("some time has passed", |state| state["time"].as_f64() > Some(0.3));
-    visitor.ask(json!({"do": "pause"}));
-    visitor.wait_state("paused", |state| state["paused"] == true);
+    visitor.pause();
     visitor.ask(json!({"do": "reset"}));
     let state = visitor.wait_state("reset", |state| state["time"].as_f64() < Some(0.1));
     assert_eq!(state["time"].as_f64(), Some(0.0), "{state}");
 }
 
 #[test]
-fn slow_motion_is_slow() {
+fn slow_motion() {
     let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
-    // From before it is asked for: what is told of it may come late.
-    let start = std::time::Instant::now();
+    let mut visitor = Visitor::enter(running.address);
+    // From before it is asked for: its state may come late.
+    let start = Instant::now();
     visitor.ask(json!({"do": "speed", "factor": 0.1}));
-    let from = visitor.wait_state("slow motion", |state| state["speed"] == 0.1);
-    let to = visitor.wait_state("0.2 s are simulated", |state| {
-        state["time"].as_f64().unwrap() > from["time"].as_f64().unwrap() + 0.2
-    });
-    let passed = to["time"].as_f64().unwrap() - from["time"].as_f64().unwrap();
+    let time = |state: &Value| state["time"].as_f64().unwrap();
+    let from = time(&visitor.wait_state("slow motion", |state| state["speed"] == 0.1));
+    let passed = time(&visitor.wait_state("0.2 s are simulated", |state| time(state) > from + 0.2)) - from;
     // A tenth of the time that passed on the wall, or less where the machine is busy; steps come in blocks of 8 ms of it, or
     // one by one, which 0.1 s is more than.
     assert!(passed <= 0.1 * (start.elapsed().as_secs_f64() + 0.1), "{passed} s in {:?}", start.elapsed());
 }
 
 #[test]
-fn what_cannot_be_done_is_said() {
+fn refusals() {
     let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
-    for (command, says) in [
+    let mut visitor = Visitor::enter(running.address);
+    visitor.wait_image("stage", |_, _| true);
+    visitor.assert_refused([
         (json!({"do": "fly"}), "unknown variant `fly`"),
         (json!({"do": "target", "robot": "leg", "joint": "JOINT1", "value": 0.0}), "\"arm\""),
         (json!({"do": "target", "robot": "arm", "joint": "JOINT7", "value": 0.0}), "JOINT1"),
@@ -138,25 +127,97 @@ fn what_cannot_be_done_is_said() {
         (json!({"do": "overlay", "name": "ghosts", "on": true}), "contacts"),
         (json!({"do": "speed", "factor": -1.0}), "0.001"),
         (json!({"do": "size", "width": 1e9 as u64, "height": 3}), "pixels"),
-    ] {
-        visitor.ask(command.clone());
-        let reason = visitor.wait("a refusal", |came| match came {
-            Came::Refused(reason) => Some(reason),
-            _ => None,
-        });
-        assert!(reason.contains(says), "{command}: {reason}");
-    }
-    let before = running.now().steps;
-    running.wait_until("it steps all the same", |now| now.steps > before + 10);
+        (json!({"do": "grab", "x": 0.01, "y": 0.99}), "nothing here"),
+        (json!({"do": "grab", "x": 2.0, "y": 0.5}), "0 to 1"),
+        (json!({"do": "select", "x": 0.5}), "missing field `y`"),
+    ]);
+    running.wait_for_steps(10);
+}
+
+/// A visitor who sees environment `env`, whose cube is at rest, and the place of the cube in the image, in parts of it.
+fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
+    let mut visitor = Visitor::enter(running.address);
+    visitor.ask(json!({"do": "size", "width": 640, "height": 360}));
+    visitor.ask(json!({"do": "environment", "env": env}));
+    // It starts where it stands, and sinks in by the softness of the contact.
+    let rests = |state: &Value| state["environment"] == env && state["time"].as_f64() > Some(1.5);
+    visitor.wait_state("the cube is at rest", rests);
+    let image = visitor.wait_image("stage", |_, image| image.dimensions() == (640, 360) && red(image).0 > 50);
+    let (_, [x, y]) = red(&image);
+    (visitor, [x / 640.0, y / 360.0])
+}
+
+fn height(state: &Value) -> Option<f64> {
+    numbers(&state["selected"]["position"]).get(2).copied()
+}
+
+/// A click on a resting body selects it: its pose, and the force that carries it.
+#[test]
+fn selection() {
+    let running = Running::start(2);
+    let (mut visitor, [x, y]) = at_rest(&running, 1);
+    let mut select = |y: f64, what: &str, holds: &dyn Fn(&Value) -> bool| {
+        visitor.ask(json!({"do": "select", "x": x, "y": y}));
+        visitor.wait_state(what, |state| holds(&state["selected"]))
+    };
+    let state = select(y, "forces of the selection", &|selected| selected["force"].is_array());
+    let selected = &state["selected"];
+    assert_eq!((&selected["name"], &selected["environment"]), (&json!("cube"), &json!(1)));
+    // It was put at (0.7, 0, 0.2) and stands; contacts give way by less than a millimetre.
+    let position = numbers(&selected["position"]);
+    assert!((0..3).all(|k| (position[k] - [0.7, 0.0, 0.2][k]).abs() < 1e-3), "{position:?}");
+    assert!((numbers(&selected["quaternion"])[0] - 1.0).abs() < 1e-6, "{selected}");
+    // At rest the contacts carry the weight and nothing else; what is left of the settling decays with the contacts' time
+    // constant of 0.02 s, from which 1.5 s are far away.
+    let force = numbers(&selected["force"]);
+    assert!((force[2] - WEIGHT).abs() < 1e-3 * WEIGHT, "{force:?}");
+    assert!(force[0].hypot(force[1]) < 1e-3 * WEIGHT, "{force:?}");
+    assert!(selected["contacts"].as_u64() >= Some(3), "{selected}");
+    let says = selected["says"].as_array().unwrap();
+    assert!(says.iter().any(|line| line.as_str().unwrap().contains("+9.81 N")), "{says:?}");
+    // The control: above it in the image there is the arm, the ground or the sky.
+    select(0.02, "something else", &|selected| selected["name"] != "cube");
+    select(y, "the cube", &|selected| selected["name"] == "cube");
+    visitor.ask(json!({"do": "unselect"}));
+    visitor.wait_state("nothing", |state| state["selected"].is_null());
+}
+
+/// A body hangs on the spring, and falls when it is let go or when the viewer leaves.
+#[test]
+fn spring() {
+    let running = Running::start(1);
+    let (mut visitor, [x, y]) = at_rest(&running, 0);
+    assert_eq!(visitor.wait_state("a state", |_| true)["selected"], Value::Null);
+    visitor.ask(json!({"do": "grab", "x": x, "y": y}));
+    visitor.wait_state("held, it is selected", |state| state["selected"]["name"] == "cube");
+    visitor.ask(json!({"do": "pull", "x": x, "y": y - 0.35}));
+    // In the air nothing touches it.
+    let state = visitor.wait_state("it is in the air", |state| {
+        height(state) > Some(0.3) && state["selected"]["contacts"] == 0 && state["selected"]["force"].is_array()
+    });
+    assert_eq!(numbers(&state["selected"]["force"]), [0.0; 3]);
+    visitor.ask(json!({"do": "release"}));
+    let state = visitor.wait_state("it has fallen and is at rest", |state| {
+        let force = numbers(&state["selected"]["force"]);
+        force.len() == 3 && (force[2] - WEIGHT).abs() < 1e-2 * WEIGHT && height(state) < Some(0.3)
+    });
+    // On a face, it is as high as before; on an edge no force would stay.
+    assert!(height(&state).unwrap() > 0.19, "{state}");
+
+    let (mut other, [x, y]) = at_rest(&running, 0);
+    other.ask(json!({"do": "grab", "x": x, "y": y}));
+    other.ask(json!({"do": "pull", "x": x, "y": y - 0.35}));
+    visitor.wait_state("another viewer pulls it up", |state| height(state) > Some(0.3));
+    drop(other);
+    visitor.wait_state("it falls", |state| height(state).is_some_and(|z| z < 0.25));
 }
 
 #[test]
-fn the_record_button_is_there_where_the_program_gives_one_and_writes_a_file() {
-    // Without one there is none, and pressing it is refused.
+fn record_button() {
+    // Without a button, pressing it is refused.
     let running = Running::start(1);
-    let mut visitor = Visitor::enter(&running);
-    let state = visitor.wait_state("a state", |_| true);
-    assert_eq!(state["recording"], Value::Null);
+    let mut visitor = Visitor::enter(running.address);
+    assert_eq!(visitor.wait_state("a state", |_| true)["recording"], Value::Null);
     visitor.ask(json!({"do": "record", "on": true}));
     visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
     drop((visitor, running));
@@ -165,17 +226,49 @@ fn the_record_button_is_there_where_the_program_gives_one_and_writes_a_file() {
     let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
     let recording = Some(RecordButton::shared(files));
     let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
-    let mut visitor = Visitor::enter(&running);
+    let mut visitor = Visitor::enter(running.address);
     visitor.wait_state("a button", |state| state["recording"] == json!({"on": false, "text": ""}));
     visitor.ask(json!({"do": "record", "on": true}));
     let text = |state: &Value| state["recording"]["text"].as_str().unwrap_or_default().to_owned();
     let state = visitor.wait_state("it records", |state| state["recording"]["on"] == true);
     assert!(text(&state).starts_with("run.npz: "), "{state}");
     // Another viewer sees it, and ends it.
-    let mut other = Visitor::enter(&running);
+    let mut other = Visitor::enter(running.address);
     other.wait_state("rows", |state| state["recording"]["on"] == true && text(state).len() > "run.npz: 9 rows".len());
     assert!(!path.exists());
     other.ask(json!({"do": "record", "on": false}));
     let state = visitor.wait_state("it has ended", |state| state["recording"]["on"] == false);
     assert!(text(&state).ends_with(" MB") && path.is_file(), "{state}");
+}
+
+/// The time line of a recording: a seek shows the scene of that time.
+#[test]
+fn seek() {
+    // From 3 m, in half a second, it falls 1.2 m.
+    play_fall(3.0, |address, _| {
+        let mut visitor = Visitor::enter(address);
+        visitor.ask(json!({"do": "size", "width": 320, "height": 240}));
+        visitor.ask(json!({"do": "pause"}));
+        let mut row = |time: f64| {
+            visitor.ask(json!({"do": "seek", "time": time}));
+            let near = |now: &Value| now.as_f64().is_some_and(|now| (now - time).abs() < 1e-6);
+            let state = visitor.wait_state("its time", |state| near(&state["timeline"]["now"]));
+            assert!(state["paused"] == true && near(&state["time"]), "{state}");
+            assert_eq!([&state["timeline"]["start"], &state["timeline"]["end"]], [&json!(0.0), &json!(0.5)]);
+            // The first image may be an old one; two equal ones are not. A turn by nothing makes the server draw again.
+            let mut last = f64::NAN;
+            loop {
+                visitor.ask(json!({"do": "orbit", "dx": 0.0, "dy": 0.0}));
+                let (_, [_, now]) = red(&visitor.wait_image("stage", |_, _| true));
+                if (now - last).abs() < 0.1 {
+                    return now;
+                }
+                last = now;
+            }
+        };
+        let (begun, ended, again) = (row(0.0), row(0.5), row(0.0));
+        assert!(ended > begun + 10.0 && (begun - again).abs() < 1.0, "{begun} {ended} {again}");
+        visitor.ask(json!({"do": "play"}));
+        visitor.wait_state("the end", |state| state["timeline"]["now"] == 0.5 && state["paused"] == true);
+    });
 }

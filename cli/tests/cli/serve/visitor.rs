@@ -1,23 +1,20 @@
 //! A viewer without a browser.
 
-use crate::serve::running::Running;
 use image::RgbImage;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::time::{Duration, Instant};
+use std::time::Instant;
+use testkit::wait::PATIENCE;
 use tungstenite::{Message, WebSocket};
 
-/// More than anything here takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// What came.
+/// A message of the server.
 #[derive(Debug)]
 pub(crate) enum Came {
     Contents(Value),
     State(Value),
     Refused(String),
-    Picture { about: Value, picture: RgbImage },
+    Image { about: Value, image: RgbImage },
 }
 
 /// A viewer that behaves as the page does.
@@ -26,76 +23,61 @@ pub(crate) struct Visitor {
 }
 
 impl Visitor {
-    /// Comes in.
-    pub(crate) fn enter(running: &Running) -> Self {
-        let stream = connect(running.address);
-        let url = format!("ws://{}/live", running.address);
-        let (socket, answer) = tungstenite::client(url, stream).unwrap();
+    pub(crate) fn enter(address: SocketAddr) -> Self {
+        let (socket, answer) = tungstenite::client(format!("ws://{address}/live"), connect(address)).unwrap();
         assert_eq!(answer.status().as_u16(), 101);
         Self { socket }
     }
 
-    /// Asks for something.
+    /// Sends a command.
     pub(crate) fn ask(&mut self, command: Value) {
         self.socket.send(Message::text(command.to_string())).unwrap();
     }
 
-    /// The next thing that comes; says that it came, as the page does.
-    pub(crate) fn next(&mut self) -> Came {
+    /// The next message; confirms it, as the page does. `None` if nothing came for as long as the socket waits.
+    pub(crate) fn next_or_silence(&mut self) -> Option<Came> {
         loop {
-            match self.socket.read().unwrap() {
-                Message::Text(text) => {
+            match self.socket.read() {
+                Ok(Message::Text(text)) => {
                     let message: Value = serde_json::from_str(&text).unwrap();
                     let came = match message["is"].as_str().unwrap() {
                         "contents" => Came::Contents(message["contents"].clone()),
                         "state" => Came::State(message["state"].clone()),
-                        "refused" => return Came::Refused(message["reason"].as_str().unwrap().into()),
+                        "refused" => return Some(Came::Refused(message["reason"].as_str().unwrap().into())),
                         other => panic!("{other:?} is not of the protocol"),
                     };
                     self.ask(json!({"do": "seen", "what": "state"}));
-                    return came;
+                    return Some(came);
                 }
-                Message::Binary(bytes) => {
-                    self.ask(json!({"do": "seen", "what": "picture"}));
-                    return read_picture(&bytes);
-                }
-                Message::Ping(_) | Message::Pong(_) => {}
-                other => panic!("{other:?} was not expected"),
-            }
-        }
-    }
-
-    /// The next picture of the stage, or `None` when nothing came for as long as the socket waits.
-    pub(crate) fn next_or_silence(&mut self) -> Option<RgbImage> {
-        loop {
-            match self.socket.read() {
                 Ok(Message::Binary(bytes)) => {
                     self.ask(json!({"do": "seen", "what": "picture"}));
-                    match read_picture(&bytes) {
-                        Came::Picture { about, picture } if about["shows"] == "stage" => return Some(picture),
-                        _ => {}
-                    }
+                    let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
+                    let about = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
+                    let image = image::load_from_memory(&bytes[4 + length..]).unwrap().into_rgb8();
+                    return Some(Came::Image { about, image });
                 }
-                Ok(Message::Text(_)) => self.ask(json!({"do": "seen", "what": "state"})),
-                Ok(_) => {}
+                Ok(Message::Ping(_) | Message::Pong(_)) => {}
+                Ok(other) => panic!("{other:?} was not expected"),
                 Err(tungstenite::Error::Io(error)) if error.kind() == std::io::ErrorKind::WouldBlock => return None,
                 Err(error) => panic!("{error}"),
             }
         }
     }
 
-    /// Waits for something.
+    /// Waits for a message.
+    #[track_caller]
     pub(crate) fn wait<T>(&mut self, what: &str, mut wanted: impl FnMut(Came) -> Option<T>) -> T {
         let start = Instant::now();
         loop {
             assert!(start.elapsed() < PATIENCE, "waited for {what}");
-            if let Some(found) = wanted(self.next()) {
+            if let Some(found) = wanted(self.next_or_silence().expect(what)) {
                 return found;
             }
         }
     }
 
     /// Waits for a state with a property.
+    #[track_caller]
     pub(crate) fn wait_state(&mut self, what: &str, mut holds: impl FnMut(&Value) -> bool) -> Value {
         self.wait(what, |came| match came {
             Came::State(state) if holds(&state) => Some(state),
@@ -103,20 +85,33 @@ impl Visitor {
         })
     }
 
-    /// Waits for a picture of something.
-    pub(crate) fn wait_picture(&mut self, shows: &str, mut good: impl FnMut(&Value, &RgbImage) -> bool) -> RgbImage {
+    /// Waits for an image of the stage or of a camera.
+    #[track_caller]
+    pub(crate) fn wait_image(&mut self, shows: &str, mut good: impl FnMut(&Value, &RgbImage) -> bool) -> RgbImage {
         self.wait(shows, |came| match came {
-            Came::Picture { about, picture } if about["shows"] == shows && good(&about, &picture) => Some(picture),
+            Came::Image { about, image } if about["shows"] == shows && good(&about, &image) => Some(image),
             _ => None,
         })
     }
-}
 
-fn read_picture(bytes: &[u8]) -> Came {
-    let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
-    let about: Value = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
-    let picture = image::load_from_memory(&bytes[4 + length..]).unwrap().into_rgb8();
-    Came::Picture { about, picture }
+    /// Commands that are refused, each with these words.
+    #[track_caller]
+    pub(crate) fn assert_refused<const N: usize>(&mut self, rows: [(Value, &str); N]) {
+        for (command, words) in rows {
+            self.ask(command.clone());
+            let reason = self.wait("a refusal", |came| match came {
+                Came::Refused(reason) => Some(reason),
+                _ => None,
+            });
+            assert!(reason.contains(words), "{command}: {reason}");
+        }
+    }
+
+    /// Pauses the simulation; the state in which it is held.
+    pub(crate) fn pause(&mut self) -> Value {
+        self.ask(json!({"do": "pause"}));
+        self.wait_state("paused", |state| state["paused"] == true)
+    }
 }
 
 /// A connection that waits no longer than is sensible.
@@ -127,7 +122,7 @@ pub(crate) fn connect(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// Sends bytes and gives everything that is answered until the other end closes.
+/// Sends bytes and returns the answer, up to the end of the connection.
 pub(crate) fn say(address: SocketAddr, bytes: &[u8]) -> String {
     let mut stream = connect(address);
     // Refused early, the rest cannot be written.
@@ -143,7 +138,7 @@ pub(crate) fn status(address: SocketAddr, path: &str, headers: &[&str]) -> u16 {
     status_of(&say(address, format!("GET {path} HTTP/1.1\r\n{headers}\r\n").as_bytes()))
 }
 
-/// The status of an answer; 0 where there is none.
+/// The status of an answer; 0 if there is none.
 pub(crate) fn status_of(answer: &str) -> u16 {
     answer.strip_prefix("HTTP/1.1 ").and_then(|rest| rest.get(..3)).and_then(|code| code.parse().ok()).unwrap_or(0)
 }

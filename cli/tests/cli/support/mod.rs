@@ -1,13 +1,13 @@
-//! The command as somebody types it.
-#![allow(dead_code, reason = "each test needs a part of it")]
+//! The command in a shell of its own folder, and images that it makes.
 
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
-use std::time::{Duration, Instant};
-
-/// What is not there by then does not come.
-pub(crate) const LONG: Duration = Duration::from_secs(60);
+use testkit::urdf::Files;
+use testkit::wait;
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{AtomEnum, ConnectionExt as _};
+use x11rb::rust_connection::RustConnection;
 
 pub(crate) const ARM: &str = r#"<robot name="arm">
   <link name="base"/>
@@ -22,67 +22,100 @@ pub(crate) const ARM: &str = r#"<robot name="arm">
 </robot>
 "#;
 
-/// The command, of which nothing is a terminal, and that knows of no display.
-pub(crate) fn command(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kinetoscope"));
-    command.args(args).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env("NO_COLOR", "1").stdin(Stdio::null());
-    command
-}
+/// A folder that command lines run in: names of files in them are relative to it.
+pub(crate) struct Shell(Files);
 
-/// What it prints, what it complains of, and its exit code.
-pub(crate) fn said(output: &Output) -> (String, String, i32) {
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (text(&output.stdout), text(&output.stderr), output.status.code().unwrap())
-}
+impl Shell {
+    /// A folder with these files.
+    pub(crate) fn with(files: &[(&str, &str)]) -> Self {
+        let shell = Self(Files::default());
+        files.iter().for_each(|(name, content)| drop(shell.0.write(name, content)));
+        shell
+    }
 
-/// What comes of the command.
-pub(crate) fn kinetoscope(args: &[&str]) -> Output {
-    command(args).output().unwrap()
-}
+    /// A folder with `arm.urdf`.
+    pub(crate) fn with_arm() -> Self {
+        Self::with(&[("arm.urdf", ARM)])
+    }
 
-/// Writes a file, and gives its path.
-pub(crate) fn write(folder: &Path, name: &str, content: &str) -> String {
-    let path = folder.join(name);
-    std::fs::write(&path, content).unwrap();
-    path.to_str().unwrap().to_owned()
-}
+    pub(crate) fn write(&self, name: &str, content: &str) {
+        self.0.write(name, content);
+    }
 
-/// Waits for something.
-pub(crate) fn until<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = found() {
-            return found;
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.folder().join(name)
+    }
+
+    pub(crate) fn image(&self, name: &str) -> image::RgbImage {
+        image::open(self.path(name)).unwrap().to_rgb8()
+    }
+
+    /// `kinetoscope` with these arguments, without a terminal and without a display.
+    pub(crate) fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinetoscope"));
+        command.args(line.split_whitespace()).current_dir(self.0.folder()).stdin(Stdio::null());
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env("NO_COLOR", "1");
+        command
+    }
+
+    /// Its output, its errors, and its exit code.
+    pub(crate) fn run(&self, line: &str) -> (String, String, i32) {
+        let Output { stdout, stderr, status } = self.command(line).output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (text(stdout), text(stderr), status.code().unwrap())
+    }
+
+    /// The output of a line that ends well and has nothing to complain of.
+    #[track_caller]
+    pub(crate) fn ok(&self, line: &str) -> String {
+        let (out, err, code) = self.run(line);
+        assert_eq!((err.as_str(), code), ("", 0), "{line}: {out}");
+        out
+    }
+
+    /// The errors of a line that is refused: nothing else is printed.
+    #[track_caller]
+    pub(crate) fn refused(&self, line: &str) -> String {
+        let (out, err, code) = self.run(line);
+        assert_eq!((out.as_str(), code), ("", 2), "{line}: {err}");
+        err
+    }
+
+    /// Lines that are refused, each with these words; no file is written.
+    #[track_caller]
+    pub(crate) fn assert_refused(&self, rows: &[(&str, &str)]) {
+        let files = || std::fs::read_dir(self.0.folder()).unwrap().count();
+        let before = files();
+        for (line, words) in rows {
+            let err = self.refused(line);
+            assert!(err.contains(words), "{line}: {err}");
+            assert_eq!(files(), before, "{line}: a file is written");
         }
-        assert!(start.elapsed() < LONG, "never: {what}");
-        std::thread::sleep(Duration::from_millis(10));
     }
 }
 
-/// The command while it runs; it is ended with the test.
+/// The command while it runs; it is killed with the value.
 pub(crate) struct Running(pub(crate) Child);
 
 impl Running {
-    /// Starts it.
     pub(crate) fn start(command: &mut Command) -> Self {
         Self(command.stdout(Stdio::piped()).spawn().unwrap())
     }
 
-    /// What it prints first.
+    /// The first line that it prints.
     pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();
         BufReader::new(self.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
         line
     }
 
-    /// As Ctrl+C in a terminal.
+    /// Ctrl+C in a terminal.
     pub(crate) fn interrupt(&self) {
         assert!(Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().unwrap().success());
     }
 
-    /// How it ends.
     pub(crate) fn ended(&mut self) -> ExitStatus {
-        until("it ends", || self.0.try_wait().unwrap())
+        wait::some("the end of the command", || self.0.try_wait().unwrap())
     }
 }
 
@@ -91,4 +124,26 @@ impl Drop for Running {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// Number and middle of the red pixels: those of the red body of a scene, of which nothing else is red.
+pub(crate) fn red(image: &image::RgbImage) -> (usize, [f64; 2]) {
+    let red = image.enumerate_pixels().filter(|(.., p)| p[0] > 60 && f64::from(p[0]) > 2.5 * f64::from(p[1].max(p[2])));
+    let sum = |(n, [sx, sy]): (usize, [f64; 2]), (x, y, _)| (n + 1, [sx + f64::from(x) + 0.5, sy + f64::from(y) + 0.5]);
+    let (count, sum) = red.fold((0, [0.0; 2]), sum);
+    (count, sum.map(|s| s / count.max(1) as f64))
+}
+
+/// Number of different colors.
+pub(crate) fn colors(pixels: impl IntoIterator<Item = [u8; 3]>) -> usize {
+    pixels.into_iter().collect::<std::collections::BTreeSet<_>>().len()
+}
+
+/// The window whose title contains this.
+pub(crate) fn window_of(connection: &RustConnection, title: &str) -> Option<u32> {
+    let children = connection.query_tree(connection.setup().roots[0].root).unwrap().reply().unwrap().children;
+    children.into_iter().find(|window| {
+        let name = connection.get_property(false, *window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 1000).unwrap().reply();
+        name.is_ok_and(|name| String::from_utf8_lossy(&name.value).contains(title))
+    })
 }

@@ -1,0 +1,114 @@
+//! Access: hosts, origins, tokens, and what is answered.
+
+use super::running::{Running, scene};
+use super::visitor::{connect, say, status, status_of};
+use kinetoscope::prelude::*;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+
+/// Headers with which a browser opens a WebSocket.
+const UPGRADE: [&str; 4] = [
+    "Connection: keep-alive, Upgrade",
+    "Upgrade: websocket",
+    "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+];
+
+/// The page comes whole and loads nothing from elsewhere; nothing else is answered.
+#[test]
+fn page() {
+    let running = Running::start(1);
+    assert_eq!(running.url, format!("http://{}/", running.address));
+    let answer = say(running.address, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    assert_eq!(status_of(&answer), 200, "{answer}");
+    let (head, page) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(head.contains("Content-Type: text/html") && head.contains("default-src 'none'"), "{head}");
+    assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
+    let length = head.lines().find_map(|line| line.strip_prefix("Content-Length: ")).unwrap();
+    assert_eq!(length.parse::<usize>().unwrap(), page.len());
+    let answer = say(running.address, b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    assert!(status_of(&answer) == 200 && answer.ends_with("\r\n\r\n"), "{answer}");
+    let host = "Host: localhost";
+    for (path, headers, expected) in [
+        ("/etc/passwd", &[host][..], 404),
+        ("/../../etc/passwd", &[host], 404),
+        ("/live", &[host], 426),
+        // HTTP 1.1 has a host, and only one.
+        ("/", &[], 400),
+        ("/", &[host, host], 400),
+    ] {
+        assert_eq!(status(running.address, path, headers), expected, "{path} {headers:?}");
+    }
+    let post = say(running.address, b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nabcd");
+    assert_eq!(status_of(&post), 405, "{post}");
+}
+
+#[test]
+fn other_sites() {
+    let running = Running::start(1);
+    let port = running.address.port();
+    for (host, expected) in [
+        // The name of a site that was made to point here (DNS rebinding).
+        ("evil.example".into(), 403),
+        (format!("evil.example:{port}"), 403),
+        ("127.0.0.1.evil.example".into(), 403),
+        ("10.1.2.3".into(), 403),
+        (format!("127.0.0.1:{port}"), 200),
+        // A tunnel has another port.
+        ("localhost:1234".into(), 200),
+        ("[::1]:80".into(), 200),
+    ] {
+        assert_eq!(status(running.address, "/", &[&format!("Host: {host}")]), expected, "{host}");
+    }
+    let host = format!("Host: 127.0.0.1:{port}");
+    for origin in ["http://evil.example", "null", &format!("http://localhost:{port}"), "http://127.0.0.1"] {
+        let origin = format!("Origin: {origin}");
+        let headers = [&UPGRADE[..], &[&host, &origin]].concat();
+        assert_eq!(status(running.address, "/live", &headers), 403, "{origin}");
+    }
+    // The control. An open WebSocket does not end: only the first answer is read.
+    let mut stream = connect(running.address);
+    let headers = UPGRADE.join("\r\n");
+    write!(stream, "GET /live HTTP/1.1\r\n{headers}\r\n{host}\r\nOrigin: http://127.0.0.1:{port}\r\n\r\n").unwrap();
+    let mut answer = [0; 256];
+    let n = stream.read(&mut answer).unwrap();
+    let answer = String::from_utf8_lossy(&answer[..n]);
+    // The answer to this key in RFC 6455, section 1.3.
+    assert!(status_of(&answer) == 101 && answer.contains("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), "{answer}");
+}
+
+/// An address of the network needs the token, and nothing else opens it.
+#[test]
+fn token() {
+    let running = Running::start_at(1, "0.0.0.0:0", ServeCfg::default());
+    let token = running.url.split_once("/?token=").expect("a token in the address").1;
+    assert!(token.len() >= 32, "{token}");
+    let local = ([127, 0, 0, 1], running.address.port()).into();
+    let host = "Host: robot.lan:8080";
+    let upgrade = [&UPGRADE[..], &[host]].concat();
+    for (path, headers, expected) in [
+        ("/", &[host][..], 403),
+        ("/?token=", &[host], 403),
+        (&format!("/?token={}", &token[1..]), &[host], 403),
+        (&format!("/?token={}x", &token[..token.len() - 1]), &[host], 403),
+        ("/live", &upgrade, 403),
+        (&format!("/?token={token}"), &[host], 200),
+        ("/", &["Host: localhost"], 403),
+    ] {
+        assert_eq!(status(local, path, headers), expected, "{path}");
+    }
+}
+
+#[test]
+fn address_errors() {
+    let mut sim = scene(1);
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap();
+    let error = sim.serve(&address.to_string()).unwrap_err();
+    let ServeError::PortInUse { next: Some(next), .. } = &error else { panic!("{error}") };
+    assert!(error.to_string().contains(&format!("port {} is in use; try {next}", address.port())), "{error}");
+    let error = sim.serve("127.0.0.1:http").unwrap_err();
+    assert!(matches!(error, ServeError::Address { .. }) && error.to_string().contains("127.0.0.1:8080"), "{error}");
+    // The candidate is right, and a view that could not be had leaves nothing behind.
+    sim.serve(&next.to_string()).unwrap();
+}
