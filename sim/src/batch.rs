@@ -546,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_spins_where_gaps_are_short_and_sleeps_where_steps_are_paced() {
+    fn patience() {
         let after = |gaps: &[bool]| gaps.iter().fold(Patience::LONGEST, |patience, &in_vain| patience.after(in_vain));
         assert_eq!(after(&[false; 100]), Patience::LONGEST);
         for jobs in [0, 1, 3, 8, 32] {
@@ -559,7 +559,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_with_a_step_is_what_is_there_after_it() {
+    fn step_and_read() {
         // The calling thread dawdles, or it would do all of this alone.
         let caller = std::thread::current().id();
         for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
@@ -584,7 +584,7 @@ mod tests {
     }
 
     #[test]
-    fn every_environment_is_stepped_once_whoever_helps() {
+    fn every_environment_once() {
         let mut batch = pendulums(50, 4);
         for step in 1..=20 {
             // The first share is slow: the others help with it.
@@ -599,7 +599,7 @@ mod tests {
     }
 
     #[test]
-    fn so_many_that_they_leave_the_cache_step_as_few_do() {
+    fn beyond_the_cache() {
         let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
         assert!(many.shared.cold && !few.shared.cold);
         many.step(7);
@@ -616,7 +616,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "5 numbers for 3 x 1")]
-    fn an_array_of_the_wrong_size_is_refused() {
+    fn wrong_size() {
         pendulums(3, 1).step_and_read(1, |env| [env.data().qpos()], [&mut [0.0; 5]]);
     }
 }

@@ -689,7 +689,7 @@ mod tests {
     const HUGE: Buffers = Buffers { contacts: 500, constraints: 2000, arena_bytes: 64 << 20 };
 
     #[test]
-    fn steps_done_again_keep_every_bit_of_raw_quaternions() {
+    fn repeated_steps() {
         let model = falling();
         let (mut tiny, mut huge) = (tumbling(&model, TINY), tumbling(&model, HUGE));
         let at_first = tiny.growths();
@@ -709,7 +709,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_fails_is_undone_to_the_last_bit() {
+    fn failed_step() {
         let mut env = tumbling(&falling(), HUGE);
         for steps in [0, 30] {
             env.step(steps);

@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn two_half_boxes_make_one_box() {
+    fn half_boxes() {
         let half = Vector3::new(0.5, 0.2, 0.1);
         let left = box_inertia(1.5, half, Vector3::new(-0.25, 0.0, 0.0));
         let right = box_inertia(1.5, half, Vector3::new(0.25, 0.0, 0.0));
@@ -323,10 +323,10 @@ mod tests {
     }
 
     #[test]
-    fn combining_commutes_with_moving() {
+    fn combine_and_move() {
         let pose = from_xyz_rpy([0.3, -2.0, 1.0], [0.4, 1.2, -2.0]);
-        let a =
-            RigidInertia { com: Vector3::new(0.1, 0.2, 0.3), ..body(2.0, tensor(0.3, 0.02, 0.01, 0.4, -0.03, 0.5)) };
+        let tensor = tensor(0.3, 0.02, 0.01, 0.4, -0.03, 0.5);
+        let a = RigidInertia { com: Vector3::new(0.1, 0.2, 0.3), ..body(2.0, tensor) };
         let b = RigidInertia { com: Vector3::new(-1.0, 0.0, 0.5), ..diagonal(0.7, 0.01, 0.02, 0.02) };
         let moved_after = a.combine(&b).transformed(&pose);
         let moved_before = a.transformed(&pose).combine(&b.transformed(&pose));
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inertial_frame_is_turned_into_link_axes() {
+    fn inertial_frame() {
         let inertial = Inertial {
             source: Source::new("a.urdf", 1),
             link_from_com: from_xyz_rpy([1.0, 2.0, 3.0], [0.0, 0.0, std::f64::consts::FRAC_PI_2]),
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn principal_axes_rebuild_the_tensor_also_with_equal_moments() {
+    fn principal_axes() {
         let turn = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
         for moments in [[3.0, 2.0, 1.5], [2.0, 2.0, 1.0], [2.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1e-9, 1e-9, 1e-12]] {
             for turn in [turn, UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(1e-9, 0.0, 1e-12)] {
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_plate_is_no_fault_however_it_is_turned() {
+    fn thin_plates() {
         let mut faults = 0;
         let mut unsnapped = 0;
         for k in 0..2000 {
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn faults() {
         assert_eq!(diagonal(1.0, 1.0, 1.0, 1.0).check(), Ok(()));
         assert!(matches!(diagonal(f64::NAN, 1.0, 1.0, 1.0).check(), Err(InertiaFault::NotFinite)));
         assert!(matches!(diagonal(0.0, 1.0, 1.0, 1.0).check(), Err(InertiaFault::MassNotPositive { .. })));
@@ -401,7 +401,7 @@ mod tests {
     /// The five links of the ANYmal C model (`anymal_c_simple_description`) that MuJoCo refuses: four depth cameras
     /// with the same numbers, and the hatch.
     #[test]
-    fn the_broken_links_of_anymal_c_are_repaired_without_losing_inertia() {
+    fn links_of_anymal_c() {
         let camera = tensor(0.000637051, 0.000484569, 0.000424211, 0.000929402, 5.138e-06, 0.000484569);
         let hatch = Matrix3::from_element(0.001);
         for (mass, inertia) in [(0.16043, camera), (0.142, hatch)] {
@@ -426,15 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_links_stay_as_they_are() {
-        // LF_FOOT of ANYmal C: long and thin, A = 8.0e-5, B ≈ C.
-        let foot =
-            body(0.25, tensor(0.00317174097, 2.63048e-06, 6.815581e-05, 0.00317174092, 6.815583e-05, 8.319196e-05));
-        assert_eq!(foot.repaired(), (foot, String::new()));
-    }
-
-    #[test]
-    fn every_broken_body_is_repaired() {
+    fn every_broken_body() {
         let huge = [0.0, -0.0, 1e-300, 1e-20, 1e-9, 1.0, 1e6, -1.0, -1e-9, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE];
         for mass in huge {
             for a in huge {
@@ -453,7 +445,10 @@ mod tests {
     }
 
     #[test]
-    fn a_rotor_without_mass_keeps_its_inertia() {
+    fn rotors_and_points() {
+        // LF_FOOT of ANYmal C is sound: long and thin, A = 8.0e-5, B ≈ C.
+        let foot = tensor(0.00317174097, 2.63048e-06, 6.815581e-05, 0.00317174092, 6.815583e-05, 8.319196e-05);
+        assert_eq!(body(0.25, foot).repaired(), (body(0.25, foot), String::new()));
         let (fixed, what) = diagonal(0.0, 1e-3, 1e-3, 1e-3).repaired();
         assert_eq!(fixed, diagonal(1e-6, 1e-3, 1e-3, 1e-3));
         assert!(what.contains("the mass was set"), "{what}");

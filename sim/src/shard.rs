@@ -120,9 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn every_launcher_is_understood() {
+    fn launchers() {
         type Case<'c> = (&'c str, &'c [(&'c str, &'c str)], [usize; 2]);
         let (mpi_rank, mpi_world) = VARIABLES[1];
+        let step = ("SLURM_STEP_ID", "0");
+        let srun = [step, ("SLURM_PROCID", "1"), ("SLURM_NTASKS", "2")];
+        let torchrun_in_job = [&srun[..], &[("RANK", "5"), ("WORLD_SIZE", "16")]].concat();
+        let srun_and_halves = [&[("WORLD_SIZE", "9"), (mpi_rank, "7")], &srun[..]].concat();
         let cases: [Case<'_>; 11] = [
             ("no launcher", &[], [0, 1]),
             ("torchrun", &[("RANK", "3"), ("WORLD_SIZE", "8")], [3, 8]),
@@ -131,30 +135,10 @@ mod tests {
             ("a shell of salloc", &[("SLURM_JOB_ID", "17"), ("SLURM_NTASKS", "8")], [0, 1]),
             ("the script of sbatch", &[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "8")], [0, 1]),
             ("a step without a process", &[("SLURM_STEP_ID", "0"), ("SLURM_NTASKS", "8")], [0, 1]),
-            (
-                "torchrun in a job of two nodes",
-                &[
-                    ("SLURM_STEP_ID", "0"),
-                    ("SLURM_PROCID", "1"),
-                    ("SLURM_NTASKS", "2"),
-                    ("RANK", "5"),
-                    ("WORLD_SIZE", "16"),
-                ],
-                [5, 16],
-            ),
+            ("torchrun in a job of two nodes", &torchrun_in_job, [5, 16]),
             ("mpirun in the script of sbatch", &[("SLURM_NTASKS", "8"), (mpi_rank, "1"), (mpi_world, "4")], [1, 4]),
             ("mpirun, and half of another", &[("RANK", "5"), (mpi_rank, "1"), (mpi_world, "4")], [1, 4]),
-            (
-                "srun, and halves of two others",
-                &[
-                    ("WORLD_SIZE", "9"),
-                    (mpi_rank, "7"),
-                    ("SLURM_STEP_ID", "0"),
-                    ("SLURM_PROCID", "1"),
-                    ("SLURM_NTASKS", "2"),
-                ],
-                [1, 2],
-            ),
+            ("srun, and halves of two others", &srun_and_halves, [1, 2]),
         ];
         for (who, variables, [rank, world]) in cases {
             assert_eq!(of(variables), Ok(Shard { rank, world }), "{who}");
@@ -162,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_together_is_named() {
+    fn errors() {
         let step = ("SLURM_STEP_ID", "0");
         for (rank, world) in VARIABLES {
             assert_eq!(of(&[step, (rank, "3")]), Err(ShardError::Incomplete { present: rank, missing: world }));

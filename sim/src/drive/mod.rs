@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_mode_is_found_by_its_name() {
+    fn names_of_modes() {
         for mode in DriveType::ALL {
             assert_eq!(mode.mode().name().parse(), Ok(*mode));
         }
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn every_mode_scales_its_gains_together() {
+    fn gains() {
         // Whatever the unit, doubling stiffness and damping doubles the actuator's gains.
         let joint = JointInfo { effective_inertia: 0.3 };
         for mode in DriveType::ALL {

@@ -456,7 +456,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_one_environment_is_told_the_others_do_not_hear() {
+    fn environments_are_separate() {
         let model = mj::compile(
             r#"<mujoco><worldbody><body><joint type="hinge" ref="0.5"/><geom size="0.1"/></body></worldbody></mujoco>"#,
             &[],
@@ -500,7 +500,7 @@ mod tests {
     }
 
     #[test]
-    fn taking_over_what_is_the_same_shares_it_still() {
+    fn equal_values_stay_shared() {
         let mut list = Shared(Arc::from([1.0, 2.0]));
         let same = list.clone();
         list.put(1, 2.0);

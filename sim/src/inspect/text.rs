@@ -334,7 +334,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_do_not_vanish() {
+    fn numbers() {
         assert_eq!([number(1.0, 4), number(-0.5, 4), number(2.792_52, 4)], ["1", "-0.5", "2.7925"]);
         assert_eq!([number(0.0, 4), number(-1e-17, 4), number(1e30, 4)], ["0", "-1.00e-17", "1.00e30"]);
         assert_eq!([fixed(0.0, 4), fixed(0.25, 4), fixed(2e-6, 6)], ["0.0000", "0.2500", "2.000e-6"]);
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_tables_are_fitted() {
+    fn wide_tables() {
         let mut table = Table::new("<name <other >number <?remark");
         table.push(["n".repeat(50), "o".repeat(70), "1".to_owned(), "r".repeat(20)]);
         let text = table.to_string();
@@ -352,24 +352,22 @@ mod tests {
     }
 
     #[test]
-    fn a_deep_tree_stays_narrow() {
-        let links = 3000;
+    fn deep_tree() {
         let name = |i: usize| format!("link{i}");
+        let link = |i: usize| LinkReport {
+            name: name(i),
+            parent: i.checked_sub(1).map(name),
+            mass: 0.0,
+            com: None,
+            inertia: None,
+            pose: [0.0; 7],
+        };
         let report = Report {
             robot: "chain".to_owned(),
             files: Vec::new(),
             total_mass: 0.0,
             com: None,
-            links: (0..links)
-                .map(|i| LinkReport {
-                    name: name(i),
-                    parent: i.checked_sub(1).map(name),
-                    mass: 0.0,
-                    com: None,
-                    inertia: None,
-                    pose: [0.0; 7],
-                })
-                .collect(),
+            links: (0..3000).map(link).collect(),
             joints: Vec::new(),
             joint_names: Vec::new(),
             qpos: Vec::new(),

@@ -237,7 +237,7 @@ mod tests {
     use super::short_name;
 
     #[test]
-    fn names_of_types_are_short() {
+    fn names_of_types() {
         assert_eq!(short_name::<sensors::Camera>(), "Camera");
         assert_eq!(short_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
     }

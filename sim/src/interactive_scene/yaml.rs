@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn words_are_what_the_core_schema_says() {
+    fn core_schema() {
         let yaml = "a: 1\nb: -007\nc: 1.5\nd: .5\ne: 1.\nf: 1e3\ng: .inf\nh: -.INF\ni: yes\nj: True\nk: '1'\nl: 0x1F\nm: 0o17\n\
                     n: !!str 5\no: 1_000\np: inf\nq: \"tab\\tquote\\\"\"\nr: +3\ns: nan\nt: 12e03\nu: 0.1\n\"v w\": [1, [2, x], {}]\n";
         let expected = "a = 1\nb = -7\nc = 1.5\nd = 0.5\ne = 1.0\nf = 1000.0\ng = inf\nh = -inf\ni = \"yes\"\nj = true\nk = \"1\"\n\
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_lists_and_aliases_are_the_same_in_both() {
+    fn nesting_and_aliases() {
         let yaml = "one: &one\n  list:\n    - 1\n    - &two {a: b, c: [d]}\n    - *two\nagain: *one\ntext: |\n  two\n  lines\n";
         let table = "{ list = [1, { a = \"b\", c = [\"d\"] }, { a = \"b\", c = [\"d\"] }] }";
         let expected = format!("one = {table}\nagain = {table}\ntext = \"two\\nlines\\n\"\n");
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn words_know_their_lines() {
+    fn lines() {
         let translation = translate("a:\n  b: 1\n  c:\n    - 2\n    - x\n").unwrap();
         for (word, line) in [("\"a\"", 1), ("\"b\"", 2), ("1", 2), ("\"c\"", 3), ("2", 4), ("\"x\"", 5)] {
             assert_eq!(translation.line(translation.toml.find(word).unwrap()), line, "{word}");
@@ -326,16 +326,10 @@ mod tests {
     }
 
     #[test]
-    fn what_no_scene_can_hold_is_refused_with_its_line() {
+    fn refusals() {
         let deep = format!("a: {}1{}", "[".repeat(60), "]".repeat(60));
-        let bomb: String = (0..40)
-            .map(|k| {
-                format!(
-                    "k{k}: &k{k} [{}]\n",
-                    vec![if k == 0 { "lol".into() } else { format!("*k{}", k - 1) }; 9].join(", ")
-                )
-            })
-            .collect();
+        let item = |k: usize| if k == 0 { "lol".into() } else { format!("*k{}", k - 1) };
+        let bomb: String = (0..40).map(|k| format!("k{k}: &k{k} [{}]\n", vec![item(k); 9].join(", "))).collect();
         for (yaml, line, needle) in [
             ("a: 1\nb:\n", 2, "nothing is said here"),
             ("a: 1\nb: ~\n", 2, "nothing is said here"),

@@ -331,8 +331,12 @@ mod tests {
         mj::compile(text, &[]).expect("compiles").into_model()
     }
 
+    fn base_text() -> String {
+        text([1.0, 0.5, 2.0], [0.1, 0.0, 0.02], [0.01, 0.02, 0.025], 0.02)
+    }
+
     fn base() -> Model {
-        compile(&text([1.0, 0.5, 2.0], [0.1, 0.0, 0.02], [0.01, 0.02, 0.025], 0.02))
+        compile(&base_text())
     }
 
     /// Names of arrays, of all there are, in which two models of the same sizes differ by more than rounding.
@@ -370,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_from_masses_is_what_compiling_gives() {
+    fn masses() {
         let model = base();
         let (com, moments) = ([0.13, -0.02, 0.05], [0.03, 0.035, 0.04]);
         // The ball, whose rows MuJoCo takes a short cut through: 2.5 kg, and 2/5 m r² about any axis.
@@ -415,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_from_sizes_and_places_is_what_compiling_gives() {
+    fn sizes_and_places() {
         let model = shapes(["0.1", "0.1 0.2", "0.1 0.2 0.3", "0.1 0.2", "0.1 0.2 0.3"], "0 5 0");
         let fresh = shapes(["0.11", "0.12 0.22", "0.13 0.35 0.32", "0.14 0.21", "0.2 0.1 0.35"], "0 4 1");
         assert!(!differences(&model, &fresh).is_empty());
@@ -430,18 +434,13 @@ mod tests {
     }
 
     #[test]
-    fn a_diagonal_inertia_matrix_fills_where_there_is_room() {
+    fn diagonal_inertia() {
         let model = base();
         let mut editor = Editor::new(&model).expect("small");
         let with_com = |com: &str| {
             let inertial = format!(r#"<inertial pos="{com}" mass="4.1887902" diaginertia="0.0167 0.0167 0.0167"/>"#);
-            let text = text([1.0, 0.5, 2.0], [0.1, 0.0, 0.02], [0.01, 0.02, 0.025], 0.02);
-            compile(
-                &text.replace(
-                    r#"<freejoint/><geom size="0.1"/>"#,
-                    &format!(r#"<freejoint/>{inertial}<geom size="0.1"/>"#),
-                ),
-            )
+            let free = format!(r#"<freejoint/>{inertial}<geom size="0.1"/>"#);
+            compile(&base_text().replace(r#"<freejoint/><geom size="0.1"/>"#, &free))
         };
         let (centred, shifted) = (with_com("0 0 0"), with_com("0.03 0 0.01"));
         if cfg!(mj4) {
@@ -457,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_is_not_changed_is_shared() {
+    fn sharing() {
         let model = base();
         let mut editor = Editor::new(&model).expect("small");
         editor.geom_friction_mut()[3] = 0.4;
@@ -482,13 +481,13 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "another scene")]
-    fn a_model_of_another_scene_is_refused() {
+    fn another_scene() {
         let _ = Editor::new(&base()).expect("small").model(&base());
     }
 
     #[test]
     #[should_panic(expected = "other sizes")]
-    fn data_refuse_a_model_of_other_sizes() {
+    fn other_sizes() {
         let model = base();
         let mut data = Data::new(&model).expect("small");
         data.set_model(model.with_buffers(mj::Buffers { contacts: 7, constraints: 7, arena_bytes: 1 << 20 }));

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_line_is_found_in_all_of_mujocos_phrasings() {
+    fn lines() {
         assert_eq!(line_named_in("XML Error: bad\nElement 'geom', line 7\n"), Some(7));
         assert_eq!(line_named_in("Error: mass\nObject name = a, id = 1, line = 12, column = 4"), Some(12));
         let broken = "XML parse error 6:\nError=XML_ERROR_PARSING_ELEMENT ErrorID=6 (0x6) Line number=12\n";

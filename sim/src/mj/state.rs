@@ -211,7 +211,7 @@ mod tests {
 
     /// What [`RawQuats`] keeps is what a forward pass changes, on either line of MuJoCo.
     #[test]
-    fn a_forward_pass_changes_no_state_but_raw_quaternions() {
+    fn raw_quaternions() {
         const JOINTS: &str = r#"<mujoco><worldbody>
             <body><joint type="slide"/><joint type="ball"/><geom size="0.1"/></body>
             <body pos="1 0 0"><freejoint/><geom size="0.1"/>

@@ -28,25 +28,24 @@ fn counted() -> Model {
 }
 
 #[test]
-fn counts_are_those_of_the_file() {
+fn counts() {
     let model = counted();
     let counts = [model.nmat(), model.nkey(), model.nskin(), model.nsensor(), model.nsensordata(), model.nactuator()];
     assert_eq!(counts, [2, 3, 1, 3, 1 + 3 + 4, 3]);
     assert_eq!(model.nsensordata(), Data::new(&model).expect("small").sensordata().len());
     assert_eq!([0, 1, 2].map(|actuator| model.actuator_control(actuator)), [0, 1, 2]);
-    let none = Model::nmat;
-    assert_eq!(none(&self::model("<mujoco/>")), 0);
+    assert_eq!(self::model("<mujoco/>").nmat(), 0);
 }
 
 #[test]
 #[should_panic(expected = "3")]
-fn an_actuator_that_does_not_exist_has_no_control() {
+fn control_of_no_actuator() {
     let _ = counted().actuator_control(3);
 }
 
 /// Room for an equality of six rows, two for each of three degrees of freedom and for the tendon, and 16 contacts of four.
 #[test]
-fn small_buffers_hold_what_is_always_there() {
+fn small_buffers() {
     let model = counted();
     let Buffers { contacts, constraints, arena_bytes } = model.small_buffers();
     assert_eq!((contacts, constraints), (16, 6 + 2 * 3 + 2 + 16 * 4));
@@ -59,7 +58,7 @@ fn small_buffers_hold_what_is_always_there() {
 }
 
 #[test]
-fn many_rays_hit_what_each_of_them_hits() {
+fn multi_ray() {
     let model = model(
         r#"<mujoco><worldbody><geom type="plane" size="9 9 1"/><geom type="box" size="0.2 0.3 0.4" pos="1 0 0.5" euler="10 20 30"/>
         <body pos="-1 0.2 0.6"><freejoint/><geom type="capsule" size="0.2 0.3"/></body></worldbody></mujoco>"#,
@@ -95,7 +94,7 @@ fn many_rays_hit_what_each_of_them_hits() {
 /// holds it. What the world exerts on it is its mass times its acceleration, across the slide r a + 2 w u, its weight, and I a
 /// about the axis. Where MuJoCo has integrated already, the velocities before that are to be given.
 #[test]
-fn forces_are_those_of_the_velocities_before_the_integration() {
+fn forces_before_integration() {
     let (mass, moment, radius, turning, sliding, g) = (2.0, 0.7, 0.5, 3.0, 0.4, 9.81);
     let model = model(&format!(
         r#"<mujoco><worldbody><body><joint axis="0 0 1"/><joint type="slide" axis="1 0 0"/>
@@ -107,11 +106,7 @@ fn forces_are_those_of_the_velocities_before_the_integration() {
     data.forward().expect("fits");
     let slowing = -2.0 * mass * radius * turning * sliding / (moment + mass * radius * radius);
     let qacc = [slowing, turning * turning * radius];
-    assert!(
-        data.qacc().iter().zip(qacc).all(|(found, expected)| (found - expected).abs() < 1e-12),
-        "{:?}",
-        data.qacc()
-    );
+    assert!(data.qacc().iter().zip(qacc).all(|(found, qacc)| (found - qacc).abs() < 1e-12), "{:?}", data.qacc());
     let later = [7.0, -1.0];
     data.qvel_mut().copy_from_slice(&later);
     let across = mass * (radius * slowing + 2.0 * turning * sliding);

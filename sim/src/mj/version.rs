@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_number_formats_are_read() {
+    fn number_formats() {
         assert_eq!(dotted(222), "2.2.2");
         assert_eq!(dotted(340), "3.4.0");
         assert_eq!(dotted(4_000_001), "4.0.1");

@@ -110,15 +110,12 @@ mod tests {
 
     /// The numbers stand where MuJoCo's compiler puts them, and nothing else differs.
     #[test]
-    fn a_weld_is_as_the_compiler_makes_it() {
+    fn compiled() {
         let (off, on) = (model("false"), model("true"));
         let weld = Weld { equality: 0, pose: [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0] };
         let welded = off.with_welds(&[weld]);
-        assert!(
-            welded.eq_data().iter().zip(on.eq_data()).all(|(a, b)| (a - b).abs() < 1e-15),
-            "{:?}",
-            welded.eq_data()
-        );
+        let same = welded.eq_data().iter().zip(on.eq_data()).all(|(a, b)| (a - b).abs() < 1e-15);
+        assert!(same, "{:?}", welded.eq_data());
         assert_eq!(welded.eq_data().len(), WIDTH);
         let expected: &[&str] = if cfg!(mj4) { &["eq_data"] } else { &["eq_active", "eq_data"] };
         let mut apart = welded.arrays_apart(&off);
@@ -135,7 +132,7 @@ mod tests {
 
     /// Arrays that an environment has for something else stay.
     #[test]
-    fn other_arrays_of_its_own_stay() {
+    fn other_arrays() {
         let off = model("false");
         let mut editor = mj::Editor::new(&off).expect("small");
         editor.geom_friction_mut()[0] = 0.3;

@@ -540,14 +540,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_as_the_same_bits() {
+    fn numbers() {
         for value in [0.1, 1.0 / 3.0, 1e-300, 6.02e23, -0.0, 1e-5, 123_456_789.25, f64::MIN_POSITIVE] {
             assert_eq!(number(value).parse::<f64>().ok(), Some(value + 0.0), "{}", number(value));
         }
     }
 
     #[test]
-    fn names_are_escaped() {
+    fn escapes() {
         assert_eq!(escape("a<b>\"&'\n"), "a&lt;b&gt;&quot;&amp;&apos; ");
     }
 }

@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn the_damping_gives_the_restitution() {
+    fn damping() {
         for wanted in [0.14, 0.2, 0.35, 0.5, 0.75, 0.9, 0.99] {
             let [stiffness, damping] = solref(wanted, 0.002).map(|x| -x);
             let found = bounce(stiffness, damping);

@@ -183,7 +183,7 @@ mod tests {
 
     /// MuJoCo computes mass and moments of a geom by itself.
     #[test]
-    fn volumes_and_moments_are_mujocos() {
+    fn moments_by_mujoco() {
         let shapes = [
             (ObjectShape::Box { size: [0.2, 0.3, 0.5] }, "type='box' size='0.1 0.15 0.25'"),
             (ObjectShape::Sphere { radius: 0.3 }, "type='sphere' size='0.3'"),
@@ -211,7 +211,7 @@ mod tests {
     /// The pyramid has the volume of a cone over a polygon: n/2 r² sin(2π/n) h/3, and its moments go to those of the cone as
     /// the base goes to a circle: with 64 corners by 2π²/(3·64²) = 0.16 % in area, twice that in the moment about the axis.
     #[test]
-    fn a_pyramid_of_64_sides_is_nearly_a_cone() {
+    fn pyramid_and_cone() {
         let (radius, height) = (0.3, 0.8);
         let (shape, solid) = (ObjectShape::Cone { radius, height }, cone(radius, height).solid().expect("closed"));
         let polygon = 32.0 * radius * radius * (TAU / 64.0).sin() * height / 3.0;

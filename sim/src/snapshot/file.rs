@@ -266,14 +266,10 @@ mod tests {
 
     /// An environment of a small model, with a joint that a drive with a delay moves.
     fn env() -> (Env, Layout) {
-        let model = mj::compile(
-            r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/>
+        let text = r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/>
             <body name="c"><joint name="k" axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></body></worldbody>
-            <actuator><motor name="m" joint="k"/></actuator></mujoco>"#,
-            &[],
-        )
-        .expect("compiles")
-        .into_model();
+            <actuator><motor name="m" joint="k"/></actuator></mujoco>"#;
+        let model = mj::compile(text, &[]).expect("compiles").into_model();
         let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: 9.0 };
         let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
         let (realization, range) = (Realization::Actuator, [f64::NEG_INFINITY, 1.0]);
@@ -314,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_what_is_read() {
+    fn round_trip() {
         let buffers = Buffers { contacts: 1, constraints: 2, arena_bytes: 3 };
         for reason in [
             Divergence::Warning(Warning::BadAcceleration),
@@ -329,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn every_file_that_ends_early_says_so() {
+    fn truncated_files() {
         let bytes = bytes();
         for end in 0..bytes.len() {
             let error = decode(&bytes[..end]).expect_err("too short");
@@ -341,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_that_flips_is_noticed() {
+    fn flipped_bits() {
         let good = bytes();
         for bit in 0..8 * good.len() {
             let mut bytes = good.clone();
@@ -358,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_formats_and_engines_are_told_apart() {
+    fn foreign_files() {
         assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::Foreign { .. })));
         let snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
         let other = decode(&snapshot.encode(2, &mj::version_string()));
@@ -370,7 +366,7 @@ mod tests {
     /// Every byte of the content is changed, and the checksum made right again: an error or another snapshot, never a panic
     /// or an allocation beyond the file; and an environment that goes on from what is another snapshot steps, or diverges.
     #[test]
-    fn a_right_checksum_over_wrong_content_harms_nobody() {
+    fn right_checksum_of_wrong_content() {
         let good = bytes();
         let (mut refused, mut stepped) = (0, 0);
         let (mut env, _) = env();
@@ -399,19 +395,22 @@ mod tests {
         assert_eq!(env.remember(), like, "what was restored meanwhile left nothing behind");
     }
 
+    /// The fault of a snapshot whose entries were changed.
+    fn fault(change: &dyn Fn(&mut Vec<Entry>)) -> Option<String> {
+        let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
+        let mut entries = snapshot.entries.to_vec();
+        change(&mut entries);
+        snapshot.entries = entries.into();
+        match decode(&snapshot.encode(FORMAT, &mj::version_string())) {
+            Ok(_) => None,
+            Err(SnapshotError::Malformed { what, .. }) => Some(what.to_string()),
+            Err(other) => panic!("{other}"),
+        }
+    }
+
     #[test]
-    fn numbers_that_no_run_gives_are_refused() {
-        let fault = |change: &dyn Fn(&mut EnvState)| {
-            let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
-            let mut entries = snapshot.entries.to_vec();
-            change(&mut entries[1].state);
-            snapshot.entries = entries.into();
-            match decode(&snapshot.encode(FORMAT, &mj::version_string())) {
-                Ok(_) => None,
-                Err(SnapshotError::Malformed { what, .. }) => Some(what),
-                Err(other) => panic!("{other}"),
-            }
-        };
+    fn impossible_numbers() {
+        let fault = |change: &dyn Fn(&mut EnvState)| fault(&|entries| change(&mut entries[1].state));
         // Control: what is not changed is read.
         assert_eq!(fault(&|_| {}), None);
         let motion = |value| {
@@ -435,31 +434,26 @@ mod tests {
         assert!(fault(&motion(infinite)).is_some());
         assert!(fault(&input(nan)).is_some_and(|what| what.contains("control")));
         // Gains, limits, drive type, stiffness, damping, inertia, range; targets; what the delay keeps.
-        let bad = [
-            (0, nan),
-            (0, -1.0),
-            (0, infinite),
-            (1, -1.0),
-            (2, -1.0),
-            (2, nan),
-            (3, -1.0),
-            (4, 0.5),
-            (4, 9.0),
-            (5, nan),
-            (5, -1.0),
-            (6, -1.0),
-            (7, -1.0),
-            (7, infinite),
-            (8, nan),
-            (8, 2.0),
-            (9, nan),
-            (10, nan),
-            (11, infinite),
-            (12, nan),
-            (16, nan),
-            (20, infinite),
+        let bad: [(usize, &[f64]); 15] = [
+            (0, &[nan, -1.0, infinite]),
+            (1, &[-1.0]),
+            (2, &[-1.0, nan]),
+            (3, &[-1.0]),
+            (4, &[0.5, 9.0]),
+            (5, &[nan, -1.0]),
+            (6, &[-1.0]),
+            (7, &[-1.0, infinite]),
+            (8, &[nan, 2.0]),
+            (9, &[nan]),
+            (10, &[nan]),
+            (11, &[infinite]),
+            (12, &[nan]),
+            (16, &[nan]),
+            (20, &[infinite]),
         ];
-        for (index, value) in bad {
+        for (index, value) in
+            bad.into_iter().flat_map(|(index, values)| values.iter().map(move |&value| (index, value)))
+        {
             assert!(fault(&drive(index, value)).is_some(), "number {index}: {value}");
         }
         for (index, value) in [(2, infinite), (3, infinite), (4, 1.0), (8, -2.0), (9, infinite), (10, -3.0)] {
@@ -471,18 +465,8 @@ mod tests {
     }
 
     #[test]
-    fn properties_that_no_environment_has_are_refused() {
-        let fault = |change: &dyn Fn(&mut OwnProperties)| {
-            let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
-            let mut entries = snapshot.entries.to_vec();
-            change(Arc::make_mut(&mut entries[0].own));
-            snapshot.entries = entries.into();
-            match decode(&snapshot.encode(FORMAT, &mj::version_string())) {
-                Ok(_) => None,
-                Err(SnapshotError::Malformed { what, .. }) => Some(what),
-                Err(other) => panic!("{other}"),
-            }
-        };
+    fn impossible_properties() {
+        let fault = |change: &dyn Fn(&mut OwnProperties)| fault(&|entries| change(Arc::make_mut(&mut entries[0].own)));
         assert_eq!(fault(&|_| {}), None, "control");
         for bad in [vec![], vec![1.0, 2.0], vec![0.0], vec![f64::NAN], vec![-1.0]] {
             assert!(fault(&|own| own.values[0].value = bad.clone().into()).is_some(), "{bad:?}");
@@ -492,7 +476,7 @@ mod tests {
     }
 
     #[test]
-    fn counting_goes_on_from_the_most_steps() {
+    fn most_steps() {
         let (mut env, _) = env();
         let mut state = env.remember();
         for (steps, then) in [(MOST_STEPS, MOST_STEPS + 2), (u64::MAX, u64::MAX)] {

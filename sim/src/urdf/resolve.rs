@@ -311,30 +311,29 @@ fn remark(path: &Path) -> Option<String> {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
-    use std::fs;
+    use testkit::urdf::Files;
 
     /// `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other folder` with the package
     /// `meshes_pkg`, `ws/install/share/installed`, `ws/ros/rospkg`.
-    fn workspace() -> tempfile::TempDir {
-        let dir = tempfile::tempdir().unwrap();
-        let write = |path: &str, text: &str| {
-            let path = dir.path().join(path);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, text).unwrap();
-        };
-        write("ws/robot_description/urdf/robot.urdf", "");
-        write("ws/robot_description/urdf/local.stl", "");
-        write("ws/robot_description/urdf/100%25.stl", "");
-        write("ws/robot_description/urdf/mj/only_here.stl", "");
-        write("ws/robot_description/package.xml", "<package><name> robot_description </name></package>");
-        write("ws/robot_description/meshes/part one.stl", "");
-        write("ws/robot_description/meshes/Base.STL", "");
-        write("ws/other folder/package.xml", "<package><name>meshes_pkg</name></package>");
-        write("ws/other folder/a.stl", "");
-        write("ws/install/share/installed/b.stl", "");
-        write("ws/ros/rospkg/c.stl", "");
-        write("ws/broken/package.xml", "<package><name>");
-        dir
+    fn workspace() -> Files {
+        let files = Files::default();
+        for (path, text) in [
+            ("robot_description/urdf/robot.urdf", ""),
+            ("robot_description/urdf/local.stl", ""),
+            ("robot_description/urdf/100%25.stl", ""),
+            ("robot_description/urdf/mj/only_here.stl", ""),
+            ("robot_description/package.xml", "<package><name> robot_description </name></package>"),
+            ("robot_description/meshes/part one.stl", ""),
+            ("robot_description/meshes/Base.STL", ""),
+            ("other folder/package.xml", "<package><name>meshes_pkg</name></package>"),
+            ("other folder/a.stl", ""),
+            ("install/share/installed/b.stl", ""),
+            ("ros/rospkg/c.stl", ""),
+            ("broken/package.xml", "<package><name>"),
+        ] {
+            files.write(&format!("ws/{path}"), text);
+        }
+        files
     }
 
     fn resolve(dir: &Path, uri: &str) -> Resolved {
@@ -345,9 +344,9 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_uri_is_found() {
+    fn found() {
         let dir = workspace();
-        let absolute = dir.path().join("ws/ros/rospkg/c.stl").display().to_string();
+        let absolute = dir.folder().join("ws/ros/rospkg/c.stl").display().to_string();
         for (uri, file) in [
             ("package://robot_description/meshes/part%20one.stl", "part one.stl"),
             ("package://robot_description/meshes/part one.stl", "part one.stl"),
@@ -370,7 +369,7 @@ mod tests {
             ("only_here.stl", "only_here.stl"),
             ("some/folder/only_here.stl", "only_here.stl"),
         ] {
-            match resolve(dir.path(), uri) {
+            match resolve(dir.folder(), uri) {
                 Resolved::Found(path) => assert!(path.is_file() && path.ends_with(file), "{uri}: {path:?}"),
                 other => panic!("{uri}: {other:?}"),
             }
@@ -378,21 +377,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_found_says_where_it_was_looked_for() {
+    fn missing() {
         let dir = workspace();
         for uri in ["package://robot_description/../../outside.stl", "../../outside.stl"] {
-            let Resolved::Missing { tried, .. } = resolve(dir.path(), uri) else { panic!("{uri}") };
+            let Resolved::Missing { tried, .. } = resolve(dir.folder(), uri) else { panic!("{uri}") };
             assert!(tried[0].ends_with("outside.stl") && !tried[0].contains(".."), "{tried:?}");
         }
-        let Resolved::Missing { hint, .. } = resolve(dir.path(), "../meshes/base.stl") else { panic!() };
-        assert_eq!(hint.unwrap(), "the folder has \"Base.STL\"");
-        let Resolved::Missing { hint, .. } = resolve(dir.path(), "../meshes/") else { panic!() };
-        assert_eq!(hint.unwrap(), "it is a folder");
-        let Resolved::Missing { tried, .. } = resolve(dir.path(), "package://mapped/c.stl") else { panic!() };
+        for (uri, says) in [("../meshes/base.stl", "the folder has \"Base.STL\""), ("../meshes/", "it is a folder")] {
+            let Resolved::Missing { hint, .. } = resolve(dir.folder(), uri) else { panic!("{uri}") };
+            assert_eq!(hint.unwrap(), says);
+        }
+        let Resolved::Missing { tried, .. } = resolve(dir.folder(), "package://mapped/c.stl") else { panic!() };
         assert!(tried[0].ends_with("ws/other folder/c.stl"));
-        let Resolved::PackageUnknown { package, tried, .. } = resolve(dir.path(), "package://nope/x.stl") else {
-            panic!()
-        };
+        let unknown = resolve(dir.folder(), "package://nope/x.stl");
+        let Resolved::PackageUnknown { package, tried, .. } = unknown else { panic!() };
         assert_eq!(package, "nope");
         for place in ["ws/ros/nope (ROS_PACKAGE_PATH)", "ws/install/share/nope (AMENT_PREFIX_PATH)", "ws/nope (above"] {
             assert!(tried.iter().any(|t| t.contains(place)), "{place} not in {tried:?}");
@@ -400,20 +398,19 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_without_panic() {
+    fn nonsense() {
         let dir = workspace();
-        assert_eq!(resolve(dir.path(), ""), Resolved::Empty);
-        assert_eq!(resolve(dir.path(), "  "), Resolved::Empty);
+        assert_eq!(resolve(dir.folder(), ""), Resolved::Empty);
+        assert_eq!(resolve(dir.folder(), "  "), Resolved::Empty);
         for uri in ["http://example.com/a.stl", "package://", "package://pkg", "package://pkg/", "package:///a.stl"] {
-            assert!(matches!(resolve(dir.path(), uri), Resolved::Unsupported { .. }), "{uri}");
+            assert!(matches!(resolve(dir.folder(), uri), Resolved::Unsupported { .. }), "{uri}");
         }
         for uri in ["package://../robot_description/x.stl", "package://./x.stl", "package://a\0b/x.stl"] {
-            assert!(matches!(resolve(dir.path(), uri), Resolved::PackageUnknown { .. }), "{uri}");
+            assert!(matches!(resolve(dir.folder(), uri), Resolved::PackageUnknown { .. }), "{uri}");
         }
-        for uri in
-            ["%", "%0", "%zz.stl", "%ff.stl", "%00.stl", "file://", "://", "../../../../../../../../../../x", "~"]
-        {
-            let resolved = resolve(dir.path(), uri);
+        let up = "../../../../../../../../../../x";
+        for uri in ["%", "%0", "%zz.stl", "%ff.stl", "%00.stl", "file://", "://", up, "~"] {
+            let resolved = resolve(dir.folder(), uri);
             assert!(!matches!(resolved, Resolved::Found(_)), "{uri}: {resolved:?}");
         }
     }

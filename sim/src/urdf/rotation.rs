@@ -30,20 +30,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_rebuild_the_rotation() {
+    fn rebuilt() {
         let steps = [-PI, -3.0, -FRAC_PI_2, -1.0, -1e-9, 0.0, 1e-9, 0.3, FRAC_PI_2 - 5e-12, FRAC_PI_2, 2.0, PI];
-        let pitches = [
-            -FRAC_PI_2,
-            -FRAC_PI_2 + 5e-12,
-            -1.0,
-            -1e-12,
-            0.0,
-            1e-6,
-            0.7,
-            FRAC_PI_2 - 3e-8,
-            FRAC_PI_2 - 5e-12,
-            FRAC_PI_2,
-        ];
+        let (right, near) = (FRAC_PI_2, FRAC_PI_2 - 5e-12);
+        let pitches = [-right, -near, -1.0, -1e-12, 0.0, 1e-6, 0.7, right - 3e-8, near, right];
         for roll in steps {
             for pitch in pitches {
                 for yaw in steps {

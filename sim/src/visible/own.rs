@@ -48,7 +48,7 @@ mod tests {
 
     /// A look that cannot be drawn is an error, not the nominal one.
     #[test]
-    fn what_cannot_be_drawn_is_an_error() {
+    fn invalid_appearance() {
         let text = r#"<mujoco><worldbody><geom type="box" size="0.1 0.2 0.3"/></worldbody></mujoco>"#;
         let model = mj::compile(text, &[]).expect("compiles").into_model();
         let visible = Visible::of_model(&model);

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_model_has_a_name_of_its_own_that_files_know_it_by() {
+    fn names_in_files() {
         let mut names: Vec<&str> = ActuatorModel::examples().iter().map(|model| model.law().name()).collect();
         for (model, name) in ActuatorModel::examples().iter().zip(&names) {
             let text = serde_json::to_string(model).expect("numbers");

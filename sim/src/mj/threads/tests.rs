@@ -28,7 +28,7 @@ fn numbers(threads: &StayingThreads, desks: usize, count: usize, fail: Option<us
 }
 
 #[test]
-fn everything_is_done_once_by_threads_that_stay() {
+fn reused_threads() {
     let threads = StayingThreads::default();
     let mut seen = BTreeSet::new();
     for round in 0..20 {
@@ -45,7 +45,7 @@ fn everything_is_done_once_by_threads_that_stay() {
 
 /// What the caller borrows is written to by others, and is the caller's again afterwards.
 #[test]
-fn work_borrows() {
+fn borrowed_data() {
     let threads = StayingThreads::default();
     let mut helped = 0;
     for round in 1..=200 {
@@ -64,15 +64,15 @@ fn work_borrows() {
         assert!(parts.iter().flatten().all(|&number| number == round));
         helped += others.into_inner();
     }
-    assert!(helped > 0, "the control: somebody else than the caller wrote");
+    assert!(helped > 0, "the control: a helper wrote");
 }
 
 #[test]
-fn one_thread_and_busy_threads_work_alone() {
+fn alone() {
     let threads = StayingThreads::default();
     assert_eq!(numbers(&threads, 1, 5, None).len(), 5);
     assert_eq!(format!("{threads:?}"), "StayingThreads { started: 0 }");
-    // While they do one thing, somebody else asks them to do another.
+    // A second caller while they are busy.
     let (there, over) = (AtomicBool::new(false), AtomicBool::new(false));
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -94,7 +94,7 @@ fn one_thread_and_busy_threads_work_alone() {
 }
 
 #[test]
-fn threads_end_with_their_owner() {
+fn end_of_threads() {
     let threads = StayingThreads::default();
     numbers(&threads, 3, 5, None);
     let shared = Arc::downgrade(&threads.shared);
@@ -105,7 +105,7 @@ fn threads_end_with_their_owner() {
 
 /// A panic reaches the caller, whichever thread it was on, and the threads go on.
 #[test]
-fn panics_reach_the_caller() {
+fn panics() {
     let threads = StayingThreads::default();
     for fail in 0..6 {
         let run = || numbers(&threads, 3, 10, Some(fail));
@@ -114,18 +114,17 @@ fn panics_reach_the_caller() {
     assert_eq!(numbers(&threads, 3, 10, None).len(), 10);
 }
 
-/// Root cause: whoever dismissed next took the panic. A caller that waited for its helper had already taken its work
-/// from the board, so that another caller could put up its own there before the first one woke: that one's dismissal
-/// then took the note of the panic. The board is one caller's now until that caller has dismissed everybody.
+/// Root cause: a caller that waited for its helper had already taken its work from the board, so another caller could put
+/// up its own before the first one woke, and took the panic. The board stays with one caller until all helpers are done.
 #[test]
-fn a_panic_reaches_its_own_caller_only() {
+fn panics_of_two_callers() {
     let threads = StayingThreads::default();
     for round in 0..300 {
         let (there, now) = (AtomicBool::new(false), AtomicBool::new(false));
         // Fails at any desk but the first, when told.
         let fails_late = |desk| {
             if desk == 0 {
-                // Until a helper came: who is late is not waited for.
+                // Until a helper came: late helpers are not waited for.
                 while !there.load(Ordering::Relaxed) {
                     std::thread::yield_now();
                 }

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn elements_are_found_by_kind_and_name_in_included_files_too() {
+    fn by_kind_and_name() {
         let dir = tempfile::tempdir().unwrap();
         let part = dir.path().join("part.xml");
         std::fs::write(&part, "<mujocoinclude>\n\n<body name='b'/></mujocoinclude>").unwrap();
