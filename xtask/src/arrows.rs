@@ -43,13 +43,16 @@ fn written_arrows(page: &str) -> Result<BTreeSet<Arrow>, String> {
     Ok(arrows)
 }
 
-/// Edges between members (normal, dev and build) with the kind that makes them.
+/// Edges between members with the kind that makes them. Dev-dependencies are left out: tests may use any crate.
 fn used_arrows(metadata: &Value) -> BTreeMap<Arrow, String> {
     let members: BTreeSet<&str> = packages(metadata).filter_map(|package| package["name"].as_str()).collect();
     let mut arrows = BTreeMap::new();
     for (from, dependency) in dependencies(metadata) {
         let Some(to) = dependency["name"].as_str().filter(|name| members.contains(name)) else { continue };
         let kind = dependency["kind"].as_str().unwrap_or("normal").to_string();
+        if kind == "dev" {
+            continue;
+        }
         arrows.insert((from.to_string(), to.to_string()), kind);
     }
     arrows
@@ -139,7 +142,10 @@ mod tests {
                 {"name": "regex", "kind": null, "source": "registry"},
             ]},
             {"name": "scene", "dependencies": [{"name": "tempfile", "kind": "dev", "source": "registry"}]},
-            {"name": "tests", "dependencies": [{"name": "sim", "kind": "dev", "source": null}]},
+            {"name": "tests", "dependencies": [
+                {"name": "sim", "kind": "build", "source": null},
+                {"name": "scene", "kind": "dev", "source": null},
+            ]},
         ]})
     }
 
@@ -160,7 +166,7 @@ mod tests {
     fn an_arrow_that_is_not_written_is_named_with_its_kind() {
         let found = findings("sim -> scene");
         assert_eq!(found.len(), 1);
-        assert!(found[0].starts_with("tests -> sim (dev dependency"), "{}", found[0]);
+        assert!(found[0].starts_with("tests -> sim (build dependency"), "{}", found[0]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::progress::Progress;
 use crate::python::{self, Module};
 use crate::run::{Failure, Outcome, Repo};
 use crate::setup::{self, Line, Need, Wanted};
+use crate::wheel;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
         }
     }
     let mut progress = Progress::of(both.len());
-    for (ready, line) in both.into_iter().zip(["2.2.2", "4.0.0"]) {
+    for (ready, line) in both.into_iter().zip(["2.2.2", wheel::VERSION]) {
         progress.begin(&format!("{} on MuJoCo {line}", args.name.as_deref().unwrap_or("all benchmarks")));
         let file = repo.target.join("bench-rows.json");
         if file.exists() {

@@ -6,7 +6,8 @@ use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
 use crate::setup::{self, Line, Need, Ready, Wanted};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
-use crate::{arrows, docs_check, examples, mutate, source_check, wheel};
+use crate::{arrows, docs_check, examples, mutate, own_time, source_check, wheel};
+use serde_json::json;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
@@ -68,7 +69,7 @@ const STAGES: &[Stage] = &[
         when: When::Always,
         run: |c| docs_check::run(c.repo),
     },
-    Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?) },
+    Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?, &["--workspace"]) },
     Stage { name: "unit", what: "unit tests, MuJoCo 2.2.2", when: When::Quick, run: unit_tests },
     Stage { name: "rustdoc", what: "documentation", when: When::Full, run: rustdoc },
     Stage { name: "demo", what: "the README's first command", when: When::Full, run: demo },
@@ -77,20 +78,35 @@ const STAGES: &[Stage] = &[
         name: "examples",
         what: "examples, MuJoCo 2.2.2",
         when: When::Full,
-        run: |c| examples::run(c.repo, &c.debian()?),
+        run: |c| examples::run(c.repo, &c.debian()?, &["--workspace"]),
     },
-    Stage { name: "benches", what: "benchmarks compile", when: When::Full, run: benches },
-    Stage { name: "clippy-4", what: "lints, MuJoCo 4", when: When::Wheel, run: |c| clippy(&c.wheel()?) },
+    Stage {
+        name: "clippy-4",
+        what: "lints, MuJoCo 4",
+        when: When::Wheel,
+        run: |c| clippy(&c.wheel()?, &test::of_mujoco()),
+    },
     Stage { name: "test-4", what: "tests, MuJoCo 4", when: When::Wheel, run: wheel_test },
     Stage { name: "physics", what: "the page of numbers, both lines", when: When::Wheel, run: physics },
     Stage {
         name: "examples-4",
         what: "examples, MuJoCo 4",
         when: When::Wheel,
-        run: |c| examples::run(c.repo, &c.wheel()?),
+        run: |c| examples::run(c.repo, &c.wheel()?, &test::of_mujoco()),
     },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];
+
+/// What a stage took.
+#[derive(Debug)]
+struct Took {
+    stage: &'static str,
+    /// "passed", "failed" or "skipped".
+    result: &'static str,
+    wall: Duration,
+    /// Processor time of all programs that the stage started, user and system; zero where the kernel does not tell.
+    cpu: Duration,
+}
 
 pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
     let context = Context { repo, changed_before: changed_files(repo) };
@@ -102,27 +118,60 @@ pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
     for (at, stage) in chosen.iter().enumerate() {
         println!("\n=== {}/{} {}: {} [{}]", at + 1, chosen.len(), stage.name, stage.what, clock(start.elapsed()));
         if stage.when == When::Wheel && !in_ci() && !wheel::is_available(repo) {
-            println!(
-                "skipped: MuJoCo {} is downloaded with pip, and there is none (with CI=true an error)",
-                wheel::VERSION
-            );
-            table.push((stage.name, "skipped".to_string()));
+            println!("skipped: MuJoCo {} is downloaded with pip, and pip is missing", wheel::VERSION);
+            table.push(Took { stage: stage.name, result: "skipped", wall: Duration::ZERO, cpu: Duration::ZERO });
             continue;
         }
-        let stage_start = Instant::now();
+        let (wall, cpu) = (Instant::now(), own_time::of_children());
         let result = (stage.run)(&context);
-        let took = clock(stage_start.elapsed());
+        table.push(Took {
+            stage: stage.name,
+            result: if result.is_ok() { "passed" } else { "failed" },
+            wall: wall.elapsed(),
+            cpu: own_time::of_children().saturating_sub(cpu),
+        });
         if let Err(failure) = result {
-            table.push((stage.name, format!("{took} FAILED")));
-            print_table(&table, start.elapsed());
+            report(repo, &table, start.elapsed())?;
             let again = failure.again.unwrap_or_else(|| format!("cargo xtask ci --only {}", stage.name));
             let message = format!("stage `{}` failed: {}", stage.name, failure.message);
             return Err(Failure { message, again: Some(again), code: 1 });
         }
-        table.push((stage.name, took));
     }
-    print_table(&table, start.elapsed());
-    Ok(())
+    report(repo, &table, start.elapsed())
+}
+
+/// Prints the table of stages and writes it to `ci-times.json` in the target folder.
+fn report(repo: &Repo, table: &[Took], total: Duration) -> Outcome {
+    print!("\n{}", lines(table, total));
+    let seconds = |time: Duration| (10.0 * time.as_secs_f64()).round() / 10.0;
+    let stage = |took: &Took| {
+        json!({
+            "stage": took.stage,
+            "result": took.result,
+            "wall_seconds": seconds(took.wall),
+            "cpu_seconds": seconds(took.cpu),
+        })
+    };
+    let cpu: Duration = table.iter().map(|took| took.cpu).sum();
+    let report = json!({
+        "stages": table.iter().map(stage).collect::<Vec<_>>(),
+        "wall_seconds": seconds(total),
+        "cpu_seconds": seconds(cpu),
+    });
+    let path = repo.target.join("ci-times.json");
+    std::fs::write(&path, format!("{report:#}\n")).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+}
+
+/// The table: wall and CPU time of each stage.
+fn lines(table: &[Took], total: Duration) -> String {
+    let mut lines = format!("{:<12} {:>7} {:>7}\n", "stage", "wall", "CPU");
+    for Took { stage, result, wall, cpu } in table {
+        let note = if *result == "passed" { "" } else { result };
+        lines.push_str(format!("{stage:<12} {:>7} {:>7} {note}", clock(*wall), clock(*cpu)).trim_end());
+        lines.push('\n');
+    }
+    let cpu = table.iter().map(|took| took.cpu).sum();
+    lines + &format!("{:<12} {:>7} {:>7}\n", "total", clock(total), clock(cpu))
 }
 
 fn chosen(args: &CiArgs) -> Vec<&'static Stage> {
@@ -134,14 +183,6 @@ fn chosen(args: &CiArgs) -> Vec<&'static Stage> {
             None => stage.when != When::Quick,
         })
         .collect()
-}
-
-fn print_table(table: &[(&str, String)], total: Duration) {
-    println!();
-    for (name, took) in table {
-        println!("{name:<12} {took:>7}");
-    }
-    println!("{:<12} {:>7}", "total", clock(total));
 }
 
 fn clock(time: Duration) -> String {
@@ -165,18 +206,23 @@ fn fmt(context: &Context<'_>) -> Outcome {
     Cmd::new("cargo").args(["fmt", "--all", "--check"]).current_dir(&context.repo.root).run()
 }
 
-fn clippy(ready: &Ready) -> Outcome {
-    let cargo = ready.cargo().args(["clippy", "--workspace", "--all-targets"]).args(test::features(None));
+fn clippy(ready: &Ready, packages: &[&str]) -> Outcome {
+    let cargo = ready.cargo().arg("clippy").args(packages).arg("--all-targets").args(test::features(packages));
     cargo.args(["--", "-D", "warnings"]).run()
 }
 
 fn unit_tests(context: &Context<'_>) -> Outcome {
-    context.debian()?.cargo().args(["test", "--workspace", "--lib", "--bins"]).args(test::features(None)).run()
+    context
+        .debian()?
+        .cargo()
+        .args(["test", "--workspace", "--lib", "--bins"])
+        .args(test::features(&["--workspace"]))
+        .run()
 }
 
 fn rustdoc(context: &Context<'_>) -> Outcome {
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
-    cargo.args(["doc", "--workspace", "--no-deps"]).args(test::features(None)).run()
+    cargo.args(["doc", "--workspace", "--no-deps"]).args(test::features(&["--workspace"])).run()
 }
 
 fn demo(context: &Context<'_>) -> Outcome {
@@ -194,7 +240,7 @@ fn readme_test(context: &Context<'_>) -> Outcome {
 }
 
 fn wheel_test(context: &Context<'_>) -> Outcome {
-    test::run(context.repo, &TestArgs { mujoco: Some(Line::Wheel), ..TestArgs::default() })
+    test::run_packages(context.repo, &TestArgs { mujoco: Some(Line::Wheel), ..TestArgs::default() }, &test::of_mujoco())
         .map_err(|failure| Failure { again: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
 }
 
@@ -204,10 +250,6 @@ fn physics(context: &Context<'_>) -> Outcome {
         return physics_report::check_rows(context.repo);
     }
     physics_report::run(context.repo, &PhysicsReportArgs { check: true })
-}
-
-fn benches(context: &Context<'_>) -> Outcome {
-    context.debian()?.cargo().args(["build", "--release", "--package", "kinetoscope-benches"]).run()
 }
 
 /// MuJoCo's log file, and files that tests or examples wrote into the tree.
@@ -262,8 +304,14 @@ mod tests {
     }
 
     #[test]
-    fn times_read_as_minutes_and_seconds() {
-        assert_eq!(clock(Duration::from_millis(61_900)), "1:01");
+    fn table_of_times() {
+        let second = Duration::from_secs(1);
+        let took = |stage, result, wall, cpu| Took { stage, result, wall: wall * second, cpu: cpu * second };
+        let table = [took("fmt", "passed", 1, 2), took("test", "failed", 61, 119)];
+        let lines = lines(&table, 63 * second);
+        let words: Vec<Vec<&str>> = lines.lines().map(|line| line.split_whitespace().collect()).collect();
+        let expected = ["stage wall CPU", "fmt 0:01 0:02", "test 1:01 1:59 failed", "total 1:03 2:01"];
+        assert_eq!(words, expected.map(|line| line.split(' ').collect::<Vec<_>>()));
     }
 
     #[test]

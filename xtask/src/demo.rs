@@ -8,12 +8,18 @@ const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs",
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct DemoArgs {
+    /// Install what is missing without asking
+    #[arg(long, short)]
+    yes: bool,
     /// Flags of the example `create_sensor`; they replace the demo's own
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) args: Vec<String>,
 }
 
 pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
+    if !args.yes {
+        setup::ask_before_installing();
+    }
     let ready = setup::prepare(repo, Wanted::default())?;
     let pictures = repo.target.join("demo").to_string_lossy().into_owned();
     let mut defaults = DEFAULTS.to_vec();
@@ -22,7 +28,7 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
         .cargo()
         // Paths among the arguments are relative to where the user is, not to the repository.
         .current_dir(".")
-        .args(["run", "--release", "--manifest-path"])
+        .args(["run", "--manifest-path"])
         .arg(repo.root.join("Cargo.toml"))
         .args(["--package", "kinetoscope", "--example", "create_sensor"])
         .args(rooms(&args.args))

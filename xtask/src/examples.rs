@@ -2,14 +2,15 @@
 
 use crate::alike;
 use crate::progress::Progress;
-use crate::run::{Failure, Outcome, Repo, no_findings};
+use crate::run::{Failure, Outcome, Repo, in_ci, no_findings};
 use crate::setup::Ready;
+use crate::test;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// Vendor robots beside the repository; where they are absent, the rows that need them are skipped.
+/// Vendor robots beside the repository; where they are absent, the rows that need them are left out, in CI an error.
 const ROBOTS: &str = "../shared/robots";
 /// No example runs that long with the arguments of the table; one that does hangs.
 const TIME_LIMIT: Duration = Duration::from_secs(600);
@@ -331,10 +332,11 @@ const ALIKE: [(&str, [&str; 2], bool); 6] = [
     ("render_model", ["model/raster", "model/fast-rt"], false),
 ];
 
-/// Builds and runs every row of the table.
-pub(crate) fn run(repo: &Repo, ready: &Ready) -> Outcome {
+/// Builds the examples with cargo's choice of packages, and runs every row of the table.
+pub(crate) fn run(repo: &Repo, ready: &Ready, packages: &[&str]) -> Outcome {
     no_findings("examples and their table in xtask/src/examples.rs disagree", &table_gaps(&examples(&repo.root)))?;
-    ready.cargo().args(["build", "--release", "--package", "kinetoscope", "--examples"]).run()?;
+    // As the tests are built, so that nothing is compiled twice.
+    ready.cargo().args(["build", "--examples"]).args(packages).args(test::features(packages)).run()?;
     let out = repo.target.join("examples-out");
     if out.exists() {
         fs::remove_dir_all(&out).map_err(|e| Failure::new(format!("{}: {e}", out.display())))?;
@@ -347,7 +349,10 @@ pub(crate) fn run(repo: &Repo, ready: &Ready) -> Outcome {
     for row in TABLE {
         progress.begin(row.example);
         if row.args.contains("{robots}") && !has_robots {
-            println!("skipped, {ROBOTS} is not there: {} {}", row.example, row.args);
+            if in_ci() {
+                return Err(Failure::new(format!("{ROBOTS} is missing: {} {}", row.example, row.args)));
+            }
+            println!("left out, {ROBOTS} is missing: {} {}", row.example, row.args);
             continue;
         }
         run_row(ready, row, &out)?;
@@ -361,10 +366,7 @@ pub(crate) fn run(repo: &Repo, ready: &Ready) -> Outcome {
 
 fn run_row(ready: &Ready, row: &Run, out: &Path) -> Outcome {
     let args = words(row.args, &out.to_string_lossy());
-    let cmd = ready
-        .cargo()
-        .args(["run", "--quiet", "--release", "--package", "kinetoscope", "--example", row.example, "--"])
-        .args(&args);
+    let cmd = ready.example(row.example).args(&args);
     let line = cmd.to_string();
     let failure = |message: String| Failure { again: Some(line.clone()), ..Failure::new(message) };
     let (code, took) = cmd.exit_code_within(TIME_LIMIT)?;

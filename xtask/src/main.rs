@@ -20,6 +20,7 @@ mod physics_report;
 mod plot;
 mod progress;
 mod python;
+mod robots;
 mod run;
 mod setup;
 mod source_check;
@@ -114,7 +115,11 @@ mod tests {
 
     #[test]
     fn demo_takes_flags_with_and_without_two_dashes() {
-        for line in [&["cargo xtask", "demo", "--steps", "7"][..], &["cargo xtask", "demo", "--", "--steps", "7"]] {
+        for line in [
+            &["cargo xtask", "demo", "--steps", "7"][..],
+            &["cargo xtask", "demo", "--", "--steps", "7"],
+            &["cargo xtask", "demo", "--yes", "--steps", "7"],
+        ] {
             let cli = Cli::try_parse_from(line).expect("valid");
             let Task::Demo(args) = cli.command else { panic!("parsed as another task") };
             assert_eq!(args.args, ["--steps", "7"]);

@@ -38,7 +38,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     let (mut findings, mut table, mut rows) = (Vec::new(), String::new(), Vec::new());
     let test = |binary: &str, words: &[&str]| {
         let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
-        cargo.args(["test", "--package", "kinetoscope", "--test", binary, "--"]).args(words).success_and_output()
+        cargo.arg("test").args(target(binary)).arg("--").arg("--include-ignored").args(words).success_and_output()
     };
     // A test that fails on the code as it is would seem to catch everything.
     for (binary, words) in binaries(&chosen) {
@@ -128,6 +128,15 @@ pub(crate) fn check(root: &Path) -> Outcome {
     no_findings("docs/mutations.md is of another list: cargo xtask mutate", &findings)
 }
 
+/// Cargo's words for the tests that a mutation names.
+fn target(binary: &str) -> Vec<&str> {
+    match binary.split_once('/') {
+        Some((package, test)) => vec!["--package", package, "--test", test],
+        None if binary.starts_with("kinetoscope-") => vec!["--package", binary, "--lib"],
+        None => vec!["--package", "kinetoscope", "--test", binary],
+    }
+}
+
 /// The test binaries of some mutations, each with the words of all of them.
 fn binaries(mutations: &[&Mutation]) -> BTreeMap<&'static str, Vec<&'static str>> {
     let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
@@ -214,6 +223,13 @@ mod tests {
         assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n", &["a"]), Verdict::Survived);
         assert!(matches!(verdict(false, "", &["a"]), Verdict::NotTried(_)));
         assert!(matches!(verdict(true, "running 0 tests\n", &["a"]), Verdict::NotTried(_)));
+    }
+
+    #[test]
+    fn targets_of_cargo() {
+        assert_eq!(target("api").join(" "), "--package kinetoscope --test api");
+        assert_eq!(target("kinetoscope-scene").join(" "), "--package kinetoscope-scene --lib");
+        assert_eq!(target("kinetoscope-record/record").join(" "), "--package kinetoscope-record --test record");
     }
 
     #[test]

@@ -9,7 +9,8 @@ pub(crate) struct Mutation {
     /// Stands in the file exactly once.
     pub(crate) search: &'static str,
     pub(crate) replacement: &'static str,
-    /// The test binary, and words in the names of the tests that are run.
+    /// The tests that are run: a test of the root package (`api`), of another package (`kinetoscope-record/record`) or the unit
+    /// tests of a package (`kinetoscope-scene`); and words in the names of the tests.
     pub(crate) tests: (&'static str, &'static [&'static str]),
 }
 
@@ -122,35 +123,35 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
         file: "sim/src/capture/motion.rs",
         search: "let acceleration = spatial + turning.cross(&velocity) + gravity;",
         replacement: "let acceleration = spatial + gravity;",
-        tests: ("sensors", &["imu"]),
+        tests: ("api", &["sensors::imu"]),
     },
     Mutation {
         name: "wrench of a joint about another point",
         file: "sim/src/capture/motion.rs",
         search: "let torque = vector(data.cfrc_int(), 6 * body) + arm.cross(&force);",
         replacement: "let torque = vector(data.cfrc_int(), 6 * body) - arm.cross(&force);",
-        tests: ("sensors", &["wrench"]),
+        tests: ("api", &["sensors::wrench"]),
     },
     Mutation {
         name: "contact force on the other body",
         file: "sim/src/capture/contacts.rs",
         search: "force: force.into(),",
         replacement: "force: (-force).into(),",
-        tests: ("sensors", &["contact"]),
+        tests: ("api", &["sensors::contact"]),
     },
     Mutation {
         name: "contact time one step behind",
         file: "sensors/src/contact_sensor/air_time.rs",
         search: "(self.contact, self.air) = (self.contact + steps, 0);",
         replacement: "(self.contact, self.air) = (self.contact + steps - 1, 0);",
-        tests: ("sensors", &["contact"]),
+        tests: ("api", &["sensors::contact"]),
     },
     Mutation {
         name: "implicit drive without its stiffness",
         file: "sim/src/drive/implicit.rs",
         search: "let stiffness = h * (gains.kd + h * gains.kp);",
         replacement: "let stiffness = h * gains.kd;",
-        tests: ("drives", &["law"]),
+        tests: ("api", &["drives::law"]),
     },
     physics(
         "drive pushes the wrong way",
@@ -163,14 +164,14 @@ pub(crate) const MUTATIONS: &[Mutation] = &[
         file: "sim/src/drive/implicit.rs",
         search: "gains.max_effort.min(UNLIMITED)",
         replacement: "UNLIMITED",
-        tests: ("drives", &["law"]),
+        tests: ("api", &["drives::law"]),
     },
     Mutation {
         name: "drive law from the velocity of the step before",
         file: "sim/src/drive/implicit.rs",
         search: "effort / stiffness - v / h",
         replacement: "effort / stiffness",
-        tests: ("drives", &["law"]),
+        tests: ("api", &["drives::law"]),
     },
     physics(
         "damping of joints that drives",

@@ -54,7 +54,7 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
     let venv = repo.target.join("bench-venv");
     let python = venv.join("bin/python");
     let is_ready = || {
-        let check = format!("import mujoco; assert mujoco.__version__ == '{}'", wheel::VERSION);
+        let check = format!("import mujoco; assert mujoco.__version__ == '{}'", wheel::PYTHON_VERSION);
         Cmd::new(&python).args(["-c", &check]).quiet().succeeds()
     };
     if is_ready() {
@@ -64,11 +64,11 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
         .args(["-m", "venv", "--clear"])
         .arg(&venv)
         .run()
-        .and_then(|()| pip_install(&python, &[&format!("mujoco=={}", wheel::VERSION)]));
+        .and_then(|()| pip_install(&python, &[&format!("mujoco=={}", wheel::PYTHON_VERSION)]));
     if made.is_ok() && is_ready() {
         return Some(python);
     }
-    eprintln!("note: no python with mujoco {} could be made", wheel::VERSION);
+    eprintln!("note: no python with mujoco {} could be made", wheel::PYTHON_VERSION);
     None
 }
 

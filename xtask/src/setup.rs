@@ -4,7 +4,9 @@ use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, which};
 use crate::wheel;
 use clap::ValueEnum;
 use std::env;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The two supported lines of MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -12,7 +14,7 @@ pub(crate) enum Line {
     /// Debian's package libmujoco-dev (2.2.2)
     #[value(name = "2")]
     Debian,
-    /// The PyPI wheel mujoco-core (4.0.0), downloaded into the target folder
+    /// The PyPI wheel mujoco-core (4.0.1), downloaded into the target folder
     #[value(name = "4")]
     Wheel,
 }
@@ -30,6 +32,7 @@ pub(crate) struct Wanted {
 #[derive(Debug)]
 pub(crate) struct Ready {
     root: PathBuf,
+    target: PathBuf,
     choice: Choice,
 }
 
@@ -37,7 +40,7 @@ pub(crate) struct Ready {
 enum Choice {
     Environment,
     Debian,
-    Wheel { mujoco_dir: PathBuf, target: PathBuf },
+    Wheel { mujoco_dir: PathBuf },
 }
 
 impl Ready {
@@ -47,7 +50,22 @@ impl Ready {
         match &self.choice {
             Choice::Environment => cmd,
             Choice::Debian => cmd.env_remove("MUJOCO_DIR"),
-            Choice::Wheel { mujoco_dir, target } => cmd.env("MUJOCO_DIR", mujoco_dir).env("CARGO_TARGET_DIR", target),
+            Choice::Wheel { mujoco_dir } => cmd.env("MUJOCO_DIR", mujoco_dir).env("CARGO_TARGET_DIR", &self.target),
+        }
+    }
+
+    /// An example that cargo has built with the profile of the tests, in the repository's root.
+    pub(crate) fn example(&self, name: &str) -> Cmd {
+        let cmd = Cmd::new(self.target.join("debug/examples").join(name)).current_dir(&self.root);
+        // Cargo tells programs that it starts where libraries are; here cargo does not start them.
+        let mujoco_dir = match &self.choice {
+            Choice::Environment => env::var_os("MUJOCO_DIR").map(PathBuf::from),
+            Choice::Debian => None,
+            Choice::Wheel { mujoco_dir } => Some(mujoco_dir.clone()),
+        };
+        match mujoco_dir.and_then(|dir| env::join_paths([dir.join("lib"), dir]).ok()) {
+            Some(folders) => cmd.env("LD_LIBRARY_PATH", folders),
+            None => cmd,
         }
     }
 }
@@ -61,7 +79,7 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     let choice = match wanted.line {
         None if mujoco_dir_set => Choice::Environment,
         None | Some(Line::Debian) => Choice::Debian,
-        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new(), target: target_of_wheel(repo, in_ci()) },
+        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new() },
     };
     let machine = Machine::this();
     let mut needs = vec![Need::Compiler, Need::Libclang];
@@ -78,11 +96,11 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
         }
         eprintln!("note: {}", failure.message);
     }
-    let choice = match choice {
-        Choice::Wheel { target, .. } => Choice::Wheel { mujoco_dir: wheel::obtain(repo)?, target },
-        other => other,
+    let (choice, target) = match choice {
+        Choice::Wheel { .. } => (Choice::Wheel { mujoco_dir: wheel::obtain(repo)? }, target_of_wheel(repo, in_ci())),
+        other => (other, repo.target.clone()),
     };
-    Ok(Ready { root: repo.root.clone(), choice })
+    Ok(Ready { root: repo.root.clone(), target, choice })
 }
 
 /// Installs what newer distributions no longer have; says so where it is not to be had.
@@ -110,6 +128,7 @@ pub(crate) enum Need {
     OsMesa,
     Chromium,
     Xvfb,
+    Readelf,
 }
 
 impl Need {
@@ -124,6 +143,7 @@ impl Need {
             Self::OsMesa => &["libosmesa6"],
             Self::Chromium => &["chromium"],
             Self::Xvfb => &["xvfb"],
+            Self::Readelf => &["binutils"],
         }
     }
 
@@ -142,6 +162,7 @@ impl Need {
                 "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
             }
             Self::Chromium => "Chromium (the page of the browser view is tested in it)",
+            Self::Readelf => "readelf (a MuJoCo of another version than the headers is tested with it)",
             Self::Xvfb => "Xvfb, an X server without a screen (the window is tested on it)",
         }
     }
@@ -180,6 +201,7 @@ impl Machine {
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
             Need::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
+            Need::Readelf => self.search_path.iter().any(|dir| dir.join("readelf").is_file()),
             Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Need::Pip | Need::Venv => (self.python_has)(need),
             Need::OsMesa => {
@@ -276,7 +298,10 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
             by_hand(&names)
         )));
     };
-    eprintln!("installing {}", names.join(" "));
+    eprintln!("installing with apt-get: {}", names.join(" "));
+    if asks() && !confirmed()? {
+        return Err(Failure::new(format!("nothing was installed. By hand:\n\n    {}\n", by_hand(&names))));
+    }
     let known = |name: &&&str| Cmd::new("apt-cache").args(["show", name]).quiet().succeeds();
     let lists_are_complete = names.iter().filter(known).count() == names.len();
     if !lists_are_complete {
@@ -300,6 +325,31 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
             Err(Failure { message: format!("{}\nneeded:{}", failure.message, descriptions(&absent)), ..failure })
         }
     }
+}
+
+/// Set where a person is asked before packages are installed.
+static ASK: AtomicBool = AtomicBool::new(false);
+
+/// From now on, a person at a terminal is asked before packages are installed; on a build machine nobody is asked.
+pub(crate) fn ask_before_installing() {
+    ASK.store(true, Ordering::Relaxed);
+}
+
+fn asks() -> bool {
+    ASK.load(Ordering::Relaxed) && !in_ci() && std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
+}
+
+/// Reads the answer to the question whether to go on; an empty line is a yes.
+fn confirmed() -> Outcome<bool> {
+    eprint!("go on? [Y/n] ");
+    let mut answer = String::new();
+    std::io::stdin().read_line(&mut answer).map_err(|e| Failure::new(format!("the answer: {e}")))?;
+    Ok(is_yes(&answer))
+}
+
+/// True for an empty line, `y` and `yes`; the end of the input is no answer, thus no yes.
+fn is_yes(answer: &str) -> bool {
+    answer.ends_with('\n') && ["", "y", "yes"].contains(&answer.trim().to_ascii_lowercase().as_str())
 }
 
 /// The words that give root's rights without a question: none for root, else `sudo -n`.
@@ -420,6 +470,13 @@ mod tests {
             line,
             "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends libclang-dev libmujoco-dev'"
         );
+    }
+
+    #[test]
+    fn answers() {
+        let yes = |answer| is_yes(answer);
+        assert_eq!(["\n", "y\n", "Yes\n"].map(yes), [true; 3]);
+        assert_eq!(["", "n\n", "no\n", "what\n"].map(yes), [false; 4]);
     }
 
     #[test]

@@ -1,12 +1,13 @@
-//! `cargo xtask test`: every test of the workspace, doctests included, against one MuJoCo.
+//! `cargo xtask test`: every test of the workspace, those included that need something installed, against one MuJoCo.
 
-use crate::run::{Failure, Outcome, Repo, in_ci};
+use crate::robots::{self, Robots};
+use crate::run::{Failure, Outcome, Repo};
 use crate::setup::{self, Line, Need, Wanted};
 use crate::{physics_report, python};
 
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TestArgs {
-    /// MuJoCo to test against: 2 is Debian's 2.2.2, 4 the wheel's 4.0.0 [default: MUJOCO_DIR if set, else 2]
+    /// MuJoCo to test against: 2 is Debian's 2.2.2, 4 the wheel's 4.0.1 [default: MUJOCO_DIR if set, else 2]
     #[arg(long, value_enum)]
     pub(crate) mujoco: Option<Line>,
     /// Only this package, for example kinetoscope-sim
@@ -19,63 +20,86 @@ pub(crate) struct TestArgs {
     pub(crate) test_args: Vec<String>,
 }
 
+/// A reason for which tests are left out, and the part of their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct LeftOut {
+    name: &'static str,
+    why: &'static str,
+}
+
+const OF_MUJOCO_4: LeftOut = LeftOut { name: "mujoco_renderer", why: "MuJoCo's own renderer draws files of MuJoCo 4" };
+const OF_MUJOCO_2: LeftOut = LeftOut { name: "batch::sample_models", why: "MuJoCo's sample models are of 2.2.2" };
+const OF_VENDORS: LeftOut =
+    LeftOut { name: "vendor", why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others" };
+
+/// Packages with code that depends on MuJoCo's version, and the tests of the whole: what is tested on the second version.
+pub(crate) fn of_mujoco() -> [&'static str; 6] {
+    ["--package", "mujoco-sys", "--package", "kinetoscope-sim", "--package", "kinetoscope"]
+}
+
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
-    // MuJoCo's own renderer is a judge of our pictures where both have the same MuJoCo.
-    let judged = args.mujoco == Some(Line::Wheel);
-    // Readers that nobody here wrote are judges of our recordings.
-    let extras: &[Need] = match judged {
-        true => &[Need::Xvfb, Need::Pip, Need::Venv, Need::OsMesa],
-        false => &[Need::Xvfb, Need::Pip, Need::Venv],
-    };
-    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras })?;
+    match &args.package {
+        Some(package) => run_packages(repo, args, &["--package", package.as_str()]),
+        None => run_packages(repo, args, &["--workspace"]),
+    }
+}
+
+pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> Outcome {
+    const NEEDS: [Need; 7] =
+        [Need::Xvfb, Need::Chromium, Need::Models, Need::Readelf, Need::Pip, Need::Venv, Need::OsMesa];
+    // MuJoCo's own renderer is compared with where both have the same MuJoCo.
+    let with_renderer = args.mujoco == Some(Line::Wheel);
+    let needs = if with_renderer { &NEEDS[..] } else { &NEEDS[..6] };
+    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: needs })?;
+    let mut left_out = vec![if with_renderer { OF_MUJOCO_2 } else { OF_MUJOCO_4 }];
     // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
-    let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE).args(cargo_args(args));
+    let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE);
+    if let Robots::FromPyPi(folder) = robots::obtain(repo)? {
+        cargo = cargo.env(robots::VARIABLE, folder);
+        left_out.push(OF_VENDORS);
+    }
     // The laws of physics write what they measure, for the page of numbers to be compared with.
     let everything = args.package.is_none() && args.filter.is_none() && args.test_args.is_empty();
     if let Some(line) = args.mujoco.filter(|_| everything) {
         cargo = cargo.env(physics_report::VARIABLE, physics_report::fresh_folder(repo, line)?);
     }
-    if judged {
-        match python::with_mujoco(repo).filter(|python| python::OPENGL.install(python)) {
-            Some(python) => cargo = cargo.env(python::VARIABLE, python),
-            None if in_ci() => return Err(Failure::new("MuJoCo's renderer, a judge of our pictures, is not there")),
-            None => eprintln!("note: pictures are not compared with those of MuJoCo's renderer"),
-        }
+    if with_renderer {
+        let python = python::with_mujoco(repo).filter(|python| python::OPENGL.install(python));
+        cargo = cargo.env(python::VARIABLE, python.ok_or_else(|| Failure::new("no Python with MuJoCo's renderer"))?);
     }
-    match python::with_readers(repo) {
-        Some(python) => cargo = cargo.env(python::READERS_VARIABLE, python),
-        None if in_ci() => return Err(Failure::new("the readers of recordings, their judges, are not there")),
-        None => eprintln!("note: recordings are not read by other programs"),
+    let readers = python::with_readers(repo).ok_or_else(|| Failure::new("no Python with readers of recordings"))?;
+    cargo = cargo.env(python::READERS_VARIABLE, readers);
+    for LeftOut { name, why } in &left_out {
+        eprintln!("left out: tests named `{name}`: {why}");
     }
-    cargo.run()
+    cargo.args(cargo_args(args, packages, &left_out)).run()
 }
 
-fn cargo_args(args: &TestArgs) -> Vec<String> {
+fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[LeftOut]) -> Vec<String> {
     let mut words = vec!["test".to_string()];
-    match &args.package {
-        Some(package) => words.extend(["--package".to_string(), package.clone()]),
-        None => words.push("--workspace".to_string()),
-    }
-    words.extend(features(args.package.as_deref()));
+    words.extend(packages.iter().map(|word| (*word).to_string()));
+    words.extend(features(packages));
     words.extend(args.filter.clone());
-    if !args.test_args.is_empty() {
-        words.push("--".to_string());
-        words.extend(args.test_args.iter().cloned());
-    }
+    // Needs are installed: tests that wait for one are run.
+    words.extend(["--", "--include-ignored"].map(String::from));
+    words.extend(left_out.iter().flat_map(|left| ["--skip", left.name]).map(String::from));
+    words.extend(args.test_args.iter().cloned());
     words
 }
 
 /// Crates that have the feature of recordings as HDF5, which is off by default.
 const WITH_HDF5: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
-/// What is off by default and is to be checked too, in the whole workspace or in a package.
-pub(crate) fn features(package: Option<&str>) -> Vec<String> {
-    let feature = match package {
-        None => "kinetoscope-cli/hdf5",
-        Some(package) if WITH_HDF5.contains(&package) => "hdf5",
-        Some(_) => return Vec::new(),
+/// The features to check beside the default ones, for cargo's choice of packages.
+pub(crate) fn features(packages: &[&str]) -> Vec<String> {
+    let feature = match packages {
+        ["--workspace"] => "kinetoscope-cli/hdf5".to_string(),
+        _ => match WITH_HDF5.iter().find(|name| packages.contains(name)) {
+            Some(package) => format!("{package}/hdf5"),
+            None => return Vec::new(),
+        },
     };
-    ["--features", feature].map(String::from).to_vec()
+    vec!["--features".into(), feature]
 }
 
 #[cfg(test)]
@@ -83,26 +107,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_arguments_everything_is_tested() {
-        assert_eq!(cargo_args(&TestArgs::default()), ["test", "--workspace", "--features", "kinetoscope-cli/hdf5"]);
+    fn whole_workspace() {
+        let words = cargo_args(&TestArgs::default(), &["--workspace"], &[OF_MUJOCO_4]);
+        let expected = "test --workspace --features kinetoscope-cli/hdf5 -- --include-ignored --skip mujoco_renderer";
+        assert_eq!(words.join(" "), expected);
     }
 
     #[test]
-    fn packages_are_tested_with_their_feature() {
+    fn features_of_packages() {
         for package in WITH_HDF5 {
-            assert_eq!(features(Some(package)), ["--features", "hdf5"]);
+            assert_eq!(features(&["--package", package]), ["--features".to_string(), format!("{package}/hdf5")]);
         }
-        assert!(features(Some("kinetoscope-sim")).is_empty());
+        assert!(features(&["--package", "kinetoscope-sim"]).is_empty());
+        assert_eq!(features(&of_mujoco()), ["--features", "kinetoscope/hdf5"]);
     }
 
     #[test]
-    fn package_filter_and_test_arguments_are_handed_on() {
-        let args = TestArgs {
-            package: Some("xtask".into()),
-            filter: Some("wheel".into()),
-            test_args: vec!["--nocapture".into()],
-            ..TestArgs::default()
-        };
-        assert_eq!(cargo_args(&args), ["test", "--package", "xtask", "wheel", "--", "--nocapture"]);
+    fn filter_and_arguments() {
+        let args =
+            TestArgs { filter: Some("wheel".into()), test_args: vec!["--nocapture".into()], ..TestArgs::default() };
+        let words = cargo_args(&args, &["--package", "xtask"], &[]);
+        assert_eq!(words.join(" "), "test --package xtask wheel -- --include-ignored --nocapture");
     }
 }

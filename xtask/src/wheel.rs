@@ -4,9 +4,12 @@ use crate::run::{Cmd, Failure, Outcome, Repo};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-pub(crate) const VERSION: &str = "4.0.0";
+pub(crate) const VERSION: &str = "4.0.1";
 
-/// The folder with `include/mujoco` and `libmujoco.so.4.0.0`, downloaded and unpacked at the first call.
+/// The release of the Python package `mujoco` that is compared with: it may be older than the library.
+pub(crate) const PYTHON_VERSION: &str = "4.0.0";
+
+/// The folder with `include/mujoco` and `libmujoco.so.*`, downloaded and unpacked at the first call.
 ///
 /// # Errors
 /// If pip is missing, the download fails, or the wheel does not hold what is expected of it.

