@@ -1,15 +1,14 @@
-//! Bundled files: where they are looked for.
+//! Bundled files: the folders that are searched.
 
 use kinetoscope::prelude::*;
 use testkit::process;
 
 #[test]
-fn a_miss_lists_the_places() {
+fn missing_file() {
     assert!(assets::path("sr5/SR5.urdf").is_ok_and(|p| p.is_file()));
     let folder = tempfile::tempdir().unwrap();
-    let output =
-        process::run(module_path!(), "scenario_elsewhere", folder.path(), &[("KINETOSCOPE_ASSETS", "elsewhere")]);
-    let text = process::text(&output.stdout);
+    let variables = [("KINETOSCOPE_ASSETS", "elsewhere")];
+    let text = process::text(&process::run(module_path!(), "scenario_elsewhere", folder.path(), &variables).stdout);
     assert!(text.contains("elsewhere/no/such.urdf") && text.contains("assets/no/such.urdf"), "{text}");
 }
 

@@ -1,7 +1,7 @@
 //! Every writer of robots, objects and MJCF parts, with every kind of mistake that its arrays and indices can have: a typed
 //! error that names it, and nothing is written. Each is called rightly, too, and then something changes.
 
-use super::support::{INERTIAL, bits, cfg, robot};
+use super::support::{LIMIT, bits, chain, robot};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::RobotMut;
@@ -23,19 +23,11 @@ const PART: &str = r#"<mujoco><worldbody><body name="hand" mocap="true"><geom si
 
 fn world() -> (SimulationManager, Ids) {
     let dir = tempfile::tempdir().unwrap();
-    let mut urdf = format!("<robot name=\"r\"><link name=\"l0\">{INERTIAL}</link>");
-    for i in 1..4 {
-        urdf += &format!(
-            "<link name=\"l{i}\">{INERTIAL}</link><joint name=\"j{i}\" type=\"revolute\"><parent link=\"l{}\"/>\
-             <child link=\"l{i}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\" effort=\"9\" velocity=\"1\"/>\
-             <dynamics damping=\"0.1\" friction=\"0.1\"/></joint>",
-            i - 1
-        );
-    }
-    let mut sim = SimulationManager::new(cfg(ENVS)).unwrap();
+    let urdf = chain(4, "revolute", &format!("{LIMIT}<dynamics damping=\"0.1\" friction=\"0.1\"/>"));
+    let mut sim = super::support::sim(ENVS);
     let init_pose = Pose::translation(0.0, 0.0, 3.0);
-    let base = RobotCfg { fix_base: false, init_pose, ..robot(dir.path(), "r", &(urdf + "</robot>")) };
-    let cube = RigidObjectCfg { uid: "o".into(), shape: ObjectShape::cube(0.1), ..Default::default() };
+    let base = RobotCfg { fix_base: false, init_pose, ..robot(dir.path(), "r", &urdf) };
+    let cube = testkit::worlds::object("o", ObjectShape::cube(0.1), [0.0; 3]);
     let ids = Ids {
         robot: sim.add_robot(base).unwrap(),
         object: sim.add_rigid_object(cube).unwrap(),
@@ -112,7 +104,7 @@ const OF_ROWS: &[OfRows] = &[
     ("write_mocap_pose", POSE, |s, i, v, e| s.mjcf_part_mut(i.part).write_mocap_pose("hand", v, e)),
 ];
 
-/// What a mistake must be told as.
+/// The error that a mistake must give.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Shape,
@@ -131,7 +123,7 @@ fn assert_refused(result: Result<()>, name: &str, kind: Kind) {
         (Error::UnknownIndex { what, index, .. }, Kind::Unknown(of, which)) => *what == of && *index == which,
         _ => false,
     };
-    assert!(right, "{name}: {kind:?} was told as {error:?}");
+    assert!(right, "{name}: {kind:?} gave {error:?}");
 }
 
 /// Tables of `rows` rows like the good one.
@@ -147,8 +139,6 @@ fn with_last(mut values: Array2<f64>, value: f64) -> Array2<f64> {
 
 /// Tables and environments that are wrong for any writer of such rows.
 fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Vec<EnvId>>, Kind)> {
-    let mut wide = good.to_vec();
-    wide.push(0.5);
     let some = |ids: &[usize]| Some(ids.iter().map(|&id| EnvId(id)).collect());
     let mut mistakes = vec![
         (table(good, 2), None, Kind::Shape),
@@ -162,7 +152,7 @@ fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Ve
         (table(good, 1), some(&[1, 1]), Kind::Twice),
     ];
     if good.len() > 1 {
-        mistakes.push((table(&wide, 3), None, Kind::Shape));
+        mistakes.push((table(&[good, &[0.5]].concat(), 3), None, Kind::Shape));
         mistakes.push((table(&good[1..], 3), None, Kind::Shape));
     }
     if !infinity_is_fine {
@@ -173,7 +163,7 @@ fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Ve
 }
 
 #[test]
-fn writers_of_joints_refuse_every_mistake() {
+fn of_joints() {
     let (mut sim, ids) = world();
     sim.update(3);
     for (name, infinity_is_fine, call) in OF_JOINTS {
@@ -198,7 +188,7 @@ fn writers_of_joints_refuse_every_mistake() {
             assert_refused(call(&mut sim.robot_mut(ids.robot), &values, Some(joints), None), name, kind);
             assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
         }
-        // Nobody and nothing is no mistake.
+        // No environment and no joint are no mistake.
         let mut robot = sim.robot_mut(ids.robot);
         call(&mut robot, &table(good, 0), None, Some(&[])).unwrap();
         call(&mut robot, &Array2::zeros((ENVS, 0)), Some(&[]), None).unwrap();
@@ -209,7 +199,7 @@ fn writers_of_joints_refuse_every_mistake() {
 }
 
 #[test]
-fn writers_of_rows_refuse_every_mistake() {
+fn of_rows() {
     let (mut sim, ids) = world();
     sim.update(3);
     for (name, good, call) in OF_ROWS {
@@ -219,7 +209,7 @@ fn writers_of_rows_refuse_every_mistake() {
             assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
         }
         call(&mut sim, ids, &table(good, 0), Some(&[])).unwrap();
-        assert_eq!(told(&sim, ids), before, "{name}: nobody is asked");
+        assert_eq!(told(&sim, ids), before, "{name}: no environment");
         call(&mut sim, ids, &table(good, 1), Some(&[EnvId(2)])).unwrap();
         assert_ne!(told(&sim, ids), before, "{name}: the control");
     }

@@ -1,12 +1,15 @@
 //! The example `inspect_robot`: what it reports agrees with closed forms and with MuJoCo, and its exit codes.
 
+use super::support::TETRAHEDRON;
+use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, inspect};
-use kinetoscope::sim::mj::ObjectKind;
+use kinetoscope::sim::mj::{Data, ObjectKind, compile};
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
+use testkit::urdf::{self, Files};
 
 #[allow(dead_code, reason = "main is what cargo runs")]
 #[path = "../../examples/inspect_robot.rs"]
@@ -33,40 +36,44 @@ fn report(args: &[&str]) -> (u8, Value) {
     (run.code, serde_json::from_str(&run.out).unwrap())
 }
 
-struct Folder(tempfile::TempDir);
+struct Folder(Files);
 
 impl Folder {
     fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        Self(Files::default())
     }
 
     fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
-        let path = self.0.path().join(name);
-        fs::write(&path, content).unwrap();
-        path.to_str().unwrap().to_owned()
+        self.0.write(name, content).to_str().unwrap().to_owned()
     }
 
     /// A robot with these elements; the first is in line 2.
-    fn urdf(&self, elements: &str) -> String {
-        self.write("robot.urdf", format!("<robot name=\"r\">\n{elements}\n</robot>"))
+    fn urdf(&self, elements: &[&str]) -> String {
+        self.write("robot.urdf", urdf::robot("r", &elements.join("\n")))
+    }
+
+    fn pendulum(&self, more: &[&str]) -> String {
+        let link = link("arm", M, [L, 0.0, 0.0], I);
+        self.urdf(
+            &[&["<link name=\"base\"/>", &link, &joint("swing", "revolute", "base", "arm", LIMIT)], more].concat(),
+        )
     }
 }
 
-fn link(name: &str, mass: f64, com: &str, moment: f64) -> String {
-    format!(
-        "<link name=\"{name}\"><inertial><origin xyz=\"{com}\"/><mass value=\"{mass}\"/><inertia ixx=\"{moment}\" \
-         ixy=\"0\" ixz=\"0\" iyy=\"{moment}\" iyz=\"0\" izz=\"{moment}\"/></inertial></link>"
-    )
+fn link(name: &str, mass: f64, com: [f64; 3], moment: f64) -> String {
+    urdf::link(name, mass, moment, com, "").trim_end().to_owned()
 }
 
 fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> String {
-    format!(
-        "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"0 1 0\"/>\
-         {more}</joint>"
-    )
+    urdf::joint(name, kind, [parent, child], [0.0; 3], "0 1 0", more).trim_end().to_owned()
 }
 
 const LIMIT: &str = "<limit lower=\"-1\" upper=\"2\" effort=\"5\" velocity=\"3\"/>";
+/// Mass, distance, moment and angle of a pendulum.
+const M: f64 = 2.0;
+const L: f64 = 0.5;
+const I: f64 = 0.1;
+const Q: f64 = 0.7;
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
@@ -87,19 +94,6 @@ fn warnings(report: &Value) -> Vec<String> {
     report["warnings"].as_array().unwrap().iter().map(of).collect()
 }
 
-/// A binary STL of two triangles.
-fn stl() -> Vec<u8> {
-    let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut bytes = vec![0; 80];
-    bytes.extend(4u32.to_le_bytes());
-    for triangle in [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] {
-        bytes.extend([0; 12]);
-        bytes.extend(triangle.iter().flat_map(|&c| corners[c]).flat_map(f32::to_le_bytes));
-        bytes.extend([0; 2]);
-    }
-    bytes
-}
-
 fn vendor(name: &str) -> String {
     testkit::needs::robot(name).to_str().unwrap().to_owned()
 }
@@ -111,80 +105,61 @@ const ANYMAL: &str = "anymal_c_simple_description/urdf/anymal.urdf";
 /// A point mass m at distance l from a horizontal axis, at angle q below the horizontal after a turn by q about +y:
 /// M = I + m l², g = -m 9.81 l cos q (the height of the mass is -l sin q).
 #[test]
-fn a_pendulum_has_the_inertia_and_torque_of_the_textbook() {
+fn pendulum() {
     let folder = Folder::new();
-    let (m, l, i, q) = (2.0, 0.5, 0.1, 0.7_f64);
-    let file = folder.urdf(&format!(
-        "<link name=\"base\"/>\n{}\n{}\n{}\n{}",
-        link("arm", m, &format!("{l} 0 0"), i),
-        "<link name=\"tool\"/>",
-        joint("swing", "revolute", "base", "arm", LIMIT),
-        joint("weld", "fixed", "arm", "tool", "<origin xyz=\"1 0 0\"/>")
-    ));
-    let (code, json) = report(&[&file, "--qpos", &format!("swing={q}")]);
+    // A fixed link without mass: its origin is 1 m from the axis.
+    let weld = urdf::joint("weld", "fixed", ["arm", "tool"], [1.0, 0.0, 0.0], "0 1 0", "");
+    let file = folder.pendulum(&["<link name=\"tool\"/>", &weld]);
+    let (code, json) = report(&[&file, "--qpos", &format!("swing={Q}")]);
     assert_eq!(code, 0, "{:?}", warnings(&json));
-    assert!(close(&numbers(&json["mass_matrix"][0]), &[i + m * l * l], 1e-15));
-    assert!(close(&numbers(&json["gravity_torque"]), &[-m * 9.81 * l * q.cos()], 1e-14));
-    assert!(close(&numbers(&json["com"]), &[l * q.cos(), 0.0, -l * q.sin()], 1e-15));
+    assert!(close(&numbers(&json["mass_matrix"][0]), &[I + M * L * L], 1e-15));
+    assert!(close(&numbers(&json["gravity_torque"]), &[-M * 9.81 * L * Q.cos()], 1e-14));
+    assert!(close(&numbers(&json["com"]), &[L * Q.cos(), 0.0, -L * Q.sin()], 1e-15));
     let tool = &json["links"][2];
     assert_eq!((tool["name"].as_str(), tool["parent"].as_str()), (Some("tool"), Some("arm")));
     assert_eq!((&tool["mass"], &tool["com"], &tool["inertia"]), (&Value::from(0.0), &Value::Null, &Value::Null));
-    let half = q / 2.0;
-    assert!(close(&numbers(&tool["pose"]), &[q.cos(), 0.0, -q.sin(), half.cos(), 0.0, half.sin(), 0.0], 1e-15));
-    assert_eq!(numbers(&json["links"][1]["inertia"][2]), [0.0, 0.0, i]);
+    let half = Q / 2.0;
+    assert!(close(&numbers(&tool["pose"]), &[Q.cos(), 0.0, -Q.sin(), half.cos(), 0.0, half.sin(), 0.0], 1e-15));
+    assert_eq!(numbers(&json["links"][1]["inertia"][2]), [0.0, 0.0, I]);
     assert_eq!(json["links"][0]["parent"], Value::Null);
-
     let (_, still) = report(&[&file]);
     assert_ne!(still["gravity_torque"], json["gravity_torque"], "the position matters");
 }
 
-/// What the example prints is what a program gets: the textbook's numbers, and the text without the part about warnings.
+/// The report of the library: the textbook's numbers, and the text without the section of warnings.
 #[test]
-fn a_program_asks_for_the_same_report() {
+fn library() {
     let folder = Folder::new();
-    let (m, l, i, q) = (2.0, 0.5, 0.1, 0.7_f64);
-    let file = folder.urdf(&format!(
-        "<link name=\"base\"/>\n{}\n{}\n<gizmo/>",
-        link("arm", m, &format!("{l} 0 0"), i),
-        joint("swing", "revolute", "base", "arm", LIMIT),
-    ));
-    let cfg = InspectCfg { urdf: UrdfCfg::single(&file), qpos: vec![("swing".into(), q)], ..Default::default() };
+    let urdf = UrdfCfg::single(folder.pendulum(&["<gizmo/>"]));
+    let cfg = InspectCfg { urdf, qpos: vec![("swing".into(), Q)], ..Default::default() };
     let report = inspect(&cfg).unwrap();
-    assert_eq!((report.total_mass, report.joint_names.as_slice()), (m, &["swing".to_string()][..]));
-    assert!(close(&report.mass_matrix[0], &[i + m * l * l], 1e-15));
-    assert!(close(&report.gravity_torque, &[-m * 9.81 * l * q.cos()], 1e-14));
+    assert_eq!((report.total_mass, report.joint_names.as_slice()), (M, &["swing".to_string()][..]));
+    assert!(close(&report.mass_matrix[0], &[I + M * L * L], 1e-15));
+    assert!(close(&report.gravity_torque, &[-M * 9.81 * L * Q.cos()], 1e-14));
     let kinds: Vec<(&str, Option<u32>)> = report.warnings.iter().map(|w| (w.kind, w.line)).collect();
     assert_eq!(kinds, [("element-ignored", Some(5))]);
-
     let (with, without) = (report.to_string(), report.without_warnings().to_string());
     let rest = with.strip_prefix(&without).unwrap();
     assert!(rest.starts_with("\n1 warning\n") && rest.contains("element-ignored") && rest.contains("gizmo"), "{rest}");
     assert!(without.contains("total mass 2 kg") && !without.contains("element-ignored"), "{without}");
-    let wrong = InspectCfg { qpos: vec![("swong".into(), q)], ..cfg };
+    let wrong = InspectCfg { qpos: vec![("swong".into(), Q)], ..cfg };
     let error = inspect(&wrong).unwrap_err().to_string();
     assert!(error.contains("there is no joint \"swong\"") && error.contains("swing"), "{error}");
 }
 
 #[test]
-fn joints_say_what_the_file_says() {
+fn joints() {
     let folder = Folder::new();
-    let file = folder.urdf(&format!(
-        "<link name=\"base\"/>{}{}{}{}\n{}\n{}\n{}\n{}",
-        link("a", 1.0, "0 0 0", 1.0),
-        link("b", 1.0, "0 0 0", 1.0),
-        link("c", 1.0, "0 0 0", 1.0),
-        link("d", 1.0, "0 0 0", 1.0),
-        joint("lead", "revolute", "base", "a", LIMIT),
-        joint("turn", "continuous", "base", "b", ""),
-        joint("slide", "prismatic", "base", "c", "<limit upper=\"0.5\" effort=\"0\" velocity=\"1\"/>"),
-        joint(
-            "follow",
-            "revolute",
-            "base",
-            "d",
-            "<limit lower=\"-9\" upper=\"9\" effort=\"5\" velocity=\"3\"/><mimic joint=\"lead\" multiplier=\"-2\" offset=\"0.5\"/>"
-        ),
-    ));
+    let links: String = ["a", "b", "c", "d"].map(|name| link(name, 1.0, [0.0; 3], 1.0)).concat();
+    let follow = "<limit lower=\"-9\" upper=\"9\" effort=\"5\" velocity=\"3\"/>\
+                  <mimic joint=\"lead\" multiplier=\"-2\" offset=\"0.5\"/>";
+    let file = folder.urdf(&[
+        &format!("<link name=\"base\"/>{links}"),
+        &joint("lead", "revolute", "base", "a", LIMIT),
+        &joint("turn", "continuous", "base", "b", ""),
+        &joint("slide", "prismatic", "base", "c", "<limit upper=\"0.5\" effort=\"0\" velocity=\"1\"/>"),
+        &joint("follow", "revolute", "base", "d", follow),
+    ]);
     let (code, json) = report(&[&file, "--qpos", "lead=0.25, slide=0.1"]);
     assert_eq!((code, warnings(&json)), (1, [4, 5].map(|n| format!("robot.urdf:{n}: effort-unlimited")).to_vec()));
     assert_eq!(names(&json["joint_names"]), ["lead", "turn", "slide", "follow"]);
@@ -208,25 +183,19 @@ fn joints_say_what_the_file_says() {
 }
 
 #[test]
-fn the_shipped_robots_have_no_warnings_and_hang_together() {
+fn several_files() {
     for file in [SR5, HAND] {
         assert_eq!(run(&[file]).code, 0, "{file}");
     }
     let (code, json) = report(&[SR5, HAND]);
-    assert_eq!(code, 0);
-    let connector = |name: &str| json["joints"].as_array().unwrap().iter().any(|j| j["name"] == name);
-    assert!(connector("arm_TO_hand_CONNECTOR"));
-    assert_eq!(json["files"].as_array().unwrap().len(), 2);
+    assert_eq!((code, json["files"].as_array().unwrap().len()), (0, 2));
+    assert!(json["joints"].as_array().unwrap().iter().any(|j| j["name"] == "arm_TO_hand_CONNECTOR"));
 
     let folder = Folder::new();
     let part = |name: &str| {
-        let text = format!(
-            "<robot name=\"{name}\">{}{}\n{}</robot>",
-            link(&format!("{name}_a"), 1.0, "0 0 0", 1.0),
-            link(&format!("{name}_b"), 1.0, "0 0 0", 1.0),
-            joint(name, "revolute", &format!("{name}_a"), &format!("{name}_b"), LIMIT)
-        );
-        folder.write(&format!("{name}.urdf"), text)
+        let [a, b] = ["a", "b"].map(|end| format!("{name}_{end}"));
+        let links = [&a, &b].map(|link_name| link(link_name, 1.0, [0.0; 3], 1.0)).concat();
+        folder.write(&format!("{name}.urdf"), urdf::robot(name, &(links + &joint(name, "revolute", &a, &b, LIMIT))))
     };
     let (code, json) = report(&[&part("x"), &part("y"), &part("z")]);
     assert_eq!((code, names(&json["joint_names"])), (0, vec!["x", "y", "z"]));
@@ -238,8 +207,7 @@ fn the_shipped_robots_have_no_warnings_and_hang_together() {
 /// Entries are compared in units of the two coordinates they couple; the MJCF is written with all digits.
 fn compare_with_mujoco(files: &[&str], urdf: UrdfCfg, floating: bool) {
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
-    let cfg = RobotCfg { urdf, fix_base: !floating, ..Default::default() };
-    let robot = sim.add_robot(cfg).unwrap();
+    let robot = sim.add_robot(RobotCfg { urdf, fix_base: !floating, ..Default::default() }).unwrap();
     // Inside of all limits, each joint at a place of its own; mimic joints follow.
     let view = sim.robot(robot);
     let (limits, drivers) = (view.qpos_limits(), view.mimic_drivers());
@@ -250,7 +218,7 @@ fn compare_with_mujoco(files: &[&str], urdf: UrdfCfg, floating: bool) {
         })
         .collect();
     let qpos: Vec<f64> = drivers.iter().map(|&(driver, ratio, offset)| ratio * own[driver.0] + offset).collect();
-    let row = kinetoscope::ndarray::Array2::from_shape_vec((1, qpos.len()), qpos.clone()).unwrap();
+    let row = Array2::from_shape_vec((1, qpos.len()), qpos.clone()).unwrap();
     sim.robot_mut(robot).write_qpos(&row, None, None).unwrap();
     assert_eq!(sim.robot(robot).get_qpos(), row, "inside of all limits");
 
@@ -281,25 +249,19 @@ fn compare_with_mujoco(files: &[&str], urdf: UrdfCfg, floating: bool) {
         }
         largest[1] = largest[1].max((g[row] - torque[i]).abs() / unit(i));
     }
-    println!("{files:?}, floating {floating}: mass matrix {:.1e}, gravity {:.1e}", largest[0], largest[1]);
-    assert!(largest[0] < 1e-9 && largest[1] < 1e-9, "{largest:?}");
+    assert!(largest[0] < 1e-9 && largest[1] < 1e-9, "{files:?}: {largest:?}");
     assert!(torque.iter().any(|t| t.abs() > 1e-3), "the comparison sees gravity");
 }
 
 fn components(files: &[&str]) -> UrdfCfg {
     let found = |file: &str| if Path::new(file).is_file() { file.into() } else { assets::path(file).unwrap() };
-    match *files {
-        [arm, hand] => UrdfCfg {
-            components: vec![ComponentCfg::new("arm", found(arm)), ComponentCfg::new("hand", found(hand))],
-            ..Default::default()
-        },
-        [file] => UrdfCfg::single(found(file)),
-        _ => panic!("one or two files"),
-    }
+    let named = ["arm", "hand"].iter().zip(files).map(|(name, file)| ComponentCfg::new(*name, found(file)));
+    let components = named.collect();
+    if let [file] = *files { UrdfCfg::single(found(file)) } else { UrdfCfg { components, ..Default::default() } }
 }
 
 #[test]
-fn dynamics_agree_with_mujoco() {
+fn dynamics() {
     compare_with_mujoco(&[SR5, HAND], components(&[SR5, HAND]), false);
     compare_with_mujoco(&[HAND], components(&[HAND]), true);
 }
@@ -307,24 +269,24 @@ fn dynamics_agree_with_mujoco() {
 /// Its broken inertias are sound once the links are fused.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn dynamics_of_anymal_agree_with_mujoco() {
+fn dynamics_of_anymal() {
     let anymal = vendor(ANYMAL);
     compare_with_mujoco(&[&anymal], components(&[&anymal]), true);
 }
 
 #[test]
-fn warnings_are_those_of_the_simulation() {
+fn warnings_of_the_simulation() {
     let folder = Folder::new();
-    folder.write("good.stl", stl());
-    let file = folder.urdf(&format!(
-        "<link name=\"base\"/>\n{}\n<link name=\"empty\"/>\n{}\n{}\n{}\n{}\n{}",
-        link("bad", 1.0, "0 0 0", 1.0).replace("ixx=\"1\"", "ixx=\"9\""),
-        link("light", 1.0, "0 0 0", 0.0),
-        joint("j1", "revolute", "base", "bad", LIMIT),
-        joint("j2", "revolute", "bad", "empty", LIMIT),
-        joint("j3", "revolute", "bad", "light", "<limit lower=\"2\" upper=\"1\" effort=\"5\" velocity=\"3\"/>"),
-        "<gizmo/>"
-    ));
+    let file = folder.urdf(&[
+        "<link name=\"base\"/>",
+        &link("bad", 1.0, [0.0; 3], 1.0).replace("ixx=\"1\"", "ixx=\"9\""),
+        "<link name=\"empty\"/>",
+        &link("light", 1.0, [0.0; 3], 0.0),
+        &joint("j1", "revolute", "base", "bad", LIMIT),
+        &joint("j2", "revolute", "bad", "empty", LIMIT),
+        &joint("j3", "revolute", "bad", "light", "<limit lower=\"2\" upper=\"1\" effort=\"5\" velocity=\"3\"/>"),
+        "<gizmo/>",
+    ]);
     let (code, json) = report(&[&file]);
     assert_eq!(code, 1);
     assert_eq!(
@@ -341,35 +303,30 @@ fn warnings_are_those_of_the_simulation() {
     assert_eq!(json["total_mass"], 2.0);
 
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
-    sim.add_robot(RobotCfg { urdf: UrdfCfg::single(&file), ..Default::default() }).unwrap();
-    let mut simulated: Vec<String> = sim.diagnostics().iter().map(|d| d.message.clone()).collect();
-    let mut reported: Vec<String> =
-        names(&Value::Array(json["warnings"].as_array().unwrap().iter().map(|w| w["message"].clone()).collect()))
-            .into_iter()
-            .map(str::to_owned)
-            .collect();
-    simulated.sort();
-    reported.sort();
+    sim.add_robot(testkit::worlds::urdf_robot("robot", &file)).unwrap();
+    let mut simulated: Vec<&str> = sim.diagnostics().iter().map(|d| d.message.as_str()).collect();
+    let found = json["warnings"].as_array().unwrap();
+    let mut reported: Vec<&str> = found.iter().map(|w| w["message"].as_str().unwrap()).collect();
+    simulated.sort_unstable();
+    reported.sort_unstable();
     assert_eq!(simulated, reported);
 
-    let still = folder.urdf("<link name=\"base\"/>");
+    let still = folder.urdf(&["<link name=\"base\"/>"]);
     assert_eq!(run(&[&still]).code, 0, "what stands still needs no mass");
     assert_eq!(warnings(&report(&[&still, "--floating-base"]).1), ["robot.urdf:2: massless-link"]);
 }
 
 #[test]
-fn visual_meshes_warn_and_collision_meshes_refuse() {
+fn broken_meshes() {
     let folder = Folder::new();
-    let whole = stl();
-    folder.write("good.stl", &whole);
-    folder.write("torn.stl", &whole[..100]);
+    folder.write("good.stl", TETRAHEDRON);
+    folder.write("torn.stl", &TETRAHEDRON[..100]);
     folder.write("empty.stl", "");
-    folder.write("no_triangles.stl", [&[0u8; 84][..]].concat());
+    folder.write("no_triangles.stl", [0; 84]);
     folder.write("what.xyz", "hello");
     let mesh = |role: &str, file: &str| {
-        folder.urdf(&format!(
-            "<link name=\"base\">\n<{role}><geometry><mesh filename=\"{file}\"/></geometry></{role}></link>"
-        ))
+        let geometry = format!("<geometry><mesh filename=\"{file}\"/></geometry>");
+        folder.urdf(&["<link name=\"base\">", &format!("<{role}>{geometry}</{role}></link>")])
     };
     for role in ["visual", "collision"] {
         assert_eq!(run(&[&mesh(role, "good.stl")]).code, 0, "{role}");
@@ -388,22 +345,19 @@ fn visual_meshes_warn_and_collision_meshes_refuse() {
 
         let refused = run(&[&mesh("collision", file)]);
         assert_eq!((refused.code, refused.out.as_str()), (2, ""), "{file}");
-        let says = |part: &str| assert!(refused.err.contains(part), "{part}: {}", refused.err);
-        says("robot.urdf:3: ");
-        says("\"base\"");
-        says(file);
+        for part in ["robot.urdf:3: ", "\"base\"", file] {
+            assert!(refused.err.contains(part), "{part}: {}", refused.err);
+        }
     }
 }
 
 #[test]
-fn packages_are_found_where_they_are_said_to_be() {
+fn packages() {
     let folder = Folder::new();
-    fs::create_dir(folder.0.path().join("elsewhere")).unwrap();
-    fs::write(folder.0.path().join("elsewhere/a.stl"), stl()).unwrap();
-    let file = folder.urdf(
-        "<link name=\"base\"><collision><geometry><mesh filename=\"package://pkg/a.stl\"/></geometry></collision></link>",
-    );
-    let elsewhere = folder.0.path().join("elsewhere");
+    folder.write("elsewhere/a.stl", TETRAHEDRON);
+    let mesh = urdf::collision("<mesh filename=\"package://pkg/a.stl\"/>", [0.0; 3]);
+    let file = folder.urdf(&[&format!("<link name=\"base\">{mesh}</link>")]);
+    let elsewhere = folder.0.folder().join("elsewhere");
     assert_eq!(run(&[&file]).code, 2);
     assert_eq!(run(&[&file, "--package", &format!("pkg={}", elsewhere.display())]).code, 0);
     let wrong = run(&[&file, "--package", "pkg=no_such_folder"]);
@@ -411,7 +365,7 @@ fn packages_are_found_where_they_are_said_to_be() {
 }
 
 #[test]
-fn what_is_refused_says_why() {
+fn refusals() {
     let folder = Folder::new();
     let torn = folder.write("torn.urdf", "<robot name=\"torn\">\n  <link name=\"base\">\n");
     let two_roots = folder.write("roots.urdf", "<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\"/>\n</robot>");
@@ -439,7 +393,7 @@ fn what_is_refused_says_why() {
 }
 
 #[test]
-fn a_floating_base_has_six_rows_of_its_own() {
+fn floating_base() {
     let (_, json) = report(&[HAND, "--floating_base"]);
     let columns = names(&json["columns"]);
     assert_eq!(columns[..6], ["base.vx", "base.vy", "base.vz", "base.wx", "base.wy", "base.wz"]);
@@ -452,9 +406,9 @@ fn a_floating_base_has_six_rows_of_its_own() {
 }
 
 #[test]
-fn people_see_a_tree_tables_and_warnings() {
+fn text() {
     let folder = Folder::new();
-    let json = folder.0.path().join("report.json");
+    let json = folder.0.folder().join("report.json");
     let run = run(&[SR5, HAND, "--json", json.to_str().unwrap()]);
     assert_eq!(run.code, 0, "{}", run.err);
     for part in ["14.005 kg", "├─left_thumb_meta", "JOINT6", "LEFT_THUMB_DIP  = 1.05 * LEFT_HAND_THUMB1", "No warnings"]
@@ -476,10 +430,9 @@ const MJCF: &str = r#"<mujoco><compiler angle="degree" autolimits="true"/><world
   </body></worldbody><equality><joint joint1="line" joint2="turn" polycoef="0.1 2 0 0 0"/>
   <joint joint1="curve" joint2="turn" polycoef="0.1 0 3 0 0"/></equality></mujoco>"#;
 
-/// MuJoCo with the file alone says what masses do: the matrix of `mj_fullM`, which holds rotor inertias too, and `qfrc_bias` at rest.
+/// Judged by MuJoCo with the file alone: the matrix of `mj_fullM`, which holds rotor inertias too, and `qfrc_bias` at rest.
 #[test]
-fn robots_of_mjcf_files() {
-    use kinetoscope::sim::mj::{Data, compile};
+fn mjcf_file() {
     let folder = Folder::new();
     let file = folder.write("robot.xml", MJCF);
     let (code, json) = report(&[&file, "--qpos", "turn=0.4"]);
@@ -521,7 +474,7 @@ fn robots_of_mjcf_files() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn robots_of_vendors() {
+fn vendors_robots() {
     let anymal = vendor(ANYMAL);
     let (code, json) = report(&[&anymal, "--floating-base"]);
     assert_eq!(code, 1);

@@ -1,157 +1,121 @@
 //! Names of any kind go through the URDF, the MJCF and back.
 
-use super::support::{INERTIAL, TETRAHEDRON, cfg, robot};
+use super::support::{INERTIAL, LIMIT, TETRAHEDRON, cfg, exported, robot, sim};
+use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::mj::ObjectKind;
 use std::path::Path;
 
 fn escaped(name: &str) -> String {
-    name.chars()
-        .map(|c| match c {
-            '&' => "&amp;".into(),
-            '<' => "&lt;".into(),
-            '>' => "&gt;".into(),
-            '"' => "&quot;".into(),
-            '\'' => "&apos;".into(),
-            '\n' | '\t' | '\r' => format!("&#{};", c as u32),
-            _ => c.to_string(),
-        })
-        .collect()
+    let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    name.replace('"', "&quot;").replace('\'', "&apos;").replace('\n', "&#10;")
 }
 
-/// A root and two links that collide by a mesh, with joints of the same names.
-fn two_links(dir: &Path, uid: &str, first: &str, second: &str) -> RobotCfg {
-    std::fs::write(dir.join("t.stl"), TETRAHEDRON).unwrap();
-    let link = |name: &str| {
-        let name = escaped(name);
+/// A root and two links that collide by a mesh of this size, with joints of the same names.
+fn two_links(dir: &Path, uid: &str, names: [&str; 2], size: &str) -> RobotCfg {
+    std::fs::write(dir.join("t.stl"), TETRAHEDRON.replace("0.1", size)).unwrap();
+    let links = names.map(|name| {
+        let (name, mesh) = (escaped(name), "<geometry><mesh filename=\"t.stl\"/></geometry>");
         format!(
-            "<link name=\"{name}\">{INERTIAL}<visual><geometry><mesh filename=\"t.stl\"/></geometry></visual>\
-             <collision><geometry><mesh filename=\"t.stl\"/></geometry></collision></link>\
-             <joint name=\"{name}\" type=\"revolute\"><parent link=\"root\"/><child link=\"{name}\"/><origin xyz=\"0 0 1\"/>\
-             <axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\" effort=\"10\" velocity=\"1\"/>\
-             <dynamics damping=\"0.1\" friction=\"0.1\"/></joint>"
+            "<link name=\"{name}\">{INERTIAL}<visual>{mesh}</visual><collision>{mesh}</collision></link><joint \
+             name=\"{name}\" type=\"revolute\"><parent link=\"root\"/><child link=\"{name}\"/><origin xyz=\"0 0 1\"/>\
+             <axis xyz=\"0 1 0\"/>{LIMIT}<dynamics damping=\"0.1\" friction=\"0.1\"/></joint>"
         )
-    };
-    let urdf =
-        format!("<robot name=\"{}\"><link name=\"root\"/>{}{}</robot>", escaped(first), link(first), link(second));
+    });
+    let urdf = format!("<robot name=\"{}\"><link name=\"root\"/>{}</robot>", escaped(names[0]), links.concat());
     RobotCfg { self_collision: true, ..robot(dir, uid, &urdf) }
 }
 
-fn export_of(sim: &SimulationManager, out: &Path) -> Result<(), String> {
-    sim.dump(out).map_err(|e| format!("dump: {e}"))?;
-    let file = match kinetoscope::sim::mj::TARGET {
-        kinetoscope::sim::mj::Target::V2 => "robot.mjcf2.xml",
-        kinetoscope::sim::mj::Target::V4 => "robot.mjcf4.xml",
-    };
-    let compiled = kinetoscope::sim::mj::compile_file(&out.join(file)).map_err(|e| format!("the export: {e}"))?;
-    assert_eq!(compiled.into_model().njnt(), sim.batch().model().njnt());
-    Ok(())
+fn assert_exports(sim: &SimulationManager, out: &Path) {
+    sim.dump(out).unwrap();
+    assert_eq!(exported(out).unwrap().njnt(), sim.batch().model().njnt());
 }
 
 #[test]
-fn names_of_any_kind_work() {
+fn links_and_joints() {
     let long = "long".repeat(2500);
-    let pairs = [
-        ("a\"b", "a'b"),
-        ("a<b>&c", "&lt;"),
-        ("größe", "日本語"),
-        ("a b", " a  b"),
-        ("a/b", "a//b"),
-        ("Link", "link"),
-        ("É", "é"),
-        ("base", "world"),
-        ("ground", "light0"),
-        ("a", "a/collision0"),
-        ("a", "a/friction"),
-        ("%s%n%d", "{}"),
-        ("--", "-->"),
-        (&long, "short"),
-        ("\u{200b}", "\u{1f600}"),
-    ];
-    let mut wrong = Vec::new();
-    for (first, second) in pairs {
+    for names in [
+        ["a\"b", "a'b"],
+        ["a<b>&c", "&lt;"],
+        ["größe", "日本語"],
+        ["a b", " a  b"],
+        ["a/b", "a//b"],
+        ["Link", "link"],
+        ["É", "é"],
+        ["base", "world"],
+        ["ground", "light0"],
+        ["a", "a/collision0"],
+        ["a", "a/friction"],
+        ["%s%n%d", "{}"],
+        ["--", "-->"],
+        [&long, "short"],
+        ["\u{200b}", "\u{1f600}"],
+    ] {
         for fix_base in [true, false] {
+            let what = format!("{:.20?}, {:?}, fix_base {fix_base}", names[0], names[1]);
             let dir = tempfile::tempdir().unwrap();
-            let result = (|| -> Result<(), String> {
-                let mut sim = SimulationManager::new(cfg(1)).map_err(|e| e.to_string())?;
-                let cfg = RobotCfg { fix_base, ..two_links(dir.path(), "r", first, second) };
-                let id = sim.add_robot(cfg).map_err(|e| format!("refused: {e}"))?;
-                for (i, name) in [first, second].into_iter().enumerate() {
-                    let joint = sim.robot(id).joint_id(name).map_err(|e| e.to_string())?;
-                    assert_eq!(joint, JointIndex(i));
-                    sim.robot(id).link_pose(name).map_err(|e| e.to_string())?;
-                }
-                sim.robot_mut(id).set_qpos(&kinetoscope::ndarray::array![[0.5, -0.5]], None, None).unwrap();
-                sim.update(100);
-                let q = sim.robot(id).get_qpos();
-                if (q[(0, 0)] - 0.5).abs() > 0.1 || (q[(0, 1)] + 0.5).abs() > 0.1 {
-                    return Err(format!("joints are at {q}"));
-                }
-                export_of(&sim, &dir.path().join("out"))
-            })();
-            if let Err(mut message) = result {
-                message.truncate(500);
-                wrong.push(format!("{:.20?}, {second:?}, fix_base {fix_base}: {message}", first));
+            let mut sim = sim(1);
+            let cfg = RobotCfg { fix_base, ..two_links(dir.path(), "r", names, "0.1") };
+            let id = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{what}: {e:.500}"));
+            for (i, name) in names.into_iter().enumerate() {
+                assert_eq!(sim.robot(id).joint_id(name).unwrap(), JointIndex(i), "{what}");
+                sim.robot(id).link_pose(name).unwrap();
             }
+            sim.robot_mut(id).set_qpos(&array![[0.5, -0.5]], None, None).unwrap();
+            sim.update(100);
+            let q = sim.robot(id).get_qpos();
+            assert!((q[(0, 0)] - 0.5).abs() < 0.1 && (q[(0, 1)] + 0.5).abs() < 0.1, "{what}: joints are at {q}");
+            assert_exports(&sim, &dir.path().join("out"));
         }
     }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// `x.x` is what the document calls the first degree of freedom of a planar joint `x`.
+/// `x.x` is the name in the document of the first degree of freedom of a planar joint `x`.
 #[test]
-fn names_that_the_document_makes_up_do_not_clash() {
+fn generated_names() {
     let dir = tempfile::tempdir().unwrap();
-    for kind in ["planar", "floating"] {
-        let mut urdf =
-            format!("<robot name=\"r\"><link name=\"root\">{INERTIAL}</link><link name=\"m\">{INERTIAL}</link>");
-        urdf += "<joint name=\"m\" type=\"continuous\"><parent link=\"root\"/><child link=\"m\"/></joint>";
-        for (name, kind) in [("x", kind), ("x.x", "continuous"), ("x.yaw", "continuous"), ("x.ball", "continuous")] {
-            urdf += &format!(
-                "<link name=\"{name}\">{INERTIAL}</link>\
-                 <joint name=\"{name}\" type=\"{kind}\"><parent link=\"m\"/><child link=\"{name}\"/></joint>"
+    for free in ["planar", "floating"] {
+        let mut elements = format!("<link name=\"root\">{INERTIAL}</link>");
+        let continuous = ["x.x", "x.yaw", "x.ball"].map(|name| (name, "m", "continuous"));
+        for (name, parent, kind) in [("m", "root", "continuous"), ("x", "m", free)].into_iter().chain(continuous) {
+            elements += &format!(
+                "<link name=\"{name}\">{INERTIAL}</link><joint name=\"{name}\" type=\"{kind}\"><parent \
+                 link=\"{parent}\"/><child link=\"{name}\"/></joint>"
             );
         }
-        let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(1) }).unwrap();
-        let id = sim.add_robot(robot(dir.path(), "r", &(urdf + "</robot>"))).unwrap();
-        sim.robot_mut(id).write_qpos(&kinetoscope::ndarray::array![[0.1, 0.2, 0.3, 0.4]], None, None).unwrap();
-        assert_eq!(sim.robot(id).get_qpos(), kinetoscope::ndarray::array![[0.1, 0.2, 0.3, 0.4]]);
+        let mut sim = testkit::worlds::sim(SimulationManagerCfg { ground: None, ..cfg(1) });
+        let urdf = format!("<robot name=\"r\">{elements}</robot>");
+        let id = sim.add_robot(robot(dir.path(), "r", &urdf)).unwrap();
+        sim.robot_mut(id).write_qpos(&array![[0.1, 0.2, 0.3, 0.4]], None, None).unwrap();
+        assert_eq!(sim.robot(id).get_qpos(), array![[0.1, 0.2, 0.3, 0.4]]);
         sim.update(3);
     }
 }
 
-/// Robots whose uids differ in case only have meshes of their own.
 #[test]
-fn uids_that_differ_in_case_share_nothing() {
-    let (small, large) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let mut sim = SimulationManager::new(cfg(1)).unwrap();
-    for (uid, dir, scale) in [("arm", &small, "0.1"), ("ARM", &large, "0.7")] {
-        let cfg = two_links(dir.path(), uid, "l", "m");
-        std::fs::write(dir.path().join("t.stl"), TETRAHEDRON.replace("0.1", scale)).unwrap();
-        sim.add_robot(cfg).unwrap();
+fn uids() {
+    // Names that differ in case only have meshes of their own.
+    let dirs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let mut sim = sim(1);
+    for (uid, dir, size) in [("arm", &dirs[0], "0.1"), ("ARM", &dirs[1], "0.7")] {
+        sim.add_robot(two_links(dir.path(), uid, ["l", "m"], size)).unwrap();
     }
     let model = sim.batch().model();
     let radius = |uid: &str| {
-        let geom = model.id(kinetoscope::sim::mj::ObjectKind::Geom, &format!("{uid}/l/collision0")).unwrap();
+        let geom = model.id(ObjectKind::Geom, &format!("{uid}/l/collision0")).unwrap();
         model.geom_size()[3 * geom..3 * geom + 3].iter().fold(0.0_f64, |a, &b| a.max(b))
     };
     assert!((radius("ARM") / radius("arm") - 7.0).abs() < 0.1, "{} {}", radius("ARM"), radius("arm"));
-    export_of(&sim, &small.path().join("out")).unwrap();
-}
-
-#[test]
-fn odd_uids_work() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+    let dir = dirs[0].path();
     for uid in ["world", "ground", "a\"b<c>&'", "日本", " ", "...", "%s", "İ", "i̇", "robot"] {
-        let cfg = two_links(dir.path(), uid, "l", "m");
-        let id = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
+        let id = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
         assert_eq!(sim.robot_id(uid).unwrap(), id);
     }
     // Names become parts of paths, of files too.
     for uid in [".", "..", "a/b", "a\\b", "a\nb", ""] {
-        let error = sim.add_robot(two_links(dir.path(), uid, "l", "m")).unwrap_err();
+        let error = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_err();
         assert!(matches!(error, Error::InvalidUid(_)), "{uid:?}: {error}");
     }
     sim.update(2);
-    export_of(&sim, &dir.path().join("out")).unwrap();
+    assert_exports(&sim, &dir.join("out"));
 }

@@ -1,9 +1,7 @@
-//! Mass, centre of mass and inertia of the whole robot in MuJoCo against the links of the URDF, composed here.
-//!
-//! The composition uses moments about the origin of the world, forward kinematics from the description, and nothing of
-//! the code that it tests.
+//! Mass, centre of mass and inertia of the whole robot in MuJoCo against the links of the URDF, composed here: moments
+//! about the origin of the world, forward kinematics from the description, and nothing of the code under test.
 
-use super::robots::{all, simulation};
+use super::robots::simulation;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::description::{JointKind, RobotDescription};
@@ -11,22 +9,25 @@ use kinetoscope::sim::mj::Data;
 use nalgebra::{Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Mass, first moment and inertia about the origin.
+#[derive(Default)]
 struct Sum {
     mass: f64,
     moment: Vector3<f64>,
     inertia: Matrix3<f64>,
 }
 
-impl Sum {
-    fn new() -> Self {
-        Self { mass: 0.0, moment: Vector3::zeros(), inertia: Matrix3::zeros() }
-    }
+/// The inertia of a point mass about the origin.
+fn point(mass: f64, at: Vector3<f64>) -> Matrix3<f64> {
+    (Matrix3::identity() * at.norm_squared() - at * at.transpose()) * mass
+}
 
-    /// Adds a body: inertia about its centre of mass, in world axes.
-    fn add(&mut self, mass: f64, com: Vector3<f64>, inertia: Matrix3<f64>) {
+impl Sum {
+    /// Adds a body with this inertia about its centre of mass, in axes that are turned so.
+    fn add(&mut self, mass: f64, com: Vector3<f64>, inertia: Matrix3<f64>, turn: UnitQuaternion<f64>) {
+        let turn = turn.to_rotation_matrix();
         self.mass += mass;
         self.moment += com * mass;
-        self.inertia += inertia + (Matrix3::identity() * com.norm_squared() - com * com.transpose()) * mass;
+        self.inertia += turn.matrix() * inertia * turn.matrix().transpose() + point(mass, com);
     }
 
     fn com(&self) -> Vector3<f64> {
@@ -35,30 +36,27 @@ impl Sum {
 
     /// About the centre of mass.
     fn central(&self) -> Matrix3<f64> {
-        let com = self.com();
-        self.inertia - (Matrix3::identity() * com.norm_squared() - com * com.transpose()) * self.mass
+        self.inertia - point(self.mass, self.com())
     }
 }
 
 fn of_description(robot: &RobotDescription, base: Pose, qpos: &[f64]) -> Sum {
     let position: std::collections::BTreeMap<_, _> =
         robot.drivable_joints().map(|(id, _)| id).zip(qpos.iter().copied()).collect();
-    let mut sum = Sum::new();
+    let mut sum = Sum::default();
     let mut stack = vec![(robot.root, base)];
     while let Some((link, world_from_link)) = stack.pop() {
         if let Some(inertial) = &robot.link(link).inertial {
             let frame = world_from_link * inertial.link_from_com;
-            let turn = frame.rotation.to_rotation_matrix();
-            let inertia = turn.matrix() * inertial.inertia * turn.matrix().transpose();
-            sum.add(inertial.mass, frame.translation.vector, inertia);
+            sum.add(inertial.mass, frame.translation.vector, inertial.inertia, frame.rotation);
         }
         for &id in &robot.link(link).child_joints {
             let joint = robot.joint(id);
+            let turned = |q| UnitQuaternion::from_axis_angle(&joint.axis, q);
             let motion = match joint.kind {
-                JointKind::Revolute | JointKind::Continuous => Pose::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&joint.axis, position[&id]),
-                ),
+                JointKind::Revolute | JointKind::Continuous => {
+                    Pose::from_parts(Translation3::identity(), turned(position[&id]))
+                }
                 JointKind::Prismatic => {
                     Pose::from_parts((joint.axis.into_inner() * position[&id]).into(), UnitQuaternion::identity())
                 }
@@ -73,42 +71,39 @@ fn of_description(robot: &RobotDescription, base: Pose, qpos: &[f64]) -> Sum {
 
 fn of_mujoco(data: &Data) -> Sum {
     let model = data.model();
-    let mut sum = Sum::new();
+    let mut sum = Sum::default();
     for body in 1..model.nbody() {
         let quat = |q: &[f64]| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
         let turn = quat(&data.xquat()[4 * body..4 * body + 4]) * quat(&model.body_iquat()[4 * body..4 * body + 4]);
-        let turn = turn.to_rotation_matrix();
         let moments = Vector3::from_column_slice(&model.body_inertia()[3 * body..3 * body + 3]);
-        let inertia = turn.matrix() * Matrix3::from_diagonal(&moments) * turn.matrix().transpose();
         let com = Vector3::from_column_slice(&data.xipos()[3 * body..3 * body + 3]);
-        sum.add(model.body_mass()[body], com, inertia);
+        sum.add(model.body_mass()[body], com, Matrix3::from_diagonal(&moments), turn);
     }
     sum
 }
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn the_whole_robot_weighs_what_its_links_weigh() {
-    for cfg in all() {
-        let (uid, base) = (cfg.uid.clone(), cfg.init_pose);
-        let (mut sim, id) = simulation(RobotCfg { self_collision: false, ..cfg });
-        let dof = sim.robot(id).dof();
-        for pose in 0..3 {
-            let wanted = Array2::from_shape_fn((1, dof), |(_, j)| 0.3 * f64::from(pose) * (1.0 + j as f64).sin());
-            sim.robot_mut(id).write_qpos(&wanted, None, None).unwrap();
-            let qpos = sim.robot(id).get_qpos().row(0).to_vec();
-            let expected = of_description(sim.robot(id).description(), base, &qpos);
-            let (found, subtree, subtree_com) = sim.batch().read(0, |env| {
-                let com = Vector3::from_column_slice(&env.data().subtree_com()[..3]);
-                (of_mujoco(env.data()), env.data().model().body_subtreemass()[0], com)
-            });
-            assert!((found.mass - expected.mass).abs() < 1e-9, "{uid}: {} {}", found.mass, expected.mass);
-            assert!((found.mass - sim.robot(id).total_mass()).abs() < 1e-9, "{uid}");
-            assert!((subtree - expected.mass).abs() < 1e-9, "{uid}: {subtree}");
-            assert!((found.com() - expected.com()).norm() < 1e-9, "{uid}: {} {}", found.com(), expected.com());
-            assert!((subtree_com - expected.com()).norm() < 1e-9, "{uid}: {subtree_com}");
-            let difference = found.central() - expected.central();
-            assert!(difference.amax() < 1e-9, "{uid}, pose {pose}: {difference:e}");
+of_each_robot! { weight }
+
+fn weight(cfg: RobotCfg) {
+    let (uid, base) = (cfg.uid.clone(), cfg.init_pose);
+    let (mut sim, id) = simulation(RobotCfg { self_collision: false, ..cfg });
+    let dof = sim.robot(id).dof();
+    for pose in 0..3 {
+        let wanted = Array2::from_shape_fn((1, dof), |(_, j)| 0.3 * f64::from(pose) * (1.0 + j as f64).sin());
+        sim.robot_mut(id).write_qpos(&wanted, None, None).unwrap();
+        let qpos = sim.robot(id).get_qpos().row(0).to_vec();
+        let expected = of_description(sim.robot(id).description(), base, &qpos);
+        let (found, subtree, subtree_com) = sim.batch().read(0, |env| {
+            let com = Vector3::from_column_slice(&env.data().subtree_com()[..3]);
+            (of_mujoco(env.data()), env.data().model().body_subtreemass()[0], com)
+        });
+        for mass in [found.mass, sim.robot(id).total_mass(), subtree] {
+            assert!((mass - expected.mass).abs() < 1e-9, "{uid}: {mass} {}", expected.mass);
         }
+        for com in [found.com(), subtree_com] {
+            assert!((com - expected.com()).norm() < 1e-9, "{uid}: {com} {}", expected.com());
+        }
+        let difference = found.central() - expected.central();
+        assert!(difference.amax() < 1e-9, "{uid}, pose {pose}: {difference:e}");
     }
 }

@@ -1,85 +1,63 @@
 //! The files of a dump against the simulation they come from.
 
-use super::robots::{all, anymal, bundled, simulation};
+use super::robots::{anymal, bundled, dump, simulation, vendor_arm_and_hand};
+use crate::support::exported;
+use crate::urdf::assert_same;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::description::{Geometry, RobotDescription};
-use kinetoscope::sim::mj::{Data, Model, ObjectKind, TARGET, Target, compile_file};
+use kinetoscope::sim::mj::{Data, Model, ObjectKind};
 use kinetoscope::sim::urdf::assemble;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-fn exported(dir: &Path) -> Model {
-    let file = match TARGET {
-        Target::V2 => "robot.mjcf2.xml",
-        Target::V4 => "robot.mjcf4.xml",
-    };
-    compile_file(&dir.join(file)).unwrap().into_model()
-}
+of_each_robot! { model steps same_bytes diagnostics urdf }
 
 fn names(model: &Model, kind: ObjectKind) -> Vec<String> {
     (0..).map_while(|i| model.name(kind, i)).collect()
 }
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn the_exported_model_is_the_one_that_runs() {
-    for cfg in all() {
-        let uid = cfg.uid.clone();
-        let (sim, id) = simulation(cfg);
-        let dir = tempfile::tempdir().unwrap();
-        sim.dump(dir.path()).unwrap();
-        let (run, export) = (sim.batch().model(), exported(dir.path()));
-        for kind in [ObjectKind::Body, ObjectKind::Joint, ObjectKind::Actuator] {
-            assert_eq!(names(run, kind), names(&export, kind), "{uid}");
-        }
-        assert_eq!(export.nq(), run.nq(), "{uid}");
-        assert_eq!(export.qpos0(), run.qpos0(), "{uid}");
-        assert_eq!(export.jnt_range(), run.jnt_range(), "{uid}");
-        for (body, (mine, theirs)) in run.body_mass().iter().zip(export.body_mass()).enumerate() {
-            assert!((mine - theirs).abs() < 1e-9, "{uid}: body {body} has {mine} and {theirs} kg");
-        }
-        let total: f64 = export.body_mass().iter().sum();
-        assert!((total - run.body_mass().iter().sum::<f64>()).abs() < 1e-9, "{uid}");
-        for (mine, theirs) in [
-            (run.body_inertia(), export.body_inertia()),
-            (run.body_ipos(), export.body_ipos()),
-            (run.body_pos(), export.body_pos()),
-            (run.body_quat(), export.body_quat()),
-        ] {
-            assert!(mine.iter().zip(theirs).all(|(a, b)| (a - b).abs() < 1e-12), "{uid}");
-        }
-        // A link that was fused keeps its frame: as a site here, by its name there.
-        let mut data = Data::new(&export).unwrap();
-        data.qpos_mut().copy_from_slice(&sim.batch().read(0, |env| env.data().qpos().to_vec()));
-        data.forward().unwrap();
-        let sites = names(&export, ObjectKind::Site);
-        for link in sim.robot(id).link_names() {
-            assert!(sites.contains(&format!("{uid}/{link}")), "{uid}: no site of {link}");
-            sim.robot(id).link_pose(link).unwrap();
-        }
-        assert!(export.nmesh() >= run.nmesh(), "{uid}");
+/// The exported model is the one that runs.
+fn model(cfg: RobotCfg) {
+    let uid = cfg.uid.clone();
+    let (sim, id) = simulation(cfg);
+    let (run, export) = (sim.batch().model(), exported(dump(&sim).path()).unwrap());
+    for kind in [ObjectKind::Body, ObjectKind::Joint, ObjectKind::Actuator] {
+        assert_eq!(names(run, kind), names(&export, kind), "{uid}");
     }
+    assert_eq!(export.nq(), run.nq(), "{uid}");
+    assert_eq!(export.qpos0(), run.qpos0(), "{uid}");
+    assert_eq!(export.jnt_range(), run.jnt_range(), "{uid}");
+    for (what, tolerance, mine, theirs) in [
+        ("mass", 1e-9, run.body_mass(), export.body_mass()),
+        ("total mass", 1e-9, &[run.body_mass().iter().sum()], &[export.body_mass().iter().sum()]),
+        ("inertia", 1e-12, run.body_inertia(), export.body_inertia()),
+        ("ipos", 1e-12, run.body_ipos(), export.body_ipos()),
+        ("pos", 1e-12, run.body_pos(), export.body_pos()),
+        ("quat", 1e-12, run.body_quat(), export.body_quat()),
+    ] {
+        assert!(mine.iter().zip(theirs).all(|(a, b)| (a - b).abs() < tolerance), "{uid}: {what} {mine:?} {theirs:?}");
+    }
+    // A link that was fused keeps its frame: as a site here, by its name there.
+    let mut data = Data::new(&export).unwrap();
+    data.qpos_mut().copy_from_slice(&sim.batch().read(0, |env| env.data().qpos().to_vec()));
+    data.forward().unwrap();
+    let sites = names(&export, ObjectKind::Site);
+    for link in sim.robot(id).link_names() {
+        assert!(sites.contains(&format!("{uid}/{link}")), "{uid}: no site of {link}");
+        sim.robot(id).link_pose(link).unwrap();
+    }
+    assert!(export.nmesh() >= run.nmesh(), "{uid}");
 }
 
 /// The exported model, in plain MuJoCo, with its own actuators: a second at its own time step, targets at the start.
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn the_exported_model_steps() {
-    for cfg in all() {
-        let uid = cfg.uid.clone();
-        let (sim, _) = simulation(cfg);
-        let dir = tempfile::tempdir().unwrap();
-        sim.dump(dir.path()).unwrap();
-        let mut data = Data::new(&exported(dir.path())).unwrap();
-        data.qpos_mut().copy_from_slice(&sim.batch().read(0, |env| env.data().qpos().to_vec()));
-        for _ in 0..100 {
-            data.step().unwrap();
-        }
-        let warnings = data.take_warnings();
-        assert_eq!(warnings.diverged(), None, "{uid}: {warnings:?}");
-        assert_eq!(warnings.overflow(), None, "{uid}: {warnings:?}");
-    }
+fn steps(cfg: RobotCfg) {
+    let uid = cfg.uid.clone();
+    let (sim, _) = simulation(cfg);
+    let mut data = Data::new(&exported(dump(&sim).path()).unwrap()).unwrap();
+    data.qpos_mut().copy_from_slice(&sim.batch().read(0, |env| env.data().qpos().to_vec()));
+    (0..100).for_each(|_| data.step().unwrap());
+    let warnings = data.take_warnings();
+    assert_eq!((warnings.diverged(), warnings.overflow()), (None, None), "{uid}: {warnings:?}");
 }
 
 fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -99,121 +77,57 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn two_dumps_are_the_same_bytes() {
-    for cfg in all() {
-        let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let (mut sim, _) = simulation(cfg.clone());
-        sim.dump(first.path()).unwrap();
-        let (again, _) = simulation(cfg);
-        again.dump(second.path()).unwrap();
-        let (a, b) = (files(first.path()), files(second.path()));
-        assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
-        for (name, bytes) in &a {
-            assert!(*bytes == b[name], "{name} differs");
-        }
-        // Into the same folder, after some steps: a dump is of the model, not of its state.
-        sim.update(5);
-        sim.dump(first.path()).unwrap();
-        assert!(files(first.path()) == a);
+fn same_bytes(cfg: RobotCfg) {
+    let (mut sim, _) = simulation(cfg.clone());
+    let first = dump(&sim);
+    let (a, b) = (files(first.path()), files(dump(&simulation(cfg).0).path()));
+    assert!(a.keys().eq(b.keys()), "{:?} {:?}", a.keys(), b.keys());
+    for (name, bytes) in &a {
+        assert!(*bytes == b[name], "{name} differs");
     }
+    // Into the same folder, after some steps: a dump is of the model, not of its state.
+    sim.update(5);
+    sim.dump(first.path()).unwrap();
+    assert!(files(first.path()) == a);
 }
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn diagnostics_are_all_in_the_dump() {
-    for cfg in all() {
-        let (sim, _) = simulation(cfg);
-        let dir = tempfile::tempdir().unwrap();
-        sim.dump(dir.path()).unwrap();
-        let text = std::fs::read_to_string(dir.path().join("diagnostics.txt")).unwrap();
-        let expected: String = sim.diagnostics().iter().map(|d| format!("{d}\n")).collect();
-        assert_eq!(text, expected);
-    }
-    let (sim, _) = simulation(anymal());
-    assert!(sim.diagnostics().len() > 5);
+fn diagnostics(cfg: RobotCfg) {
+    let least = if cfg.uid == "anymal" { 6 } else { 0 };
+    let (sim, _) = simulation(cfg);
+    let text = std::fs::read_to_string(dump(&sim).path().join("diagnostics.txt")).unwrap();
+    let expected: String = sim.diagnostics().iter().map(|d| format!("{d}\n")).collect();
+    assert_eq!(text, expected);
+    assert!(sim.diagnostics().len() >= least);
 }
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn the_dumped_urdf_is_the_same_robot() {
-    for cfg in all() {
-        let (sim, id) = simulation(cfg);
-        let dir = tempfile::tempdir().unwrap();
-        sim.dump(dir.path()).unwrap();
-        let again = assemble(&UrdfCfg::single(dir.path().join("robot.urdf"))).unwrap().description;
-        assert_same(sim.robot(id).description(), &again);
-    }
-}
-
-fn assert_same(a: &RobotDescription, b: &RobotDescription) {
-    let near = |x: &Pose, y: &Pose| {
-        (x.translation.vector - y.translation.vector).norm() < 1e-12 && x.rotation.angle_to(&y.rotation) < 1e-12
-    };
-    let same_shape = |x: &Geometry, y: &Geometry| match (x, y) {
-        (Geometry::Mesh { path: p, scale: s, .. }, Geometry::Mesh { path: q, scale: t, .. }) => {
-            s == t && (p == q || p.canonicalize().ok() == q.canonicalize().ok())
-        }
-        _ => x == y,
-    };
-    assert_eq!((&a.name, a.root, a.links.len(), a.joints.len()), (&b.name, b.root, b.links.len(), b.joints.len()));
-    for (x, y) in a.links.iter().zip(&b.links) {
-        assert_eq!((&x.name, x.parent_joint, &x.child_joints), (&y.name, y.parent_joint, &y.child_joints));
-        assert_eq!(x.inertial.is_some(), y.inertial.is_some(), "{}", x.name);
-        if let (Some(x), Some(y)) = (&x.inertial, &y.inertial) {
-            assert_eq!((x.mass, x.inertia), (y.mass, y.inertia));
-            assert!(near(&x.link_from_com, &y.link_from_com));
-        }
-        assert_eq!((x.visuals.len(), x.collisions.len()), (y.visuals.len(), y.collisions.len()), "{}", x.name);
-        for (x, y) in x.visuals.iter().zip(&y.visuals) {
-            assert!(near(&x.link_from_shape, &y.link_from_shape) && same_shape(&x.geometry, &y.geometry));
-            assert_eq!(x.material.as_ref().map(|m| m.rgba), y.material.as_ref().map(|m| m.rgba));
-        }
-        for (x, y) in x.collisions.iter().zip(&y.collisions) {
-            assert!(near(&x.link_from_shape, &y.link_from_shape) && same_shape(&x.geometry, &y.geometry));
-        }
-    }
-    for (x, y) in a.joints.iter().zip(&b.joints) {
-        assert_eq!((&x.name, x.kind, x.parent, x.child), (&y.name, y.kind, y.parent, y.child));
-        assert_eq!((x.damping, x.friction), (y.damping, y.friction), "{}", x.name);
-        assert!(near(&x.parent_from_joint, &y.parent_from_joint), "{}", x.name);
-        assert!((x.axis.into_inner() - y.axis.into_inner()).norm() < 1e-15, "{}", x.name);
-        let limit = |j: &kinetoscope::sim::description::Joint| {
-            j.limit.as_ref().map(|l| (l.lower, l.upper, l.effort, l.velocity))
-        };
-        assert_eq!(limit(x), limit(y), "{}", x.name);
-        let mimic =
-            |j: &kinetoscope::sim::description::Joint| j.mimic.as_ref().map(|m| (m.joint, m.multiplier, m.offset));
-        assert_eq!(mimic(x), mimic(y), "{}", x.name);
-    }
-}
-
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn anymal_keeps_its_textures_its_mass_and_its_feet() {
-    let cfg = anymal();
+/// The dumped URDF is the same robot.
+fn urdf(cfg: RobotCfg) {
     let (sim, id) = simulation(cfg);
-    let dir = tempfile::tempdir().unwrap();
-    sim.dump(dir.path()).unwrap();
-    let export = exported(dir.path());
-    let pictures = files(dir.path()).keys().filter(|name| name.ends_with(".png")).count();
-    assert_eq!(pictures, 17, "17 JPEG files");
-    assert_eq!(export.ntex(), 17);
+    let dir = dump(&sim);
+    let again = assemble(&UrdfCfg::single(dir.path().join("robot.urdf"))).unwrap().description;
+    assert_same(sim.robot(id).description(), &again);
+}
+
+/// Its textures, its mass and its feet.
+#[test]
+#[ignore = "needs real robots: cargo xtask test"]
+fn anymal_c() {
+    let (sim, id) = simulation(anymal());
+    let (robot, dir) = (sim.robot(id), dump(&sim));
+    let export = exported(dir.path()).unwrap();
+    let images = files(dir.path()).keys().filter(|name| name.ends_with(".png")).count();
+    assert_eq!((images, export.ntex()), (17, 17), "17 JPEG files");
     assert!(export.nmesh() > 17, "{}", export.nmesh());
-    assert!((sim.robot(id).total_mass() - 52.135).abs() < 5e-4, "{}", sim.robot(id).total_mass());
-    let total: f64 = export.body_mass().iter().sum();
-    assert!((total - sim.robot(id).total_mass()).abs() < 1e-9, "{total}");
-    for (foot, front, left) in
-        [("LF_FOOT", 1.0, 1.0), ("RF_FOOT", 1.0, -1.0), ("LH_FOOT", -1.0, 1.0), ("RH_FOOT", -1.0, -1.0)]
-    {
-        let pose = sim.robot(id).link_pose(foot).unwrap();
+    assert!((robot.total_mass() - 52.135).abs() < 5e-4, "{}", robot.total_mass());
+    let bodies = names(sim.batch().model(), ObjectKind::Body);
+    for (foot, front, left) in [("LF", 1.0, 1.0), ("RF", 1.0, -1.0), ("LH", -1.0, 1.0), ("RH", -1.0, -1.0)] {
+        let pose = robot.link_pose(&format!("{foot}_FOOT")).unwrap();
         assert!(pose[(0, 0)] * front > 0.2 && pose[(0, 1)] * left > 0.1, "{foot} is at {pose}");
-        assert!(!names(sim.batch().model(), ObjectKind::Body).contains(&format!("anymal/{foot}")), "it is fused");
+        assert!(!bodies.contains(&format!("anymal/{foot}_FOOT")), "it is fused");
     }
     let repaired: Vec<_> = sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::InertiaRepaired).collect();
     assert_eq!(repaired.len(), 5, "{repaired:#?}");
-    let urdf = std::fs::read_to_string(sim.robot(id).description().links[0].source.file.as_path()).unwrap();
+    let urdf = std::fs::read_to_string(robot.description().links[0].source.file.as_path()).unwrap();
     for diagnostic in repaired {
         let source = diagnostic.source.as_ref().unwrap();
         assert!(source.file.ends_with("anymal.urdf"), "{diagnostic}");
@@ -228,7 +142,7 @@ fn anymal_keeps_its_textures_its_mass_and_its_feet() {
 
 /// Meshes whose names are alike do not overwrite each other.
 #[test]
-fn meshes_with_names_alike_stay_apart() {
+fn alike_names_of_meshes() {
     let dir = tempfile::tempdir().unwrap();
     let mtl = "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n";
     std::fs::write(dir.path().join("two.mtl"), mtl).unwrap();
@@ -247,46 +161,37 @@ fn meshes_with_names_alike_stay_apart() {
         ("é.obj", one(0.8)),
     ] {
         std::fs::write(dir.path().join(file), text).unwrap();
-        urdf += &format!(
-            "<visual><geometry><mesh filename=\"{file}\"/></geometry></visual>\
-             <collision><geometry><mesh filename=\"{file}\"/></geometry></collision>"
-        );
+        let mesh = format!("<geometry><mesh filename=\"{file}\"/></geometry>");
+        urdf += &format!("<visual>{mesh}</visual><collision>{mesh}</collision>");
     }
-    let path = dir.path().join("r.urdf");
-    std::fs::write(&path, urdf + "</link></robot>").unwrap();
-    let (sim, _) = simulation(RobotCfg { urdf: UrdfCfg::single(path), ..Default::default() });
+    let (sim, _) = simulation(super::super::support::robot(dir.path(), "robot", &(urdf + "</link></robot>")));
     assert!(sim.diagnostics().is_empty(), "{:?}", sim.diagnostics());
-    let out = dir.path().join("out");
-    sim.dump(&out).unwrap();
-    let objs = files(&out).keys().filter(|name| name.ends_with(".obj")).count();
-    assert_eq!(objs, 2 + 7, "{:?}", files(&out).keys().collect::<Vec<_>>());
-    let export = exported(&out);
-    assert_eq!(export.nmesh(), 2 + 7 + 8, "two parts, seven files, eight hulls");
+    let out = dump(&sim);
+    let objs = files(out.path()).keys().filter(|name| name.ends_with(".obj")).count();
+    assert_eq!(objs, 2 + 7, "{:?}", files(out.path()).keys());
+    assert_eq!(exported(out.path()).unwrap().nmesh(), 2 + 7 + 8, "two parts, seven files, eight hulls");
 }
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn a_dump_of_several_robots_loads() {
-    let other = super::robots::vendor_arm_and_hand();
-    let cfg = SimulationManagerCfg { threads: Some(1), ..Default::default() };
-    let mut sim = SimulationManager::new(cfg).unwrap();
-    for (i, robot) in [bundled(), other.clone(), RobotCfg { uid: "third".into(), ..other }].into_iter().enumerate() {
-        sim.add_robot(RobotCfg { init_pose: Pose::translation(2.0 * i as f64, 0.0, 0.0), ..robot }).unwrap();
+fn several_robots() {
+    let other = vendor_arm_and_hand();
+    let (mut sim, _) = simulation(bundled());
+    for (i, robot) in [other.clone(), RobotCfg { uid: "third".into(), ..other }].into_iter().enumerate() {
+        let init_pose = Pose::translation(2.0 * (i + 1) as f64, 0.0, 0.0);
+        sim.add_robot(RobotCfg { init_pose, ..robot }).unwrap();
     }
-    let dir = tempfile::tempdir().unwrap();
-    sim.dump(dir.path()).unwrap();
-    assert_eq!(names(&exported(dir.path()), ObjectKind::Body), names(sim.batch().model(), ObjectKind::Body));
+    let dir = dump(&sim);
+    let export = exported(dir.path()).unwrap();
+    assert_eq!(names(&export, ObjectKind::Body), names(sim.batch().model(), ObjectKind::Body));
     for uid in ["sr5", "inspire", "third"] {
         assert!(dir.path().join(format!("{uid}.urdf")).is_file());
     }
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_an_error() {
-    let (sim, _) = simulation(bundled());
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("file");
-    std::fs::write(&file, "").unwrap();
-    let message = sim.dump(&file).unwrap_err().to_string();
-    assert!(message.contains("file"), "{message}");
+fn unwritable_folder() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let message = simulation(bundled()).0.dump(file.path()).unwrap_err().to_string();
+    assert!(message.contains(&*file.path().file_name().unwrap().to_string_lossy()), "{message}");
 }

@@ -2,15 +2,15 @@
 //!
 //! `KINETOSCOPE_BLESS=1` writes the files anew (`cargo xtask bless`).
 
-use super::robots::{bundled, bundled_hand, simulation};
+use super::robots::{bundled_robots, dump, simulation};
 use kinetoscope::sim::mj::{TARGET, Target};
 use std::path::Path;
 
-/// Compares with `tests/data/<name>`; where they differ, writes what was found beside it.
+/// Compares with `tests/data/<name>`; where they differ, writes the found text beside it.
 fn compare(name: &str, found: &str) -> Result<(), String> {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
     if std::env::var_os("KINETOSCOPE_BLESS").is_some_and(|v| !v.is_empty() && v != "0") {
-        std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
         std::fs::write(&golden, found).unwrap();
         return Ok(());
     }
@@ -19,34 +19,29 @@ fn compare(name: &str, found: &str) -> Result<(), String> {
         return Ok(());
     }
     let actual = golden.with_extension("actual.xml");
-    std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
     std::fs::write(&actual, found).unwrap();
     let line = expected.lines().zip(found.lines()).position(|(a, b)| a != b);
     let line = line.unwrap_or_else(|| expected.lines().count().min(found.lines().count()));
     let nth = |text: &str| text.lines().nth(line).unwrap_or("(ends)").trim().to_owned();
+    let (golden, found, actual) = (nth(&expected), nth(found), actual.display());
     Err(format!(
-        "tests/data/{name}, line {}:\n  golden: {}\n  found:  {}\nall of it is in {}; \
-         if it is right, run `cargo xtask bless`",
-        line + 1,
-        nth(&expected),
-        nth(found),
-        actual.display()
+        "tests/data/{name}, line {}:\n  golden: {golden}\n  found:  {found}\nall of it is in {actual}; if it is right, \
+         run `cargo xtask bless`",
+        line + 1
     ))
 }
 
 #[test]
-fn golden_mjcf_of_the_bundled_robots() {
+fn mjcf() {
     let mut wrong = Vec::new();
-    for cfg in [bundled(), bundled_hand()] {
+    for cfg in bundled_robots() {
         let name = cfg.uid.clone();
-        let (sim, _) = simulation(cfg);
-        let dir = tempfile::tempdir().unwrap();
-        sim.dump(dir.path()).unwrap();
+        let dir = dump(&simulation(cfg).0);
         let run = match TARGET {
             Target::V2 => "run2",
             Target::V4 => "run4",
         };
-        // The exports are written for both lines by every build; what runs is written for its own.
+        // The exports are written for both lines by every build, the model that runs for its own.
         for (file, golden) in [("robot.mjcf2.xml", "mjcf2"), ("robot.mjcf4.xml", "mjcf4"), ("run.mjcf.xml", run)] {
             let text = std::fs::read_to_string(dir.path().join(file)).unwrap();
             wrong.extend(compare(&format!("{name}.{golden}.xml"), &text).err());

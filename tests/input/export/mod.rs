@@ -1,4 +1,23 @@
-//! `SimulationManager::dump`: what is written loads in plain MuJoCo, is the same robot, and is the same text every time.
+//! `SimulationManager::dump`: the files load in plain MuJoCo, describe the same robot, and have the same bytes every time.
+
+/// Two tests of each check function of one robot: `bundled::...`, and `vendors::...`, which needs files of vendors.
+macro_rules! of_each_robot {
+    ($($check:ident)*) => {
+        mod bundled {
+            $(#[test]
+            fn $check() {
+                crate::export::robots::bundled_robots().into_iter().for_each(super::$check);
+            })*
+        }
+        mod vendors {
+            $(#[test]
+            #[ignore = "needs real robots: cargo xtask test"]
+            fn $check() {
+                crate::export::robots::vendors_robots().into_iter().for_each(super::$check);
+            })*
+        }
+    };
+}
 
 mod composite;
 mod dump;

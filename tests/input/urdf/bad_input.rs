@@ -3,6 +3,7 @@
 use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::urdf::{UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str};
 use std::path::Path;
+use testkit::urdf::Files;
 
 type Check = fn(&UrdfError) -> bool;
 
@@ -42,8 +43,18 @@ fn shape(geometry: &str) -> String {
 const INERTIA: &str = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
 const LIMIT: &str = "<limit lower=\"-1\" upper=\"1\" effort=\"5\" velocity=\"1\"/>";
 
+/// Asserts that a result is this error with a message of these parts, and returns the message.
+#[track_caller]
+fn assert_error<T>(what: &str, result: Result<T, UrdfError>, is_right: Check, needles: &[&str]) -> String {
+    let Err(error) = result else { panic!("{what}: accepted") };
+    let message = error.to_string();
+    assert!(is_right(&error), "{what}: {error:?}");
+    assert!(needles.iter().all(|needle| message.contains(needle)), "{what}: {needles:?} in: {message}");
+    message
+}
+
 #[test]
-fn every_mistake_has_a_typed_error_with_place_and_remedy() {
+fn mistakes() {
     let three = |tail: &str| {
         format!(
             "<robot name=\"r\">\n<joint name=\"j1\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\n\
@@ -153,124 +164,111 @@ fn every_mistake_has_a_typed_error_with_place_and_remedy() {
         ("entity", "<robot name=\"&undefined;\"/>".to_owned(), is!(Xml), &["robot.urdf:1: column"]),
     ];
     for (what, text, is_right, needles) in &cases {
-        let error = parse(text).expect_err(what);
-        let message = error.to_string();
-        assert!(is_right(&error), "{what}: {error:?}");
-        for needle in *needles {
-            assert!(message.contains(needle), "{what}: \"{needle}\" is not in: {message}");
-        }
+        let message = assert_error(what, parse(text), *is_right, needles);
         assert!(message.contains("robot.urdf"), "{what}: {message}");
     }
 }
 
 #[test]
-fn files_that_cannot_be_read() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = |name: &str, bytes: &[u8]| {
-        let path = dir.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        path
-    };
-    let error = parse_file(&dir.path().join("nothing.urdf")).unwrap_err();
-    assert!(matches!(error, UrdfError::FileMissing { .. }) && error.to_string().contains("nothing.urdf"), "{error}");
-    file("arm.urdf", b"<robot/>");
-    let error = parse_file(dir.path()).unwrap_err();
-    assert!(matches!(error, UrdfError::FileIsFolder { .. }) && error.to_string().contains("arm.urdf"), "{error}");
-    let error = parse_file(&file("latin1.urdf", b"<robot>\n<link name=\"\xe9\"/></robot>")).unwrap_err();
-    let text = error.to_string();
-    assert!(matches!(error, UrdfError::Encoding { .. }) && text.contains("latin1.urdf:2: byte 0xe9"), "{text}");
-    let error = parse_file(&file("utf16.urdf", b"\xff\xfe<\0r\0")).unwrap_err().to_string();
-    assert!(error.contains("UTF-16") && error.contains("UTF-8"), "{error}");
-    let error = parse_file(&file("empty.urdf", b"")).unwrap_err();
-    assert!(matches!(error, UrdfError::FileEmpty { .. }));
-    assert!(parse_file(&file("bom.urdf", b"\xef\xbb\xbf<robot name=\"r\"><link name=\"a\"/></robot>")).is_ok());
+fn unreadable_files() {
+    let files = Files::default();
+    files.write("arm.urdf", "<robot/>");
+    let rows: [(&str, Option<&[u8]>, Check, &[&str]); 5] = [
+        ("nothing.urdf", None, is!(FileMissing), &["nothing.urdf"]),
+        (".", None, is!(FileIsFolder), &["arm.urdf"]),
+        ("latin1.urdf", Some(b"<robot>\n<link name=\"\xe9\"/></robot>"), is!(Encoding), &["latin1.urdf:2: byte 0xe9"]),
+        ("utf16.urdf", Some(b"\xff\xfe<\0r\0"), is!(Encoding), &["UTF-16", "UTF-8"]),
+        ("empty.urdf", Some(b""), is!(FileEmpty), &[]),
+    ];
+    for (name, content, is_right, needles) in rows {
+        if let Some(content) = content {
+            files.write(name, content);
+        }
+        assert_error(name, parse_file(&files.folder().join(name)), is_right, needles);
+    }
+    let bom = files.write("bom.urdf", b"\xef\xbb\xbf<robot name=\"r\"><link name=\"a\"/></robot>");
+    assert!(parse_file(&bom).is_ok());
 }
 
 #[test]
-fn files_named_by_a_robot_must_exist() {
-    let dir = tempfile::tempdir().unwrap();
+fn missing_meshes() {
+    let files = Files::default();
     let assemble_with = |element: &str, uri: &str| {
-        let path = dir.path().join("robot.urdf");
         let mesh = format!("<{element}><geometry><mesh filename=\"{uri}\"/></geometry></{element}>");
-        std::fs::write(&path, link(&mesh)).unwrap();
-        assemble(&UrdfCfg::single(path))
+        assemble(&UrdfCfg::single(files.write("robot.urdf", link(&mesh))))
     };
-    let cases: [(&str, Check, &[&str]); 5] = [
+    let unknown = &["package \"not_there\"", "UrdfCfg::packages", "looked at:"];
+    let rows: [(&str, Check, &[&str]); 5] = [
         ("meshes/a.stl", is!(MeshMissing), &["meshes/a.stl\" does not exist; looked at:\n"]),
         ("../../../b.stl", is!(MeshMissing), &["b.stl"]),
-        (
-            "package://not_there/c.stl",
-            is!(PackageUnknown),
-            &["package \"not_there\"", "UrdfCfg::packages", "looked at:"],
-        ),
+        ("package://not_there/c.stl", is!(PackageUnknown), unknown),
         ("https://example.com/d.stl", is!(UriUnsupported), &["https:// is not supported; use package://"]),
         ("package://x", is!(UriUnsupported), &["package://name_of_package/"]),
     ];
-    for (uri, is_right, needles) in cases {
-        let error = assemble_with("collision", uri).expect_err(uri);
-        let message = error.to_string();
-        assert!(is_right(&error), "{uri}: {error:?}");
+    for (uri, is_right, needles) in rows {
+        let message = assert_error(uri, assemble_with("collision", uri), is_right, needles);
         assert!(message.contains("robot.urdf:2: link \"l\":"), "{message}");
-        assert!(needles.iter().all(|n| message.contains(n)), "{message}");
-        let assembly = assemble_with("visual", uri).expect(uri);
-        assert_eq!(assembly.diagnostics.len(), 1);
-        let warning = &assembly.diagnostics[0];
-        assert_eq!(warning.kind, DiagnosticKind::VisualMeshMissing);
-        assert!(warning.to_string().contains("robot.urdf:2: link \"l\": visual mesh"), "{warning}");
+        let diagnostics = assemble_with("visual", uri).expect(uri).diagnostics;
+        assert_eq!(diagnostics.len(), 1);
+        assert_eq!(diagnostics[0].kind, DiagnosticKind::VisualMeshMissing);
+        let warning = diagnostics[0].to_string();
+        assert!(warning.contains("robot.urdf:2: link \"l\": visual mesh"), "{warning}");
     }
 }
 
 #[test]
-fn what_is_odd_but_usable_is_a_warning() {
-    let kinds = |text: &str| parse(text).unwrap().diagnostics.iter().map(|d| d.kind).collect::<Vec<_>>();
-    let file = parse(&revolute("\n<limit lower=\"1\" upper=\"-1\" effort=\"5\" velocity=\"2\"/>")).unwrap();
-    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::LimitIgnored);
-    assert!(file.diagnostics[0].to_string().starts_with("robot.urdf:3: joint \"j\": lower limit 1 is above"));
-    let limit = file.joints[0].limit.as_ref().unwrap();
-    assert!(!limit.lower && !limit.upper && limit.effort && limit.velocity);
-
-    for effort in ["", "effort=\"0\""] {
-        assert_eq!(kinds(&revolute(&format!("<limit {effort}/>"))), [DiagnosticKind::EffortUnlimited]);
-    }
-    assert_eq!(kinds(&joint("type=\"continuous\"", "")), [DiagnosticKind::EffortUnlimited]);
-    for quiet in ["fixed", "floating", "planar"] {
-        assert_eq!(kinds(&joint(&format!("type=\"{quiet}\""), "")), []);
-    }
-    // Exporters write a zero axis and a limit for fixed joints.
-    assert_eq!(kinds(&joint("type=\"fixed\"", "<axis xyz=\"0 0 0\"/><limit effort=\"0\"/>")), []);
-
-    let file = parse(&revolute(&format!("{LIMIT}<axis xyz=\"0 3 4\"/>"))).unwrap();
-    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::AxisNormalized);
-    assert_eq!(file.robot.joints[0].axis.xyz.0, [0.0, 0.6, 0.8]);
-    assert_eq!(kinds(&revolute(&format!("{LIMIT}<axis xyz=\"0 0 1.0001\"/>"))), []);
-    assert_eq!(kinds(&revolute(&format!("{LIMIT}<axis xyz=\"0 0 1e300\"/>"))), [DiagnosticKind::AxisNormalized]);
-
-    let in_fixed = |body: &str| joint("type=\"fixed\"", body);
-    let fixed = in_fixed("");
-    let with = |body: &str| fixed.replacen('\n', &format!("\n{body}"), 1);
-    assert_eq!(kinds(&with("<sensors/>")), [DiagnosticKind::ElementIgnored]);
-    assert_eq!(kinds(&with("<gazebo reference=\"a\"/><mujoco/><ros2_control/>")), []);
-    assert_eq!(kinds(&with("<transmission name=\"t\"><joint name=\"j\"/></transmission>")), []);
-    let file = parse(&with("<transmission name=\"t\"><joint name=\"jj\"/></transmission>")).unwrap();
-    assert_eq!(file.diagnostics[0].kind, DiagnosticKind::ReferenceUnknown);
-    assert!(file.diagnostics[0].message.contains("<transmission name=\"t\"> names joint \"jj\""));
-    assert_eq!(kinds(&in_fixed("<mimic joint=\"j\"/>")), [DiagnosticKind::ElementIgnored]);
-
+fn warnings() {
+    use DiagnosticKind::*;
     let looks = |materials: &str| {
         let visual = "<visual><geometry><box size=\"1 1 1\"/></geometry><material name=\"m\"/></visual>";
         format!("<robot>{materials}<link name=\"l\">{visual}{visual}</link></robot>")
     };
-    assert_eq!(kinds(&looks("")), [DiagnosticKind::MaterialUndefined]);
     let grey = "<material name=\"m\"><color rgba=\"1 1 1 1\"/></material>";
-    assert_eq!(kinds(&looks(&format!("{grey}{grey}"))), []);
-    assert_eq!(kinds(&looks(&grey.replace("1 1 1 1", "255 0 0 1"))), [DiagnosticKind::ColorClamped]);
+    let fixed = |body: &str| joint("type=\"fixed\"", body);
+    let with = |body: &str| fixed("").replacen('\n', &format!("\n{body}"), 1);
+    let transmission = |name: &str| with(&format!("<transmission name=\"t\"><joint name=\"{name}\"/></transmission>"));
+    let axis = |xyz: &str| revolute(&format!("{LIMIT}<axis xyz=\"{xyz}\"/>"));
+    let rows: &[(String, &[DiagnosticKind])] = &[
+        (revolute("<limit />"), &[EffortUnlimited]),
+        (revolute("<limit effort=\"0\"/>"), &[EffortUnlimited]),
+        (joint("type=\"continuous\"", ""), &[EffortUnlimited]),
+        (fixed(""), &[]),
+        (joint("type=\"floating\"", ""), &[]),
+        (joint("type=\"planar\"", ""), &[]),
+        // Exporters write a zero axis and a limit for fixed joints.
+        (fixed("<axis xyz=\"0 0 0\"/><limit effort=\"0\"/>"), &[]),
+        (axis("0 0 1.0001"), &[]),
+        (axis("0 0 1e300"), &[AxisNormalized]),
+        (with("<sensors/>"), &[ElementIgnored]),
+        (with("<gazebo reference=\"a\"/><mujoco/><ros2_control/>"), &[]),
+        (transmission("j"), &[]),
+        (fixed("<mimic joint=\"j\"/>"), &[ElementIgnored]),
+        (looks(""), &[MaterialUndefined]),
+        (looks(&format!("{grey}{grey}")), &[]),
+        (looks(&grey.replace("1 1 1 1", "255 0 0 1")), &[ColorClamped]),
+    ];
+    for (text, expected) in rows {
+        let kinds: Vec<_> = parse(text).unwrap().diagnostics.iter().map(|d| d.kind).collect();
+        assert_eq!(kinds, *expected, "{text}");
+    }
+    let file = parse(&revolute("\n<limit lower=\"1\" upper=\"-1\" effort=\"5\" velocity=\"2\"/>")).unwrap();
+    assert_eq!(file.diagnostics[0].kind, LimitIgnored);
+    assert!(file.diagnostics[0].to_string().starts_with("robot.urdf:3: joint \"j\": lower limit 1 is above"));
+    let limit = file.joints[0].limit.as_ref().unwrap();
+    assert!(!limit.lower && !limit.upper && limit.effort && limit.velocity);
+    let file = parse(&axis("0 3 4")).unwrap();
+    assert_eq!(file.diagnostics[0].kind, AxisNormalized);
+    assert_eq!(file.robot.joints[0].axis.xyz.0, [0.0, 0.6, 0.8]);
+    let file = parse(&transmission("jj")).unwrap();
+    assert_eq!(file.diagnostics[0].kind, ReferenceUnknown);
+    assert!(file.diagnostics[0].message.contains("<transmission name=\"t\"> names joint \"jj\""));
     let file = parse(&link("<colision/><self_filter/>")).unwrap();
     assert_eq!(file.diagnostics.len(), 1);
     assert!(file.diagnostics[0].message.contains("<colision> is not read and was ignored (<collision>?)"));
 }
 
 #[test]
-fn absent_is_not_zero() {
+fn absent_or_zero() {
     let file = parse(&revolute("<limit lower=\"0\" effort=\"0\"/>")).unwrap();
     let limit = file.joints[0].limit.as_ref().unwrap();
     assert!(limit.lower && !limit.upper && limit.effort && !limit.velocity);
@@ -281,7 +279,7 @@ fn absent_is_not_zero() {
 }
 
 #[test]
-fn namespaces_comments_and_capsules_are_fine() {
+fn namespaces_comments_capsules() {
     let text = "<?xml version=\"1.0\"?>\n<!-- c --><robot name=\"r &amp; s\" xmlns=\"http://ros.org\" xmlns:xacro=\"http://xacro\" \
                 xmlns:g=\"http://g\" version=\"1.1\"><g:link/><link name=\"a&lt;'&quot;\"><!-- c --><visual>\
                 <origin quat_xyzw=\"0 0 1 1\"/><geometry><capsule radius=\".5\" length=\"+1.\"/></geometry></visual></link></robot>";
