@@ -1,6 +1,7 @@
 //! `cargo xtask ci`: everything a change has to pass, stage by stage, on both lines of MuJoCo.
 
 use crate::docs_check::TEST_COMMAND;
+use crate::examples::Rows;
 use crate::physics_report::{self, PhysicsReportArgs};
 use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
 use crate::setup::{self, Line, Need, Ready, Wanted};
@@ -78,7 +79,7 @@ const STAGES: &[Stage] = &[
         name: "examples",
         what: "examples, MuJoCo 2.2.2",
         when: When::Full,
-        run: |c| examples::run(c.repo, &c.debian()?, &["--workspace"]),
+        run: |c| examples::run(c.repo, &c.debian()?, &["--workspace"], Rows::All),
     },
     Stage {
         name: "clippy-4",
@@ -92,7 +93,7 @@ const STAGES: &[Stage] = &[
         name: "examples-4",
         what: "examples, MuJoCo 4",
         when: When::Wheel,
-        run: |c| examples::run(c.repo, &c.wheel()?, &test::of_mujoco()),
+        run: |c| examples::run(c.repo, &c.wheel()?, &test::of_mujoco(), Rows::OfPhysics),
     },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];
