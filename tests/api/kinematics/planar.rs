@@ -1,33 +1,26 @@
 //! An arm of two links in a plane: everything has a closed form.
 
-use crate::kinematics::robots::*;
-use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::prelude::*;
+use super::*;
+use kinetoscope::sim::kinematics::{Chain, IkSolver};
+use testkit::urdf::joint;
 
 const L1: f64 = 0.5;
 const L2: f64 = 0.3;
 
-fn two_links(limit: &str) -> (tempfile::TempDir, SimulationManager, RobotId) {
+fn two_links(elbow: [f64; 2]) -> (SimulationManager, RobotId) {
     let joints = [
-        joint(
-            "shoulder",
-            "revolute",
-            ["root", "upper"],
-            "0 0 0",
-            "0 0 1",
-            "<limit lower=\"-3.2\" upper=\"3.2\" effort=\"9\" velocity=\"9\"/>",
-        ),
-        joint("elbow", "revolute", ["upper", "lower"], &format!("{L1} 0 0"), "0 0 1", limit),
+        joint("shoulder", "revolute", ["root", "upper"], [0.0; 3], "0 0 1", &wide([-3.2, 3.2])),
+        joint("elbow", "revolute", ["upper", "lower"], [L1, 0.0, 0.0], "0 0 1", &wide(elbow)),
     ];
-    let dir = written(&["root", "upper", "lower"], &joints);
-    let (sim, id) = simulation(1, arm(dir.path().join("r.urdf")));
-    (dir, sim, id)
+    built(1, &["root", "upper", "lower"], &joints)
 }
-
-const WIDE: &str = "<limit lower=\"-3.2\" upper=\"3.2\" effort=\"9\" velocity=\"9\"/>";
 
 fn hand() -> Tip<'static> {
     Tip::of_part("arm").with_tcp(Pose::translation(L2, 0.0, 0.0))
+}
+
+fn position() -> IkCfg {
+    IkCfg { task: IkTask::Position, ..Default::default() }
 }
 
 /// Shoulder and elbow for the point (x, y): the law of cosines, elbow turned to the side of `side`.
@@ -37,68 +30,34 @@ fn closed_form(x: f64, y: f64, side: f64) -> [f64; 2] {
     [y.atan2(x) - (L2 * elbow.sin()).atan2(L1 + L2 * elbow.cos()), elbow]
 }
 
-/// A variable moves a frame exactly where the frame's Jacobian has a column for it that is not zero.
-#[test]
-fn joints_beyond_a_link_do_not_move_it() {
-    use kinetoscope::sim::kinematics::Chain;
-    let (_dir, sim, id) = two_links(WIDE);
-    let robot = sim.robot(id);
-    for (link, moved) in [("root", [false, false]), ("upper", [true, false]), ("lower", [true, true])] {
-        let chain = Chain::new(robot.description(), robot.link_id(link).unwrap(), &Pose::identity()).unwrap();
-        assert_eq!([0, 1].map(|variable| chain.is_moved_by(variable)), moved, "{link}");
-        assert!(!chain.is_moved_by(2), "there is no such variable");
-        let turned = [0, 1].map(|variable| {
-            let mut q = [0.3, 0.4];
-            let before = chain.pose(&q);
-            q[variable] += 0.1;
-            chain.pose(&q).rotation.angle_to(&before.rotation) > 0.09
-        });
-        assert_eq!(turned, moved, "{link}");
-    }
-}
-
 fn at(x: f64, y: f64) -> Array2<f64> {
-    array![[x, y, 0.0, 1.0, 0.0, 0.0, 0.0]]
+    row(&[x, y, 0.0, 1.0, 0.0, 0.0, 0.0])
 }
 
-/// A position alone leaves two solutions: each start finds its own. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a
-/// joint, the smallest singular value of these Jacobians being above 0.1; the finish leaves far less.
+/// A position alone has two solutions, and each start finds its own; a pose has one: that whose hand points as wanted, from
+/// wherever the search starts. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a joint, the smallest singular value of these
+/// Jacobians being above 0.1; the finish leaves far less.
 #[test]
-fn a_position_has_two_solutions() {
-    let (_dir, sim, id) = two_links(WIDE);
+fn solutions() {
+    let (sim, id) = two_links([-3.2, 3.2]);
     let robot = sim.robot(id);
-    let cfg = IkCfg { task: IkTask::Position, ..Default::default() };
+    let mut cases = Vec::new();
     for (x, y) in [(0.5, 0.2), (-0.3, 0.4), (0.1, -0.6), (0.35, 0.0)] {
         let both = [1.0, -1.0].map(|side| closed_form(x, y, side));
         assert!((both[0][1] - both[1][1]).abs() > 0.5, "two that differ");
-        for expected in both {
-            let near = array![[expected[0] + 0.2, expected[1] - 0.15]];
-            let found = robot.compute_ik(&at(x, y), hand(), &cfg, Some(near.view()), None).unwrap();
-            assert!(found.success[0] && found.seed[0] == 0, "{found:?}");
-            for (q, expected) in found.qpos.iter().zip(expected) {
-                assert!((q - expected).abs() < 1e-5, "({x}, {y}): {} is not {expected:?}", found.qpos);
-            }
-        }
+        cases.extend(both.map(|q| (at(x, y), position(), [q[0] + 0.2, q[1] - 0.15], q)));
     }
-}
-
-/// A pose has one: that whose hand points as wanted, from wherever the search starts.
-#[test]
-fn a_pose_has_one_solution() {
-    let (_dir, sim, id) = two_links(WIDE);
-    let robot = sim.robot(id);
     for side in [1.0, -1.0] {
-        let expected = closed_form(0.45, -0.3, side);
-        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, expected[0] + expected[1]);
-        let target = Pose::from_parts(nalgebra::Translation3::new(0.45, -0.3, 0.0), turn);
-        for start in [[0.0, 0.0], [1.5, -2.0], [-2.0, 2.5]] {
-            let start = array![start];
-            let found = robot.compute_ik(&target, hand(), &IkCfg::default(), Some(start.view()), None).unwrap();
-            assert!(found.success[0], "{found:?}");
-            for (q, expected) in found.qpos.iter().zip(expected) {
-                assert!((q - expected).abs() < 1e-5, "{} is not {expected:?}", found.qpos);
-            }
-        }
+        let q = closed_form(0.45, -0.3, side);
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, q[0] + q[1]);
+        let target = row(&[0.45, -0.3, 0.0, turn.w, turn.i, turn.j, turn.k]);
+        cases.extend([[0.0, 0.0], [1.5, -2.0], [-2.0, 2.5]].map(|from| (target.clone(), IkCfg::default(), from, q)));
+    }
+    for (target, cfg, from, expected) in cases {
+        let found = robot.compute_ik(&target, hand(), &cfg, Some(row(&from).view()), None).unwrap();
+        assert!(found.success[0] && (cfg.task != IkTask::Position || found.seed[0] == 0), "{found:?}");
+        let off = found.qpos.iter().zip(expected).map(|(q, expected)| (q - expected).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-5, "{target} from {from:?}: {} is not {expected:?}", found.qpos);
     }
 }
 
@@ -106,52 +65,96 @@ fn a_pose_has_one_solution() {
 /// away from it, and it says that it failed. The search ends where the error does not grow smaller in double precision:
 /// it is quadratic in the angle that is still missing, of about 1e-7.
 #[test]
-fn what_is_out_of_reach_is_approached_and_said_so() {
-    let (_dir, sim, id) = two_links(WIDE);
+fn out_of_reach() {
+    let (sim, id) = two_links([-3.2, 3.2]);
     let robot = sim.robot(id);
-    let cfg = IkCfg { task: IkTask::Position, ..Default::default() };
+    let solve = |target: &Array2<f64>| robot.compute_ik(target, hand(), &position(), None, None).unwrap();
     for (x, y) in [(1.0_f64, 0.4), (-0.7, 0.7), (0.0, -0.9), (0.81, 0.0), (0.1, 0.05), (-0.12, 0.1)] {
         let r = x.hypot(y);
         let expected = (r - (L1 + L2)).max(L1 - L2 - r);
-        let found = robot.compute_ik(&at(x, y), hand(), &cfg, None, None).unwrap();
+        let found = solve(&at(x, y));
         assert!(!found.success[0] && expected > 0.0);
         assert!((found.position_error[0] - expected).abs() < 1e-9, "({x}, {y}): {found:?}, expected {expected}");
         let hand = robot.compute_fk(&found.qpos, hand(), None).unwrap();
-        let on_circle = hand[(0, 0)].hypot(hand[(0, 1)]);
         let circle = if r > L1 { L1 + L2 } else { L1 - L2 };
-        assert!((on_circle - circle).abs() < 1e-9, "{on_circle}");
+        assert!((hand[(0, 0)].hypot(hand[(0, 1)]) - circle).abs() < 1e-9, "{hand}");
     }
     // The control: a hair inside it succeeds.
-    let found = robot.compute_ik(&at(L1 + L2 - 1e-6, 0.0), hand(), &cfg, None, None).unwrap();
+    let found = solve(&at(L1 + L2 - 1e-6, 0.0));
     assert!(found.success[0], "{found:?}");
-}
-
-/// Out of the plane: the height is left, and so is the turn about the axes that no joint has.
-#[test]
-fn what_no_joint_does_is_left() {
-    let (_dir, sim, id) = two_links(WIDE);
-    let robot = sim.robot(id);
-    let cfg = IkCfg { task: IkTask::Position, ..Default::default() };
+    // Out of the plane the height is left.
     let mut target = at(0.5, 0.2);
     target[(0, 2)] = 0.25;
-    let found = robot.compute_ik(&target, hand(), &cfg, None, None).unwrap();
+    let found = solve(&target);
     assert!(!found.success[0] && (found.position_error[0] - 0.25).abs() < 1e-9, "{found:?}");
     let expected = [closed_form(0.5, 0.2, 1.0), closed_form(0.5, 0.2, -1.0)];
     assert!(expected.iter().any(|e| (found.qpos[(0, 0)] - e[0]).abs() + (found.qpos[(0, 1)] - e[1]).abs() < 1e-5));
 }
 
 /// An elbow that cannot stretch: it stays at its limit, and the hand as far out as that lets it, which is the third
-/// side of the triangle.
+/// side of the triangle. Just inside, the elbow is a little bent.
 #[test]
-fn a_limit_keeps_the_arm_short() {
-    let (_dir, sim, id) = two_links("<limit lower=\"0.8\" upper=\"2.5\" effort=\"9\" velocity=\"9\"/>");
-    let robot = sim.robot(id);
-    let cfg = IkCfg { task: IkTask::Position, ..Default::default() };
+fn elbow_limit() {
+    let (sim, id) = two_links([0.8, 2.5]);
     let longest = (L1 * L1 + L2 * L2 + 2.0 * L1 * L2 * 0.8_f64.cos()).sqrt();
-    let found = robot.compute_ik(&at(0.0, longest + 0.02), hand(), &cfg, None, None).unwrap();
-    assert!(!found.success[0] && (found.position_error[0] - 0.02).abs() < 1e-9, "{found:?}");
-    assert_eq!(found.qpos[(0, 1)], 0.8);
-    // Just inside, with the elbow a little bent.
-    let found = robot.compute_ik(&at(0.0, longest - 0.01), hand(), &cfg, None, None).unwrap();
-    assert!(found.success[0] && found.qpos[(0, 1)] > 0.8, "{found:?}");
+    let [beyond, inside] = [0.02, -0.01]
+        .map(|by| sim.robot(id).compute_ik(&at(0.0, longest + by), hand(), &position(), None, None).unwrap());
+    assert!(!beyond.success[0] && (beyond.position_error[0] - 0.02).abs() < 1e-9, "{beyond:?}");
+    assert_eq!(beyond.qpos[(0, 1)], 0.8);
+    assert!(inside.success[0] && inside.qpos[(0, 1)] > 0.8, "{inside:?}");
+}
+
+/// A variable moves a frame exactly where the frame turns with it.
+#[test]
+fn moved_by() {
+    let (sim, id) = two_links([-3.2, 3.2]);
+    let robot = sim.robot(id);
+    for (link, moved) in [("root", [false, false]), ("upper", [true, false]), ("lower", [true, true])] {
+        let chain = Chain::new(robot.description(), robot.link_id(link).unwrap(), &Pose::identity()).unwrap();
+        assert_eq!([0, 1].map(|variable| chain.is_moved_by(variable)), moved, "{link}");
+        assert!(!chain.is_moved_by(2), "there is no such variable");
+        let turned = [[0.4, 0.4], [0.3, 0.5]]
+            .map(|q| chain.pose(&q).rotation.angle_to(&chain.pose(&[0.3, 0.4]).rotation) > 0.09);
+        assert_eq!(turned, moved, "{link}");
+    }
+}
+
+/// Chains and solvers by themselves: two links, and a slide that the hand is not on, the second column of three.
+#[test]
+fn chains() {
+    let joints = [
+        joint("shoulder", "continuous", ["root", "upper"], [0.0; 3], "0 0 1", ""),
+        joint("slide", "prismatic", ["root", "sled"], [0.0, 0.0, 1.0], "1 0 0", &wide([-1.0, 1.0])),
+        joint("elbow", "continuous", ["upper", "lower"], [L1, 0.0, 0.0], "0 0 1", ""),
+    ];
+    let (sim, id) = built(1, &["root", "upper", "sled", "lower"], &joints);
+    let robot = sim.robot(id);
+    let tool = Pose::translation(L2, 0.0, 0.0);
+    let chain = Chain::new(robot.description(), robot.link_id("lower").unwrap(), &tool).unwrap();
+    let is_hand = |pose: &Pose, shoulder: f64, elbow: f64| {
+        let x = L1 * shoulder.cos() + L2 * (shoulder + elbow).cos();
+        let y = L1 * shoulder.sin() + L2 * (shoulder + elbow).sin();
+        (pose.translation.x - x).abs() < 1e-12 && (pose.translation.y - y).abs() < 1e-12
+    };
+    assert_eq!((chain.variables(), [0, 1, 2].map(|k| chain.is_moved_by(k))), (3, [true, false, true]));
+    assert!((chain.reach() - (L1 + L2)).abs() < 1e-15);
+    assert!(is_hand(&chain.pose(&[0.4, 9.0, -1.1]), 0.4, -1.1));
+    // Nowhere farther, and there where it is stretched.
+    let far = |elbow: f64| chain.pose(&[0.4, 0.0, elbow]).translation.vector.norm();
+    assert!((0..63).all(|k| far(0.1 * f64::from(k)) <= chain.reach() + 1e-15));
+    assert!((far(0.0) - chain.reach()).abs() < 1e-15);
+
+    // Joints that are held stay where they are, and the rest is counted anew.
+    let held = chain.clone().held(&[2], &[0.7, 0.2, 0.5]);
+    assert_eq!(held.variables(), 1);
+    assert!([-1.0, 0.0, 2.0].into_iter().all(|elbow| is_hand(&held.pose(&[elbow]), 0.7, elbow)));
+    assert!(is_hand(&chain.clone().held(&[2, 0], &[0.0; 3]).pose(&[-0.6, 1.2]), 1.2, -0.6), "the other way round");
+    let all = chain.clone().held(&[], &[0.7, 0.2, 0.5]);
+    assert!(all.variables() == 0 && is_hand(&all.pose(&[]), 0.7, 0.5));
+
+    let bound = chain.held(&[0, 2], &[0.0; 3]);
+    let mut solver = IkSolver::new(bound.clone(), vec![[-2.0, 2.0]; 2], IkCfg::default()).unwrap();
+    assert_eq!(solver.chain(), &bound);
+    let found = solver.solve(&bound.pose(&[0.3, 0.9]), &[0.0, 0.5]).unwrap();
+    assert!(found.success && (found.positions[0] - 0.3).abs() < 1e-3 && (found.positions[1] - 0.9).abs() < 1e-3);
 }

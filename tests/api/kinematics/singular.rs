@@ -1,10 +1,9 @@
 //! Near positions in which a direction is lost: where neighbouring targets have neighbouring solutions, those are found.
 
-use crate::kinematics::robots::*;
-use kinetoscope::ndarray::{Array2, ArrayView2};
-use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use super::*;
+use kinetoscope::ndarray::ArrayView2;
 use kinetoscope::scene::pose::to_row;
+use kinetoscope::sim::Robot;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -18,38 +17,30 @@ fn solvers() -> [IkCfg; 2] {
     [IkCfg { num_seeds: 1, ..IkCfg::default() }, IkCfg::default()]
 }
 
-fn rows(pose: &Pose) -> Array2<f64> {
-    Array2::from_shape_vec((1, 7), to_row(pose).to_vec()).unwrap()
-}
-
-fn row(q: &[f64]) -> Array2<f64> {
-    Array2::from_shape_vec((1, q.len()), q.to_vec()).unwrap()
+/// The pose of the tip at these positions.
+fn frame(robot: &Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Pose {
+    pose_in(&robot.compute_fk(&row(q), tip, None).unwrap(), 0)
 }
 
 fn largest(a: ArrayView2<'_, f64>, b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn jacobian(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Matrix6<f64> {
+fn jacobian(robot: &Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Matrix6<f64> {
     let jacobian = robot.jacobian(tip, Some(row(q).view()), None).unwrap();
     Matrix6::from_fn(|i, k| jacobian[(0, i, k)])
 }
 
 /// A shoulder, an elbow and three axes through one point. With the last but one at zero, the two beside it are one line, and
 /// the tool turns about no axis that is square to both that line and the axis between.
-fn spherical_wrist() -> (tempfile::TempDir, SimulationManager, RobotId) {
-    let of = |name, between, xyz, axis| joint(name, "continuous", between, xyz, axis, "");
-    let joints = [
-        of("j1", ["foot", "a"], "0 0 0.3", "0 0 1"),
-        of("j2", ["a", "b"], "0 0 0", "0 1 0"),
-        of("j3", ["b", "c"], "0 0 0.4", "0 1 0"),
-        of("j4", ["c", "d"], "0 0 0.2", "0 0 1"),
-        of("j5", ["d", "e"], "0 0 0.2", "0 1 0"),
-        of("j6", ["e", "f"], "0 0 0", "0 0 1"),
-    ];
-    let dir = written(&["foot", "a", "b", "c", "d", "e", "f"], &joints);
-    let (sim, id) = simulation(1, arm(dir.path().join("r.urdf")));
-    (dir, sim, id)
+fn spherical_wrist() -> (SimulationManager, RobotId) {
+    let (links, mut joints) = (["foot", "a", "b", "c", "d", "e", "f"], Vec::new());
+    for (k, (z, axis)) in [0.3, 0.0, 0.4, 0.2, 0.2, 0.0].into_iter().zip(["z", "y", "y", "z", "y", "z"]).enumerate() {
+        let axis = if axis == "z" { "0 0 1" } else { "0 1 0" };
+        let between = [links[k], links[k + 1]];
+        joints.push(testkit::urdf::joint(&format!("j{}", k + 1), "continuous", between, [0.0, 0.0, z], axis, ""));
+    }
+    built(1, &links, &joints)
 }
 
 /// The tilt of the tool's axis against the forearm is a vector whose length is j5 and whose direction turns with j4. A turn
@@ -59,14 +50,14 @@ fn spherical_wrist() -> (tempfile::TempDir, SimulationManager, RobotId) {
 /// j4. What the rotation is off by at the end, e, is an angle of asin(e / length of the new tilt) at j4; tilts of 2e-3 and
 /// 1e-2 bend this by less than 1e-3.
 #[test]
-fn a_spherical_wrist_turns_no_further_than_it_has_to() {
-    let (_dir, sim, id) = spherical_wrist();
+fn spherical_wrist_turn() {
+    let (sim, id) = spherical_wrist();
     let robot = sim.robot(id);
     let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
     let delta = AWAY.1;
     for near in NEAR {
         let q = [0.3, 0.4, 1.1, 0.5, near, -0.4];
-        let start = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        let start = frame(&robot, tip, &q);
         let center = start * nalgebra::Point3::new(0.0, 0.0, -0.1);
         let at_zero = jacobian(&robot, tip, &[q[0], q[1], q[2], q[3], 0.0, q[5]]);
         let [along, between] = [3, 4].map(|k| at_zero.fixed_view::<3, 1>(3, k).into_owned());
@@ -107,10 +98,10 @@ fn bent(near: f64) -> [f64; 6] {
 
 /// A neighbour at joint positions `from + s * way`, with the largest `s` up to 0.3 for which the frame is not farther away than
 /// asked.
-fn neighbour(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
+fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
     let fk = |s: f64| {
         let q: Vec<f64> = from.iter().zip(way).map(|(q, w)| q + s * w).collect();
-        let at = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        let at = frame(robot, tip, &q);
         (q, at)
     };
     let (_, start) = fk(0.0);
@@ -131,7 +122,7 @@ fn neighbour(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, from: &[f64], wa
 /// made of a solution; going down leads to it, or to the other, which is no farther from the start than twice as far. One
 /// start is enough for all of them.
 #[test]
-fn neighbours_of_a_position_without_a_direction_are_found_nearby() {
+fn nearby_solutions() {
     let (sim, id) = simulation(1, sr5());
     let robot = sim.robot(id);
     let tip = Tip::of_part("arm").at("ee_link");
@@ -168,14 +159,14 @@ fn neighbours_of_a_position_without_a_direction_are_found_nearby() {
 /// more starts find one, which may be another posture of the arm. What one start finds is within twice the 0.12 rad of the
 /// fold, and more starts give the same.
 #[test]
-fn where_nothing_is_nearby_only_more_starts_go_far() {
+fn far_solutions() {
     let (sim, id) = simulation(1, sr5());
     let robot = sim.robot(id);
     let tip = Tip::of_part("arm").at("ee_link");
     let (mut nearby, mut far_away) = (0, 0);
     for near in NEAR {
         let q = bent(near);
-        let start = pose(robot.compute_fk(&row(&q), tip, None).unwrap().row(0));
+        let start = frame(&robot, tip, &q);
         for k in 0..12 {
             let axis = |k: usize| Vector3::ith(k % 3, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
             let turn = UnitQuaternion::from_scaled_axis(AWAY.1 * axis(k));
@@ -197,8 +188,8 @@ fn where_nothing_is_nearby_only_more_starts_go_far() {
 }
 
 /// Poses between two ends, solved one after the other, each from the one before: the longest step of a joint.
-fn follow(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
-    let [from, to] = ends.map(|q| pose(robot.compute_fk(&row(q), tip, None).unwrap().row(0)));
+fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
+    let [from, to] = ends.map(|q| frame(robot, tip, q));
     let (mut q, mut longest) = (ends[0].to_vec(), 0.0_f64);
     for step in 1..=100 {
         let target = from.lerp_slerp(&to, f64::from(step) / 100.0);
@@ -214,14 +205,14 @@ fn follow(robot: &kinetoscope::sim::Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) 
 /// 100 steps, and by less than three times that. A spherical wrist that does not meet the singular position to the last bit
 /// has to turn by half a turn on the way: no step is more than it has to be, a right angle or what is left of half a turn.
 #[test]
-fn lines_lead_through_positions_without_a_direction() {
+fn lines() {
     let (sim, id) = simulation(1, sr5());
     let tip = Tip::of_part("arm").at("ee_link");
     for [from, to] in [[-0.3, 0.3], [0.3, -0.3]] {
         let longest = follow(&sim.robot(id), tip, [&bent(from), &bent(to)]);
         assert!((0.006..0.018).contains(&longest), "{longest}");
     }
-    let (_dir, sim, id) = spherical_wrist();
+    let (sim, id) = spherical_wrist();
     let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
     for j4 in [0.5, 0.55] {
         let ends = [&[0.3, 0.4, 1.1, 0.5, -0.3, -0.4][..], &[0.3, 0.4, 1.1, j4, 0.3, -0.4]];
@@ -233,21 +224,20 @@ fn lines_lead_through_positions_without_a_direction() {
 /// Half a turn is where the way round is not told from the way back: of the base, and of each axis of the wrist, whose other joints
 /// stay. Each of these targets has a solution: that half a turn.
 #[test]
-fn a_target_half_a_turn_away_is_reached() {
+fn half_a_turn() {
     let (mut sim, id) = simulation(1, sr5());
     let tip = Tip::of_part("arm").at("ee_link");
     let q = [0.3, 0.3, -1.5, 0.2, 0.6, 0.4];
-    let start = pose(sim.robot(id).compute_fk(&row(&q), tip, None).unwrap().row(0));
+    let start = frame(&sim.robot(id), tip, &q);
     for joint in [0, 3, 4, 5] {
         let mut there = q;
         there[joint] -= PI;
-        let target = pose(sim.robot(id).compute_fk(&row(&there), tip, None).unwrap().row(0));
+        let target = frame(&sim.robot(id), tip, &there);
         assert!((start.rotation.angle_to(&target.rotation) - PI).abs() < 1e-6);
         let found = sim.robot(id).compute_ik(&target, tip, &IkCfg::default(), Some(row(&q).view()), None).unwrap();
         assert!(found.success[0], "joint {joint}: {found:?}");
-        sim.robot_mut(id).write_qpos(&found.qpos, None, None).unwrap();
-        let (far, turned) = apart(&sim.robot(id).link_pose("ee_link").unwrap(), &rows(&target));
-        assert!(far <= 1e-4 && turned <= 1e-3, "joint {joint}: {far} {turned}");
+        let off = apart(&placed(&mut sim, id, &found.qpos, "ee_link"), &row(&to_row(&target)));
+        assert!(reaches(off), "joint {joint}: {off:?}");
         assert!(largest(found.qpos.view(), &q) > 1.0, "the control: it went somewhere");
     }
 }

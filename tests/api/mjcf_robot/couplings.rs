@@ -1,9 +1,10 @@
 //! Equalities of joints: those that are mimics, and those that only hold.
 
-use super::{empty, robot};
-use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::prelude::*;
-use kinetoscope::sim::KinematicsError;
+use super::*;
+use kinetoscope::ndarray::array;
+use kinetoscope::sim::{DiagnosticKind, KinematicsError};
+use testkit::refusal::assert_error;
+use testkit::worlds::count_diagnostics;
 
 /// A drive, a finger on either side, and a third joint; `%` are the equalities.
 const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="palm"><geom size="0.03" mass="1"/>
@@ -19,6 +20,10 @@ const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><world
 const LINES: &str = r#"<joint joint1="left" joint2="crank" polycoef="0.05 -1.5 0 0 0" solref="0.004 1"/>
     <joint joint1="right" joint2="left" polycoef="0 0.1 0 0 0" solref="0.004 1"/>"#;
 
+fn hand(equalities: &str) -> RobotCfg {
+    robot("hand", &HAND.replace('%', equalities))
+}
+
 /// `left - ref = 0.05 - 1.5 (crank - ref)`: what MuJoCo's equation says; `right` follows `left`, and so the crank.
 fn implied(crank: f64) -> (f64, f64) {
     let left = -0.2 + 0.05 - 1.5 * (crank - 0.1);
@@ -26,9 +31,8 @@ fn implied(crank: f64) -> (f64, f64) {
 }
 
 #[test]
-fn lines_are_mimics_and_are_followed() {
-    let mut sim = empty(1);
-    let id = sim.add_robot(robot("hand", &HAND.replace('%', LINES))).unwrap();
+fn lines() {
+    let (mut sim, id) = with(1, hand(LINES));
     let crank = sim.robot(id).joint_id("crank").unwrap();
     let columns = ["crank", "left", "right", "other"].map(|name| sim.robot(id).joint_id(name).unwrap());
     assert_eq!(columns.map(|c| sim.robot(id).is_mimic(c).unwrap()), [false, true, true, false]);
@@ -61,19 +65,17 @@ fn lines_are_mimics_and_are_followed() {
 
 /// A parabola, a joint that is held where it is, and a circle of lines: nothing is driven against them.
 #[test]
-fn other_equalities_hold_and_nothing_drives_against_them() {
+fn curves_and_circles() {
     let circle = format!("{LINES}<joint joint1=\"crank\" joint2=\"right\" polycoef=\"0 1 0 0 0\"/>");
     for (equalities, qpos) in [
         (r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#, Some(-0.2 + 0.5 * 0.4 + 0.8 * 0.16)),
         (r#"<joint joint1="left" polycoef="0.3 0 0 0 0"/>"#, Some(0.1)),
         (circle.as_str(), None),
     ] {
-        let mut sim = empty(1);
-        let id = sim.add_robot(robot("hand", &HAND.replace('%', equalities))).unwrap();
-        let said: Vec<String> = sim.diagnostics().iter().map(ToString::to_string).collect();
-        assert_eq!(said.iter().filter(|d| d.contains("no mimic says it")).count(), 1, "{said:?}");
+        let (mut sim, id) = with(1, hand(equalities));
+        assert_eq!(count_diagnostics(&sim, &["no mimic says it"]), 1, "{:?}", sim.diagnostics());
         let Some(expected) = qpos else {
-            assert!(said.iter().any(|d| d.contains("joint \"crank\" has no drive")), "{said:?}");
+            assert!(count_diagnostics(&sim, &["joint \"crank\" has no drive"]) > 0, "{:?}", sim.diagnostics());
             // crank = 0.1 + right, right = 0.1 (left + 0.2) and left = -0.15 - 1.5 (crank - 0.1): they meet in one point only,
             // right = 0.1 (0.05 - 1.5 right). Lines that are solved together give way to none: within 1e-3 there.
             let right = 0.005 / 1.15;
@@ -91,16 +93,16 @@ fn other_equalities_hold_and_nothing_drives_against_them() {
         sim.update(1000);
         let left = sim.robot(id).get_qpos()[(0, 1)];
         assert!((left - expected).abs() < 1e-3, "{left} is not {expected}");
-        let error = sim.robot_mut(id).set_stiffness(&Array2::from_elem((1, 4), 1.0), None, None).unwrap_err();
-        assert!(matches!(&error, Error::NotDriven { joint, .. } if joint == "left"), "{error}");
+        let undriven = sim.robot_mut(id).set_stiffness(&row([1.0; 4]), None, None);
+        assert!(matches!(&undriven, Err(Error::NotDriven { joint, .. }) if joint == "left"), "{undriven:?}");
     }
 }
 
-/// Followers by curves start on them, for wherever what they follow starts, also through mimics and other curves: MuJoCo's
-/// equalities are off by nothing, and nothing moves. Positions are right up to rounding, 1e-15 of 1. (An earlier version asked
-/// for the forces of the equalities, which nobody has solved before the first step: MuJoCo 4 left there what the memory held.)
+/// Followers by curves start on them, wherever the joint starts that they follow, also through mimics and other curves: MuJoCo's
+/// equalities are off by nothing, and nothing moves. Positions are right up to rounding, 1e-15 of 1. (The forces of
+/// the equalities are not solved before the first step: MuJoCo 4 leaves there what the memory held.)
 #[test]
-fn followers_by_curves_start_on_them() {
+fn starts_on_curves() {
     let parabola = r#"<joint joint1="left" joint2="crank" polycoef="0.02 0.5 0.8 -0.3 0.1"/>"#;
     let at = |x: f64| -0.2 + 0.02 + 0.5 * x + 0.8 * x * x - 0.3 * x * x * x + 0.1 * x * x * x * x;
     let chain = format!("{parabola}<joint joint1=\"right\" joint2=\"left\" polycoef=\"0 0.1 0.2 0 0\"/>");
@@ -109,19 +111,18 @@ fn followers_by_curves_start_on_them() {
     let constant = r#"<joint joint1="left" polycoef="0.3 0 0 0 0"/>"#;
     for (equalities, crank, left, right) in [
         (parabola, 0.5, at(0.4), 0.0),
-        // What nobody asks for starts where the file does.
+        // A joint without a given start begins where the file does.
         (parabola, 0.1, at(0.0), 0.0),
         (chain.as_str(), -0.4, at(-0.5), behind(-0.5, 0.2)),
         (of_mimic.as_str(), -0.4, at(-0.5), behind(-0.5, 0.0)),
         (constant, 0.5, -0.2 + 0.3, 0.0),
     ] {
-        let mut sim = empty(2);
-        // What is said of the follower itself holds no more than of a mimic.
+        // A start that is given for the follower itself holds no more than of a mimic.
         let mut init_qpos = vec![("left".to_string(), 1.5)];
         if crank != 0.1 {
             init_qpos.push(("crank".into(), crank));
         }
-        let id = sim.add_robot(RobotCfg { init_qpos, ..robot("hand", &HAND.replace('%', equalities)) }).unwrap();
+        let (mut sim, id) = with(2, RobotCfg { init_qpos, ..hand(equalities) });
         let expected = array![crank, left, right, 0.0];
         for when in ["at first", "after a reset"] {
             let qpos = sim.robot(id).get_qpos();
@@ -130,19 +131,17 @@ fn followers_by_curves_start_on_them() {
             let off = sim.batch().read(0, |env| env.data().efc_pos()[..env.data().ne()].to_vec());
             assert!(!off.is_empty() && off.iter().all(|off| off.abs() < 1e-14), "{when}: {off:?}");
             sim.update(50);
-            let moved = (sim.robot(id).get_qpos() - &expected).iter().fold(0.0f64, |far, d| far.max(d.abs()));
+            let moved = largest(&(sim.robot(id).get_qpos() - &expected));
             assert!(moved < 1e-9, "{when}: {moved}");
             sim.reset(None).unwrap();
         }
-        let clamped = sim.diagnostics().iter().filter(|d| d.message.contains("the start position"));
-        assert_eq!(clamped.count(), 0, "{:?}", sim.diagnostics());
+        assert_eq!(count_diagnostics(&sim, &["the start position"]), 0, "{:?}", sim.diagnostics());
     }
     // A circle of curves, and two for one joint, say no place: the file's own.
     let circle = format!("{parabola}<joint joint1=\"crank\" joint2=\"left\" polycoef=\"0 0 1 0 0\"/>");
     let twice = format!("{parabola}{constant}");
     for (equalities, starts) in [(circle, [0.1, at(0.0)]), (twice, [0.1, -0.2])] {
-        let mut sim = empty(1);
-        let id = sim.add_robot(robot("hand", &HAND.replace('%', &equalities))).unwrap();
+        let (sim, id) = with(1, hand(&equalities));
         let qpos = sim.robot(id).get_qpos();
         assert!((qpos[(0, 0)] - starts[0]).abs() + (qpos[(0, 1)] - starts[1]).abs() < 1e-14, "{equalities}: {qpos}");
     }
@@ -151,53 +150,39 @@ fn followers_by_curves_start_on_them() {
 /// left - ref = (crank - ref)⁴ on a crank without limits, or with a factor on one that has them: 1e100⁴ is no number, and a
 /// start beyond the follower's own limits is said.
 #[test]
-fn starts_beyond_limits_are_said_and_endless_ones_refused() {
+fn starts_beyond_limits() {
     let quartic = r#"<joint joint1="left" joint2="crank" polycoef="0 0 0 0 1"/>"#;
     let unlimited = HAND.replace('%', quartic).replacen(r#"range="-1 1" ref="0.1""#, r#"ref="0.1""#, 1);
     let starts = |at: f64| {
         let mut sim = empty(1);
-        let cfg = RobotCfg { init_qpos: vec![("crank".into(), at)], ..robot("hand", &unlimited) };
-        sim.add_robot(cfg).map(|id| {
-            let said = sim
-                .diagnostics()
-                .iter()
-                .filter(|d| d.kind == kinetoscope::sim::DiagnosticKind::FollowerStartsBeyondLimits);
-            let said: Vec<String> = said.map(|d| d.message.clone()).collect();
-            (sim.robot(id).get_qpos()[(0, 1)], said)
+        let init_qpos = vec![("crank".into(), at)];
+        sim.add_robot(RobotCfg { init_qpos, ..robot("hand", &unlimited) }).map(|id| {
+            let mut said = sim.diagnostics().to_vec();
+            said.retain(|d| d.kind == DiagnosticKind::FollowerStartsBeyondLimits);
+            (sim.robot(id).get_qpos()[(0, 1)], said.into_iter().map(|d| d.message.clone()).collect::<Vec<String>>())
         })
     };
-    let error = starts(1e100).unwrap_err().to_string();
-    assert!(error.contains("\"left\" is inf"), "{error}");
+    assert_error(starts(1e100), "", &["\"left\" is inf"]);
     // -0.2 + 1.5⁴ = 4.8625, beyond 2.
     let (left, said) = starts(1.6).unwrap();
     assert!((left - 4.8625).abs() < 1e-12 && said.len() == 1, "{left} {said:?}");
-    assert!(
-        said[0].contains("\"left\"") && said[0].contains("4.8625") && said[0].contains("-2.0000 .. 2.0000"),
-        "{said:?}"
-    );
+    assert!(["\"left\"", "4.8625", "-2.0000 .. 2.0000"].iter().all(|word| said[0].contains(word)), "{said:?}");
     // Control: 1.2⁴ - 0.2 = 1.87 is inside.
     assert_eq!(starts(1.3).unwrap().1, Vec::<String>::new());
 }
 
-/// What follows by a curve would have to move with what is searched: refused, where it moves the frame.
+/// A follower by a curve would have to move with the joints that are searched: refused, where it moves the frame.
 #[test]
-fn inverse_kinematics_refuses_followers_by_curves() {
-    let parabola = r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#;
-    let mut sim = empty(1);
-    let id = sim.add_robot(robot("hand", &HAND.replace('%', parabola))).unwrap();
+fn inverse_kinematics() {
+    let (sim, id) = with(1, hand(r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#));
     let robot = sim.robot(id);
     let ik = |link: &str| {
-        let target = robot.compute_link_fk(&robot.get_qpos(), None).unwrap();
-        let index = robot.link_names().iter().position(|name| *name == link).unwrap();
-        let target = target.index_axis(kinetoscope::ndarray::Axis(1), index).to_owned();
+        let target = robot.link_pose(link).unwrap();
         robot.compute_ik(&target, Tip::of_link(link), &IkCfg::default(), None, None)
     };
-    let error = ik("left").unwrap_err();
-    let Error::Kinematics { error, .. } = error else { panic!("{error}") };
-    assert!(
-        matches!(&*error, KinematicsError::CurveFollower { joint, link } if joint == "left" && link == "left"),
-        "{error}"
-    );
+    let Err(Error::Kinematics { error, .. }) = ik("left") else { panic!("accepted") };
+    let is_named = |joint: &str, link: &str| joint == "left" && link == "left";
+    assert!(matches!(&*error, KinematicsError::CurveFollower { joint, link } if is_named(joint, link)), "{error}");
     // Controls: neither its driver's own link nor another is moved by it.
     assert!(ik("crank").unwrap().success[0] && ik("other").unwrap().success[0]);
 }

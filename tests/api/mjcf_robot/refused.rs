@@ -1,8 +1,12 @@
-//! Files that are no robots: typed errors that name what is wrong and where, and nothing was added.
+//! Files that are no robots: typed errors that name what is wrong and where, and nothing was added; parts of a file that a
+//! robot leaves out; and files that only MuJoCo 4.x reads.
 
-use super::{empty, robot};
-use kinetoscope::prelude::*;
+use super::*;
+use kinetoscope::sim::mj::{TARGET, Target};
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
+use testkit::refusal::assert_error;
+use testkit::urdf::Files;
+use testkit::worlds::count_diagnostics;
 
 /// The error of adding a robot.
 fn refused(cfg: RobotCfg) -> Error {
@@ -13,11 +17,14 @@ fn refused(cfg: RobotCfg) -> Error {
     error
 }
 
-/// What is wrong with a text.
+fn of_file(path: impl AsRef<std::path::Path>) -> RobotCfg {
+    RobotCfg { mjcf: Some(MjcfFile::new(path.as_ref())), ..Default::default() }
+}
+
+/// The reason why a text is no robot; the message begins with the line if there is one.
 fn reason(text: &str) -> (RobotFileError, String) {
     let error = refused(robot("r", text));
     let said = error.to_string();
-    // The line first, where there is one.
     let lined = said.strip_prefix("text:").and_then(|rest| rest.split_once(": robot \"r\": "));
     let is_lined = lined.is_some_and(|(line, _)| line.parse::<usize>().is_ok());
     assert!(is_lined || said.starts_with("robot \"r\": text: "), "{said}");
@@ -26,103 +33,206 @@ fn reason(text: &str) -> (RobotFileError, String) {
 }
 
 #[test]
-fn files_that_cannot_be_read() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = |name: &str| RobotCfg { mjcf: Some(MjcfFile::new(dir.path().join(name))), ..Default::default() };
-    let error = refused(at("none.xml"));
-    assert!(matches!(error, Error::File { .. }) && error.to_string().contains("none.xml"), "{error}");
-    std::fs::write(
-        dir.path().join("bad.xml"),
-        "<mujoco>\n<worldbody>\n<body>\n<geom sise=\"1\"/></body></worldbody></mujoco>",
-    )
-    .unwrap();
-    let said = refused(at("bad.xml")).to_string();
-    assert!(["robot \"robot\"", "bad.xml", "sise", "line 4"].iter().all(|word| said.contains(word)), "{said}");
-    std::fs::write(dir.path().join("torn.xml"), "<mujoco><worldbody><body>").unwrap();
-    assert!(matches!(refused(at("torn.xml")), Error::RobotFile { .. }));
-    std::fs::write(dir.path().join("bytes.xml"), [0xff, 0xfe, 0x00]).unwrap();
-    assert!(matches!(refused(at("bytes.xml")), Error::File { .. }));
+fn unreadable_files() {
+    let files = Files::default();
+    let bad = "<mujoco>\n<worldbody>\n<body>\n<geom sise=\"1\"/></body></worldbody></mujoco>";
+    for (path, kind, parts) in [
+        (files.folder().join("none.xml"), "File {", &["none.xml"][..]),
+        (files.write("bad.xml", bad), "", &["robot \"robot\"", "bad.xml", "sise", "line 4"]),
+        (files.write("torn.xml", "<mujoco><worldbody><body>"), "RobotFile {", &[]),
+        (files.write("bytes.xml", [0xff, 0xfe, 0x00]), "File {", &[]),
+    ] {
+        let error = refused(of_file(&path));
+        assert!(format!("{error:?}").starts_with(kind), "{error:?}");
+        assert_error(Err::<(), _>(error), "", parts);
+    }
     for text in ["", "no xml", "<mujoco><worldbody/><nothing/></mujoco>"] {
         assert!(matches!(reason(text).0, RobotFileError::Compile(_)));
     }
     let both = RobotCfg { urdf: UrdfCfg::single("a.urdf"), ..robot("r", "<mujoco/>") };
-    let error = refused(both);
-    assert!(matches!(error, Error::Config { field: "mjcf", .. }), "{error}");
+    assert!(matches!(refused(both), Error::Config { field: "mjcf", .. }));
 }
 
 #[test]
-fn trees_that_are_no_robots() {
-    let body = |inside: &str| format!("<mujoco><worldbody>{inside}</worldbody></mujoco>");
-    let (error, said) = reason(&body("<geom size='1'/>"));
-    assert!(matches!(error, RobotFileError::NoBody), "{said}");
-    let (error, said) = reason(&body(
-        "<body name='a'><geom size='1'/></body><body name='b'><joint/><geom size='1'/></body><body><geom size='1'/></body>",
-    ));
-    assert!(matches!(error, RobotFileError::SeveralRoots { .. }), "{said}");
-    assert!(said.contains("3 bodies in its world (\"a\", \"b\", \"body3\")"), "{said}");
-    for inside in ["<body><geom size='1'/></body>", "<body><freejoint/><geom size='1'/></body>"] {
-        let (error, said) = reason(&body(inside));
-        assert!(matches!(error, RobotFileError::NoJoint) && said.contains("add_mjcf"), "{said}");
+fn no_robots() {
+    let several = "<body name='a'><geom size='1'/></body><body name='b'><joint/><geom size='1'/></body><body><geom size='1'/></body>";
+    for (inside, kind, says) in [
+        ("<geom size='1'/>", "NoBody", ""),
+        (several, "SeveralRoots", "3 bodies in its world (\"a\", \"b\", \"body3\")"),
+        ("<body><geom size='1'/></body>", "NoJoint", "add_mjcf"),
+        ("<body><freejoint/><geom size='1'/></body>", "NoJoint", "add_mjcf"),
+        ("<body mocap='true' name='m'><body><joint/><geom size='1'/></body></body>", "MocapBody", "\"m\""),
+    ] {
+        let (error, said) = reason(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"));
+        assert!(format!("{error:?}").starts_with(kind) && said.contains(says), "{error:?}: {said}");
     }
-    let (error, said) = reason(&body("<body mocap='true' name='m'><body><joint/><geom size='1'/></body></body>"));
-    assert!(matches!(error, RobotFileError::MocapBody { .. }) && said.contains("\"m\""), "{said}");
 }
 
 /// Joints and actuators that no drive stands for are named with their line, in the file that includes them and in those it
 /// includes.
 #[test]
-fn elements_that_no_robot_has_are_named_with_their_line() {
-    let dir = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+fn named_elements() {
+    let files = Files::default();
     let tree = "<worldbody>\n<body name='a'><geom size='1'/>\n<body name='b'><joint name='j' axis='0 0 1'/><geom size='1'/>\n\
                 <site name='s'/>%</body></body><site name='w'/></worldbody>";
-    let said = |inside: &str, after: &str| {
-        let included = format!("<mujocoinclude>\n{}</mujocoinclude>", tree.replace('%', inside));
-        write("tree.xml", &included);
-        write("robot.xml", &format!("<mujoco><include file='tree.xml'/>\n\n{after}</mujoco>"));
-        let error = refused(RobotCfg { mjcf: Some(MjcfFile::new(dir.path().join("robot.xml"))), ..Default::default() });
-        assert!(matches!(error, Error::RobotFile { .. }), "{error}");
-        error.to_string()
-    };
-    let text = said("<body><joint name='ball' type='ball'/><geom size='1'/></body>", "");
-    assert!(text.contains("tree.xml:5: joint \"ball\" is a ball"), "{text}");
-    for (actuator, target) in [
-        ("<motor name='m' site='s'/>", "a site"),
-        ("<motor name='m' tendon='t'/>", "the spatial tendon \"t\""),
-        ("<general name='m' cranksite='s' slidersite='s2' cranklength='1'/>", "a cranksite"),
+    let string = |to: &str| format!("<tendon><spatial name='t'><site site='s'/><site site='{to}'/></spatial></tendon>");
+    let site = "<body><site name='s2' pos='0 0 1'/></body>";
+    let acts = ["robot.xml:4: robot \"robot\": actuator \"m\" acts on ", "add_mjcf"];
+    let actuator = |of: &str| format!("{}\n<actuator>{of}</actuator>", string("s2"));
+    for (inside, after, parts, target) in [
+        (
+            "<body><joint name='ball' type='ball'/><geom size='1'/></body>",
+            String::new(),
+            &["tree.xml:5: joint \"ball\" is a ball"][..],
+            "",
+        ),
+        (site, actuator("<motor name='m' site='s'/>"), &acts, "a site"),
+        (site, actuator("<motor name='m' tendon='t'/>"), &acts, "the spatial tendon \"t\""),
+        (site, actuator("<general name='m' cranksite='s' slidersite='s2' cranklength='1'/>"), &acts, "a cranksite"),
+        ("", string("w"), &["robot.xml:3: robot \"robot\": tendon \"t\" needs \"w\" in the file's world"], ""),
     ] {
-        let after = format!(
-            "<tendon><spatial name='t'><site site='s'/><site site='s2'/></spatial></tendon>\n<actuator>{actuator}</actuator>"
-        );
-        let text = said("<body><site name='s2' pos='0 0 1'/></body>", &after);
-        assert!(
-            text.contains("robot.xml:4: robot \"robot\": actuator \"m\" acts on ") && text.contains(target),
-            "{text}"
-        );
-        assert!(text.contains("add_mjcf"), "{text}");
+        files.write("tree.xml", format!("<mujocoinclude>\n{}</mujocoinclude>", tree.replace('%', inside)));
+        let path = files.write("robot.xml", format!("<mujoco><include file='tree.xml'/>\n\n{after}</mujoco>"));
+        let error = refused(of_file(path));
+        assert!(matches!(error, Error::RobotFile { .. }), "{error}");
+        assert_error(Err::<(), _>(error), "", &[parts, &[target]].concat());
     }
-    let string = "<tendon><spatial name='t'><site site='s'/><site site='w'/></spatial></tendon>";
-    let text = said("", string);
-    assert!(text.contains("robot.xml:3: robot \"robot\": tendon \"t\" needs \"w\" in the file's world"), "{text}");
 }
 
-/// What stands in the file's world is left out, and said.
+/// Elements of the file's world are left out, and said.
 #[test]
-fn the_world_of_the_file_is_left_out() {
+fn world_of_the_file() {
     let text = r#"<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><light name="sun" pos="0 0 3"/>
         <site name="mark"/><body name="a"><geom name="g" size="0.1" mass="1"/>
         <body name="b"><joint name="j" axis="0 0 1"/><geom name="h" size="0.1" mass="1"/></body></body></worldbody>
         <contact><pair geom1="floor" geom2="g"/></contact>
         <sensor><framepos name="seen" objtype="body" objname="b" reftype="site" refname="mark"/>
           <jointpos name="angle" joint="j"/></sensor></mujoco>"#;
-    let mut sim = empty(1);
-    sim.add_robot(robot("r", text)).unwrap();
+    let (sim, _) = with(1, robot("r", text));
     assert_eq!((sim.batch().model().ngeom(), sim.batch().model().npair()), (2, 0));
-    let said: Vec<String> = sim.diagnostics().iter().map(ToString::to_string).collect();
     for words in [
         "robot \"r\": what stands in the file's world is no part of it: geom \"floor\", site \"mark\", light \"sun\"",
         "sensor \"seen\": site \"mark\", which a robot leaves out",
     ] {
-        assert_eq!(said.iter().filter(|d| d.contains(words)).count(), 1, "{words}: {said:#?}");
+        assert_eq!(count_diagnostics(&sim, &[words]), 1, "{words}: {:#?}", sim.diagnostics());
+    }
+}
+
+const NO_BITS: &str = r#"contype="0" conaffinity="0""#;
+
+/// The scene's world is another than the file's. A ball of 0.1 m stands on the scene's ground whatever its bits in the file,
+/// also where the file pairs it with its own floor or excludes it from its world, which is said; a ball that collides with
+/// nothing falls 20 m.
+#[test]
+fn ground() {
+    let (pair, exclude) = (r#"<pair geom1="foot" geom2="floor"/>"#, r#"<exclude body1="world" body2="b"/>"#);
+    let paired = ["\"foot\"", "\"floor\"", "pairs with what stands"];
+    let floor = r#"<geom name="floor" type="plane" size="1 1 1"/>"#;
+    for (bits, floor, contact, stands, words, said) in [
+        (NO_BITS, floor, pair, true, &paired[..], 1),
+        (NO_BITS, floor, "", false, &["pairs with"], 0),
+        (NO_BITS, "", "", false, &["pairs with"], 0),
+        ("", floor, exclude, true, &["body \"b\" collides with the scene"], 1),
+        ("", "", "", true, &["collides with the scene"], 0),
+        (r#"contype="0" conaffinity="1""#, "", "", true, &["collides with the scene"], 0),
+        (r#"contype="8" conaffinity="16""#, "", "", true, &["collides with the scene"], 0),
+    ] {
+        let text = format!(
+            r#"<mujoco><worldbody>{floor}<body name="b" pos="0 0 0.3"><freejoint/><geom name="foot" size="0.1" mass="1" {bits}/>
+            <body><joint name="j"/><geom size="0.01" pos="0 0 0.05" mass="0.01" {NO_BITS}/></body></body></worldbody>
+            <contact>{contact}</contact></mujoco>"#
+        );
+        let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+        let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("r", &text) }).unwrap();
+        sim.update(200);
+        let height = sim.robot(id).get_root_pose()[(0, 2)];
+        let right = if stands { (height - 0.1).abs() < 2e-3 } else { height < -1.0 };
+        assert!(right, "{bits} {contact}: {height}");
+        assert_eq!(count_diagnostics(&sim, words), said, "{bits} {contact}: {:?}", sim.diagnostics());
+    }
+    // Pairs within a robot are named where it does not collide with itself.
+    let text = r#"<mujoco><worldbody><body name="a"><geom name="g" size="0.1" mass="1"/><body name="b" pos="1 0 0">
+        <joint name="j" axis="0 0 1"/><geom name="h" size="0.1" mass="1"/></body></body></worldbody>
+        <contact><pair geom1="g" geom2="h"/></contact></mujoco>"#;
+    for self_collision in [false, true] {
+        let (sim, _) = with(1, RobotCfg { self_collision, ..robot("r", text) });
+        let named = count_diagnostics(&sim, &["\"g\" and \"h\""]);
+        assert_eq!((named, sim.batch().model().npair()), (usize::from(!self_collision), usize::from(self_collision)));
+    }
+}
+
+/// A pendulum with these attributes of its body and of its joint; `after` stands behind the bodies.
+fn pendulum(body: &str, joint: &str, after: &str) -> String {
+    format!(
+        r#"<mujoco><compiler angle="radian"/><worldbody><body name="base"><geom size="0.01" mass="1"/>
+        <body name="arm" {body}><joint name="j" axis="0 1 0" {joint}/><geom size="0.02" pos="0.3 0 0" mass="1"/></body>
+        </body></worldbody>{after}</mujoco>"#
+    )
+}
+
+/// Adds a robot; `None` where this MuJoCo does not know an attribute of its file, which is an error then.
+fn newer(cfg: RobotCfg) -> Option<(SimulationManager, RobotId)> {
+    let mut sim = empty(1);
+    match sim.add_robot(cfg) {
+        Ok(id) => {
+            assert_eq!(TARGET, Target::V4);
+            Some((sim, id))
+        }
+        Err(error) => {
+            assert!(TARGET == Target::V2 && matches!(error, Error::RobotFile { .. }), "{error}");
+            assert!(error.to_string().contains("XML"), "{error}");
+            None
+        }
+    }
+}
+
+/// A body that MuJoCo lifts by half is lifted by the other half, and no further.
+#[test]
+fn newer_gravity_compensation() {
+    let Some((mut sim, id)) = newer(passive(robot("r", &pendulum(r#"gravcomp="0.5""#, "", "")))) else { return };
+    let start = sim.robot(id).get_qpos();
+    let mut moved = |compensated, steps| {
+        sim.robot_mut(id).set_gravity_compensation(compensated, None, None).unwrap();
+        sim.update(steps);
+        (sim.robot(id).get_qpos() - &start)[(0, 0)]
+    };
+    let off = moved(true, 500);
+    assert!(off.abs() < 1e-9, "{off}");
+    // Half of g at 0.3 m: 16.35 rad/s² times (0.1 s)² / 2, while it is near the horizon.
+    let fallen = moved(false, 50);
+    assert!((fallen - 0.0817).abs() < 4e-3, "{fallen}");
+}
+
+/// The file's limit of actuators' forces is that of the drive, and the configuration may raise it.
+#[test]
+fn newer_force_limit() {
+    let text = pendulum("", r#"actuatorfrcrange="-5 5""#, r#"<actuator><position joint="j" kp="100"/></actuator>"#);
+    for model in [DriveModel::Implicit, DriveModel::Actuator] {
+        let add = |max_effort: Option<f64>| {
+            let drive = DriveCfg { model, max_effort: max_effort.map(Into::into), ..Default::default() };
+            newer(RobotCfg { drive, ..robot("r", &text) })
+        };
+        let Some((sim, id)) = add(None) else { return };
+        assert_eq!(sim.robot(id).qf_limits()[(0, 0)], 5.0);
+        let Some((mut sim, id)) = add(Some(20.0)) else { return };
+        assert_eq!((sim.robot(id).qf_limits()[(0, 0)], sim.batch().model().joint_actuator_force(0)), (20.0, None));
+        sim.robot_mut(id).set_qpos(&row([1.0]), None, None).unwrap();
+        sim.update(1);
+        let effort = sim.robot(id).get_qf()[(0, 0)];
+        assert!((effort.abs() - 20.0).abs() < 1e-6, "{model:?}: {effort}");
+    }
+}
+
+/// Sensors of actuators' forces are left out by name.
+#[test]
+fn newer_sensors() {
+    let after = r#"<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
+        <sensor><jointactuatorfrc name="felt" joint="j"/><tendonactuatorfrc name="pulled" tendon="t"/>
+        <jointpos name="angle" joint="j"/></sensor>"#;
+    let Some((sim, _)) = newer(robot("r", &pendulum("", "", after))) else { return };
+    assert_eq!(sim.batch().model().nsensor(), 1);
+    for name in ["felt", "pulled"] {
+        let said = count_diagnostics(&sim, &[&format!("sensor {name:?}")]);
+        assert_eq!(said, 1, "{name}: {:?}", sim.diagnostics());
     }
 }

@@ -1,44 +1,24 @@
 //! Meshes that are not convex: in pieces, and triangle by triangle.
-//!
-//! Contacts are soft: with MuJoCo's default reference a body sinks in by (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) = 0.4 mm
-//! at most (k = 1 / (0.95 · 0.02 s)²): SOFT.
 
-use super::{Files, channel, empty, object};
+use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::prelude::*;
-use kinetoscope::scene::mesh::{PiecesCfg, TriMesh};
+use kinetoscope::scene::mesh::PiecesCfg;
 use std::f32::consts::{FRAC_PI_2, TAU};
+use testkit::refusal::assert_error;
+use testkit::worlds::count_diagnostics;
 
-const SOFT: f64 = 5e-4;
 const R: f64 = 0.05;
-
-/// A prism along y over an outline in x and z, counter-clockwise, which `cut` divides into triangles; from -0.5 to 0.5 in
-/// `parts` parts.
-fn along_y(outline: &[[f32; 2]], cut: &[[u32; 3]], parts: u32) -> TriMesh {
-    let n = outline.len() as u32;
-    let ring = |k: u32| outline.iter().map(move |&[x, z]| [x, k as f32 / parts as f32 - 0.5, z]);
-    let last = n * parts;
-    let back = cut.iter().map(|&[a, b, c]| [a + last, c + last, b + last]);
-    let rim = (0..parts).flat_map(|part| {
-        (0..n).flat_map(move |k| {
-            let (here, next) = (part * n + k, part * n + (k + 1) % n);
-            [[here, here + n, next + n], [here, next + n, next]]
-        })
-    });
-    let triangles = cut.iter().copied().chain(back).chain(rim).collect();
-    TriMesh::from_triangles((0..=parts).flat_map(ring).collect(), triangles)
-}
 
 /// An L: a foot of 25 cm height from x = 0 to 1, a wall up to 1 m at its beginning.
 fn ell() -> TriMesh {
     let outline = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.25], [0.25, 0.25], [0.25, 1.0], [0.0, 1.0]];
-    along_y(&outline, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 1)
+    prism(&outline, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 1)
 }
 
 /// A valley along y whose sides rise at 45 degrees from z = 0.
 fn valley(parts: u32) -> TriMesh {
     let outline = [[-0.5, -0.2], [0.5, -0.2], [0.5, 0.5], [0.0, 0.0], [-0.5, 0.5]];
-    along_y(&outline, &[[0, 1, 3], [1, 2, 3], [0, 3, 4]], parts)
+    prism(&outline, &[[0, 1, 3], [1, 2, 3], [0, 3, 4]], parts)
 }
 
 /// Half a hollow ball, open above, its middle in the origin.
@@ -63,11 +43,8 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
             let quad = |base| [at(base, k, s), at(base, k, s + 1), at(base, k + 1, s + 1), at(base, k + 1, s)];
             let ([a, b, c, d], [e, f, g, h]) = (quad(0), quad(first));
             // Inside, seen from the middle; outside, seen from below.
-            triangles.extend(
-                [[a, d, c], [a, c, b], [e, g, h], [e, f, g]]
-                    .into_iter()
-                    .filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]),
-            );
+            let all = [[a, d, c], [a, c, b], [e, g, h], [e, f, g]];
+            triangles.extend(all.into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]));
         }
         let (i, o) = ([at(0, rings, s), at(0, rings, s + 1)], [at(first, rings, s), at(first, rings, s + 1)]);
         triangles.extend([[i[0], o[0], o[1]], [i[0], o[1], i[1]]]);
@@ -76,19 +53,22 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
 }
 
 /// A ball of radius R that stops by itself.
-fn ball(at: [f64; 3]) -> RigidObjectCfg {
-    let ball = object("ball", ObjectShape::Sphere { radius: R }, at);
-    RigidObjectCfg { mass: Some(0.5), linear_damping: 2.0, angular_damping: 0.01, ..ball }
+fn marble(at: [f64; 3]) -> RigidObjectCfg {
+    RigidObjectCfg { linear_damping: 2.0, angular_damping: 0.01, ..ball("ball", R, 0.5, at) }
 }
 
-/// Where a ball lies after three seconds in a mesh that stands, in environments without ground.
-fn lies(mesh: &TriMesh, mesh_collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
-    let files = Files::new();
+fn collides(mesh: RigidObjectCfg, mesh_collision: MeshCollision) -> RigidObjectCfg {
+    RigidObjectCfg { mesh_collision, ..mesh }
+}
+
+/// The place of a ball after three seconds in a mesh that stands, without ground.
+fn lies(mesh: &TriMesh, collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
+    let files = Files::default();
     let mut sim = empty(1);
-    let cfg = object("mesh", ObjectShape::mesh(files.obj("m.obj", mesh)), [0.0; 3]);
-    sim.add_rigid_object(RigidObjectCfg { body_type: BodyType::Static, mesh_collision, ..cfg }).unwrap();
+    let cfg = object("mesh", ObjectShape::mesh(obj(&files, "m.obj", mesh)), [0.0; 3]);
+    sim.add_rigid_object(collides(fixed(cfg), collision)).unwrap();
     assert_eq!(sim.diagnostics(), []);
-    let ball = sim.add_rigid_object(ball(from)).unwrap();
+    let ball = sim.add_rigid_object(marble(from)).unwrap();
     sim.update(3000);
     let pose = sim.rigid_object(ball).get_pose();
     [0, 1, 2].map(|k| pose[(0, k)])
@@ -98,26 +78,27 @@ fn pieces(max_pieces: usize, tolerance: f64) -> MeshCollision {
     MeshCollision::Pieces(PiecesCfg { max_pieces, tolerance })
 }
 
-/// On the foot of an L: its height and the ball's radius. On the hull there is a slope from the wall's top to the foot's end,
-/// which it rolls down and off.
+fn triangles(thickness: f64) -> MeshCollision {
+    MeshCollision::Triangles { thickness }
+}
+
+/// A ball lies on the foot of an L, at its height and the ball's radius. On the hull there is a slope from the wall's top to
+/// the foot's end, which it rolls down and off.
+///
+/// The middle of a ball in a bowl is nowhere nearer to the bowl's middle than the inner radius less the ball's, less what the
+/// pieces may be above the surface (4 mm), and nowhere farther; chords of 48 sides are 0.2 (1 - cos(π/48)) = 0.43 mm inside.
 #[test]
-fn a_ball_lies_on_the_foot_of_an_ell() {
+fn balls_on_pieces() {
     let from = [0.6, 0.0, 0.9];
     let found = lies(&ell(), pieces(4, 1e-3), from);
     assert!((found[2] - 0.25 - R).abs() < SOFT && (found[0] - 0.6).abs() < 1e-2, "{found:?}");
     let hull = lies(&ell(), MeshCollision::Hull, from);
     assert!(hull[2] < -1.0, "the control: it falls off the hull: {hull:?}");
-}
 
-/// The middle of a ball in a bowl is nowhere nearer to the bowl's middle than the inner radius less the ball's, less what the
-/// pieces may be above the surface (4 mm), and nowhere farther; chords of 48 sides are 0.2 (1 - cos(π/48)) = 0.43 mm inside.
-#[test]
-fn a_ball_lies_in_a_bowl() {
     let mesh = bowl(0.2, 0.23, 12, 48);
     assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
-    let distance = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
     let found = lies(&mesh, pieces(200, 4e-3), [0.06, -0.03, 0.1]);
-    let gap = 0.2 - R - distance(found);
+    let gap = 0.2 - R - found.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!(gap > -SOFT && gap < 4e-3 + 0.43e-3, "{found:?} {gap}");
     // It lies low: a flat part of a piece is 2 sqrt(2 · 0.2 · 0.004) = 8 cm wide, 4 cm from its middle.
     assert!(found[2] < -0.15 + 4.5e-3 && found[0].hypot(found[1]) < 0.05, "{found:?}");
@@ -125,39 +106,38 @@ fn a_ball_lies_in_a_bowl() {
     assert!((hull[2] - R).abs() < SOFT, "the control: it lies on the rim: {hull:?}");
 }
 
-/// A ball between two planes at 45 degrees has its middle R sqrt(2) above their line; on the hull it lies on top.
+/// A ball between two planes at 45 degrees has its middle R sqrt(2) above their line; on the hull it lies on top. In a bowl
+/// chords of 24 sides and 12 rings are 0.2 (1 - cos(π/24)) = 1.7 mm inside.
 #[test]
-fn a_ball_lies_in_a_valley_of_triangles() {
-    for (parts, thickness) in [(1, 0.02), (7, 0.005)] {
-        let found = lies(&valley(parts), MeshCollision::Triangles { thickness }, [0.1, 0.03, 0.3]);
-        assert!((found[2] - R * 2f64.sqrt()).abs() < 2.0 * SOFT && found[0].abs() < SOFT, "{parts} parts: {found:?}");
+fn balls_on_triangles() {
+    let from = [0.1, 0.03, 0.3];
+    for (what, mesh, collision, from, height, within, across) in [
+        ("valley", valley(1), triangles(0.02), from, R * 2f64.sqrt(), 2.0 * SOFT, SOFT),
+        ("valley in parts", valley(7), triangles(0.005), from, R * 2f64.sqrt(), 2.0 * SOFT, SOFT),
+        ("the control: hull", valley(1), MeshCollision::Hull, [0.1, 0.03, 0.6], 0.5 + R, SOFT, 1.0),
+        ("channel", channel(), triangles(0.02), [0.1, 0.0, 0.3], 0.1 + R, SOFT, 1.0),
+        ("bowl", bowl(0.2, 0.23, 12, 24), triangles(0.01), [0.06, -0.03, 0.1], R - 0.2, 2.2e-3, 0.02),
+    ] {
+        let found = lies(&mesh, collision, from);
+        let off = if what == "bowl" { found[0].hypot(found[1]) } else { found[0].abs() };
+        assert!((found[2] - height).abs() < within && off < across, "{what}: {found:?}");
     }
-    let hull = lies(&valley(1), MeshCollision::Hull, [0.1, 0.03, 0.6]);
-    assert!((hull[2] - 0.5 - R).abs() < SOFT, "the control: {hull:?}");
-    // The channel of the other tests: its floor is 10 cm high, its walls keep the ball in.
-    let found = lies(&channel(), MeshCollision::Triangles { thickness: 0.02 }, [0.1, 0.0, 0.3]);
-    assert!((found[2] - 0.1 - R).abs() < SOFT, "{found:?}");
-    // A bowl of 2 · 12 · 24 - ... triangles: chords of 24 sides and 12 rings are 0.2 (1 - cos(π/24)) = 1.7 mm inside.
-    let found = lies(&bowl(0.2, 0.23, 12, 24), MeshCollision::Triangles { thickness: 0.01 }, [0.06, -0.03, 0.1]);
-    assert!((found[2] + 0.2 - R).abs() < 2.2e-3 && found[0].hypot(found[1]) < 0.02, "{found:?}");
 }
 
 /// Sliding along a valley over edges between coplanar triangles, without friction and damping: it neither climbs nor stops,
 /// but every edge brakes it a little, as `MeshCollision::Triangles` says.
 #[test]
-fn a_ball_slides_over_edges_of_triangles() {
-    let files = Files::new();
+fn sliding_over_edges() {
+    let files = Files::default();
     let mut sim = empty(1);
-    let cfg = object("mesh", ObjectShape::mesh(files.obj("m.obj", &valley(20))), [0.0; 3]);
-    let smooth = Some([0.0; 3]);
-    let mesh_collision = MeshCollision::Triangles { thickness: 0.02 };
-    sim.add_rigid_object(RigidObjectCfg { body_type: BodyType::Static, mesh_collision, friction: smooth, ..cfg })
-        .unwrap();
+    let smooth = |cfg| RigidObjectCfg { friction: Some([0.0; 3]), ..cfg };
+    let cfg = object("mesh", ObjectShape::mesh(obj(&files, "m.obj", &valley(20))), [0.0; 3]);
+    sim.add_rigid_object(smooth(collides(fixed(cfg), triangles(0.02)))).unwrap();
     let height = R * 2f64.sqrt();
     let ball = object("ball", ObjectShape::Sphere { radius: R }, [0.0, -0.4, height]);
-    let ball = sim.add_rigid_object(RigidObjectCfg { friction: smooth, ..ball }).unwrap();
+    let ball = sim.add_rigid_object(smooth(ball)).unwrap();
     sim.update(300);
-    sim.rigid_object_mut(ball).write_velocity(&array![[0.0, 0.5, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
+    sim.rigid_object_mut(ball).write_velocity(&row([0.0, 0.5, 0.0, 0.0, 0.0, 0.0]), None).unwrap();
     let mut highest = f64::NEG_INFINITY;
     for _ in 0..1500 {
         sim.update(1);
@@ -170,38 +150,31 @@ fn a_ball_slides_over_edges_of_triangles() {
 
 /// A triangle of 1 mm by 2e-10 m has a prism of less than MuJoCo takes: it is left out and said, and the scene stands.
 #[test]
-fn slivers_are_left_out_and_open_meshes_named() {
-    let files = Files::new();
-    let corners = vec![
-        [-1.0, -1.0, 0.0],
-        [1.0, -1.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0],
-        [1e-3, 0.0, 0.0],
-        [5e-4, 2e-10, 0.0],
-    ];
+fn slivers() {
+    let files = Files::default();
+    let mut corners = vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+    corners.extend([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [5e-4, 2e-10, 0.0]]);
     let mesh = TriMesh::from_triangles(corners, vec![[0, 1, 2], [3, 4, 5]]);
     let mut sim = empty(1);
-    let cfg = object("mesh", ObjectShape::mesh(files.obj("m.obj", &mesh)), [0.0; 3]);
-    let mesh_collision = MeshCollision::Triangles { thickness: 0.01 };
-    sim.add_rigid_object(RigidObjectCfg { body_type: BodyType::Static, mesh_collision, ..cfg }).unwrap();
-    let said: Vec<String> = sim.diagnostics().iter().map(ToString::to_string).collect();
-    assert!(said.iter().any(|said| said.contains("1 triangles are too thin")), "{said:?}");
-    assert!(said.iter().any(|said| said.contains("not all that is behind it")), "{said:?}");
-    let ball = sim.add_rigid_object(ball([0.0, -0.2, 0.1])).unwrap();
+    let cfg = object("mesh", ObjectShape::mesh(obj(&files, "m.obj", &mesh)), [0.0; 3]);
+    sim.add_rigid_object(collides(fixed(cfg), triangles(0.01))).unwrap();
+    for words in ["1 triangles are too thin", "not all that is behind it"] {
+        assert!(count_diagnostics(&sim, &[words]) > 0, "{:?}", sim.diagnostics());
+    }
+    let ball = sim.add_rigid_object(marble([0.0, -0.2, 0.1])).unwrap();
     sim.update(1000);
     assert!((sim.rigid_object(ball).get_pose()[(0, 2)] - R).abs() < SOFT);
 }
 
-/// What moves collides in pieces too, and weighs what its triangles enclose.
+/// An L that moves collides in pieces too, and weighs what its triangles enclose.
 #[test]
-fn an_ell_that_moves_carries_a_ball() {
-    let files = Files::new();
-    let mut sim = SimulationManager::new(SimulationManagerCfg { physics_dt: 1e-3, ..Default::default() }).unwrap();
-    let cfg = object("ell", ObjectShape::mesh(files.obj("l.obj", &ell())), [0.0, 0.0, 0.001]);
-    let id = sim.add_rigid_object(RigidObjectCfg { mesh_collision: pieces(4, 1e-3), ..cfg }).unwrap();
+fn moving_pieces() {
+    let files = Files::default();
+    let mut sim = sim(SimulationManagerCfg { physics_dt: 1e-3, ..Default::default() });
+    let cfg = object("ell", ObjectShape::mesh(obj(&files, "l.obj", &ell())), [0.0, 0.0, 0.001]);
+    let id = sim.add_rigid_object(collides(cfg, pieces(4, 1e-3))).unwrap();
     assert!((sim.rigid_object(id).mass() / (1000.0 * (0.25 + 0.75 * 0.25)) - 1.0).abs() < 1e-6);
-    let ball = sim.add_rigid_object(ball([0.7, 0.1, 0.4])).unwrap();
+    let ball = sim.add_rigid_object(marble([0.7, 0.1, 0.4])).unwrap();
     sim.update(2000);
     let (lies, stands) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(id).get_pose());
     assert!((lies[(0, 2)] - 0.25 - R).abs() < 2.0 * SOFT && stands[(0, 2)].abs() < SOFT, "{lies} {stands}");
@@ -211,51 +184,33 @@ fn an_ell_that_moves_carries_a_ball() {
         let model = env.data().model();
         let body = model.id(kinetoscope::sim::mj::ObjectKind::Body, "ell").unwrap();
         let of = |geom: &usize| model.geom_bodyid()[*geom] as usize == body && model.geom_contype()[*geom] != 0;
-        let shapes: Vec<usize> = (0..model.ngeom()).filter(of).collect();
-        assert_eq!(shapes.len(), 2);
-        assert!(shapes.iter().all(|geom| model.geom_friction()[3 * geom] == 0.3));
+        let frictions: Vec<f64> = (0..model.ngeom()).filter(of).map(|geom| model.geom_friction()[3 * geom]).collect();
+        assert_eq!(frictions, [0.3; 2]);
     });
     assert_eq!(sim.mask_ids().iter().filter(|id| id.object == "ell").count(), 1);
 }
 
 #[test]
-fn collisions_that_cannot_be_are_named() {
-    let files = Files::new();
+fn refusals() {
+    let files = Files::default();
     let mut sim = empty(1);
-    let path = files.obj("m.obj", &valley(1));
-    let mesh = object("o", ObjectShape::mesh(&path), [0.0; 3]);
-    let fixed = RigidObjectCfg { body_type: BodyType::Static, ..mesh.clone() };
-    let cases = [
-        (RigidObjectCfg { mesh_collision: MeshCollision::Triangles { thickness: 0.01 }, ..mesh.clone() }, "Pieces"),
-        (RigidObjectCfg { mesh_collision: MeshCollision::Triangles { thickness: 0.0 }, ..fixed.clone() }, "thickness"),
-        (
-            RigidObjectCfg { mesh_collision: MeshCollision::Triangles { thickness: f64::NAN }, ..fixed.clone() },
-            "thickness",
-        ),
-        (RigidObjectCfg { mesh_collision: pieces(0, 1e-3), ..mesh.clone() }, "max_pieces"),
-        (RigidObjectCfg { mesh_collision: pieces(8, -1.0), ..mesh.clone() }, "tolerance"),
-        (
-            RigidObjectCfg { mesh_collision: pieces(8, 1e-3), ..object("o", ObjectShape::cube(0.1), [0.0; 3]) },
-            "ObjectShape::Mesh",
-        ),
-    ];
-    for (cfg, says) in cases {
-        let error = sim.add_rigid_object(cfg).unwrap_err();
-        assert!(matches!(&error, Error::Config { field: "mesh_collision", .. }), "{error}");
-        assert!(error.to_string().contains(says), "{error}");
+    let mesh = object("o", ObjectShape::mesh(obj(&files, "m.obj", &valley(1))), [0.0; 3]);
+    let many = object("o", ObjectShape::mesh(obj(&files, "many.obj", &valley(300))), [0.0; 3]);
+    for (cfg, parts) in [
+        (collides(mesh.clone(), triangles(0.01)), &["Pieces"][..]),
+        (collides(fixed(mesh.clone()), triangles(0.0)), &["thickness"]),
+        (collides(fixed(mesh.clone()), triangles(f64::NAN)), &["thickness"]),
+        (collides(mesh.clone(), pieces(0, 1e-3)), &["max_pieces"]),
+        (collides(mesh.clone(), pieces(8, -1.0)), &["tolerance"]),
+        (collides(object("o", ObjectShape::cube(0.1), [0.0; 3]), pieces(8, 1e-3)), &["ObjectShape::Mesh"]),
+        (collides(fixed(many), triangles(0.01)), &["3006 triangles", "2000"]),
+    ] {
+        let kind = if parts.len() == 1 { "Config { field: \"mesh_collision\"" } else { "" };
+        assert_error(sim.add_rigid_object(cfg), kind, parts);
     }
-    let many = files.obj("many.obj", &valley(300));
-    let cfg = RigidObjectCfg {
-        shape: ObjectShape::mesh(many),
-        mesh_collision: MeshCollision::Triangles { thickness: 0.01 },
-        ..fixed
-    };
-    let error = sim.add_rigid_object(cfg).unwrap_err().to_string();
-    assert!(error.contains("3006 triangles") && error.contains("2000"), "{error}");
     // Too few pieces are said.
-    let round = files.obj("bowl.obj", &bowl(0.2, 0.23, 6, 24));
-    let cfg = RigidObjectCfg { shape: ObjectShape::mesh(round), mesh_collision: pieces(3, 1e-4), ..mesh };
-    sim.add_rigid_object(cfg).unwrap();
-    let [diagnostic] = sim.diagnostics() else { panic!("{:?}", sim.diagnostics()) };
-    assert!(diagnostic.to_string().contains("3 convex pieces"), "{diagnostic}");
+    let round = ObjectShape::mesh(obj(&files, "bowl.obj", &bowl(0.2, 0.23, 6, 24)));
+    sim.add_rigid_object(collides(object("o", round, [0.0; 3]), pieces(3, 1e-4))).unwrap();
+    let said = count_diagnostics(&sim, &["3 convex pieces"]);
+    assert_eq!((said, sim.diagnostics().len()), (1, 1), "{:?}", sim.diagnostics());
 }

@@ -1,52 +1,48 @@
-//! Rigid objects: their shapes, what they weigh, how they move and rub, what holds them together.
+//! Rigid objects: their shapes, masses, motion, friction, bounces and welds.
 
-mod apart;
+mod bounces;
 mod concave;
 mod groups;
-mod kinematic;
 mod masses;
 mod meshes;
-mod properties;
+mod moved;
 mod refused;
-mod restitution;
-mod standing;
 mod welds;
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};
 use std::path::PathBuf;
+use testkit::urdf::Files;
+use testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};
 
-/// Nothing but what is added, in `num_envs` environments; steps of a millisecond.
+const SECOND: &[EnvId] = &[EnvId(1)];
+/// MuJoCo's contacts are soft: with the default reference a body sinks in by (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) =
+/// 0.4 mm at most (k = 1 / (0.95 · 0.02 s)²).
+const SOFT: f64 = 5e-4;
+
+/// Steps of a millisecond in an empty scene.
 fn empty(num_envs: usize) -> SimulationManager {
-    let cfg = SimulationManagerCfg { num_envs, ground: None, physics_dt: 1e-3, ..Default::default() };
-    SimulationManager::new(cfg).unwrap()
+    sim(SimulationManagerCfg { physics_dt: 1e-3, ..empty_cfg(num_envs) })
 }
 
 /// As [`empty`], without gravity.
 fn weightless(num_envs: usize) -> SimulationManager {
-    let cfg = SimulationManagerCfg { num_envs, ground: None, physics_dt: 1e-3, ..Default::default() };
-    SimulationManager::new(SimulationManagerCfg { gravity: [0.0; 3].into(), ..cfg }).unwrap()
+    sim(SimulationManagerCfg { physics_dt: 1e-3, ..weightless_cfg(num_envs) })
 }
 
-fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
-    let init_pose = Pose::translation(at[0], at[1], at[2]);
-    RigidObjectCfg { uid: uid.into(), shape, init_pose, ..Default::default() }
+fn kinematic(cfg: RigidObjectCfg) -> RigidObjectCfg {
+    RigidObjectCfg { body_type: BodyType::Kinematic, ..cfg }
 }
 
-/// Files that go away with it.
-struct Files(tempfile::TempDir);
+/// A force \[N\] and a torque \[N m\] in world axes, in all environments.
+fn pull(sim: &mut SimulationManager, id: ObjectId, force: [f64; 3], torque: [f64; 3]) {
+    sim.rigid_object_mut(id).set_external_wrench(&row(force), &row(torque), WrenchFrame::World, None).unwrap();
+}
 
-impl Files {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn obj(&self, name: &str, mesh: &TriMesh) -> PathBuf {
-        let path = self.0.path().join(name);
-        let out = std::fs::File::create(&path).unwrap();
-        write_obj(mesh, 0..mesh.triangles.len(), out).unwrap();
-        path
-    }
+fn obj(files: &Files, name: &str, mesh: &TriMesh) -> PathBuf {
+    let mut text = Vec::new();
+    write_obj(mesh, 0..mesh.triangles.len(), &mut text).unwrap();
+    files.write(name, text)
 }
 
 /// A brick whose sides are `size` long, with its least corner in `corner`.
@@ -57,18 +53,22 @@ fn brick(size: [f32; 3], corner: [f32; 3]) -> TriMesh {
     TriMesh::from_triangles((0..8).map(at).collect(), faces)
 }
 
+/// A prism along y over an outline in x and z, counter-clockwise, which `cut` divides into triangles; from -0.5 to 0.5 in
+/// `parts` parts.
+fn prism(outline: &[[f32; 2]], cut: &[[u32; 3]], parts: u32) -> TriMesh {
+    let n = outline.len() as u32;
+    let ring = |k: u32| outline.iter().map(move |&[x, z]| [x, k as f32 / parts as f32 - 0.5, z]);
+    let back = cut.iter().map(|&[a, b, c]| [a + n * parts, c + n * parts, b + n * parts]);
+    let rim = (0..parts * n).flat_map(|k| {
+        let (here, next) = (k, k / n * n + (k + 1) % n);
+        [[here, here + n, next + n], [here, next + n, next]]
+    });
+    let triangles = cut.iter().copied().chain(back).chain(rim).collect();
+    TriMesh::from_triangles((0..=parts).flat_map(ring).collect(), triangles)
+}
+
 /// A channel along y: a floor from 0 to 0.1 m and walls up to 0.5 m, 1 m wide and long, the hollow 0.6 m wide.
 fn channel() -> TriMesh {
     let outline = [[-0.5, 0.0], [0.5, 0.0], [0.5, 0.5], [0.3, 0.5], [0.3, 0.1], [-0.3, 0.1], [-0.3, 0.5], [-0.5, 0.5]];
-    let end = |y: f32| outline.iter().map(move |&[x, z]| [x, y, z]);
-    let positions = end(-0.5).chain(end(0.5)).collect();
-    // Triangles of the outline, counter-clockwise in x and z.
-    let cut = [[0, 1, 4], [1, 2, 3], [1, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 7]];
-    let front = cut;
-    let back = cut.map(|[a, b, c]| [a + 8, c + 8, b + 8]);
-    let rim = (0..8_u32).flat_map(|k| {
-        let next = (k + 1) % 8;
-        [[k, k + 8, next + 8], [k, next + 8, next]]
-    });
-    TriMesh::from_triangles(positions, front.into_iter().chain(back).chain(rim).collect())
+    prism(&outline, &[[0, 1, 4], [1, 2, 3], [1, 3, 4], [0, 4, 5], [0, 5, 6], [0, 6, 7]], 1)
 }

@@ -1,16 +1,18 @@
-//! What cannot be: named, with what would be right, and nothing changed.
+//! Configurations, mesh files and writes that are refused: the error names them, and nothing changes. Mistakes that every
+//! writer can make are in `tests/input/every_writer.rs`.
 
-use super::{Files, brick, empty, object};
+use super::*;
 use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::HullCfg;
+use kinetoscope::sim::mj::ObjectKind;
+use testkit::refusal::assert_error;
 
 #[test]
-fn configurations_that_cannot_be() {
+fn configurations() {
     let mut sim = empty(1);
     let cube = || object("o", ObjectShape::cube(0.1), [0.0; 3]);
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    let bad = [
+    for (field, cfg) in [
         ("shape", RigidObjectCfg { shape: ObjectShape::Cone { radius: 0.0, height: 1.0 }, ..cube() }),
         ("shape", RigidObjectCfg { shape: ObjectShape::Cone { radius: 1.0, height: nan }, ..cube() }),
         ("center_of_mass", RigidObjectCfg { center_of_mass: Some([0.0, infinite, 0.0]), ..cube() }),
@@ -21,77 +23,61 @@ fn configurations_that_cannot_be() {
         ("inertia", RigidObjectCfg { inertia: Some([0.237, 0.694, 0.931]), ..cube() }),
         ("mass", RigidObjectCfg { mass: Some(-1.0), ..cube() }),
         ("mass", RigidObjectCfg { mass: Some(0.0), ..cube() }),
-        ("mass", RigidObjectCfg { mass: Some(nan), body_type: BodyType::Static, ..cube() }),
-        ("mass", RigidObjectCfg { mass: Some(-1.0), body_type: BodyType::Kinematic, ..cube() }),
+        ("mass", fixed(RigidObjectCfg { mass: Some(nan), ..cube() })),
+        ("mass", kinematic(RigidObjectCfg { mass: Some(-1.0), ..cube() })),
         ("linear_damping", RigidObjectCfg { linear_damping: -1.0, ..cube() }),
         ("angular_damping", RigidObjectCfg { angular_damping: infinite, ..cube() }),
-        ("linear_damping", RigidObjectCfg { linear_damping: 1.0, body_type: BodyType::Kinematic, ..cube() }),
+        ("linear_damping", kinematic(RigidObjectCfg { linear_damping: 1.0, ..cube() })),
         ("restitution", RigidObjectCfg { restitution: Some(0.1), ..cube() }),
         ("restitution", RigidObjectCfg { restitution: Some(1.1), ..cube() }),
         ("restitution", RigidObjectCfg { restitution: Some(nan), ..cube() }),
         ("contact_margin", RigidObjectCfg { contact_margin: -1e-3, ..cube() }),
-    ];
-    for (expected, cfg) in bad {
-        let shown = format!("{cfg:?}");
-        match sim.add_rigid_object(cfg) {
-            Err(Error::Config { field, .. }) => assert_eq!(field, expected, "{shown}"),
-            other => panic!("{shown}: {other:?}"),
-        }
+    ] {
+        assert_error(sim.add_rigid_object(cfg), &format!("Config {{ field: {field:?}"), &[]);
     }
     // Control: what is left out of each is good.
     sim.add_rigid_object(cube()).unwrap();
 }
 
 #[test]
-fn mesh_files_that_cannot_be() {
-    let files = Files::new();
-    let good = files.obj("b.obj", &brick([0.5, 0.5, 0.5], [0.0; 3]));
-    let text = files.0.path().join("t.obj");
-    std::fs::write(&text, "v 0 0 0\nf 1 2 3\n").unwrap();
-    let mut sim = empty(1);
-    let mesh = |path: &std::path::Path, scale, hull: HullCfg| ObjectShape::Mesh { path: path.into(), scale, hull };
+fn mesh_files() {
+    let files = Files::default();
+    let good = obj(&files, "b.obj", &brick([0.5, 0.5, 0.5], [0.0; 3]));
+    let (text, absent) = (files.write("t.obj", "v 0 0 0\nf 1 2 3\n"), files.folder().join("none.stl"));
     let few = HullCfg { max_vertices: 3, ..Default::default() };
-    for (shape, says) in [
-        (mesh(&files.0.path().join("none.stl"), [1.0; 3], HullCfg::default()), "none.stl"),
-        (mesh(&text, [1.0; 3], HullCfg::default()), "t.obj"),
-        (mesh(&good, [1.0; 3], few), "max_vertices"),
-    ] {
-        let error = sim.add_rigid_object(object("o", shape, [0.0; 3])).unwrap_err();
-        assert!(matches!(&error, Error::ObjectMesh { object, .. } if object == "o"), "{error}");
-        assert!(error.to_string().contains(says), "{error}");
-    }
-    for scale in [[1.0, 0.0, 1.0], [1.0, f64::NAN, 1.0]] {
-        let error = sim.add_rigid_object(object("o", mesh(&good, scale, HullCfg::default()), [0.0; 3])).unwrap_err();
-        assert!(matches!(error, Error::Config { field: "shape", .. }), "{error}");
-    }
-    sim.add_rigid_object(object("o", mesh(&good, [1.0; 3], HullCfg::default()), [0.0; 3])).unwrap();
+    let mut sim = empty(1);
+    let mut add = |path: &std::path::Path, scale, hull: HullCfg| {
+        let shape = ObjectShape::Mesh { path: path.into(), scale, hull };
+        sim.add_rigid_object(object("o", shape, [0.0; 3]))
+    };
+    let (mesh, hull) = ("ObjectMesh { object: \"o\"", HullCfg::default());
+    assert_error(add(&absent, [1.0; 3], hull), mesh, &["none.stl"]);
+    assert_error(add(&text, [1.0; 3], hull), mesh, &["t.obj"]);
+    assert_error(add(&good, [1.0; 3], few), mesh, &["max_vertices"]);
+    assert_error(add(&good, [1.0, 0.0, 1.0], hull), "Config { field: \"shape\"", &[]);
+    assert_error(add(&good, [1.0, f64::NAN, 1.0], hull), "Config { field: \"shape\"", &[]);
+    add(&good, [1.0; 3], hull).unwrap();
 }
 
 #[test]
-fn writers_that_cannot_write() {
+fn writes() {
     let mut sim = empty(3);
-    let add = |sim: &mut SimulationManager, uid: &str, body_type| {
-        let cfg = RigidObjectCfg { body_type, ..object(uid, ObjectShape::cube(0.1), [0.0; 3]) };
-        sim.add_rigid_object(cfg).unwrap()
+    let cube = |uid| object(uid, ObjectShape::cube(0.1), [0.0; 3]);
+    let [free, hand, stands] =
+        [cube("free"), kinematic(cube("hand")), fixed(cube("fixed"))].map(|cfg| sim.add_rigid_object(cfg).unwrap());
+    let not_dynamic = |result: Result<()>, argument: &str| {
+        assert_error(result, &format!("NotDynamic {{ argument: {argument:?}"), &[]);
     };
-    let free = add(&mut sim, "free", BodyType::Dynamic);
-    let hand = add(&mut sim, "hand", BodyType::Kinematic);
-    let fixed = add(&mut sim, "fixed", BodyType::Static);
     let velocity = array![[1.0; 6]];
-    let not_dynamic = |result: Result<()>, argument: &str| match result {
-        Err(Error::NotDynamic { argument: found, .. }) => assert_eq!(found, argument),
-        other => panic!("{argument}: {other:?}"),
-    };
     not_dynamic(sim.rigid_object_mut(hand).write_velocity(&velocity, None), "write_velocity");
     not_dynamic(sim.rigid_object_mut(hand).set_mass(&array![1.0], None), "set_mass");
-    not_dynamic(sim.rigid_object_mut(fixed).set_inertia(&array![[1.0; 3]], None), "set_inertia");
-    not_dynamic(sim.rigid_object_mut(fixed).set_center_of_mass(&array![[1.0; 3]], None), "set_center_of_mass");
+    not_dynamic(sim.rigid_object_mut(stands).set_inertia(&array![[1.0; 3]], None), "set_inertia");
+    not_dynamic(sim.rigid_object_mut(stands).set_center_of_mass(&array![[1.0; 3]], None), "set_center_of_mass");
     let zeros = array![[0.0; 3]];
     let wrench = sim.rigid_object_mut(hand).set_external_wrench(&zeros, &zeros, WrenchFrame::World, None);
     not_dynamic(wrench, "set_external_wrench");
-    let result = sim.rigid_object_mut(fixed).write_velocity(&velocity, None);
-    assert!(matches!(&result, Err(Error::FixedBody(uid)) if uid == "fixed"), "{result:?}");
-    // An environment that is named twice: which row would hold?
+    assert_error(sim.rigid_object_mut(stands).write_velocity(&velocity, None), "FixedBody(\"fixed\")", &[]);
+    // Poses of objects of every type; the wrench names which of its two tables.
     let twice = Some(&[EnvId(2), EnvId(0), EnvId(2)][..]);
     let rows = |columns| Array2::from_elem((3, columns), 1.0);
     let repeated = |result: Result<()>, called: &str| match result {
@@ -100,21 +86,20 @@ fn writers_that_cannot_write() {
         }
         other => panic!("{called}: {other:?}"),
     };
-    for id in [free, hand, fixed] {
-        repeated(sim.rigid_object_mut(id).write_pose(&rows(7), twice), "write_pose");
+    for id in [free, hand, stands] {
+        let mut object = sim.rigid_object_mut(id);
+        repeated(object.write_pose(&rows(7), twice), "write_pose");
+        assert_error(object.write_pose(&array![[0.0; 7]], None), "Config { field: \"write_pose\"", &[]);
+        assert_error(object.write_pose(&array![[0.0; 6]], None), "Shape {", &[]);
+        let nan = array![[0.0, f64::NAN, 0.0, 1.0, 0.0, 0.0, 0.0]];
+        assert!(matches!(object.write_pose(&nan, None), Err(Error::NotFinite { column: 1, .. })));
     }
     let mut object = sim.rigid_object_mut(free);
-    repeated(object.write_velocity(&rows(6), twice), "write_velocity");
-    repeated(object.set_mass(&array![1.0, 1.0, 1.0], twice), "set_mass");
-    repeated(object.set_friction(&rows(3), twice), "set_friction");
     let wrench = object.set_external_wrench(&rows(3), &rows(3), WrenchFrame::World, twice);
     repeated(wrench, "set_external_wrench (forces)");
-    // Shapes, environments, numbers.
-    assert!(matches!(object.set_mass(&array![1.0, 1.0], None), Err(Error::Shape { argument: "set_mass", .. })));
-    assert!(matches!(object.set_friction(&rows(2), None), Err(Error::Shape { argument: "set_friction", .. })));
-    assert!(matches!(object.set_mass(&array![1.0], Some(&[EnvId(3)])), Err(Error::UnknownIndex { index: 3, .. })));
-    assert!(matches!(object.set_mass(&array![f64::NAN], None), Err(Error::NotFinite { .. })));
+    // The last environment's row is bad: none has changed.
     for result in [
+        object.set_mass(&array![2.0, 2.0, -1.0], None),
         object.set_mass(&array![0.0], None),
         object.set_inertia(&array![[1.0, 1.0, 3.0]], None),
         object.set_friction(&array![[-0.1, 0.0, 0.0]], None),
@@ -122,10 +107,27 @@ fn writers_that_cannot_write() {
     ] {
         assert!(matches!(&result, Err(Error::Randomization(RandomizationError::Value { .. }))), "{result:?}");
     }
-    // The last environment's row is bad: none has changed.
-    assert!(object.set_mass(&array![2.0, 2.0, -1.0], None).is_err());
     let mass = object.read().mass();
     assert_eq!(object.read().get_mass().to_vec(), [mass; 3]);
     assert_eq!(object.read().get_friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
-    assert!(object.read().get_pose().column(0).iter().all(|x| *x == 0.0));
+    for id in [free, hand, stands] {
+        assert!(sim.rigid_object(id).get_pose().column(0).iter().all(|x| *x == 0.0));
+    }
+}
+
+/// Places of single environments: only of static objects, finite, turned by quaternions of length 1.
+#[test]
+fn places() {
+    let (mut sim, shelf, _) = moved::shelf(2, 0.5);
+    let before = sim.rigid_object(shelf).get_pose();
+    for (property, name, value, says) in [
+        (Property::Rotation, "shelf", &[1.0, 1.0, 0.0, 0.0][..], "length 1"),
+        (Property::Position, "shelf", &[f64::INFINITY, 0.0, 0.0], "finite"),
+        (Property::Position, "ball", &[0.0; 3], "static object called"),
+    ] {
+        assert_error(sim.randomize_with(None, |_, _, p| p.set(property, name, value)), "", &[says]);
+    }
+    assert_eq!(sim.rigid_object(shelf).get_pose(), before);
+    let model = sim.batch().model();
+    assert!(model.id(ObjectKind::Body, "shelf").is_some() && sim.property_bytes(EnvId(0)).unwrap() == 0);
 }

@@ -1,0 +1,373 @@
+//! Sensors of parts: MuJoCo's own, joints and actuators, wrenches and frames, against MuJoCo and closed forms.
+
+use super::*;
+use kinetoscope::ndarray::{Array2, ArrayView3, Axis, array};
+use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
+use kinetoscope::sim::mj::{ObjectKind, Overflow};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use testkit::bits::bits;
+use testkit::refusal::assert_error;
+use testkit::worlds::{count_diagnostics, pose_in, row, sr5};
+
+/// A machine with all of MuJoCo's sensors.
+fn sensing(num_envs: usize) -> (SimulationManager, MjcfId, SensorId<MujocoSensor>) {
+    let (mut sim, part) = with(num_envs, MACHINE);
+    let id = sim.add_sensor("all", MujocoSensorCfg::default()).unwrap();
+    (sim, part, id)
+}
+
+fn roomy(sim: &SimulationManager, ctrl: &[f64]) -> Data {
+    let buffers = sim.batch().read(0, |env| env.data().model().buffers());
+    let buffers = buffers.enlarged(Overflow::Contacts).enlarged(Overflow::Constraints);
+    let mut data = Data::new(&sim.batch().model().with_buffers(buffers)).unwrap();
+    data.ctrl_mut().copy_from_slice(ctrl);
+    data
+}
+
+/// `mj_step` leaves all sensors of the state before it; here positions and velocities are of the state after it. Stepped
+/// side by side, every value has the same bits: what is solved those of this `mj_step`, the rest those of the next.
+#[test]
+fn bit_for_bit() {
+    const STEPS: usize = 200;
+    let controls = array![[0.4, -0.3, 0.8], [0.1, 0.2, 0.3]];
+    let (mut sim, part, id) = sensing(2);
+    sim.mjcf_part_mut(part).set_ctrl(&controls, None, None).unwrap();
+    assert_eq!(sim.sensor(id).unwrap().names().len(), 19);
+    let mut plain: Vec<Data> = controls.rows().into_iter().map(|row| roomy(&sim, row.as_slice().unwrap())).collect();
+    plain.iter_mut().for_each(|data| data.step().unwrap());
+    let (mut checked, mut differs) = ([0, 0], 0);
+    for step in 0..STEPS {
+        sim.update(1);
+        let sensor = sim.sensor(id).unwrap();
+        for (env, data) in plain.iter_mut().enumerate() {
+            assert!((sensor.stamps()[env] - sensor.force_stamps()[env] - 0.002).abs() < 1e-12);
+            let then = data.sensordata().to_vec();
+            data.step().unwrap();
+            let now = data.sensordata();
+            for (one, name) in sensor.sensors().iter().zip(sensor.names()) {
+                let range = one.first..one.first + one.width;
+                let (expected, other) = if one.solved { (&then[..], now) } else { (now, &then[..]) };
+                let values: Vec<f64> = sensor.columns(name).unwrap().map(|c| sensor.values()[(env, c)]).collect();
+                let expected = &expected[range.clone()];
+                assert_eq!(bits(&values), bits(expected), "{name} after {step}: {values:?} {expected:?}");
+                checked[usize::from(one.solved)] += 1;
+                differs += usize::from(bits(&values) != bits(&other[range]));
+            }
+        }
+    }
+    assert!(checked[0] > 10 * STEPS && checked[1] > 10 * STEPS, "{checked:?}");
+    // The other instant gives other numbers: the comparison can fail.
+    assert!(differs > 20 * STEPS, "{differs} of {checked:?}");
+}
+
+/// A write is seen at once, by sensors of forces too, and all of them are of the state as it is.
+#[test]
+fn after_a_write() {
+    let (mut sim, part, id) = sensing(2);
+    let at_start = sim.sensor(id).unwrap().values().to_owned();
+    let mut plain = roomy(&sim, &[0.0; 3]);
+    plain.forward().unwrap();
+    assert_eq!(bits(&at_start.row(0)), bits(plain.sensordata()), "before any step");
+    sim.update(40);
+    let (mut qpos, qvel) = (sim.mjcf_part(part).get_qpos(), sim.mjcf_part(part).get_qvel());
+    qpos[(1, 0)] += 0.3;
+    let before = sim.sensor(id).unwrap().value("angle").unwrap()[(1, 0)];
+    sim.mjcf_part_mut(part).write_qpos(&qpos, None).unwrap();
+    let sensor = sim.sensor(id).unwrap();
+    for env in 0..2 {
+        assert_eq!(sensor.stamps()[env], sensor.force_stamps()[env]);
+        plain.qpos_mut().copy_from_slice(&qpos.row(env).to_vec());
+        plain.qvel_mut().copy_from_slice(&qvel.row(env).to_vec());
+        sim.batch().read(env, |env| {
+            plain.act_mut().copy_from_slice(env.data().act());
+            plain.qacc_warmstart_mut().copy_from_slice(env.data().qacc_warmstart());
+            plain.set_time(env.data().time());
+        });
+        plain.forward().unwrap();
+        // Quaternions were normalised once more: the last bits of positions, times the stiffest contact (1e6 N/m).
+        for (value, expected) in sensor.values().row(env).iter().zip(plain.sensordata()) {
+            assert!((value - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{value} is not {expected}");
+        }
+    }
+    assert!((sensor.value("angle").unwrap()[(1, 0)] - before - 0.3).abs() < 1e-9);
+    sim.reset(Some(&[EnvId(1)])).unwrap();
+    assert_eq!(sim.sensor(id).unwrap().values().row(1), at_start.row(1));
+}
+
+/// Names, dimensions and units are those of the types; rate, history and resets those of all sensors.
+#[test]
+fn names_units_and_rate() {
+    let (mut sim, part) = with(1, MACHINE);
+    let patterns = ["acc", "touch", "angle", "speed", "turn", "length", "sensor13", "clock"];
+    let named = |names: &[&str]| MujocoSensorCfg {
+        sensors: Some(names.iter().map(|&name| name.into()).collect()),
+        ..Default::default()
+    };
+    let id = sim.add_sensor("some", named(&patterns)).unwrap();
+    let sensor = sim.sensor(id).unwrap();
+    assert_eq!(sensor.names()[6], "m/sensor13", "one without a name");
+    assert_eq!((sensor.dims(), sensor.values().dim()), (vec![3, 1, 1, 1, 4, 1, 4, 1], (1, 16)));
+    let units = [Some("m/s²"), Some("N"), Some("rad"), Some("m/s"), Some("1"), None, Some("1"), Some("s")];
+    assert_eq!(sensor.units(), units);
+    let kinds: Vec<&str> = sensor.sensors().iter().map(|s| s.kind.as_ref()).collect();
+    assert_eq!(kinds[..4], ["accelerometer", "touch", "jointpos", "jointvel"]);
+    assert_error(sim.add_sensor("wrong", named(&["accc"])), "", &["\"acc\""]);
+
+    let sampling = SamplingCfg { history_length: 3, ..SamplingCfg::every(0.01) };
+    let id = sim.add_sensor("angle", MujocoSensorCfg { sampling, ..named(&["angle"]) }).unwrap();
+    let mut angles = Vec::new();
+    for step in 1..=23_u32 {
+        sim.update(1);
+        if step % 5 == 0 {
+            angles.push(sim.mjcf_part(part).get_qpos()[(0, 0)]);
+        }
+    }
+    let sensor = sim.sensor(id).unwrap();
+    assert_eq!((sensor.sample_counts()[0], sensor.values()[(0, 0)]), (4, angles[3]));
+    let history: Vec<f64> = (0..3).map(|age| sensor.value_history()[(0, age, 0)]).collect();
+    assert_eq!(history, [angles[3], angles[2], angles[1]]);
+    sim.reset(None).unwrap();
+    assert_eq!(sim.sensor(id).unwrap().sample_counts()[0], 0);
+}
+
+/// A block of 2 kg that stands on the ground, a light of 0.3 kg that hangs in the world.
+const AT_REST: &str = r#"<mujoco><worldbody>
+  <geom type="plane" size="1 1 1"/>
+  <body name="block" pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="2"/>
+    <site name="block" type="box" size="0.11 0.11 0.11"/></body>
+  <body name="ceiling" pos="1 0 2">
+    <body name="light" pos="0 0 -0.2"><geom type="sphere" size="0.05" mass="0.3" pos="0.1 0 -0.4"/><site name="mount"/></body>
+  </body></worldbody>
+  <sensor><accelerometer name="acc" site="block"/><touch name="touch" site="block"/><gyro name="gyro" site="block"/>
+    <force name="force" site="mount"/><torque name="torque" site="mount"/>
+    <framepos name="pos" objtype="site" objname="mount"/></sensor></mujoco>"#;
+
+/// At rest an accelerometer reads +g, what touches carries the weight, and a mount holds force and torque of its load.
+#[test]
+fn at_rest() {
+    let (mut sim, part) = with(1, AT_REST);
+    let id = sim.add_sensor("all", MujocoSensorCfg::default()).unwrap();
+    let reads = |sim: &SimulationManager, name: &str, expected: &[f64], within: f64| {
+        let found = sim.sensor(id).unwrap().value(name).unwrap().row(0).to_vec();
+        assert!(near(&found, expected, within), "{name}: {found:?} is not {expected:?}");
+    };
+    // Statics of the mount are exact from the start: weight in the centre of the light, 0.1 m along x. MuJoCo gives what the
+    // light exerts on the ceiling's side as the force that holds it: up, and r x F = (0.1, 0, -0.4) x (0, 0, m g).
+    let (g, weight) = (9.81, 0.3 * 9.81);
+    reads(&sim, "force", &[0.0, 0.0, weight], 1e-12);
+    reads(&sim, "torque", &[0.0, -0.1 * weight, 0.0], 1e-12);
+    reads(&sim, "pos", &[1.0, 0.0, 1.8], 1e-15);
+    // The block sinks into its soft contact for some tenths of a second (time constant 20 ms): after 2 s it stands.
+    sim.update(1000);
+    reads(&sim, "acc", &[0.0, 0.0, g], 1e-6);
+    reads(&sim, "gyro", &[0.0; 3], 1e-6);
+    reads(&sim, "touch", &[2.0 * g], 1e-5);
+    // Thrown up it falls freely: nothing is felt, and nothing touches.
+    sim.mjcf_part_mut(part).write_qvel(&row([0.0, 0.0, 3.0, 0.0, 0.0, 0.0]), None).unwrap();
+    sim.update(100);
+    reads(&sim, "acc", &[0.0; 3], 1e-9);
+    reads(&sim, "touch", &[0.0], 1e-12);
+}
+
+/// A joint of every type, and actuators without and with an activation.
+const MOVERS: &str = r#"<mujoco><worldbody>
+    <body name="drop" pos="2 0 1"><freejoint name="float"/><geom size="0.1"/></body>
+    <body name="a" pos="0 0 1"><joint name="turn" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/>
+      <body name="b" pos="0.5 0 0"><joint name="ball" type="ball"/><geom size="0.05"/>
+        <body name="c" pos="0.2 0 0"><joint name="push" type="slide" axis="1 0 0"/><geom size="0.05"/></body></body></body>
+  </worldbody>
+  <actuator><motor name="motor" joint="turn" gear="2"/><position name="servo" joint="push" kp="10"/>
+    <general name="lag" joint="turn" dyntype="filter" dynprm="0.1" gainprm="4"/></actuator></mujoco>"#;
+
+/// A motor exerts its control times its gear, a servo 10 N/m times its error at the beginning of the step, and a filter of
+/// 0.1 s comes near its control by one fiftieth in each step of 2 ms.
+#[test]
+fn joints_and_actuators() {
+    const CONTROLS: [[f64; 3]; 2] = [[0.3, 0.5, 0.2], [-0.1, 0.4, 0.0]];
+    let (mut sim, part) = with(2, MOVERS);
+    let joints = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
+    let actuators = sim.add_sensor("actuators", ActuatorStateCfg::default()).unwrap();
+    // The ball and the free joint have no single number.
+    assert_eq!(sim.sensor(joints).unwrap().joint_names(), ["m/turn", "m/push"]);
+    assert_eq!(sim.sensor(actuators).unwrap().actuator_names(), ["m/motor", "m/servo", "m/lag"]);
+    sim.mjcf_part_mut(part).set_ctrl(&Array2::from(CONTROLS.to_vec()), None, None).unwrap();
+    let columns = sim.mjcf_part(part).qpos_columns(&["turn", "push"]).unwrap();
+    for step in 1..=100_i32 {
+        let before = sim.sensor(joints).unwrap().positions().to_owned();
+        sim.update(1);
+        let (joint, actuator) = (sim.sensor(joints).unwrap(), sim.sensor(actuators).unwrap());
+        let qpos = sim.mjcf_part(part).get_qpos();
+        for (env, [motor, servo, lag]) in CONTROLS.into_iter().enumerate() {
+            let act = |steps: i32| lag * (1.0 - 0.98_f64.powi(steps));
+            let push = 10.0 * (servo - before[(env, 1)]);
+            let lagging = 4.0 * act(step - 1);
+            let of = |values: kinetoscope::ndarray::ArrayView2<'_, f64>| values.row(env).to_vec();
+            for (what, found, expected) in [
+                ("efforts", of(joint.efforts()), &[2.0 * motor + lagging, push][..]),
+                ("controls", of(actuator.controls()), &[motor, servo, lag]),
+                ("forces", of(actuator.forces()), &[motor, push, lagging]),
+                ("activations", of(actuator.activations()), &[0.0, 0.0, act(step)]),
+            ] {
+                // Rounding of a handful of operations on numbers of about 10.
+                assert!(near(&found, expected, 1e-13), "{what} at step {step}: {found:?}, not {expected:?}");
+            }
+            assert_eq!(of(joint.positions()), [0, 1].map(|k| qpos[(env, columns[k].start)]));
+        }
+        let speed = (joint.positions()[(0, 0)] - before[(0, 0)]) / 0.002;
+        // Euler: the position went by the new velocity.
+        assert!((joint.velocities()[(0, 0)] - speed).abs() < 1e-10, "{speed}");
+    }
+    assert!(sim.sensor(joints).unwrap().positions()[(0, 1)].abs() > 1e-3, "the control: it moves");
+}
+
+/// Joints and actuators of robots come first, whatever was added first; their drives are actuators too.
+#[test]
+fn joints_of_robots() {
+    let (mut sim, _) = with(1, MOVERS);
+    let every = sim.add_sensor("every", JointStateCfg::default()).unwrap();
+    let motors = ActuatorStateCfg { actuators: Some(vec!["servo".into(), "JOINT[12]".into()]), ..Default::default() };
+    assert_error(sim.add_sensor("motors", motors.clone()), "", &["JOINT[12]", "\"motor\""]);
+    let arm = sim.add_robot(sr5("arm")).unwrap();
+    let motors = sim.add_sensor("motors", motors).unwrap();
+    let names = sim.sensor(every).unwrap().joint_names().to_vec();
+    assert_eq!((names.len(), &names[0][..], &names[6][..], &names[7][..]), (8, "arm/JOINT1", "m/turn", "m/push"));
+    sim.robot_mut(arm).set_qpos(&array![[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]], None, None).unwrap();
+    sim.update(5);
+    let (sensor, qf) = (sim.sensor(motors).unwrap(), sim.robot(arm).get_qf());
+    assert_eq!(sensor.actuator_names(), ["m/servo", "arm/JOINT1", "arm/JOINT2"]);
+    assert_eq!(sensor.controls(), array![[0.0, 0.1, 0.2]]);
+    assert_eq!(sensor.forces().row(0).to_vec()[1..], qf.row(0).to_vec()[..2]);
+    assert!(qf[(0, 1)].abs() > 1.0, "the control: it carries a load");
+    assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["measure nothing"]);
+}
+
+/// Masses with centres in the frame of the arm: the arm's own, and that of the tool, which is welded to it and has its mass
+/// in its origin.
+const LOADS: [(f64, [f64; 3]); 2] = [(1.5, [0.2, 0.0, -0.1]), (2.0, [0.35, 0.1, -0.4])];
+const PALM: [f64; 3] = [0.05, -0.02, 0.1];
+
+/// A crane that stands in one environment and turns freely about the vertical in the other. What its joint exerts carries
+/// all that is beyond it and bends its way: `F = sum m (omega x (omega x c) - g)`, and about the palm
+/// `T = sum (c - p) x m (omega x (omega x c) - g)`, both turned into the axes of the palm.
+#[test]
+fn wrench_at_a_site() {
+    let turn = from_xyz_rpy([0.0; 3], [0.4, -0.2, 0.7]).rotation;
+    let joined = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    // Moments that are alike about all axes: turning needs no torque of its own.
+    let inertial = |mass: f64, at: &[f64]| {
+        format!(r#"<inertial pos="{}" mass="{mass}" diaginertia="0.01 0.01 0.01"/>"#, joined(at))
+    };
+    let crane = format!(
+        r#"<mujoco><worldbody><body name="arm" pos="0 0 2"><joint name="turn" axis="0 0 1"/>{}
+        <body name="tool" pos="{}">{}<site name="palm" pos="{}" quat="{}"/></body></body></worldbody></mujoco>"#,
+        inertial(LOADS[0].0, &LOADS[0].1),
+        joined(&LOADS[1].1),
+        inertial(LOADS[1].0, &[0.0; 3]),
+        joined(&PALM),
+        joined(&[turn.w, turn.i, turn.j, turn.k]),
+    );
+    let mut sim = empty(2);
+    // The part stands turned about the vertical, which changes nothing in the axes of its bodies.
+    let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.0, 0.0, 0.5]);
+    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", crane) }).unwrap();
+    let cfg = JointWrenchCfg { links: vec!["m/arm".into()], frames: vec!["m/palm".into()], ..Default::default() };
+    let id = sim.add_sensor("wrench", cfg).unwrap();
+    let omegas = [0.0, 3.0];
+    sim.mjcf_part_mut(part).write_qvel(&array![[omegas[0]], [omegas[1]]], None).unwrap();
+    let palm = Vector3::from(LOADS[1].1) + Vector3::from(PALM);
+    let up = Vector3::new(0.0, 0.0, 9.81);
+    let wrench_about = |p: Vector3<f64>, omega: f64| {
+        LOADS.iter().fold((Vector3::zeros(), Vector3::zeros()), |(force, torque), (mass, com)| {
+            let com = Vector3::from(*com);
+            let needed = *mass * (up - omega * omega * Vector3::new(com.x, com.y, 0.0));
+            (force + needed, torque + (com - p).cross(&needed))
+        })
+    };
+    // Sums of a few numbers of at most 100, with 16 digits, through chains of frames of unit length: 1e-13.
+    let same = |found: ArrayView3<'_, f64>, env: usize, b: usize, expected: Vector3<f64>| {
+        let found = Vector3::from_fn(|k, _| found[(env, b, k)]);
+        assert!((found - expected).norm() < 1e-11, "environment {env}, {b}: {found} is not {expected}");
+    };
+    for _ in 0..4 {
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.link_names(), ["m/arm", "m/palm"]);
+        for (env, omega) in omegas.into_iter().enumerate() {
+            for (b, about, axes) in [(0, Vector3::zeros(), UnitQuaternion::identity()), (1, palm, turn.inverse())] {
+                let (force, torque) = wrench_about(about, omega);
+                same(sensor.forces(), env, b, axes * force);
+                same(sensor.torques(), env, b, axes * torque);
+            }
+        }
+        sim.update(30);
+    }
+    // The controls: the palm is elsewhere and turned, and turning is felt.
+    let (still, turning) = (wrench_about(palm, 0.0), wrench_about(palm, 3.0));
+    assert!((still.1 - wrench_about(Vector3::zeros(), 0.0).1).norm() > 1.0 && (turning.0 - still.0).norm() > 1.0);
+    assert!((turn.inverse() * still.0 - still.0).norm() > 1.0);
+}
+
+/// Sites are frames where MuJoCo has them, for sensors of frames, cameras and the handle of the part.
+#[test]
+fn sites() {
+    const SITES: [&str; 6] = ["hook", "elbow", "plate.site", "palm", "axle", "inside"];
+    let mut sim = empty(2);
+    let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.1, 0.2, -0.4]);
+    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", MACHINE) }).unwrap();
+    assert!(count_diagnostics(&sim, &["the site \"plate\" is called as a body"]) > 0);
+    let targets = SITES.iter().map(|site| TargetFrameCfg::of(format!("m/{site}"))).collect();
+    let frames = sim.add_sensor("frames", FrameTransformerCfg::from("m/elbow", targets)).unwrap();
+    let extrinsics = Extrinsics { parent: Some("m/palm".into()), ..Default::default() };
+    let camera = CameraCfg { width: 8, height: 8, extrinsics, ..Default::default() };
+    let camera = sim.add_sensor("camera", camera).unwrap();
+    let imu = sim.add_sensor("imu", ImuCfg::on("palm")).unwrap();
+    sim.update(120);
+    let model = sim.batch().model().clone();
+    for env in 0..2 {
+        let transformer = sim.sensor(frames).unwrap();
+        for (m, site) in SITES.iter().enumerate() {
+            let id = model.id(ObjectKind::Site, &format!("m/{}", site.trim_end_matches(".site"))).unwrap();
+            let (position, rotation) = sim.batch().read(env, |env| {
+                let (p, m) = (&env.data().site_xpos()[3 * id..], &env.data().site_xmat()[9 * id..9 * id + 9]);
+                ([p[0], p[1], p[2]], Matrix3::<f64>::from_row_slice(m))
+            });
+            // A few operations on numbers of about 1: 1e-14.
+            let is_there = |what: &str, pose: Pose, rotation: Matrix3<f64>| {
+                let off = (pose.rotation.to_rotation_matrix().into_inner() - rotation).norm();
+                let far = (pose.translation.vector - Vector3::from(position)).norm();
+                assert!(far < 1e-12 && off < 1e-12, "{what} of {site}: {far} m, {off}");
+            };
+            let at = |values: ArrayView3<'_, f64>| values.index_axis(Axis(0), env).row(m).to_vec();
+            let (p, q) = (at(transformer.target_pos_w()), at(transformer.target_quat_w()));
+            is_there("frame", from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), rotation);
+            if *site == "palm" {
+                // A camera without a placement of its own looks along the site's z axis.
+                let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::World);
+                assert!((0..3).all(|k| (at[(env, k)] - position[k]).abs() < 1e-12), "the camera stands on the site");
+                let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::Ros).to_owned();
+                is_there("camera", pose_in(&at, env), rotation);
+                is_there("handle", pose_in(&sim.mjcf_part(part).site_pose("palm").unwrap(), env), rotation);
+            }
+        }
+        assert_ne!(transformer.target_pos_w()[(env, 1, 0)], transformer.target_pos_w()[(env, 3, 0)]);
+    }
+    // Another site is another place, and turned: the comparison above can fail.
+    let hook = pose_in(&sim.mjcf_part(part).site_pose("hook").unwrap(), 0);
+    assert!(hook.rotation.angle_to(&UnitQuaternion::identity()) > 0.1);
+    let expected = init_pose.transform_point(&nalgebra::Point3::new(0.1, -0.2, 0.9));
+    assert!((hook.translation.vector - expected.coords).norm() < 1e-12);
+    assert!(sim.sensor(imu).unwrap().ang_vel_b().iter().any(|w| w.abs() > 1e-3), "it is read");
+}
+
+/// A site, and a body that no joint moves, are moved by the body that has one.
+#[test]
+fn welded_frames() {
+    let (mut sim, _) = with(1, MACHINE);
+    let wrench = |link: &str| JointWrenchCfg { links: vec![link.into()], ..Default::default() };
+    for (link, carrier) in [("m/elbow", "m/arm"), ("m/plate", "m/arm"), ("m/plate.site", "m/arm"), ("m/palm", "m/hand")]
+    {
+        assert_error(sim.add_sensor("w", wrench(link)), "", &[link, carrier]);
+    }
+    sim.add_sensor("w", wrench("m/arm")).unwrap();
+    let unknown = FrameTransformerCfg::from("m/elbwo", vec![]);
+    assert_error(sim.add_sensor("f", unknown), "", &["known are \"m/elbow\""]);
+}

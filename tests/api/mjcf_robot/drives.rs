@@ -1,0 +1,231 @@
+//! Drives that a file's actuators say, of single joints, followers and tendons, and what the configuration changes of them.
+
+use super::*;
+use kinetoscope::ndarray::array;
+use testkit::worlds::{count_diagnostics, empty_cfg, gains};
+
+/// Five joints: a servo with a gear, a motor, a servo of velocity, two on a tendon, and one that nothing acts on; the last
+/// two actuators are of one joint.
+const MACHINE: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="1"/>
+    <body name="a"><joint name="servo" axis="0 0 1" armature="0.1"/><geom size="0.05" mass="1"/></body>
+    <body name="b"><joint name="motor" axis="0 0 1" damping="0.2"/><geom size="0.05" mass="1"/></body>
+    <body name="c"><joint name="wheel" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
+    <body name="d"><joint name="finger1" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
+    <body name="e"><joint name="finger2" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
+    <body name="f"><joint name="idle" axis="0 0 1" frictionloss="0.3"/><geom size="0.05" mass="1"/></body>
+  </body></worldbody>
+  <tendon><fixed name="both"><joint joint="finger1" coef="0.5"/><joint joint="finger2" coef="-2"/></fixed></tendon>
+  <actuator><position name="p" joint="servo" kp="30" gear="2" forcerange="-4 4"/>
+    <motor name="m" joint="motor" gear="-3" ctrlrange="-1 2"/><velocity name="v" joint="wheel" kv="0.7"/>
+    <position name="t" tendon="both" kp="100" forcerange="-10 10"/><motor name="m2" joint="motor" gear="1" ctrlrange="-5 5"/>
+  </actuator></mujoco>"#;
+
+fn is_said(sim: &SimulationManager, words: &[&str]) {
+    assert!(count_diagnostics(sim, words) > 0, "{words:?}: {:#?}", sim.diagnostics());
+}
+
+/// Gains and limits are those of the file unless the configuration names others.
+#[test]
+fn gains_and_limits() {
+    let (sim, id) = with(1, robot("m", MACHINE));
+    let of = sim.robot(id);
+    assert_eq!(of.joint_names(), ["servo", "motor", "wheel", "finger1", "finger2", "idle"]);
+    let infinite = f64::INFINITY;
+    // Gear and coefficients count twice in gains and once in efforts; 1e4 and 1e3 where the file says only that there is an
+    // effort.
+    assert_eq!(of.get_stiffness(), array![[120.0, 1e4, 0.0, 25.0, 400.0, 0.0]]);
+    assert_eq!(of.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 0.0]]);
+    assert_eq!(of.qf_limits(), array![[8.0, 11.0, infinite, 5.0, 20.0, infinite]]);
+    assert_eq!((of.get_armature()[(0, 0)], of.get_friction()[(0, 5)]), (0.1, 0.3));
+    let types = of.get_drive_types();
+    assert_eq!((types[(0, 4)], types[(0, 5)]), (DriveType::Force, DriveType::None));
+    is_said(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
+    is_said(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
+
+    // Named joints have what is said of them, and an idle one that is named is driven.
+    let drive = DriveCfg {
+        stiffness: [("servo|idle", 50.0)].into(),
+        max_effort: Some([("motor", 7.0)].into()),
+        armature: [("wheel", 0.4)].into(),
+        ..Default::default()
+    };
+    let (sim, id) = with(1, RobotCfg { drive, ..robot("m", MACHINE) });
+    let of = sim.robot(id);
+    assert_eq!(of.get_stiffness(), array![[50.0, 1e4, 0.0, 25.0, 400.0, 50.0]]);
+    assert_eq!(of.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 1e3]]);
+    assert_eq!(of.qf_limits()[(0, 1)], 7.0);
+    assert_eq!((of.get_armature()[(0, 0)], of.get_armature()[(0, 2)]), (0.1, 0.4));
+
+    // One number for all is for all. Without any actuator all joints are driven, as in a URDF.
+    let bare = format!("{}</mujoco>", &MACHINE[..MACHINE.find("<tendon>").unwrap()]);
+    for (cfg, stiffness) in
+        [(RobotCfg { drive: gains(9.0, 2.0), ..robot("m", MACHINE) }, 9.0), (robot("m", &bare), 1e4)]
+    {
+        let (sim, id) = with(1, cfg);
+        assert!(sim.robot(id).get_stiffness().iter().all(|k| *k == stiffness));
+    }
+
+    // The softness of dry friction is the drives' where they hold it: a file that sets its own is told so.
+    for (softness, times) in [("", 0), (r#"solreffriction="0.05 1""#, 1), (r#"solimpfriction="0.8 0.9 0.001""#, 1)] {
+        let text = MACHINE.replace(r#"frictionloss="0.3""#, &format!(r#"frictionloss="0.3" {softness}"#));
+        let (sim, _) = with(1, robot("m", &text));
+        assert_eq!(count_diagnostics(&sim, &["solreffriction", "\"idle\""]), times, "{softness}");
+    }
+}
+
+/// A scene with the step of the files that are judged by MuJoCo alone, and their data.
+fn fine(text: &str) -> (SimulationManager, RobotId, Data) {
+    let cfg = SimulationManagerCfg { physics_dt: 1e-4, gravity: [0.0; 3].into(), ..empty_cfg(1) };
+    let mut sim = testkit::worlds::sim(cfg);
+    let id = sim.add_robot(robot("r", text)).unwrap();
+    (sim, id, Data::new(&mj::compile(text, &[]).unwrap().into_model()).unwrap())
+}
+
+/// The drive that stands for an actuator is its law. Ours is evaluated at the end of the step of h = 1e-4 s, which adds a damping
+/// of `h kp = 2e-3` to the 0.8 N m s/rad of joint and drive: a quarter of a percent, of which 2e-3 rad are left of 0.5.
+#[test]
+fn servo() {
+    let text = r#"<mujoco><option timestep="0.0001" gravity="0 0 0"/><default><geom contype="0" conaffinity="0"/></default>
+        <worldbody><body name="base"><geom size="0.1" mass="1"/>
+        <body><joint name="j" axis="0 0 1" damping="0.4"/><geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" mass="1"/></body>
+        </body></worldbody>
+        <actuator><general joint="j" gear="2" gaintype="fixed" biastype="affine" gainprm="5" biasprm="0 -5 -0.1"/></actuator>
+        </mujoco>"#;
+    let (mut sim, id, mut data) = fine(text);
+    assert_eq!((sim.robot(id).get_stiffness()[(0, 0)], sim.robot(id).get_damping()[(0, 0)]), (20.0, 0.4));
+    sim.robot_mut(id).set_qpos(&array![[0.5]], None, None).unwrap();
+    // The length of the actuator is twice the angle.
+    data.ctrl_mut()[0] = 1.0;
+    let mut farthest = 0.0f64;
+    for _ in 0..50 {
+        sim.update(50);
+        (0..50).for_each(|_| data.step().unwrap());
+        let (ours, theirs) = (sim.robot(id).get_qpos()[(0, 0)], data.qpos()[0]);
+        assert!((ours - theirs).abs() < 2e-3, "{ours} {theirs}");
+        farthest = farthest.max(theirs);
+    }
+    assert!(farthest > 0.5, "it overshoots: {farthest}");
+}
+
+/// `a` follows `b` by -0.5 and `c` follows `a` by 3; the actuators are at the ends of the chain.
+pub(super) const CHAIN: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 0"/>
+  <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="base"><geom size="0.1" mass="1"/>
+    <body name="a"><joint name="a" axis="0 0 1"/><geom size="0.01" mass="0.01"/></body>
+    <body name="b"><joint name="b" axis="0 0 1" stiffness="61.25"/><geom size="0.05" mass="1"/></body>
+    <body name="c"><joint name="c" axis="0 0 1"/><geom size="0.01" mass="0.01"/></body>
+  </body></worldbody>
+  <equality><joint joint1="a" joint2="b" polycoef="0 -0.5 0 0 0" solref="0.004 1"/>
+    <joint joint1="c" joint2="a" polycoef="0 3 0 0 0" solref="0.004 1"/></equality>
+  <actuator><position name="pa" joint="a" kp="100" gear="2" forcerange="-30 30"/>
+    <general name="pc" joint="c" gaintype="fixed" biastype="affine" gainprm="10" biasprm="0 -10 -4" forcerange="-20 20"/></actuator>
+  </mujoco>"#;
+
+/// An actuator of a follower drives the joint that it follows. By virtual work: `k = 100 (2 · 0.5)² + 10 · 1.5²`,
+/// `d = 4 · 1.5²`, `F = 30 · 2 · 0.5 + 20 · 1.5`. Against a spring of k / 2 the drive comes two thirds of the way.
+#[test]
+fn followers() {
+    let (mut sim, id) = with(1, robot("r", CHAIN));
+    let of = sim.robot(id);
+    let b = of.joint_id("b").unwrap();
+    assert_eq!((of.get_stiffness(), of.get_damping()), (array![[0.0, 122.5, 0.0]], array![[0.0, 9.0, 0.0]]));
+    assert_eq!((of.qf_limits()[(0, 1)], of.get_drive_types()[(0, 1)]), (60.0, DriveType::Force));
+    is_said(&sim, &["actuator \"pa\"", "\"a\" follows \"b\""]);
+    sim.robot_mut(id).set_qpos(&array![[0.3]], Some(&[b]), None).unwrap();
+    sim.update(2000);
+    let qpos = sim.robot(id).get_qpos();
+    // Nothing moves any more, so no coupling is loaded: the decay of four seconds is left.
+    assert!(largest(&(&qpos - &array![[-0.1, 0.2, -0.3]])) < 1e-4, "{qpos}");
+
+    // A joint on a curve follows nothing that a drive could stand for; that its actuator is gone is said.
+    let (sim, id) = with(1, robot("r", &CHAIN.replace("0 -0.5 0 0 0", "0 -0.5 0.1 0 0")));
+    assert!(sim.robot(id).get_drive_types().iter().all(|kind| *kind == DriveType::None));
+    for name in ["pa", "pc"] {
+        is_said(&sim, &[&format!("actuator {name:?}"), "an equality holds"]);
+    }
+}
+
+/// Two fingers on one tendon, the pattern of parallel grippers; `%` is the polynomial of the second.
+pub(super) const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option timestep="0.0001" gravity="0 0 0"/>
+  <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="palm"><geom size="0.03" mass="1"/>
+    <body name="left"><joint name="left" type="slide" axis="0 1 0" range="0 0.04"/><geom size="0.01" mass="0.5"/></body>
+    <body name="right"><joint name="right" type="slide" axis="0 -1 0" range="0 0.04"/><geom size="0.01" mass="0.5"/></body>
+  </body></worldbody>
+  <tendon><fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/></fixed></tendon>
+  <equality><joint joint1="right" joint2="left" polycoef="0 % 0 0 0" solref="0.002 1"/></equality>
+  <actuator><general name="grip" tendon="split" gaintype="fixed" biastype="affine" gainprm="0.01568627451 0 0"
+    biasprm="0 -100 -10" ctrlrange="0 255" forcerange="-100 100"/></actuator></mujoco>"#;
+
+/// A gripper closes as the tendon that moves both fingers. MuJoCo with the file alone is the judge, at its own step of
+/// h = 1e-4 s: m = 1 kg, k = 100, d = 10, so ω = 10 and ζ = 1/2. Our drive is evaluated at the end of the step, which adds
+/// h k = 0.01 to d, 0.1 percent; the coupling, loaded by half of the force of at most 3 N at 0.5 kg, gives way by less than
+/// 6 m/s² (0.002 s)² = 2.4e-5 m. So 1e-4 m of 0.03.
+#[test]
+fn gripper() {
+    let text = GRIPPER.replace('%', "1");
+    let [same, half] = [1.0, 0.5].map(|scale| {
+        let (mut sim, id, mut data) = fine(&text);
+        let left = sim.robot(id).joint_id("left").unwrap();
+        if scale == 1.0 {
+            let of = sim.robot(id);
+            let drive = (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)], of.qf_limits()[(0, 0)]);
+            assert_eq!(drive, (100.0, 10.0, 100.0));
+            is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
+            assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
+        } else {
+            sim.robot_mut(id).set_stiffness(&array![[100.0 * scale]], Some(&[left]), None).unwrap();
+        }
+        sim.robot_mut(id).set_qpos(&array![[0.03]], Some(&[left]), None).unwrap();
+        data.ctrl_mut()[0] = 0.03 * 100.0 / 0.01568627451;
+        let mut worst = 0.0f64;
+        for _ in 0..40 {
+            sim.update(100);
+            (0..100).for_each(|_| data.step().unwrap());
+            let off = sim.robot(id).get_qpos().iter().zip(data.qpos()).map(|(a, b)| a - b).collect::<Vec<f64>>();
+            worst = worst.max(largest(&off));
+        }
+        assert!(data.qpos()[0] > 0.025, "it came there: {:?}", data.qpos());
+        worst
+    });
+    assert!(same < 1e-4 && half > 2e-3, "{same} m; the control, half the stiffness: {half} m");
+
+    // A tendon that keeps its length while the fingers go drives nothing.
+    let (sim, id) = with(1, robot("r", &GRIPPER.replace('%', "-1")));
+    assert_eq!(sim.robot(id).get_drive_types()[(0, 0)], DriveType::None);
+    assert_eq!(sim.robot(id).get_stiffness(), Array2::<f64>::zeros((1, 2)));
+    is_said(&sim, &["actuator \"grip\"", "never moves \"left\""]);
+}
+
+/// The scale of a control is no part of the gains, and differences between a drive and the actuator are said, one by one.
+#[test]
+fn differences() {
+    let scaled = r#"gaintype="fixed" biastype="affine" gainprm="0.0157 0 0" biasprm="0 -100 -10""#;
+    let with_scaled = |more: &str| format!("{scaled} {more}");
+    let (servo, plain, infinite) = ((100.0, 10.0), (1e4, 1e3), f64::INFINITY);
+    for (range, actuator, gains, limit, words) in [
+        ("", with_scaled(""), servo, infinite, ""),
+        (r#"range="0 0.04""#, with_scaled(r#"ctrlrange="0 255""#), servo, infinite, ""),
+        (r#"range="0 0.05""#, with_scaled(r#"ctrlrange="0 255""#), servo, infinite, "0 .. 255 does not limit"),
+        ("", with_scaled(r#"ctrlrange="0 255""#), servo, infinite, "its ctrlrange"),
+        ("", with_scaled(r#"forcerange="0 5""#), servo, 5.0, "its forcerange 0 .. 5 became -5 .. 5"),
+        ("", with_scaled(r#"dyntype="filter" dynprm="0.1""#), servo, infinite, "its activation (filter)"),
+        ("", r#"gainprm="2" ctrlrange="-1 3" forcerange="-5 5""#.into(), plain, 5.0, "-2 .. 6 became -6 .. 6"),
+        ("", r#"gainprm="2" ctrlrange="-1 1" forcerange="-5 5""#.into(), plain, 2.0, ""),
+        ("", r#"biastype="affine" gainprm="5" biasprm="1 -5 0""#.into(), plain, infinite, "no servo and no motor"),
+        ("", r#"gaintype="affine" gainprm="5 1 0""#.into(), plain, infinite, "gaintype affine"),
+        ("", r#"gear="0""#.into(), (0.0, 0.0), infinite, "never moves"),
+    ] {
+        let text = format!(
+            r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="1"/>
+            <body><joint name="j" type="slide" {range}/><geom size="0.05" mass="1"/></body></body></worldbody>
+            <actuator><general name="x" joint="j" {actuator}/></actuator></mujoco>"#
+        );
+        let (sim, id) = with(1, robot("r", &text));
+        let of = sim.robot(id);
+        let found = (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)]);
+        assert_eq!((found, of.qf_limits()[(0, 0)]), (gains, limit), "{actuator}");
+        let all = count_diagnostics(&sim, &["differs from its drive"]);
+        let expected = usize::from(!words.is_empty());
+        let named = count_diagnostics(&sim, &["differs from its drive", "actuator \"x\"", words]);
+        assert_eq!((all, named), (expected, expected), "{actuator}: {:#?}", sim.diagnostics());
+    }
+}

@@ -1,0 +1,181 @@
+//! Names and control parts, scene files, dumps, and MuJoCo's own sample models as robots.
+
+use super::*;
+use kinetoscope::ndarray::array;
+use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::mj::{TARGET, Target, compile_file};
+use testkit::refusal::assert_error;
+use testkit::urdf::Files;
+use testkit::worlds::{errors, pose_in, sr5, urdf_robot};
+
+/// Elements without a name are called by their number.
+#[test]
+fn unnamed_elements() {
+    let text = r#"<mujoco><worldbody><body><geom size="0.1" mass="1"/>
+        <body name="joint1"><joint axis="0 0 1"/><geom size="0.1" mass="1"/><site/></body>
+        <body><joint name="joint0" axis="0 0 1" pos="0.1 0 0"/><joint axis="0 1 0" pos="0 0.1 0"/><geom size="0.1" mass="1"/>
+          <site name="joint1"/></body></body></worldbody></mujoco>"#;
+    let (sim, id) = with(1, robot("r", text));
+    // The joint that is joint0 in the file keeps its name, the one before it that has none gets another.
+    assert_eq!(sim.robot(id).joint_names(), ["joint0_", "joint0", "joint2"]);
+    let links = ["body1", "joint1", "body3", "joint1.site"];
+    assert_eq!(sim.robot(id).link_names(), links, "a site that is called as a body");
+    assert!(sim.diagnostics().iter().any(|d| d.kind == DiagnosticKind::NameClash));
+}
+
+/// Control parts are patterns of joint names.
+#[test]
+fn control_parts() {
+    let part = |name: &str, patterns: &[&str]| (name.to_string(), patterns.iter().map(|p| p.to_string()).collect());
+    let cfg = RobotCfg {
+        control_parts: vec![part("arm", &["pan", "lift|elbow"]), part("wrist", &["[ry].*l|yaw|pitch"])],
+        init_qpos: vec![("arm".into(), 0.25), ("rail".into(), 0.05)],
+        drive: DriveCfg { stiffness: [("arm", 500.0), ("wrist", 40.0)].into(), ..Default::default() },
+        ..robot("odd", ODD)
+    };
+    let (sim, id) = with(1, cfg.clone());
+    let of = sim.robot(id);
+    assert_eq!(of.control_parts(), ["arm", "wrist"]);
+    assert_eq!(of.get_joint_ids("arm").unwrap(), [0, 1, 2].map(JointIndex));
+    assert_eq!(of.get_joint_ids("wrist").unwrap(), [3, 4, 5, 6].map(JointIndex));
+    assert_eq!(of.get_stiffness().row(0).to_vec(), [500.0, 500.0, 500.0, 40.0, 40.0, 40.0, 40.0]);
+    assert_eq!(of.get_qpos().row(0).to_vec(), [0.25, 0.25, 0.25, 0.05, 0.0, 0.0, 0.0]);
+    let wrong = RobotCfg { control_parts: vec![part("arm", &["elbo"])], ..cfg.clone() };
+    assert_error(empty(1).add_robot(wrong), "", &["elbo", "\"elbow\""]);
+    let wrong = RobotCfg { drive: DriveCfg { stiffness: [("lft", 1.0)].into(), ..Default::default() }, ..cfg };
+    assert_error(empty(1).add_robot(wrong), "", &["lft", "\"lift\""]);
+    assert_error(of.link_id("hnd"), "", &["\"hand\""]);
+    // Frames behind the joints of a body have no names, where a joint follows or the anchor is beside the body's origin: two
+    // of the shoulder, two of the carriage, one of the hand.
+    assert!(of.link_id("pan.frame").is_err());
+    let named: Vec<&str> = of.description().named_links().iter().map(|link| link.name.as_str()).collect();
+    assert_eq!(named[..6], ["base", "shoulder", "fore", "carriage", "plate", "hand"]);
+    assert!(named.contains(&"tip") && named.contains(&"shoulder_site"), "{named:?}");
+    assert_eq!(of.description().links.len() - named.len(), 2 + 2 + 1);
+}
+
+/// Robots of one file are told apart by their uid.
+#[test]
+fn one_file_twice() {
+    let (mut sim, left) = with(1, robot("left", ODD));
+    let right = sim.add_robot(robot("right", ODD)).unwrap();
+    assert_error(sim.add_robot(robot("left", ODD)), "DuplicateUid", &[]);
+    sim.add_mjcf(MjcfCfg::text("part", ODD)).unwrap();
+    sim.add_robot(sr5("sr5")).unwrap();
+    sim.robot_mut(right).write_qpos(&array![[0.3]], Some(&[JointIndex(6)]), None).unwrap();
+    assert_eq!((sim.robot(left).get_qpos()[(0, 6)], sim.robot(right).get_qpos()[(0, 6)]), (0.0, 0.3));
+    assert_eq!(sim.robot(right).joint_names(), sim.robot(left).joint_names());
+}
+
+/// A scene file names the MJCF of a robot by its path, beside the file.
+#[test]
+fn scene_files() {
+    let files = Files::default();
+    files.write("odd.xml", ODD);
+    let text = "[entities.arm]\ntype = \"robot\"\nmjcf = \"odd.xml\"\ndrive.stiffness = 500.0\n";
+    let path = files.write("scene.toml", text);
+    let written = SceneCfg::from_file(&path).unwrap().to_toml(&EntityTypes::default()).unwrap();
+    for file in [path, files.write("again.toml", written)] {
+        let scene = InteractiveScene::from_file(&file).unwrap();
+        let arm = scene.robot("arm").unwrap();
+        assert_eq!((arm.dof(), arm.get_stiffness()[(0, 0)]), (7, 500.0));
+    }
+}
+
+/// A dump opens in plain MuJoCo and is the same robot, drives included. As a URDF it is the same tree: its joints and masses,
+/// without shapes.
+#[test]
+fn dumps() {
+    let (mut sim, id) = super::scenes::moving();
+    let files = Files::default();
+    sim.dump(files.folder()).unwrap();
+    let file = if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
+    let model = compile_file(&files.folder().join(file)).unwrap().into_model();
+    assert_eq!((model.nv(), model.nu()), (7, 7));
+    assert!((model.body_mass().iter().sum::<f64>() - 7.2).abs() < 1e-12);
+    assert_eq!((model.dof_damping()[2], model.dof_armature()[1]), (0.2, 0.01));
+    let (mut other, again) = with(1, urdf_robot("robot", files.folder().join("robot.urdf")));
+    assert_eq!(other.robot(again).joint_names(), sim.robot(id).joint_names());
+    let qpos = array![[0.3, -0.4, 0.5, 0.1, 0.2, -0.6, 0.7]];
+    sim.robot_mut(id).write_qpos(&qpos, None, None).unwrap();
+    other.robot_mut(again).write_qpos(&qpos, None, None).unwrap();
+    let [base, tip] = ["base", "tip"].map(|link| pose_in(&sim.robot(id).link_pose(link).unwrap(), 0));
+    let (far, angle) = errors(&(base.inverse() * tip), &pose_in(&other.robot(again).link_pose("tip").unwrap(), 0));
+    assert!(far < 1e-9 && angle < 1e-7, "{far} {angle}");
+
+    // A slide without limits and without efforts can be read again, and is not limited then.
+    let text = r#"<mujoco><worldbody><body name="base"><geom size="0.1" mass="1"/><body name="cart">
+        <joint name="rail" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"#;
+    let ((sim, id), files) = (with(1, robot("cart", text)), Files::default());
+    sim.dump(files.folder()).unwrap();
+    let (other, again) = with(1, urdf_robot("robot", files.folder().join("robot.urdf")));
+    assert_eq!(other.robot(again).qpos_limits(), sim.robot(id).qpos_limits());
+    assert_eq!(other.robot(again).qpos_limits()[(0, 0, 1)], f64::INFINITY);
+}
+
+/// Each joint of the humanoid comes to rest, with its trunk held, in the static equilibrium of springs, gravity and the drive.
+/// The judge of the torque is MuJoCo's bias and passive force there, which the stiffness of the drive turns into a sag:
+/// `kp (q* - q) = τ`. Without drives the same robot moves by radians.
+#[test]
+#[ignore = "needs MuJoCo's sample models: cargo xtask test"]
+fn humanoid() {
+    let of_file =
+        |name: &str| RobotCfg { mjcf: Some(MjcfFile::new(testkit::needs::sample_model(name))), ..Default::default() };
+    assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["bodies in its world"]);
+    let (mut sim, id) = with(2, of_file("humanoid/humanoid.xml"));
+    let of = sim.robot(id);
+    assert_eq!((of.dof(), of.get_qpos().dim(), of.get_root_pose().dim()), (21, (2, 21), (2, 7)));
+    let mass: f64 = sim.batch().read(0, |env| env.data().model().body_mass().iter().sum());
+    assert!((of.total_mass() - mass).abs() < 1e-9 * mass && mass > 30.0, "{} {mass}", of.total_mass());
+    let (start, kp) = (of.get_qpos(), of.get_stiffness());
+    sim.update(2000);
+    assert!(sim.diverged().is_empty());
+    let (off, speed) = (&start - &sim.robot(id).get_qpos(), sim.robot(id).get_qvel());
+    let load: Vec<f64> = sim.batch().read(0, |env| {
+        env.data().qfrc_bias().iter().zip(env.data().qfrc_passive()).map(|(bias, passive)| bias - passive).collect()
+    });
+    assert_eq!(load.len(), 21);
+    // The solver stops at 1e-8 of the scale of the scene; 1e-3 of the largest load is far above and far below a wrong sign.
+    assert!(largest(&load) > 1.0, "something is carried: {load:?}");
+    for (joint, load_) in load.iter().enumerate() {
+        assert!(speed[(0, joint)].abs() < 1e-4, "joint {joint} rests: {}", speed[(0, joint)]);
+        let held = kp[(0, joint)] * off[(0, joint)];
+        assert!((held - load_).abs() < 1e-2 * largest(&load), "joint {joint}: {held} N m, {load_} N m");
+    }
+    let (mut limp, id) = with(1, passive(of_file("humanoid/humanoid.xml")));
+    limp.update(500);
+    let off = limp.robot(id).get_qpos() - start.row(0);
+    assert!(largest(&off) > 0.3, "{off}");
+}
+
+/// Every other sample model is a robot or a typed error, never a panic, and steps. What MuJoCo compiles alone it compiles in
+/// the scene: an error of the scene's document is ours.
+#[test]
+#[ignore = "needs MuJoCo's sample models: cargo xtask test"]
+fn other_samples() {
+    let (mut robots, mut refused) = (0, 0);
+    for folder in std::fs::read_dir(testkit::needs::sample_model("")).unwrap().flatten() {
+        for file in std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path()) {
+            for fix_base in [true, false] {
+                if file.extension().is_none_or(|extension| extension != "xml") {
+                    continue;
+                }
+                let mut sim = empty(1);
+                match sim.add_robot(RobotCfg { mjcf: Some(MjcfFile::new(&file)), fix_base, ..Default::default() }) {
+                    Ok(id) => {
+                        let rows = Array2::zeros((1, sim.robot(id).dof()));
+                        sim.robot_mut(id).set_qpos(&rows, None, None).unwrap();
+                        sim.update(5);
+                        assert!(sim.diverged().is_empty(), "{}: {:?}", file.display(), sim.diverged());
+                        robots += 1;
+                    }
+                    Err(error) => {
+                        assert!(matches!(error, Error::RobotFile { .. }), "{}: {error}", file.display());
+                        refused += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(robots >= 2 && refused >= 10, "{robots} {refused}");
+}

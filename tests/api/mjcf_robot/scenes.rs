@@ -1,0 +1,176 @@
+//! Robots from MJCF in scenes: snapshots, additions, wrenches, self-collision, sensors and cameras.
+
+use super::*;
+use kinetoscope::ndarray::{Array3, Axis, array};
+use kinetoscope::sensors::ray::pattern::Grid;
+use testkit::refusal::assert_error;
+use testkit::worlds::{gains, object};
+
+/// Three environments on their way to different targets.
+pub(super) fn moving() -> (SimulationManager, RobotId) {
+    let (mut sim, id) = with(3, RobotCfg { drive: gains(300.0, 30.0), ..robot("odd", ODD) });
+    let targets = Array2::from_shape_fn((3, 7), |(env, joint)| 0.1 * env as f64 - 0.05 * joint as f64);
+    sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    (sim, id)
+}
+
+#[test]
+fn snapshots_and_additions() {
+    let (mut sim, id) = moving();
+    let state = |sim: &SimulationManager| {
+        let robot = sim.robot(id);
+        (robot.get_qpos(), robot.get_qvel(), robot.get_target_qpos())
+    };
+    sim.update(40);
+    let (snapshot, there) = (sim.snapshot(None).unwrap(), state(&sim));
+    sim.update(40);
+    let end = state(&sim);
+    assert_ne!(end.0.row(0), end.0.row(2), "environments differ");
+    sim.restore(&snapshot, None).unwrap();
+    assert_eq!(state(&sim), there);
+    sim.update(40);
+    assert_eq!(state(&sim), end, "going on is bit-identical");
+
+    sim.update(460);
+    let end = state(&sim);
+    sim.restore(&snapshot, None).unwrap();
+    sim.add_rigid_object(object("cube", ObjectShape::cube(0.1), [5.0, 0.0, 5.0])).unwrap();
+    sim.add_robot(RobotCfg { init_pose: Pose::translation(0.0, 5.0, 0.0), ..robot("second", ODD) }).unwrap();
+    assert_eq!(state(&sim), there, "bit-equal right after");
+    sim.update(500);
+    // A second without any contact: what is added is no part of the robot's equations.
+    let off = largest(&(sim.robot(id).get_qpos() - &end.0));
+    assert!(off < 1e-9, "{off}");
+}
+
+/// Gravity compensation of all links holds an arm that nothing else holds; an external wrench moves it.
+#[test]
+fn wrenches_and_gravity_compensation() {
+    let (mut sim, id) = with(2, passive(robot("odd", &ODD.replace(r#"stiffness="1.5""#, ""))));
+    let (start, second) = (sim.robot(id).get_qpos(), Some(&[EnvId(1)][..]));
+    sim.robot_mut(id).set_gravity_compensation(true, None, second).unwrap();
+    sim.update(100);
+    let off = sim.robot(id).get_qpos() - &start;
+    assert!(largest(&off.row(1)) < 1e-9 && largest(&off.row(0)) > 0.05, "{off}");
+    let hand = sim.robot(id).link_id("hand").unwrap();
+    let forces = Array3::from_shape_fn((1, 1, 3), |(_, _, k)| [0.0, 0.0, 5.0][k]);
+    let none = Array3::zeros((1, 1, 3));
+    sim.robot_mut(id).set_external_wrench(&forces, &none, WrenchFrame::World, Some(&[hand]), second).unwrap();
+    sim.update(50);
+    assert!(largest(&(sim.robot(id).get_qpos() - &start).row(1)) > 0.01);
+}
+
+/// Two fingers that close on each other: they pass through each other unless told to collide; a pair of the file holds only
+/// then. The centres stay a diameter of 0.04 m apart: each finger has gone (0.12 - 0.04) / 2.
+#[test]
+fn self_collision() {
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody><body name="palm"><geom name="palm" size="0.02" mass="1"/>
+        <body name="left" pos="0 0.06 0"><joint name="left" type="slide" axis="0 -1 0"/><geom name="l" size="0.02" mass="0.1"
+          contype="4" conaffinity="8"/></body>
+        <body name="right" pos="0 -0.06 0"><joint name="right" type="slide" axis="0 1 0"/><geom name="r" size="0.02" mass="0.1"/>
+        </body></body></worldbody><contact><pair geom1="l" geom2="r" margin="0.001"/><exclude body1="palm" body2="left"/>
+          <exclude body1="palm" body2="right"/></contact></mujoco>"#;
+    for (self_collision, expected, within) in [(false, 0.06, 1e-3), (true, 0.04, 2e-3)] {
+        let drive = DriveCfg { max_effort: Some(5.0.into()), ..gains(50.0, 10.0) };
+        let (mut sim, id) = with(1, RobotCfg { self_collision, drive, ..robot("hand", text) });
+        sim.robot_mut(id).set_qpos(&array![[0.06, 0.06]], None, None).unwrap();
+        sim.update(1000);
+        assert!(sim.diverged().is_empty());
+        let found = sim.robot(id).get_qpos();
+        assert!(found.iter().all(|q| (q - expected).abs() < within), "{self_collision}: {found}");
+    }
+}
+
+/// A leg that stands on a foot, with its body on a slide, and sensors of its own.
+const LEG: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="body" pos="0 0 0.6"><freejoint/>
+    <geom name="hull" type="box" size="0.2 0.15 0.05" mass="4" rgba="1 0 0 1"/><site name="imu" pos="0.05 0 0.02"/>
+    <body name="leg" pos="0 0 -0.05"><joint name="knee" type="slide" axis="0 0 1" range="-0.2 0.2" damping="2"/>
+      <geom name="shin" type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3" mass="0.5" contype="0" conaffinity="0"/>
+      <body name="foot" pos="0 0 -0.35"><geom name="foot" type="box" size="0.2 0.2 0.05" mass="0.5"/></body></body></body>
+  </worldbody><actuator><general name="k" joint="knee" biastype="affine" gainprm="4000" biasprm="0 -4000 -200"/></actuator>
+  <sensor><actuatorfrc name="gone" actuator="k"/><jointpos name="height" joint="knee"/>
+    <accelerometer name="acc" site="imu"/></sensor></mujoco>"#;
+
+fn standing(with_part: bool) -> (SimulationManager, RobotId) {
+    let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
+    if with_part {
+        let part = r#"<mujoco><worldbody><body pos="3 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
+            <sensor><clock name="clock"/><jointvel name="v" joint="j"/></sensor></mujoco>"#;
+        sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
+    }
+    let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("leg", LEG) }).unwrap();
+    // The control: an unknown link is an error that lists those there are.
+    assert_error(sim.add_sensor("contact", ContactSensorCfg::of("leg/foots")), "", &["leg/foot"]);
+    (sim, id)
+}
+
+/// Sensors find the links of a robot by name.
+#[test]
+fn sensors() {
+    for with_part in [false, true] {
+        let (mut sim, id) = standing(with_part);
+        let bodies = vec!["leg/foot".into(), "leg/body".into()];
+        let contact = sim.add_sensor("contact", ContactSensorCfg { bodies, ..Default::default() }).unwrap();
+        let imu = sim.add_sensor("imu", ImuCfg::on("leg/imu")).unwrap();
+        let grid = Grid { size: [0.2, 0.2], resolution: 0.1, ..Default::default() };
+        let targets = HitTargets::Named(vec!["leg/foot".into()]);
+        let scanner =
+            RayCasterCfg { parent: Some("leg/body".into()), pattern: grid.into(), targets, ..Default::default() };
+        let scanner = sim.add_sensor("scanner", scanner).unwrap();
+        let own = sim.add_sensor("own", MujocoSensorCfg::default()).unwrap();
+        sim.update(400);
+        assert!(sim.diverged().is_empty());
+        // The foot carries 5 kg, the body touches nothing.
+        let sensor = sim.sensor(contact).unwrap();
+        let [foot, body] = ["leg/foot", "leg/body"].map(|name| sensor.find_bodies(name).unwrap()[0]);
+        for forces in sensor.net_forces_w().axis_iter(Axis(0)) {
+            assert!((forces[(foot, 2)] - 5.0 * 9.81).abs() < 0.1 && largest(&forces.row(body)) == 0.0, "{forces}");
+        }
+        // An accelerometer at rest measures g upwards.
+        let acc = sim.sensor(imu).unwrap().lin_acc_b().to_owned();
+        assert!((acc[(0, 2)] - 9.81).abs() < 0.05 && acc[(0, 0)].abs() < 0.05, "{acc}");
+        let own = sim.sensor(own).unwrap();
+        assert!((own.value("leg/acc").unwrap()[(0, 2)] - 9.81).abs() < 0.05);
+        assert_eq!(own.value("leg/height").unwrap(), sim.robot(id).get_qpos());
+        assert!(own.value("leg/gone").is_err());
+        if with_part {
+            assert!((own.value("part/clock").unwrap()[(0, 0)] - sim.time()[0]).abs() < 0.01);
+        }
+        // Rays from the body meet the foot below it, 0.05 m high and wide as the pattern.
+        let foot = sim.robot(id).link_pose("foot").unwrap()[(0, 2)];
+        let hits = sim.sensor(scanner).unwrap().hits().to_owned();
+        let heights: Vec<f64> = hits.axis_iter(Axis(1)).map(|hit| hit[(0, 2)]).collect();
+        assert!(heights.len() == 9 && heights.iter().all(|z| (z - foot - 0.05).abs() < 1e-6), "{heights:?} {foot}");
+    }
+}
+
+/// Cameras draw its geoms and hang on its links.
+#[test]
+fn cameras() {
+    let (mut sim, robot) = standing(false);
+    let placement = Placement::LookAt { eye: [2.0, 0.0, 0.6], target: [0.0, 0.0, 0.6], up: [0.0, 0.0, 1.0] };
+    let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
+    let [free, mounted] = [
+        ("free", Extrinsics { placement, ..Default::default() }),
+        ("mounted", Extrinsics { parent: Some("leg/imu".into()), ..Default::default() }),
+    ]
+    .map(|(name, extrinsics)| {
+        sim.add_sensor(name, CameraCfg { channels: channels.clone(), extrinsics, ..Default::default() }).unwrap()
+    });
+    sim.update(1);
+    let id = |link: &str| sim.mask_ids().iter().find(|id| id.link.as_deref() == Some(link)).unwrap().clone();
+    let body = id("body");
+    assert_eq!((body.object.as_str(), body.class.as_str()), ("leg", "robot"));
+    let seen = sim.sensor(free).unwrap();
+    let (color, depth, mask) = (seen.color().unwrap(), seen.depth().unwrap(), seen.mask().unwrap());
+    // In the middle is the front of the red box, 1.8 m away.
+    assert_eq!(mask[(0, 240, 320)], body.id);
+    assert!((depth[(0, 240, 320)] - 1.8).abs() < 1e-3, "{}", depth[(0, 240, 320)]);
+    let red = [0, 1, 2].map(|k| u32::from(color[(0, 240, 320, k)]));
+    assert!(red[0] > 3 * red[1] && red[0] > 3 * red[2], "{red:?}");
+    assert!(mask.iter().any(|m| *m == id("leg").id), "the leg is seen");
+    let (at, site) = (sim.sensor(mounted).unwrap().pose_w(CameraConvention::World), sim.robot(robot).link_pose("imu"));
+    let site = site.unwrap();
+    assert!((0..3).all(|k| (at[(0, k)] - site[(0, k)]).abs() < 1e-9));
+    assert!((site[(0, 0)] - 0.05).abs() < 1e-6 && (site[(0, 2)] - 0.62).abs() < 1e-3);
+}

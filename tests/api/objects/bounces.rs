@@ -1,0 +1,202 @@
+//! Bounces: against the closed form, against the recursion of MuJoCo's steps, and between two that both bounce; pairs that
+//! never collide.
+
+use super::*;
+use kinetoscope::sim::Cone;
+use testkit::refusal::assert_error;
+
+fn bouncy(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
+    RigidObjectCfg { restitution, ..ball(uid, 0.1, mass, [0.0; 3]) }
+}
+
+/// Velocities of two balls after the one on the left came with 1 m/s; the surfaces meet `phase` of a step after one.
+fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f64) -> [f64; 2] {
+    let at = |cfg, x| RigidObjectCfg { init_pose: Pose::translation(x, 0.0, 0.0), ..cfg };
+    let left = sim.add_rigid_object(at(left, -0.15 - 1e-3 * phase)).unwrap();
+    let right = sim.add_rigid_object(at(right, 0.1)).unwrap();
+    sim.rigid_object_mut(left).write_velocity(&row([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), None).unwrap();
+    sim.update(300);
+    [left, right].map(|id| sim.rigid_object(id).get_velocity()[(0, 0)])
+}
+
+/// The error that ten steps in a contact leave of the closed form, over all places in a step where the surfaces may meet:
+/// worked out with the recursion below for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
+const BAND: [[f64; 3]; 6] = [
+    [0.14, -0.08, 0.04],
+    [0.3, -0.08, 0.04],
+    [0.6, -0.042, 0.038],
+    [0.8, -0.02, 0.03],
+    [0.9, -0.01, 0.022],
+    [1.0, -0.003, 0.003],
+];
+
+fn is_near(found: f64, wanted: f64) -> bool {
+    let next = BAND.iter().position(|row| wanted <= row[0]).unwrap().max(1);
+    let ([from, low, high], [to, lower, higher]) = (BAND[next - 1], BAND[next]);
+    let part = (wanted - from) / (to - from);
+    (low + part * (lower - low)..=high + part * (higher - high)).contains(&(found - wanted))
+}
+
+/// Relative velocity after and before is the restitution, whatever the masses; momentum stays. Eleven places in a step where
+/// they may meet.
+#[test]
+fn two_balls() {
+    for masses in [[1.0, 1.0], [0.2, 5.0]] {
+        for wanted in [0.14, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0] {
+            for phase in (0..11).map(|k| (f64::from(k) + 0.03) / 11.0) {
+                let balls = [("left", masses[0]), ("right", masses[1])].map(|(uid, m)| bouncy(uid, m, Some(wanted)));
+                let [a, b] = meet(weightless(1), balls, phase);
+                assert!(is_near(b - a, wanted), "{masses:?} {wanted} {phase}: {}", b - a);
+                assert!((masses[0] * a + masses[1] * b - masses[0]).abs() < 1e-9);
+            }
+        }
+    }
+    // The control: what is good at 0.5 is not at 0.8.
+    assert!(is_near(0.45, 0.5) && !is_near(0.75, 0.8) && !is_near(0.99, 1.0));
+}
+
+/// MuJoCo's pyramids lean on the friction coefficient: the bounce does not. mu² (1 + mu²) / 2 of at most 10, times 1e-4: a
+/// thousandth of the force.
+#[test]
+fn friction() {
+    let parted = |cone, mu: f64, wanted| {
+        let sim = sim(SimulationManagerCfg { cone, physics_dt: 1e-3, ..weightless_cfg(1) });
+        let rubs = |uid| RigidObjectCfg { friction: Some([mu, 0.005, 0.0001]), ..bouncy(uid, 1.0, Some(wanted)) };
+        let [a, b] = meet(sim, [rubs("left"), rubs("right")], 0.3);
+        b - a
+    };
+    for wanted in [0.2, 0.5, 0.8, 1.0] {
+        let expected = parted(Cone::Elliptic, 1.0, wanted);
+        for mu in [0.3, 1.0, 2.0] {
+            let found = parted(Cone::Pyramidal, mu, wanted);
+            assert!((found - expected).abs() < 2e-3, "{wanted} {mu}: {found} {expected}");
+        }
+    }
+}
+
+/// The less bouncy of two counts; one that has a restitution brings it to one that has none.
+#[test]
+fn combinations() {
+    let parted = |[left, right]: [Option<f64>; 2]| {
+        let [a, b] = meet(weightless(1), [bouncy("left", 1.0, left), bouncy("right", 2.0, right)], 0.3);
+        b - a
+    };
+    let (low, high) = (Some(0.3), Some(0.9));
+    assert_eq!(parted([low, high]), parted([low, low]));
+    assert_eq!(parted([high, low]), parted([low, low]));
+    assert!((parted([None, high]) - parted([high, high])).abs() < 1e-5);
+    assert!(parted([high, high]) > 0.8 && parted([low, low]) < 0.4);
+    // The control: without any, MuJoCo's own contacts.
+    assert!(parted([None, None]) < 0.2, "{}", parted([None, None]));
+}
+
+/// MuJoCo's steps of the spring and damper, by hand: `x'' = max(0, ...)` on the free fall, with explicit forces. `efc_force`
+/// of a contact through the centre of mass is that of a single row with A = 1/m.
+fn recursion(mut z: f64, [stiffness, damping]: [f64; 2], h: f64, steps: u32) -> (f64, f64) {
+    let mut v = 0.0;
+    for _ in 0..steps {
+        let free = -9.81;
+        // a = d (-B v - K x) + (1 - d) free with d = 0.9999, B = damping/d and K = stiffness/d² times the impedance d.
+        let held = -damping * v - stiffness * z + 1e-4 * free;
+        let a = if z < 0.0 { held.max(free) } else { free };
+        v += h * a;
+        z += h * v;
+    }
+    (z, v)
+}
+
+/// A ball dropped on the ground, step by step as the recursion says, flies off with its part of the velocity.
+#[test]
+fn dropped_ball() {
+    for wanted in [0.25, 0.5, 0.75, 0.95] {
+        let h = 1e-3;
+        let mut sim = sim(SimulationManagerCfg { physics_dt: h, ..SimulationManagerCfg::manipulation() });
+        let init_pose = Pose::translation(0.0, 0.0, 0.6004);
+        let id = sim.add_rigid_object(RigidObjectCfg { init_pose, ..bouncy("ball", 0.7, Some(wanted)) }).unwrap();
+        // solref of the object, as its model has it.
+        let solref = sim.batch().read(0, |env| {
+            let model = env.data().model();
+            let geom = (0..model.ngeom()).find(|&g| model.geom_solref()[2 * g] < 0.0).unwrap();
+            [-model.geom_solref()[2 * geom], -model.geom_solref()[2 * geom + 1]]
+        });
+        let [mut down, mut up] = [0.0_f64; 2];
+        for step in 1..=600 {
+            sim.update(1);
+            let (z, v) = recursion(0.5004, solref, h, step);
+            let (height, speed) =
+                (sim.rigid_object(id).get_pose()[(0, 2)] - 0.1, sim.rigid_object(id).get_velocity()[(0, 2)]);
+            let apart = (height - z).abs().max((speed - v).abs());
+            assert!(apart < 1e-4, "{wanted}, step {step}: {height} {z}, {speed} {v}");
+            // The first bounce alone.
+            if step < 400 {
+                (down, up) = (down.min(speed), up.max(speed));
+            }
+        }
+        // Torricelli, and a contact of 10 ms.
+        assert!((down + (2.0 * 9.81 * 0.5004_f64).sqrt()).abs() < 0.02, "{down}");
+        assert!(is_near(up / -down, wanted), "{wanted}: {}", up / -down);
+    }
+}
+
+/// A ball above a block on the ground.
+fn stack() -> (SimulationManager, [ObjectId; 2]) {
+    let mut sim = sim(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() });
+    let block = sim.add_rigid_object(object("block", ObjectShape::cube(0.4), [0.0, 0.0, 0.2])).unwrap();
+    let ball = sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 0.52])).unwrap();
+    (sim, [block, ball])
+}
+
+fn contacts(sim: &SimulationManager) -> usize {
+    sim.batch().read(1, |env| env.data().contact().len())
+}
+
+/// Objects pass through each other, and through the world, from then on when it is said.
+#[test]
+fn excluded_objects() {
+    let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
+        sim.update(500);
+        let z = ids.map(|id| sim.rigid_object(id).get_pose()[(1, 2)]);
+        assert!(
+            (0..2).all(|k| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0),
+            "{z:?}"
+        );
+    };
+    let (mut sim, ids) = stack();
+    for (one, other) in [("bal", "block"), ("block", "bal"), ("ground", "bal")] {
+        assert_error(sim.exclude_collision(one, other), "UnknownName { what: \"body called\"", &["\"ball\""]);
+    }
+    for name in ["ball", "world"] {
+        assert_error(sim.exclude_collision(name, name), "Config { field: \"exclude_collision\"", &[]);
+    }
+    stand(&mut sim, ids, [0.2, 0.5]);
+    assert!(contacts(&sim) > 0, "the control");
+    sim.exclude_collision("block", "world").unwrap();
+    stand(&mut sim, ids, [f64::NEG_INFINITY, 0.1]);
+    let (mut sim, ids) = stack();
+    sim.exclude_collision("ball", "block").unwrap();
+    let model = sim.batch().model().clone();
+    sim.exclude_collision("block", "ball").unwrap();
+    assert!(sim.batch().model().is(&model), "known already: nothing is compiled");
+    stand(&mut sim, ids, [0.2, 0.1]);
+}
+
+/// A robot by its name is all of its links; its own links among each other need their pair.
+#[test]
+fn excluded_links() {
+    let build = |name: Option<&str>| {
+        let mut sim = sim(weightless_cfg(2));
+        let arm = sim.add_robot(testkit::worlds::sr5("arm")).unwrap();
+        let tip = sim.robot(arm).link_names().last().unwrap().to_string();
+        let place = sim.robot(arm).link_pose(&tip).unwrap();
+        sim.add_rigid_object(object("fog", ObjectShape::cube(0.1), [0, 1, 2].map(|k| place[(1, k)]))).unwrap();
+        if let Some(name) = name {
+            sim.exclude_collision(name, "fog").unwrap();
+        }
+        (contacts(&sim), tip)
+    };
+    let (found, tip) = build(None);
+    assert!(found > 0, "the control");
+    assert_eq!(build(Some("arm")).0, 0);
+    // One body of two that reach into it, or all of what reaches into it: never more contacts than before.
+    assert!(build(Some(&format!("arm/{tip}"))).0 < found);
+}

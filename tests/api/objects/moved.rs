@@ -1,0 +1,209 @@
+//! Objects that are put in a place: kinematic ones, which push and are not pushed, and static ones, which may stand elsewhere
+//! in each environment.
+
+use super::*;
+use kinetoscope::ndarray::Array2;
+use kinetoscope::sensors::ray::pattern::Custom;
+use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
+
+fn paddle() -> RigidObjectCfg {
+    kinematic(object("paddle", ObjectShape::Box { size: [0.1, 1.0, 1.0] }, [0.0; 3]))
+}
+
+fn at(x: f64, z: f64) -> [f64; 7] {
+    [x, 0.0, z, 1.0, 0.0, 0.0, 0.0]
+}
+
+/// A paddle that advances 1 mm per step in one environment, against a heavy ball in both: the ball is kept ahead of it there,
+/// the paddle is exactly where it was put, and the ball in the other environment rests.
+#[test]
+fn paddle_pushes() {
+    let mut sim = weightless(2);
+    let paddle = sim.add_rigid_object(paddle()).unwrap();
+    let ball = sim.add_rigid_object(ball("ball", 0.2, 1000.0, [0.4, 0.0, 0.0])).unwrap();
+    for step in 1..=1000 {
+        let x = 1e-3 * f64::from(step);
+        sim.rigid_object_mut(paddle).write_pose(&row(at(x, 0.0)), Some(SECOND)).unwrap();
+        sim.update(1);
+        let pose = sim.rigid_object(paddle).get_pose();
+        assert_eq!([pose[(1, 0)], pose[(0, 0)]], [x, 0.0]);
+    }
+    let (x, v) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    // Ahead of the face at 1.05 m by its radius, at the paddle's 1 m/s. To MuJoCo the paddle stands: the contact is where
+    // b v = k r, with the defaults of solref (0.02 s, 1) and solimp (0.95) r = 2 * 0.95 * 0.02 s * 1 m/s.
+    assert!((1.25 - x[(1, 0)] - 0.038).abs() < 2e-3 && (v[(1, 0)] - 1.0).abs() < 1e-3, "{x} {v}");
+    assert_eq!([x[(0, 0)], v[(0, 0)]], [0.4, 0.0]);
+    assert!(sim.rigid_object(paddle).get_velocity().iter().all(|v| *v == 0.0));
+}
+
+/// A table that is raised carries a cube up with it; a quaternion of length 2 is normalised.
+#[test]
+fn table_carries() {
+    let mut sim = empty(2);
+    let table = kinematic(object("table", ObjectShape::Box { size: [1.0, 1.0, 0.1] }, [0.0; 3]));
+    let table = sim.add_rigid_object(table).unwrap();
+    let cube = sim.add_rigid_object(object("cube", ObjectShape::cube(0.2), [0.0, 0.0, 0.15])).unwrap();
+    for step in 1..=1000 {
+        let rows = Array2::from(vec![at(0.0, 0.0), [0.0, 0.0, 2e-4 * f64::from(step), 2.0, 0.0, 0.0, 0.0]]);
+        sim.rigid_object_mut(table).write_pose(&rows, None).unwrap();
+        sim.update(1);
+    }
+    sim.update(500);
+    let z = sim.rigid_object(cube).get_pose();
+    assert!((z[(0, 2)] - 0.15).abs() < 1e-3 && (z[(1, 2)] - 0.35).abs() < 1e-3, "{z}");
+    assert_eq!(sim.rigid_object(table).get_pose()[(1, 3)], 1.0);
+}
+
+/// Reset, snapshots and additions know where a kinematic object is.
+#[test]
+fn kinematic_state() {
+    let mut sim = empty(3);
+    let cfg = RigidObjectCfg { init_pose: Pose::translation(1.0, 2.0, 3.0), ..paddle() };
+    let paddle = sim.add_rigid_object(cfg).unwrap();
+    let init = [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0];
+    let there = Array2::from_shape_fn((3, 7), |(e, k)| [e as f64, 0.5, -1.0, 0.0, 1.0, 0.0, 0.0][k]);
+    sim.rigid_object_mut(paddle).write_pose(&there, None).unwrap();
+    sim.update(5);
+    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
+    let snapshot = sim.snapshot(None).unwrap();
+    // An object that is added later comes before it in MuJoCo's lists, or after: it stays where it is.
+    let other = sim.add_rigid_object(kinematic(object("other", ObjectShape::cube(0.1), [9.0; 3]))).unwrap();
+    sim.add_rigid_object(object("cube", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
+    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
+    assert_eq!(sim.rigid_object(other).get_pose()[(2, 0)], 9.0);
+    sim.update(5);
+    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
+    sim.reset(Some(SECOND)).unwrap();
+    let pose = sim.rigid_object(paddle).get_pose();
+    assert_eq!(pose.row(1).to_vec(), init);
+    assert_eq!((pose.row(0), pose.row(2)), (there.row(0), there.row(2)));
+    // The snapshot is of the scene before more was added.
+    assert!(sim.restore(&snapshot, None).is_err());
+    let now = sim.snapshot(None).unwrap();
+    sim.reset(None).unwrap();
+    sim.restore(&now, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
+    let pose = sim.rigid_object(paddle).get_pose();
+    assert_eq!((pose.row(2), pose.row(0).to_vec(), pose.row(1)), (there.row(0), init.to_vec(), there.row(2)));
+}
+
+/// A ray sees a kinematic object where it was put, at once, in each environment where it is there.
+#[test]
+fn rays_see_it() {
+    let mut sim = empty(2);
+    let paddle = sim.add_rigid_object(paddle()).unwrap();
+    let ray = RayCasterCfg {
+        offset: Pose::translation(-3.0, 0.0, 0.0),
+        pattern: Custom { directions: vec![[1.0, 0.0, 0.0]], starts: vec![[0.0; 3]] }.into(),
+        targets: HitTargets::Named(vec!["paddle".into()]),
+        ..RayCasterCfg::default()
+    };
+    let ray = sim.add_sensor("ray", ray).unwrap();
+    sim.update(1);
+    assert!(sim.sensor(ray).unwrap().distances().iter().all(|d| (d - 2.95).abs() < 1e-9));
+    sim.rigid_object_mut(paddle).write_pose(&Array2::from(vec![at(1.0, 0.0), at(0.25, 0.0)]), None).unwrap();
+    let distances = sim.sensor(ray).unwrap().distances().to_owned();
+    assert!((distances[(0, 0)] - 3.95).abs() < 1e-9 && (distances[(1, 0)] - 3.2).abs() < 1e-9, "{distances}");
+}
+
+/// A shelf of 4 cm and a ball above it.
+pub(super) fn shelf(num_envs: usize, height: f64) -> (SimulationManager, ObjectId, ObjectId) {
+    let mut sim = empty(num_envs);
+    let size = ObjectShape::Box { size: [0.4, 0.4, 0.04] };
+    let shelf = sim.add_rigid_object(fixed(object("shelf", size, [0.0, 0.0, height]))).unwrap();
+    let ball = sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.05 }, [0.0, 0.0, 1.2])).unwrap();
+    (sim, shelf, ball)
+}
+
+/// A ball lies where the shelf of its environment is.
+#[test]
+fn shelves() {
+    let heights = [0.5, 0.8, 1.0];
+    let (mut sim, shelf_id, ball) = shelf(3, heights[0]);
+    let rows = Array2::from(vec![at(0.0, heights[2]), at(0.0, heights[1])]);
+    sim.rigid_object_mut(shelf_id).write_pose(&rows, Some(&[EnvId(2), EnvId(1)])).unwrap();
+    let places = Array2::from(heights.map(|z| at(0.0, z)).to_vec());
+    assert_eq!(sim.rigid_object(shelf_id).get_pose(), places);
+    sim.update(1500);
+    let lies = sim.rigid_object(ball).get_pose();
+    for (env, height) in heights.into_iter().enumerate() {
+        assert!((lies[(env, 2)] - height - 0.07).abs() < SOFT, "environment {env}: {lies}");
+        // The judge: a scene that was built so.
+        let (mut built, _, ball) = shelf(3, height);
+        built.update(1500);
+        assert_eq!(built.rigid_object(ball).get_pose().row(env), lies.row(env), "bit for bit");
+    }
+    // The environment that was not named shares everything; the others have two arrays and what follows from them.
+    let base = sim.batch().model().clone();
+    assert!(sim.batch().read(0, |env| env.data().model().arrays_apart(&base).is_empty()));
+    let own: Vec<&str> = sim.batch().read(1, |env| env.data().model().own_arrays().map(|(name, _)| name).collect());
+    assert!(own.contains(&"body_pos") && own.len() <= 4, "{own:?}");
+    // It stands there after a reset and when more is added, until properties are nominal again.
+    sim.reset(None).unwrap();
+    sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
+    assert_eq!(sim.rigid_object(shelf_id).get_pose(), places);
+    sim.reset_properties(Some(SECOND)).unwrap();
+    let pose = sim.rigid_object(shelf_id).get_pose();
+    assert_eq!((pose[(1, 2)], pose[(2, 2)]), (heights[0], heights[2]));
+}
+
+/// A ramp at angle a: a ball that slides without friction has the acceleration g sin a along it.
+#[test]
+fn ramp() {
+    let (mut sim, shelf_id, ball) = shelf(2, 0.5);
+    let angle = 0.3_f64;
+    let (sin, cos) = (angle / 2.0).sin_cos();
+    // Quaternions are normalised.
+    let turned = row([0.0, 0.0, 0.5, 3.0 * cos, 0.0, 3.0 * sin, 0.0]);
+    sim.rigid_object_mut(shelf_id).write_pose(&turned, Some(SECOND)).unwrap();
+    let read = sim.rigid_object(shelf_id).get_pose();
+    assert!((read[(1, 3)] - cos).abs() < 1e-15 && (read[(1, 5)] - sin).abs() < 1e-15, "{read}");
+    sim.randomize_with(None, |_, _, p| {
+        p.set(Property::Friction, "shelf", &[0.0])?;
+        p.set(Property::Friction, "ball", &[0.0])
+    })
+    .unwrap();
+    // On the surface, which is 2 cm from its middle: the ball's middle is 7 cm along the normal.
+    let place = at(0.07 * angle.sin(), 0.5 + 0.07 * angle.cos());
+    sim.rigid_object_mut(ball).write_pose(&row(place), Some(SECOND)).unwrap();
+    sim.update(150);
+    let v = sim.rigid_object(ball).get_velocity();
+    let along = v[(1, 0)] * angle.cos() - v[(1, 2)] * angle.sin();
+    let expected = 9.81 * angle.sin() * 0.15;
+    // MuJoCo's contact without friction is soft along its normal only: 1 %.
+    assert!((along / expected - 1.0).abs() < 0.01, "{along}, not {expected}");
+}
+
+/// Random places by name, as any property; cameras look where the shelf is, and rays meet it where MuJoCo's do.
+#[test]
+fn drawn_places() {
+    let (mut sim, shelf_id, _) = shelf(2, 0.5);
+    let camera = CameraCfg {
+        width: 9,
+        height: 9,
+        intrinsics: Intrinsics::Pixels { fx: 9.0, fy: 9.0, cx: 4.5, cy: 4.5 },
+        channels: Channels::from_names(&["depth"]).unwrap(),
+        ..Default::default()
+    };
+    // Off edges, where rounding decides.
+    let rays = RayCasterCfg { offset: Pose::translation(0.013, 0.007, 3.0), ..Default::default() };
+    let (camera, rays) = (sim.add_sensor("camera", camera).unwrap(), sim.add_sensor("rays", rays).unwrap());
+    let eye = sim.sensor_mut(camera).unwrap();
+    eye.look_at(&[[0.1, 0.1, 3.0]], &[[0.1, 0.1, 0.0]], &[[1.0, 0.0, 0.0]], None).unwrap();
+    let draw = Randomization::new().with(Property::Position, "shelf", Draw::Add([-0.05, 0.05]));
+    sim.randomize(&draw, Some(SECOND)).unwrap();
+    let place = sim.rigid_object(shelf_id).get_pose();
+    let moved: Vec<f64> = (0..3).map(|k| place[(1, k)] - place[(0, k)]).collect();
+    assert!(moved.iter().all(|d| d.abs() <= 0.05 && *d != 0.0), "{moved:?}");
+    let (depth, rays) = (sim.sensor(camera).unwrap().depth().unwrap().to_owned(), sim.sensor(rays).unwrap());
+    for env in 0..2 {
+        // The ball is 10 cm beside the middle of the image in both directions.
+        let expected = 3.0 - place[(env, 2)] - 0.02;
+        assert!((f64::from(depth[(env, 4, 4)]) - expected).abs() < 3e-6, "{}", depth[(env, 4, 4)]);
+        for k in 0..rays.num_rays() {
+            let start = [0, 1, 2].map(|axis| rays.ray_starts()[(env, k, axis)]);
+            let hit = sim.batch().read(env, |env| env.data().ray(start, [0.0, 0.0, -1.0], 0b111)).unwrap();
+            let (ours, theirs) = (rays.distances()[(env, k)], hit.map_or(f64::INFINITY, |hit| hit.distance));
+            assert!(ours == theirs || (ours - theirs).abs() < 1e-6, "environment {env}, ray {k}: {ours}, not {theirs}");
+        }
+    }
+}
