@@ -1,23 +1,13 @@
 //! A diverged environment is taken out, reported and revived; the others do not notice.
 
-use super::support::{all_bits, bits_of, cfg, drives, free_robot, walker, wheel};
+use super::support::{add_walker, all_bits, bits_of, cfg, sim, wheel};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
-use kinetoscope::sim::env::{Divergence, EnvStatus};
+use kinetoscope::sim::env::{Divergence, EnvStatus, with_small_buffers};
 use kinetoscope::sim::mj::{Data, Warning};
-
-fn walkers(num_envs: usize) -> SimulationManager {
-    let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(cfg(num_envs, 2)).unwrap();
-    sim.add_robot(free_robot(dir.path(), "walker", &walker(), 0.3)).unwrap();
-    sim
-}
-
-/// A batch below the manager, in the manager's initial state.
-fn batch_of(sim: &SimulationManager, num_envs: usize) -> Batch {
-    Batch::new(&kinetoscope::sim::env::with_small_buffers(sim.batch().model()), &drives(sim), num_envs, 2).unwrap()
-}
+use std::sync::Arc;
+use testkit::urdf::Files;
 
 type BlowUp = (&'static str, fn(&mut Data), Warning);
 
@@ -30,11 +20,16 @@ const BLOW_UPS: [BlowUp; 6] = [
     ("force NaN", |d| d.xfrc_applied_mut()[8] = f64::NAN, Warning::BadAcceleration),
 ];
 
+/// One of 64 environments below the manager blows up, in its initial state after 50 steps.
 #[test]
-fn one_of_64_blows_up_and_63_do_not_notice() {
-    let sim = walkers(1);
+fn one_of_64() {
+    let mut sim = sim(cfg(1, 2));
+    add_walker(&mut sim, "walker", 0.3);
+    let table = sim.batch().read(0, |env| Arc::clone(env.drives.table()));
+    let model = with_small_buffers(sim.batch().model());
+    let batch_of = |num_envs| Batch::new(&model, &table, num_envs, 2).unwrap();
     for (what, blow_up, warning) in BLOW_UPS {
-        let (mut batch, mut calm) = (batch_of(&sim, 64), batch_of(&sim, 64));
+        let (mut batch, mut calm) = (batch_of(64), batch_of(64));
         batch.step(50);
         calm.step(50);
         let last_good = calm.read(17, bits_of);
@@ -43,18 +38,16 @@ fn one_of_64_blows_up_and_63_do_not_notice() {
         calm.step(30);
         batch.read(17, |env| {
             let EnvStatus::Diverged { step, reason } = env.status() else { panic!("{what}: {:?}", env.status()) };
-            assert_eq!(*step, 50, "{what}");
-            assert_eq!(*reason, Divergence::Warning(warning), "{what}");
+            assert_eq!((*step, reason), (50, &Divergence::Warning(warning)), "{what}");
             assert!((env.data().time() - 0.5).abs() < 1e-9, "{what}: time is {}", env.data().time());
             assert_eq!(bits_of(env), last_good, "{what}: the last good state");
             let height = env.data().xpos()[5];
             assert!((height - env.data().qpos()[2]).abs() < 1e-12, "{what}: poses belong to the state");
         });
-        for (k, (mine, theirs)) in all_bits(&batch).into_iter().zip(all_bits(&calm)).enumerate() {
-            assert!(k == 17 || mine == theirs, "{what}: environment {k} changed");
-        }
+        let different: Vec<usize> = (0..64).filter(|&k| batch.read(k, bits_of) != calm.read(k, bits_of)).collect();
+        assert_eq!(different, [17], "{what}");
         batch.write(17, |env| env.reset(|_, _| ()));
-        let mut fresh = batch_of(&sim, 1);
+        let mut fresh = batch_of(1);
         assert_eq!(batch.read(17, bits_of), fresh.read(0, bits_of), "{what}: revived");
         batch.step(20);
         fresh.step(20);
@@ -62,41 +55,41 @@ fn one_of_64_blows_up_and_63_do_not_notice() {
     }
 }
 
+fn wheels(num_envs: usize) -> (SimulationManager, RobotId) {
+    let (files, mut sim) = (Files::default(), sim(cfg(num_envs, 2)));
+    let robot = sim.add_robot(wheel(&files)).unwrap();
+    (sim, robot)
+}
+
+fn put(sim: &mut SimulationManager, robot: RobotId, position: f64, env: usize) {
+    sim.robot_mut(robot).write_qpos(&array![[position]], None, Some(&[EnvId(env)])).unwrap();
+}
+
 #[test]
-fn the_manager_reports_and_revives() {
-    let dir = tempfile::tempdir().unwrap();
-    let new = |n| {
-        let mut sim = SimulationManager::new(cfg(n, 2)).unwrap();
-        let robot = sim.add_robot(wheel(dir.path())).unwrap();
-        (sim, robot)
-    };
+fn report_and_revival() {
     for bad in [f64::MAX, -1e11] {
-        let (mut sim, robot) = new(64);
-        let (mut calm, _) = new(64);
+        let ((mut sim, robot), (mut calm, _)) = (wheels(64), wheels(64));
         sim.update(25);
         calm.update(25);
         let last_good = calm.batch().read(40, bits_of);
-        sim.robot_mut(robot).write_qpos(&array![[bad]], None, Some(&[EnvId(40)])).unwrap();
+        put(&mut sim, robot, bad, 40);
         assert_eq!(sim.diverged().len(), 1, "reported at once");
         sim.update(25);
         calm.update(25);
         let diverged = sim.diverged();
-        assert_eq!(diverged.len(), 1);
-        assert_eq!(diverged[0].0, EnvId(40));
-        assert!(diverged[0].1.contains("bad-position") && diverged[0].1.contains("25"), "{diverged:?}");
+        let [(EnvId(40), message)] = &diverged[..] else { panic!("{diverged:?}") };
+        assert!(message.contains("bad-position") && message.contains("25"), "{message}");
         assert_eq!(sim.batch().read(40, bits_of), last_good);
         assert_eq!(sim.time()[40], sim.batch().read(40, |env| env.data().time()));
         assert!((sim.time()[40] - 0.25).abs() < 1e-9 && (sim.time()[39] - 0.5).abs() < 1e-9);
         assert_eq!(sim.warning_counts()["environment-diverged"], 1);
         assert_eq!(sim.warning_counts()["mujoco-bad-position"], 1);
-        for (k, (mine, theirs)) in all_bits(sim.batch()).into_iter().zip(all_bits(calm.batch())).enumerate() {
-            assert!(k == 40 || mine == theirs, "environment {k}");
-        }
+        let (before, undisturbed) = (all_bits(&sim), all_bits(&calm));
+        assert!((0..64).all(|k| k == 40 || before[k] == undisturbed[k]), "the others");
         // Only a reset revives, and only the one that is named.
-        let before = all_bits(sim.batch());
         sim.reset(Some(&[EnvId(40)])).unwrap();
         assert!(sim.diverged().is_empty());
-        let (mut fresh, _) = new(1);
+        let (mut fresh, _) = wheels(1);
         assert_eq!(sim.batch().read(40, bits_of), fresh.batch().read(0, bits_of));
         assert_eq!(sim.batch().read(41, bits_of), before[41]);
         sim.update(10);
@@ -105,53 +98,41 @@ fn the_manager_reports_and_revives() {
     }
 }
 
+/// A position below MuJoCo's largest number, to which an unlimited drive answers with an acceleration above it: undone.
 #[test]
-fn a_state_that_blows_up_in_the_step_is_undone() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(cfg(4, 2)).unwrap();
-    let robot = sim.add_robot(wheel(dir.path())).unwrap();
+fn divergence_in_a_step() {
+    let (mut sim, robot) = wheels(4);
     sim.update(10);
-    // Below MuJoCo's largest number; an unlimited drive answers with an acceleration above it.
-    sim.robot_mut(robot).write_qpos(&array![[9e9]], None, Some(&[EnvId(2)])).unwrap();
+    put(&mut sim, robot, 9e9, 2);
     assert!(sim.diverged().is_empty());
     sim.update(1);
     let diverged = sim.diverged();
-    assert_eq!(diverged.len(), 1, "{diverged:?}");
-    assert!(diverged[0].1.contains("step 10"), "{diverged:?}");
+    assert!(diverged.len() == 1 && diverged[0].1.contains("step 10"), "{diverged:?}");
     assert_eq!(sim.robot(robot).get_qpos()[(2, 0)], 9e9, "the state before the step");
     assert!((sim.time()[2] - 0.1).abs() < 1e-12);
-    assert_eq!(sim.robot(robot).get_qvel().iter().filter(|v| !v.is_finite()).count(), 0);
+    assert!(sim.robot(robot).get_qvel().iter().all(|v| v.is_finite()));
     sim.reset(None).unwrap();
     assert!(sim.diverged().is_empty());
     assert_eq!(sim.robot(robot).get_qpos()[(2, 0)], 0.7);
 }
 
+/// Writing to it and adding a robot revive nothing.
 #[test]
-fn a_quarantined_environment_can_be_written_to_and_stays_out() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
-    let robot = sim.add_robot(wheel(dir.path())).unwrap();
-    sim.robot_mut(robot).write_qpos(&array![[1e300]], None, Some(&[EnvId(1)])).unwrap();
-    for value in [0.4, 1e300, 0.2] {
-        sim.robot_mut(robot).write_qpos(&array![[value]], None, Some(&[EnvId(1)])).unwrap();
-        sim.update(3);
-        assert_eq!(sim.diverged().len(), 1);
-        assert!(sim.robot(robot).get_qpos().iter().all(|q| q.abs() < 10.0), "{}", sim.robot(robot).get_qpos());
-    }
-}
-
-#[test]
-fn adding_a_robot_revives_nobody() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
-    let robot = sim.add_robot(wheel(dir.path())).unwrap();
+fn no_revival() {
+    let (mut sim, robot) = wheels(3);
     sim.update(5);
-    sim.robot_mut(robot).write_qpos(&array![[1e300]], None, Some(&[EnvId(1)])).unwrap();
+    put(&mut sim, robot, 1e300, 1);
     let (diverged, counts) = (sim.diverged(), sim.warning_counts());
-    sim.add_robot(free_robot(dir.path(), "walker", &walker(), 0.3)).unwrap();
+    add_walker(&mut sim, "walker", 0.3);
     assert_eq!(sim.diverged(), diverged);
     assert_eq!(sim.warning_counts()["mujoco-bad-position"], counts["mujoco-bad-position"]);
     sim.update(5);
     assert_eq!(sim.diverged(), diverged, "it stands still");
     assert!((sim.time()[1] - 0.05).abs() < 1e-12);
+    for value in [0.4, 1e300, 0.2] {
+        put(&mut sim, robot, value, 1);
+        sim.update(3);
+        assert_eq!(sim.diverged().len(), 1);
+        assert!(sim.robot(robot).get_qpos().iter().all(|q| q.abs() < 10.0), "{}", sim.robot(robot).get_qpos());
+    }
 }

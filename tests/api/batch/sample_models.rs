@@ -1,4 +1,4 @@
-//! MuJoCo's own sample models, where the library's package brings them.
+//! MuJoCo's own sample models, of the library's package.
 
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
@@ -19,7 +19,7 @@ fn models_below(dir: &Path, found: &mut Vec<PathBuf>) {
 
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
-fn sample_models_compile_and_step() {
+fn compile_and_step() {
     let dir = testkit::needs::sample_model("");
     let mut files = Vec::new();
     models_below(&dir, &mut files);
@@ -40,6 +40,5 @@ fn sample_models_compile_and_step() {
             Err(error) => refused.push(format!("{}: {error}", file.display())),
         }
     }
-    println!("{stepped} stepped, {} refused: {refused:#?}", refused.len());
     assert!(stepped >= 10, "{refused:#?}");
 }

@@ -1,9 +1,11 @@
-//! Explicit actuator models: the law of each, step by step, and what all of them do with a step of the target.
+//! Explicit actuator models: the law of each, step by step, what all of them do with a step of the target, and other gains,
+//! types and limits while they run.
 //!
 //! For a joint of constant inertia M without other loads MuJoCo's Euler step is v' = v + h tau / M, q' = q + h v', with tau
-//! the model's effort at the start of the step. Tolerance 1e-9 over 200 steps, as in `native.rs`: rounding of 1e-16 a step,
+//! the model's effort at the start of the step. Tolerance 1e-9 over some 200 steps, as in `law.rs`: rounding of 1e-16 a step,
 //! which stable gains do not let grow.
 
+use crate::drives::law::{EXACT, LAW, Law};
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
@@ -13,45 +15,60 @@ use kinetoscope::sim::env::Env;
 use kinetoscope::sim::mj::Buffers;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use testkit::refusal::assert_error;
+use testkit::worlds::add_ball;
 
-const EXACT: f64 = 1e-9;
-const H: f64 = 0.01;
 const M: f64 = 0.2;
 
 fn with(model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
-    DriveCfg { actuators: vec![(".*".into(), model.into())], max_velocity: Some(7.5.into()), ..gains(kp, kd) }
+    modelled(".*", model, kp, kd)
 }
 
-fn clamped(tau: f64, limit: f64) -> f64 {
-    tau.min(limit).max(-limit)
+fn motor(saturation_effort: f64) -> DriveCfg {
+    with(DcMotor { saturation_effort }, 0.0, 0.0)
 }
 
+fn wheel() -> Joint {
+    Joint::wheel("j", M)
+}
+
+/// The explicit law of such a wheel.
+fn law(kp: f64, kd: f64) -> Law {
+    Law { m: M, kp, kd, explicit: true, ..LAW }
+}
+
+/// All models, and the delay of each \[steps\].
+fn models(delay: u32) -> impl Iterator<Item = (ActuatorModel, u32)> {
+    let late = DelayedPd { delay, max_delay: delay }.into();
+    ActuatorModel::examples()
+        .into_iter()
+        .chain([late])
+        .map(|model| (model, if let ActuatorModel::DelayedPd(model) = model { model.delay } else { 0 }))
+}
+
+/// The clamped sum at the start of the step.
 #[test]
-fn ideal_pd_is_the_clamped_sum_at_the_start_of_the_step() {
-    let (kp, kd, limit) = (30.0, 1.5, 4.0);
+fn ideal_pd() {
     for integrator in [Integrator::Euler, Integrator::Implicit, Integrator::Rk4] {
         for model in [DriveModel::Implicit, DriveModel::Actuator] {
-            let drive = DriveCfg { model, ..with(IdealPd {}, kp, kd) };
+            let mut law = Law { limit: 4.0, ..law(30.0, 1.5) };
             let cfg = SimulationManagerCfg { integrator, ..weightless() };
-            let mut world = world(&[Joint::wheel("j", M).effort(limit)], drive, cfg);
-            let (mut q, mut v, mut saturated) = (0.0, 0.0, 0);
+            let mut world = world(&[wheel().effort(4.0)], DriveCfg { model, ..with(IdealPd {}, 30.0, 1.5) }, cfg);
+            let mut saturated = 0;
             for k in 0..200 {
-                let [aim, v_aim, ff] = [0.7 * (0.05 * f64::from(k)).sin(), 0.3, 0.1 * f64::from(k % 7)];
-                world.aim(&[aim]);
-                let mut robot = world.sim.robot_mut(world.robot);
-                robot.set_qvel(&row(&[v_aim]), None, None).unwrap();
-                robot.set_qf(&row(&[ff]), None, None).unwrap();
-                let asked = kp * (aim - q) + kd * (v_aim - v) + ff;
-                let tau = clamped(asked, limit);
-                saturated += u32::from(tau != asked);
-                // RK4 holds the effort, too: exact for a constant force.
-                let before = v;
-                v += H * tau / M;
-                q += H * if integrator == Integrator::Rk4 { 0.5 * (before + v) } else { v };
+                let aim = [0.7 * (0.05 * f64::from(k)).sin(), 0.3, 0.1 * f64::from(k % 7)];
+                world.command([aim]);
+                let before = law.v;
+                let (tau, bound) = law.step_to(aim);
+                saturated += u32::from(bound);
+                if integrator == Integrator::Rk4 {
+                    // RK4 holds the effort, too: exact for a constant force.
+                    law.q += H * 0.5 * (before - law.v);
+                }
                 world.step(1);
                 assert_close(world.effort()[0], tau, EXACT, "effort");
-                assert_close(world.v()[0], v, EXACT, "velocity");
-                assert_close(world.q()[0], q, EXACT, "position");
+                assert_close(world.v()[0], law.v, EXACT, "velocity");
+                assert_close(world.q()[0], law.q, EXACT, "position");
             }
             assert!((10..190).contains(&saturated), "both sides of the limit: {saturated}");
         }
@@ -60,9 +77,9 @@ fn ideal_pd_is_the_clamped_sum_at_the_start_of_the_step() {
 
 /// Stall 120 N m, continuous 80 N m, 7.5 rad/s without load: the corners and lines of the four quadrants.
 #[test]
-fn a_dc_motor_gives_less_the_faster_it_turns() {
-    // Speed, effort asked for, effort given.
-    let table = [
+fn dc_motor_quadrants() {
+    let world = world(&[wheel().effort(80.0)], motor(120.0), weightless());
+    for (speed, asked, given) in [
         (0.0, 500.0, 80.0),
         (0.0, 30.0, 30.0),
         (2.5, 500.0, 80.0),
@@ -70,17 +87,13 @@ fn a_dc_motor_gives_less_the_faster_it_turns() {
         (3.75, 10.0, 10.0),
         (3.75, -500.0, -80.0),
         (7.5, 500.0, 0.0),
-        // Faster than without load it brakes, whatever is asked for.
+        // Faster than without load it brakes, whatever the command.
         (9.0, 500.0, -24.0),
         (9.0, 0.0, -24.0),
         (12.5, 500.0, -80.0),
         (40.0, 500.0, -80.0),
         (40.0, -500.0, -80.0),
-    ];
-    let drive = with(DcMotor { saturation_effort: 120.0 }, 0.0, 0.0);
-    let world =
-        world(&[Joint::wheel("j", M).effort(80.0)], DriveCfg { max_velocity: Some(7.5.into()), ..drive }, weightless());
-    for (speed, asked, given) in table {
+    ] {
         for sign in [1.0, -1.0] {
             let mut env = world.env();
             push(&mut env, &[0.0], &[sign * speed]);
@@ -93,49 +106,39 @@ fn a_dc_motor_gives_less_the_faster_it_turns() {
         }
     }
     // Below the lines it is the ideal controller, with its gains.
-    let (kp, kd) = (40.0, 5.0);
-    let world = self::world(
-        &[Joint::wheel("j", M).effort(80.0)],
-        with(DcMotor { saturation_effort: 120.0 }, kp, kd),
-        weightless(),
-    );
-    let mut env = world.env();
+    let drive = with(DcMotor { saturation_effort: 120.0 }, 40.0, 5.0);
+    let mut env = self::world(&[wheel().effort(80.0)], drive, weightless()).env();
     push(&mut env, &[0.1], &[1.0]);
-    env.drives.position[0] = 0.5;
-    env.drives.velocity[0] = 2.0;
+    command(&mut env, [0.5, 2.0, 0.0]);
     step(&mut env);
-    assert_close(env.drives.effort[0], kp * 0.4 + kd * 1.0, EXACT, "inside of the lines");
+    assert_close(env.drives.effort[0], 40.0 * 0.4 + 5.0 * 1.0, EXACT, "inside of the lines");
 }
 
 /// The speed without load is per environment: at v a motor gives at most s (1 - v / v_max).
 #[test]
-fn speeds_without_load_differ_between_environments() {
-    let cfg = SimulationManagerCfg { num_envs: 2, ..weightless() };
-    let wheel = Joint::wheel("j", M).effort(100.0);
-    let mut world = world(&[wheel], with(DcMotor { saturation_effort: 6.0 }, 0.0, 0.0), cfg);
-    let mut robot = world.sim.robot_mut(world.robot);
+fn dc_motor_limits() {
+    let mut world = world(&[wheel().effort(100.0)], motor(6.0), weightless_envs(2));
+    let mut robot = world.robot();
     robot.set_qvel_limits(&array![[3.0]], None, Some(&[EnvId(1)])).unwrap();
     robot.write_qvel(&array![[1.5]], None, None).unwrap();
     robot.set_qf(&array![[100.0]], None, None).unwrap();
     world.step(1);
-    let effort = world.view().get_qf();
-    assert_close(effort[(0, 0)], 6.0 * (1.0 - 1.5 / 7.5), EXACT, "7.5 rad/s");
-    assert_close(effort[(1, 0)], 6.0 * (1.0 - 1.5 / 3.0), EXACT, "3 rad/s");
+    for (env, top) in [(0, 7.5), (1, 3.0)] {
+        let expected = 6.0 * (1.0 - 1.5 / top);
+        assert_close(world.view().get_qf()[(env, 0)], expected, EXACT, &format!("{top} rad/s"));
+    }
+    let before = (world.view().qvel_limits(), world.view().qf_limits());
     for bad in [0.0, f64::INFINITY] {
-        let before = world.view().qvel_limits();
-        let error = world.sim.robot_mut(world.robot).set_qvel_limits(&array![[bad]], None, None).unwrap_err();
-        assert!(matches!(error, Error::OutOfRange { argument: "set_qvel_limits", .. }), "{error}");
-        assert!(error.to_string().contains("dc_motor"), "{error}");
-        assert_eq!(world.view().qvel_limits(), before);
+        let result = world.robot().set_qvel_limits(&array![[bad]], None, None);
+        assert_error(result, "OutOfRange { argument: \"set_qvel_limits\"", &["dc_motor"]);
     }
     // A motor without a continuous limit would brake without end.
-    let before = world.view().qf_limits();
-    let error = world.sim.robot_mut(world.robot).set_qf_limits(&array![[f64::INFINITY]], None, None).unwrap_err();
+    let error = world.robot().set_qf_limits(&array![[f64::INFINITY]], None, None).unwrap_err();
     assert!(matches!(error, Error::OutOfRange { argument: "set_qf_limits", row: 0, column: 0, .. }), "{error}");
     assert!(error.to_string().contains("dc_motor") && error.to_string().contains("joint \"j\""), "{error}");
-    assert_eq!(world.view().qf_limits(), before);
-    world.sim.robot_mut(world.robot).set_qf_limits(&array![[2.0]], None, None).unwrap();
-    world.sim.robot_mut(world.robot).write_qvel(&array![[1.5]], None, None).unwrap();
+    assert_eq!((world.view().qvel_limits(), world.view().qf_limits()), before);
+    world.robot().set_qf_limits(&array![[2.0]], None, None).unwrap();
+    world.robot().write_qvel(&array![[1.5]], None, None).unwrap();
     world.step(1);
     assert_eq!(world.view().get_qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
 }
@@ -144,21 +147,18 @@ fn speeds_without_load_differ_between_environments() {
 /// v_n = v_max (1 - r^n) and q_n = h (v_1 + ... + v_n) = h v_max (n - r (1 - r^n) / (1 - r)). That settles while |r| < 1;
 /// beyond, the motor overshoots until its limit holds it, and `add_robot` has warned.
 #[test]
-fn a_dc_motor_runs_up_its_line_and_warns_where_that_is_not_stable() {
+fn dc_motor_from_rest() {
     let stall = 6.0;
     for (slope, stable) in [(0.8, true), (10.0, true), (39.0, true), (41.0, false)] {
-        let top = stall / slope;
-        let drive = with(DcMotor { saturation_effort: stall }, 0.0, 0.0);
-        let drive = DriveCfg { max_velocity: Some(top.into()), ..drive };
-        let mut world = world(&[Joint::wheel("j", M).effort(1.5 * stall)], drive, weightless());
-        let warned = world.sim.warning_counts().keys().any(|name| name.contains("unstable"));
-        assert_eq!(warned, !stable, "slope {slope}");
-        world.sim.robot_mut(world.robot).set_qf(&array![[1e4]], None, None).unwrap();
-        let r = 1.0 - H * slope / M;
+        let (top, r) = (stall / slope, 1.0 - H * slope / M);
+        let drive = DriveCfg { max_velocity: Some(top.into()), ..motor(stall) };
+        let mut world = world(&[wheel().effort(1.5 * stall)], drive, weightless());
+        assert_eq!(world.warned_unstable(), !stable, "slope {slope}");
+        world.robot().set_qf(&array![[1e4]], None, None).unwrap();
         for n in 1..=200 {
             world.step(1);
-            let power = r.powi(n);
             if stable {
+                let power = r.powi(n);
                 let q = H * top * (f64::from(n) - r * (1.0 - power) / (1.0 - r));
                 assert_close(world.v()[0], top * (1.0 - power), EXACT, &format!("velocity, slope {slope}, step {n}"));
                 assert_close(world.q()[0], q, EXACT, &format!("position, slope {slope}, step {n}"));
@@ -177,116 +177,101 @@ fn wobble(n: i32) -> [f64; 3] {
     [0.5 * (0.31 * n).sin(), 0.2 * (0.7 * n).cos(), 0.3 * (1.1 * n).sin()]
 }
 
-fn set_targets(world: &mut World, [q, v, tau]: [f64; 3]) {
-    let mut robot = world.sim.robot_mut(world.robot);
-    robot.set_qpos(&row(&[q]), None, None).unwrap();
-    robot.set_qvel(&row(&[v]), None, None).unwrap();
-    robot.set_qf(&row(&[tau]), None, None).unwrap();
+/// The targets that act in step n: before, those of the start.
+fn delayed(n: i32, delay: i32) -> [f64; 3] {
+    if n < delay { [0.0; 3] } else { wobble(n - delay) }
 }
 
-/// Each environment hears of the targets its own number of steps later; before, of the start.
+fn assert_at(found: [f64; 2], law: &Law, what: &str) {
+    assert_close(found[0], law.q, EXACT, &format!("position, {what}"));
+    assert_close(found[1], law.v, EXACT, &format!("velocity, {what}"));
+}
+
+/// Targets act in each environment its own number of steps later.
 #[test]
-fn delayed_targets_arrive_in_their_order_in_each_environment() {
-    let (kp, kd) = (25.0, 1.0);
+fn delay_per_environment() {
     let delays = [0, 1, 3, 6];
-    let cfg = SimulationManagerCfg { num_envs: delays.len(), ..weightless() };
-    let drive = with(DelayedPd { delay: 1, max_delay: 6 }, kp, kd);
-    let mut world = world(&[Joint::wheel("j", M)], drive, cfg);
+    let mut world = world(&[wheel()], with(DelayedPd { delay: 1, max_delay: 6 }, 25.0, 1.0), weightless_envs(4));
     assert_eq!(world.view().get_delay(), Array2::from_elem((4, 1), 1));
-    world.sim.robot_mut(world.robot).set_delay(&array![[0_u32], [1], [3], [6]], None, None).unwrap();
+    world.robot().set_delay(&array![[0_u32], [1], [3], [6]], None, None).unwrap();
     for round in 0..2 {
-        let (mut state, mut apart) = ([[0.0_f64; 2]; 4], 0.0_f64);
+        let (mut laws, mut apart) = ([law(25.0, 1.0); 4], 0.0_f64);
         for n in 0..200 {
-            set_targets(&mut world, wobble(n));
+            world.command([wobble(n)]);
             if n == 100 {
-                // What is under way is carried over to a new model.
-                let ball = ObjectShape::Sphere { radius: 0.1 };
-                let uid = format!("ball{round}");
-                let at = Pose::translation(5.0, round as f64, 5.0);
-                let ball = RigidObjectCfg { uid, shape: ball, init_pose: at, ..Default::default() };
-                world.sim.add_rigid_object(ball).unwrap();
+                // Delayed targets are carried over to a new model.
+                add_ball(&mut world.sim, &format!("ball{round}"), [5.0, f64::from(round), 5.0]);
             }
             world.step(1);
             let (q, v) = (world.view().get_qpos(), world.view().get_qvel());
-            for (env, (&delay, [x, u])) in delays.iter().zip(&mut state).enumerate() {
-                let [aim, v_aim, ff] = if n < delay { [0.0; 3] } else { wobble(n - delay) };
-                *u += H / M * (kp * (aim - *x) + kd * (v_aim - *u) + ff);
-                *x += H * *u;
-                assert_close(v[(env, 0)], *u, EXACT, &format!("velocity, delay {delay}, step {n}, round {round}"));
-                assert_close(q[(env, 0)], *x, EXACT, &format!("position, delay {delay}, step {n}, round {round}"));
+            for (env, (&delay, law)) in delays.iter().zip(&mut laws).enumerate() {
+                law.step_to(delayed(n, delay));
+                assert_at([q[(env, 0)], v[(env, 0)]], law, &format!("delay {delay}, step {n}, round {round}"));
             }
-            apart = apart.max((state[0][0] - state[3][0]).abs());
+            apart = apart.max((laws[0].q - laws[3].q).abs());
         }
         assert!(apart > 0.05, "the control: a delay shows: {apart}");
-        // A reset forgets what is under way, and keeps the delays.
+        // A reset forgets the delayed targets, and keeps the delays.
         world.sim.reset(None).unwrap();
         assert_eq!(world.view().get_delay().column(0).to_vec(), [0, 1, 3, 6]);
     }
 }
 
-/// Step n hears the targets of step n - d(n): the last ones again where the delay grows, some never where it falls.
+/// In step n the targets of step n - d(n) act: the last ones again where the delay grows, some never where it falls.
 #[test]
-fn delays_that_change_in_motion_repeat_or_skip_targets() {
-    let (kp, kd) = (25.0, 1.0);
-    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay: 2, max_delay: 7 }, kp, kd), weightless());
-    // First step and delay from there on; the first one is longer than anything has been set for.
+fn delay_that_changes() {
+    let mut world = world(&[wheel()], with(DelayedPd { delay: 2, max_delay: 7 }, 25.0, 1.0), weightless());
+    // First step and delay from there on; the first one is longer than any before.
     let changes = [(1, 7), (20, 2), (50, 5), (100, 1), (110, 0), (120, 7), (150, 0)];
-    let (mut delay, mut x, mut u) = (2, 0.0_f64, 0.0_f64);
-    let mut heard = Vec::new();
+    let (mut delay, mut law, mut acted) = (2, law(25.0, 1.0), Vec::new());
     for n in 0..180 {
         if let Some((_, changed)) = changes.iter().find(|(at, _)| *at == n) {
             delay = *changed;
-            world.sim.robot_mut(world.robot).set_delay(&array![[delay as u32]], None, None).unwrap();
+            world.robot().set_delay(&array![[delay as u32]], None, None).unwrap();
         }
-        set_targets(&mut world, wobble(n));
+        world.command([wobble(n)]);
         world.step(1);
-        heard.push(n - delay);
-        let [aim, v_aim, ff] = if n < delay { [0.0; 3] } else { wobble(n - delay) };
-        u += H / M * (kp * (aim - x) + kd * (v_aim - u) + ff);
-        x += H * u;
-        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
-        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+        acted.push(n - delay);
+        law.step_to(delayed(n, delay));
+        assert_at([world.q()[0], world.v()[0]], &law, &format!("step {n}"));
     }
-    // What the documents say of it: from 2 to 5 steps three targets act again, from 5 to 1 four never do.
-    assert_eq!(heard[48..55], [46, 47, 45, 46, 47, 48, 49]);
-    assert_eq!(heard[98..102], [93, 94, 99, 100]);
+    // As documented: from 2 to 5 steps three targets act again, from 5 to 1 four never do.
+    assert_eq!(acted[48..55], [46, 47, 45, 46, 47, 48, 49]);
+    assert_eq!(acted[98..102], [93, 94, 99, 100]);
 }
 
 /// A target that was set in a wide range and acts in a tight one acts at the end of the tight one, and one that waits until
 /// the range is wide again as it was set.
 #[test]
-fn targets_that_are_under_way_stay_inside_of_limits_that_are_set_later() {
-    let (kp, kd, delay) = (25.0, 1.0, 5);
-    let mut world = world(&[Joint::wheel("j", M)], with(DelayedPd { delay, max_delay: 0 }, kp, kd), weightless());
+fn delay_across_limits() {
+    let delay = 5;
+    let mut world = world(&[wheel()], with(DelayedPd { delay, max_delay: 0 }, 25.0, 1.0), weightless());
     let (wide, tight) = ([f64::NEG_INFINITY, f64::INFINITY], [-0.1, 0.15]);
     let clamp = |[low, high]: [f64; 2], x: f64| x.max(low).min(high);
-    let (mut set, mut x, mut u) = (Vec::new(), 0.0_f64, 0.0_f64);
-    let (mut cut, mut spared) = (0, 0);
+    let (mut set, mut law, mut cut, mut spared) = (Vec::new(), law(25.0, 1.0), 0, 0);
     for n in 0..200 {
         let range = if n % 40 >= 20 && n % 40 < 23 { tight } else { wide };
         if [0, 20, 23].contains(&(n % 40)) {
-            world.sim.robot_mut(world.robot).set_qpos_limits(&array![[[range[0], range[1]]]], None, None).unwrap();
+            world.robot().set_qpos_limits(&array![[[range[0], range[1]]]], None, None).unwrap();
         }
-        set_targets(&mut world, wobble(n));
-        world.step(1);
         let [q, v, tau] = wobble(n);
+        world.command([[q, v, tau]]);
+        world.step(1);
         set.push([clamp(range, q), v, tau]);
-        let heard = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
-        let aim = clamp(range, heard[0]);
-        cut += u32::from(aim != heard[0]);
+        let acts = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
+        let aim = clamp(range, acts[0]);
+        cut += u32::from(aim != acts[0]);
         // Set before the range was tight, it acts after.
         spared += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
-        u += H / M * (kp * (aim - x) + kd * (heard[1] - u) + heard[2]);
-        x += H * u;
-        assert_close(world.v()[0], u, EXACT, &format!("velocity, step {n}"));
-        assert_close(world.q()[0], x, EXACT, &format!("position, step {n}"));
+        law.step_to([aim, acts[1], acts[2]]);
+        assert_at([world.q()[0], world.v()[0]], &law, &format!("step {n}"));
     }
     assert!(cut > 3 && spared > 3, "the control: {cut} were clamped when they acted, {spared} were not");
 }
 
 /// A step that is done again, because its buffers were too small, is one step of the delay line.
 #[test]
-fn a_step_that_is_done_again_delays_nothing_twice() {
+fn delay_in_a_repeated_step() {
     let joints = ["a", "b", "c"].map(|name| Joint::wheel(name, M).range(-0.02, 0.02));
     let world = world(&joints, with(DelayedPd { delay: 3, max_delay: 0 }, 25.0, 1.0), weightless());
     let sized = |buffers: Buffers| {
@@ -295,12 +280,12 @@ fn a_step_that_is_done_again_delays_nothing_twice() {
         env.drives = drives;
         env
     };
-    // One size for each line of MuJoCo: rows of constraints on 2.2.2, one arena on 4.x.
+    // One size for each version of MuJoCo: rows of constraints on 2.2.2, one arena on 4.x.
     let huge = Buffers { contacts: 100, constraints: 100, arena_bytes: 1 << 20 };
-    let sizes = (0..40).map(|i| Buffers { constraints: 1, arena_bytes: (512.0 * 1.15_f64.powi(i)) as usize, ..huge });
     let mut in_motion = 0;
-    for size in sizes {
-        let (mut small, mut large) = (sized(size), sized(huge));
+    for i in 0..40 {
+        let arena_bytes = (512.0 * 1.15_f64.powi(i)) as usize;
+        let (mut small, mut large) = (sized(Buffers { constraints: 1, arena_bytes, ..huge }), sized(huge));
         let before = small.growths();
         for n in 0..60 {
             for env in [&mut small, &mut large] {
@@ -310,8 +295,8 @@ fn a_step_that_is_done_again_delays_nothing_twice() {
                 }
                 step(env);
             }
-            assert_eq!(small.data().qpos(), large.data().qpos(), "step {n}, {size:?}");
-            assert_eq!(small.drives, large.drives, "step {n}, {size:?}");
+            assert_eq!(small.data().qpos(), large.data().qpos(), "step {n}, arena {arena_bytes}");
+            assert_eq!(small.drives, large.drives, "step {n}, arena {arena_bytes}");
         }
         in_motion += small.growths() - before;
         assert_eq!(large.growths(), 0);
@@ -324,14 +309,11 @@ fn a_step_that_is_done_again_delays_nothing_twice() {
 /// delay. Euler's method is of first order: the error is about h times the acceleration's scale, and half of it with half
 /// the step. The bound 5 h w q* holds for z = 0.5; the control is the ratio of the errors.
 #[test]
-fn every_model_answers_a_step_with_the_solution_of_second_order() {
+fn second_order() {
     let (m, w, z, aim) = (0.1_f64, 10.0_f64, 0.5_f64, 0.05);
     let (kp, kd, d) = (m * w * w, 2.0 * m * z * w, w * (1.0 - z * z).sqrt());
-    let mut models = ActuatorModel::examples();
-    models.push(DelayedPd { delay: 7, max_delay: 0 }.into());
-    for model in models {
-        let delay = if let ActuatorModel::DelayedPd(model) = model { model.delay } else { 0 };
-        let error = |h: f64| {
+    for (model, delay) in models(7) {
+        let [one, half] = [1e-3, 5e-4].map(|h: f64| {
             let drive = DriveCfg { max_velocity: Some(1e6.into()), ..with(model, kp, kd) };
             let mut world = world(&[Joint::wheel("j", m).effort(100.0)], drive, at_dt(h, weightless()));
             world.aim(&[aim]);
@@ -345,9 +327,7 @@ fn every_model_answers_a_step_with_the_solution_of_second_order() {
             }
             assert_close(world.q()[0], aim, 0.01 * aim, "after five time constants");
             worst
-        };
-        let (one, half) = (error(1e-3), error(5e-4));
-        println!("{}: largest error {one:.1e} rad with 1 ms, {half:.1e} rad with 0.5 ms", model.law().name());
+        });
         assert!(one < 5.0 * 1e-3 * w * aim, "{model:?}: {one}");
         assert!((1.8..2.2).contains(&(one / half)), "{model:?}: {one} {half}");
     }
@@ -355,49 +335,39 @@ fn every_model_answers_a_step_with_the_solution_of_second_order() {
 
 /// Models are chosen by joint; others are driven as the robot is. Gains change at run time as those of other drives do.
 #[test]
-fn models_and_rows_go_together() {
+fn models_beside_rows() {
     let (kp, kd) = (60.0, 4.0);
-    let joints = [Joint::wheel("a", M), Joint::wheel("b", M), Joint { friction: 0.5, ..Joint::wheel("c", M) }];
-    let drive = DriveCfg { actuators: vec![("[bc]".into(), IdealPd {}.into())], ..gains(kp, kd) };
-    let mut world = world(&joints, drive, weightless());
-    world.aim(&[0.4; 3]);
-    world.step(1);
-    assert_close(world.v()[0], H * kp * 0.4 / (M + H * kd + H * H * kp), EXACT, "at the end of the step");
-    assert_close(world.v()[1], H * kp * 0.4 / M, EXACT, "at its start");
-    // With dry friction: h (tau - f) / M.
-    assert_close(world.v()[2], H * (kp * 0.4 - 0.5) / M, EXACT, "with friction");
-    world.sim.reset(None).unwrap();
-    world.aim(&[0.4; 3]);
-    let mut robot = world.sim.robot_mut(world.robot);
-    robot.set_stiffness(&array![[20.0]], Some(&[JointIndex(1)]), None).unwrap();
-    robot.set_qf_limits(&array![[3.0]], Some(&[JointIndex(1)]), None).unwrap();
-    world.step(1);
-    assert_close(world.v()[1], H * 3.0 / M, EXACT, "8 N m, clamped to 3");
-    world.sim.robot_mut(world.robot).set_qf_limits(&array![[500.0]], Some(&[JointIndex(1)]), None).unwrap();
-    world.sim.reset(None).unwrap();
-    world.aim(&[0.4; 3]);
-    world.step(1);
-    assert_close(world.v()[1], H * 20.0 * 0.4 / M, EXACT, "no limit of the model is in the way");
+    let joints = [Joint::wheel("a", M), Joint::wheel("b", M), Joint::wheel("c", M).rough(0.5)];
+    let mut world = world(&joints, modelled("[bc]", IdealPd {}, kp, kd), weightless());
+    let first = |world: &mut World| {
+        world.sim.reset(None).unwrap();
+        world.aim(&[0.4; 3]);
+        world.step(1);
+        world.v()
+    };
+    let v = first(&mut world);
+    assert_close(v[0], H * kp * 0.4 / (M + H * kd + H * H * kp), EXACT, "at the end of the step");
+    assert_close(v[1], H * kp * 0.4 / M, EXACT, "at its start");
+    assert_close(v[2], H * (kp * 0.4 - 0.5) / M, EXACT, "with friction");
+    let second = Some(&[JointIndex(1)][..]);
+    world.robot().set_stiffness(&array![[20.0]], second, None).unwrap();
+    world.robot().set_qf_limits(&array![[3.0]], second, None).unwrap();
+    assert_close(first(&mut world)[1], H * 3.0 / M, EXACT, "8 N m, clamped to 3");
+    world.robot().set_qf_limits(&array![[500.0]], second, None).unwrap();
+    assert_close(first(&mut world)[1], H * 20.0 * 0.4 / M, EXACT, "no limit of the model is in the way");
     world.assert_well();
 }
 
-/// Gains that are not stable at this time step are a warning with the largest one, as for MuJoCo's actuators.
+/// h² kp + 2 h kd = 4 I with the inertia I of a wheel and, times the square of its ratio, of the one that follows it; gains
+/// that are not stable at this time step are a warning, as for MuJoCo's actuators.
 #[test]
-fn explicit_models_warn_where_they_are_not_stable() {
-    let warned = |kp: f64| {
-        let world = world(&[Joint::wheel("j", M)], with(IdealPd {}, kp, 1.0), weightless());
-        world.sim.warning_counts().keys().any(|name| name.contains("unstable"))
-    };
-    // h² kp + 2 h kd = 4 M: kp = (0.8 - 0.02) / 1e-4 = 7800.
-    assert!(!warned(7700.0) && warned(7900.0));
-}
-
-/// h² kp + 2 h kd = 4 I with the inertia I of a wheel and, times the square of its ratio, of the one that follows it.
-#[test]
-fn the_largest_stable_step_is_the_root_of_its_law() {
-    let (kp, kd, ratio) = (200.0, 4.0, -2.0);
-    let [leader, follower] = [0.3, 0.05];
-    let joints = [Joint::wheel("a", leader), Joint { mimic: Some(("a".into(), ratio)), ..Joint::wheel("b", follower) }];
+fn largest_stable_step() {
+    // kp = (0.8 - 0.02) / 1e-4 = 7800.
+    for (kp, warns) in [(7700.0, false), (7900.0, true)] {
+        assert_eq!(world(&[wheel()], with(IdealPd {}, kp, 1.0), weightless()).warned_unstable(), warns, "{kp}");
+    }
+    let (kp, kd, ratio, [leader, follower]) = (200.0, 4.0, -2.0, [0.3, 0.05]);
+    let joints = [Joint::wheel("a", leader), Joint::wheel("b", follower).following("a", ratio)];
     let world = world(&joints, gains(kp, kd), weightless());
     let description = world.view().description();
     let (plans, _) = plan(description, &gains(kp, kd), &BTreeMap::new(), &[], false).unwrap();
@@ -417,62 +387,216 @@ fn the_largest_stable_step_is_the_root_of_its_law() {
 }
 
 #[test]
-fn models_that_do_not_go_with_their_joints_are_refused() {
+fn refused_models() {
     let plain = || DriveCfg { max_velocity: None, ..with(DcMotor { saturation_effort: 5.0 }, 1.0, 0.1) };
-    let named = |key: &str| DriveCfg { actuators: vec![(key.into(), IdealPd {}.into())], ..gains(1.0, 0.1) };
-    let twice = DriveCfg {
-        actuators: vec![("j".into(), IdealPd {}.into()), (".*".into(), DelayedPd::default().into())],
-        ..gains(1.0, 0.1)
-    };
-    let cases: Vec<(DriveCfg, &[&str])> = vec![
+    let mut twice = modelled("j", IdealPd {}, 1.0, 0.1);
+    twice.actuators.push((".*".into(), DelayedPd::default().into()));
+    let rows: [(DriveCfg, &[&str]); 8] = [
         (plain(), &["dc_motor of joint \"j\"", "max_velocity is inf", "velocity limit"]),
-        (
-            with(DcMotor { saturation_effort: 5.0 }, 1.0, 0.1),
-            &["dc_motor of joint \"j\"", "max_effort is inf", "effort limit"],
-        ),
-        (with(DcMotor { saturation_effort: 0.0 }, 1.0, 0.1), &["saturation_effort is 0", "above 0"]),
-        (with(DcMotor { saturation_effort: f64::NAN }, 1.0, 0.1), &["saturation_effort is NaN"]),
+        (motor(5.0), &["dc_motor of joint \"j\"", "max_effort is inf", "effort limit"]),
+        (motor(0.0), &["saturation_effort is 0", "above 0"]),
+        (motor(f64::NAN), &["saturation_effort is NaN"]),
         (with(DelayedPd { delay: 10_001, max_delay: 0 }, 1.0, 0.1), &["delayed_pd", "10001", "10000"]),
         (with(DelayedPd { delay: 0, max_delay: u32::MAX }, 1.0, 0.1), &["delayed_pd", "10000"]),
-        (named("J"), &["actuators", "\"J\"", "\"j\""]),
+        (modelled("J", IdealPd {}, 1.0, 0.1), &["actuators", "\"J\"", "\"j\""]),
         (twice, &["actuators", "matched by both"]),
     ];
-    for (drive, expected) in cases {
+    for (drive, parts) in rows {
         let what = format!("{drive:?}");
-        let error = try_world(&[Joint::wheel("j", M)], drive, weightless()).unwrap_err();
-        assert!(matches!(&*error, Error::Plan { .. }), "{error}");
-        if let Error::Plan { error: plan, .. } = &*error {
-            assert!(matches!(**plan, PlanError::ActuatorModel { .. } | PlanError::Drive(_)), "{error}");
-        }
-        for part in expected {
-            assert!(error.to_string().contains(part), "{part:?} is not in {error}, of {what}");
-        }
+        let error = *try_world(&[wheel()], drive, weightless()).unwrap_err();
+        let Error::Plan { error: plan, .. } = &error else { panic!("{error}") };
+        assert!(matches!(**plan, PlanError::ActuatorModel { .. } | PlanError::Drive(_)), "{error}");
+        assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error} lacks {parts:?}, of {what}");
     }
     // A velocity limit in the file is enough; a passive joint needs none.
-    try_world(&[Joint::wheel("j", M).effort(5.0)], plain(), weightless()).unwrap();
-    try_world(&[Joint::wheel("j", M)], DriveCfg { drive_type: DriveType::None, ..plain() }, weightless()).unwrap();
+    try_world(&[wheel().effort(5.0)], plain(), weightless()).unwrap();
+    try_world(&[wheel()], DriveCfg { drive_type: DriveType::None, ..plain() }, weightless()).unwrap();
 }
 
+/// Refused delays, which change nothing.
 #[test]
-fn delays_that_cannot_be_are_refused_and_nothing_is_set() {
-    let joints = [Joint::wheel("a", M), Joint::wheel("b", M)];
-    let drive =
-        DriveCfg { actuators: vec![("a".into(), DelayedPd { delay: 2, max_delay: 5 }.into())], ..gains(1.0, 0.1) };
-    let cfg = SimulationManagerCfg { num_envs: 2, ..weightless() };
-    let mut world = world(&joints, drive, cfg);
-    let first = [JointIndex(0)];
-    let mut refused = |steps: Array2<u32>, joints: Option<&[JointIndex]>, envs: Option<&[EnvId]>, part: &str| {
-        let message = world.sim.robot_mut(world.robot).set_delay(&steps, joints, envs).unwrap_err().to_string();
-        assert!(message.contains("set_delay") || message.contains("does not exist"), "{message}");
-        assert!(message.contains(part), "{part:?} is not in {message}");
+fn refused_delays() {
+    let drive = modelled("a", DelayedPd { delay: 2, max_delay: 5 }, 1.0, 0.1);
+    let mut world = world(&[Joint::wheel("a", M), Joint::wheel("b", M)], drive, weightless_envs(2));
+    let first = Some(&[JointIndex(0)][..]);
+    type Row<'a> = (Array2<u32>, Option<&'a [JointIndex]>, Option<&'a [EnvId]>, &'a [&'a str]);
+    let rows: [Row<'_>; 8] = [
+        (array![[5], [6]], first, None, &["set_delay[1, 0] (joint \"a\") is 6; it must be at most 5"]),
+        (array![[u32::MAX]], first, None, &["set_delay", "at most 5"]),
+        (array![[1, 1]], None, None, &["set_delay", "joint \"b\""]),
+        (array![[1]], None, None, &["set_delay", "[1, 1]"]),
+        (array![[1]], Some(&[JointIndex(7)]), None, &["joint 7 does not exist"]),
+        (array![[1, 3]], Some(&[JointIndex(0); 2]), None, &["set_delay names joint \"a\" twice"]),
+        (array![[1], [3]], first, Some(&[EnvId(1); 2]), &["set_delay names environment 1 twice"]),
+        (array![[1]], first, Some(&[EnvId(2)]), &["environment 2 does not exist"]),
+    ];
+    for (steps, joints, envs, parts) in rows {
+        assert_error(world.robot().set_delay(&steps, joints, envs), "", parts);
         assert_eq!(world.view().get_delay(), array![[2, 0], [2, 0]]);
+    }
+}
+
+const ENVS: usize = 3;
+/// Two wheels with the model, and one without.
+const MOMENTS: [f64; 3] = [0.2, 0.5, 0.3];
+const LIMIT: f64 = 0.9;
+
+/// Settings of each drive, by environment and joint.
+#[derive(Clone, Debug, PartialEq)]
+struct Settings {
+    stiffness: Array2<f64>,
+    damping: Array2<f64>,
+    limit: Array2<f64>,
+    kind: Array2<DriveType>,
+}
+
+impl Settings {
+    fn at_first() -> Self {
+        let all = |value| Array2::from_elem((ENVS, 3), value);
+        Self { stiffness: all(3.0), damping: all(0.4), limit: all(LIMIT), kind: Array2::default((ENVS, 3)) }
+    }
+
+    fn of(world: &World) -> Self {
+        let view = world.view();
+        let (stiffness, damping) = (view.get_stiffness(), view.get_damping());
+        Self { stiffness, damping, limit: view.qf_limits(), kind: view.get_drive_types() }
+    }
+
+    /// Changes of step n, of single joints in single environments.
+    fn change(&mut self, world: &mut World, n: i32) {
+        const A: Option<&[JointIndex]> = Some(&[JointIndex(0)]);
+        const B: Option<&[JointIndex]> = Some(&[JointIndex(1)]);
+        const ONE: Option<&[EnvId]> = Some(&[EnvId(1)]);
+        const TWO: Option<&[EnvId]> = Some(&[EnvId(2)]);
+        let mut robot = world.robot();
+        match n {
+            40 => {
+                robot.set_stiffness(&array![[6.0], [1.5]], A, Some(&[EnvId(2), EnvId(1)])).unwrap();
+                (self.stiffness[(2, 0)], self.stiffness[(1, 0)]) = (6.0, 1.5);
+            }
+            80 => {
+                robot.set_damping(&array![[0.9]], B, ONE).unwrap();
+                robot.set_qf_limits(&array![[0.3]], B, TWO).unwrap();
+                (self.damping[(1, 1)], self.limit[(2, 1)]) = (0.9, 0.3);
+            }
+            120 => {
+                robot.set_drive_type(DriveType::Acceleration, A, ONE).unwrap();
+                robot.set_drive_type(DriveType::None, B, TWO).unwrap();
+                (self.kind[(1, 0)], self.kind[(2, 1)]) = (DriveType::Acceleration, DriveType::None);
+            }
+            160 => {
+                // A number that is set while it does not act, acts when it does.
+                robot.set_stiffness(&array![[5.0]], B, TWO).unwrap();
+                robot.set_drive_type(DriveType::Force, None, None).unwrap();
+                self.stiffness[(2, 1)] = 5.0;
+                self.kind.fill(DriveType::Force);
+            }
+            200 => {
+                let limit = Randomization::new().with(Property::MaxEffort, "robot/a", Draw::Set([0.5, 0.5]));
+                world.sim.randomize(&limit, ONE).unwrap();
+                self.limit[(1, 0)] = 0.5;
+            }
+            _ => return,
+        }
+        assert_eq!(Self::of(world), *self, "step {n}");
+    }
+}
+
+fn three_wheels(model: ActuatorModel) -> World {
+    let joints: Vec<Joint> =
+        ["a", "b", "c"].into_iter().zip(MOMENTS).map(|(name, m)| Joint::wheel(name, m).effort(LIMIT)).collect();
+    let drive = DriveCfg { max_velocity: Some(1e6.into()), ..modelled("[ab]", model, 3.0, 0.4) };
+    world(&joints, drive, weightless_envs(ENVS))
+}
+
+/// Below its stall effort and far from its speed without load a motor gives the clamped sum, as the others do. Gains of type
+/// `acceleration` are multiplied by M, type `none` has none.
+#[test]
+fn changes_at_run_time() {
+    // All three targets of step n, wide enough to reach the limit.
+    let wobble = |n: i32, joint: usize| {
+        let (n, phase) = (f64::from(n), joint as f64);
+        [0.6 * (0.13 * n + phase).sin(), 0.2 * (0.7 * n + phase).cos(), 0.1 * (1.1 * n - phase).sin()]
     };
-    refused(array![[5], [6]], Some(&first), None, "set_delay[1, 0] (joint \"a\") is 6; it must be at most 5");
-    refused(array![[u32::MAX]], Some(&first), None, "at most 5");
-    refused(array![[1, 1]], None, None, "joint \"b\"");
-    refused(array![[1]], None, None, "[1, 1]");
-    refused(array![[1]], Some(&[JointIndex(7)]), None, "joint 7");
-    refused(array![[1, 3]], Some(&[JointIndex(0); 2]), None, "set_delay names joint \"a\" twice");
-    refused(array![[1], [3]], Some(&first), Some(&[EnvId(1); 2]), "set_delay names environment 1 twice");
-    refused(array![[1]], Some(&first), Some(&[EnvId(2)]), "environment 2");
+    for (model, delay) in models(3) {
+        let (name, delay) = (model.law().name(), delay as i32);
+        let [mut world, mut unchanged] = [(); 2].map(|()| three_wheels(model));
+        let mut settings = Settings::at_first();
+        assert_eq!(Settings::of(&world), settings, "{name}");
+        // In the second round every change before the reset holds from the start.
+        for round in 0..2 {
+            let mut laws = Array2::from_elem((ENVS, 2), law(0.0, 0.0));
+            let (mut saturated, mut free, mut apart) = (0, 0, 0.0_f64);
+            for n in 0..240 {
+                if round == 0 {
+                    settings.change(&mut world, n);
+                }
+                for world in [&mut world, &mut unchanged] {
+                    world.command([0, 1, 2].map(|joint| wobble(n, joint)));
+                    world.step(1);
+                }
+                let (q, v, effort) = (world.view().get_qpos(), world.view().get_qvel(), world.view().get_qf());
+                let others = unchanged.view().get_qpos();
+                for (at, law) in laws.indexed_iter_mut() {
+                    let m = MOMENTS[at.1];
+                    let unit = match settings.kind[at] {
+                        DriveType::Force => 1.0,
+                        DriveType::Acceleration => m,
+                        DriveType::None => 0.0,
+                    };
+                    let (kp, kd) = (unit * settings.stiffness[at], unit * settings.damping[at]);
+                    *law = Law { m, kp, kd, limit: settings.limit[at], ..*law };
+                    let (tau, bound) = law.step_to(if n < delay { [0.0; 3] } else { wobble(n - delay, at.1) });
+                    if bound {
+                        saturated += 1
+                    } else {
+                        free += 1
+                    }
+                    let what = format!("{name}, round {round}, step {n}, environment and joint {at:?}");
+                    assert_close(effort[at], tau, EXACT, &format!("effort, {what}"));
+                    assert_at([q[at], v[at]], law, &what);
+                    apart = apart.max((q[at] - others[at]).abs());
+                }
+                for env in 0..ENVS {
+                    assert_close(q[(env, 2)], others[(env, 2)], EXACT, "the wheel with a row");
+                }
+                assert_eq!(q.row(0), others.row(0), "environment 0 was not named: {name}, step {n}");
+            }
+            assert!(saturated > 50 && free > 50, "{name}: both sides of the limit: {saturated} {free}");
+            assert!(apart > 0.05, "{name}: the control: changes matter: {apart}");
+            for world in [&mut world, &mut unchanged] {
+                world.sim.reset(None).unwrap();
+            }
+            assert_eq!(Settings::of(&world), settings, "{name}: they stay through a reset");
+        }
+        world.assert_well();
+    }
+}
+
+/// A motor's own demands hold for random numbers as for those that are set: an effort limit must be finite.
+#[test]
+fn randomized_limits() {
+    for model in ActuatorModel::examples() {
+        let mut world = three_wheels(model);
+        let unlimited = |sim: &mut SimulationManager, joint: &str, envs: Option<&[EnvId]>| {
+            sim.randomize_with(envs, |_, _, all| all.set(Property::MaxEffort, joint, &[f64::INFINITY]))
+        };
+        let result = unlimited(&mut world.sim, "robot/b", Some(&[EnvId(2)]));
+        if let ActuatorModel::DcMotor(_) = model {
+            let error = result.unwrap_err();
+            let right = matches!(&error, Error::Randomization(RandomizationError::Model { env: 2, name, .. }) if name == "robot/b");
+            assert!(right, "{error:?}");
+            assert_error(
+                Err::<(), _>(error),
+                "",
+                &["environment 2", "max_effort", "\"robot/b\"", "dc_motor", "finite"],
+            );
+            assert_eq!(Settings::of(&world), Settings::at_first(), "nothing is set");
+            // The wheel without a model may have no limit.
+            unlimited(&mut world.sim, "robot/c", None).unwrap();
+        } else {
+            result.unwrap();
+            assert_eq!(world.view().qf_limits()[(2, 1)], f64::INFINITY);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! A finger of 45 g turns about x; its round tip, 90 mm from the axis, meets a block whose face is normal to the tip's
 //! path at 0.3 rad; the drive (1e3 / 1e2) aims at 0.8 rad with a limit of 2 N m. At rest the limit is in balance with the
 //! contact: F = 2 N m / 0.09 m = 22.2 N. Tolerance 5 %: the tip rests a little inside the face, and the four edges of
-//! the friction pyramid tilt the force. The finger rests (1 mrad/s), the centre of its tip in front of the face: its depth
+//! the friction pyramid tilt the force. The finger rests (1 mrad/s), the center of its tip in front of the face: its depth
 //! is that of MuJoCo's default contact, 2.5 mm of the tip's radius of 8 mm.
 //!
 //! Control: the same drive as a torque computed beforehand (the implicit law without the contact in it, clamped, applied
@@ -13,6 +13,7 @@ use crate::drives::worlds::*;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::{Cone, mj};
+use testkit::urdf::{Files, collision, robot};
 
 const KP: f64 = 1e3;
 const KD: f64 = 1e2;
@@ -20,44 +21,33 @@ const LIMIT: f64 = 2.0;
 const LEVER: f64 = 0.09;
 const AIM: f64 = 0.8;
 const FACE: f64 = 0.3;
-const H: f64 = 0.01;
 /// Moment of inertia about the joint.
 const MOMENT: f64 = 3e-5 + 0.045 * 0.045 * 0.045;
 
-fn scene(drive: DriveCfg, cfg: SimulationManagerCfg) -> World {
+fn scene(drive: DriveCfg, cone: Cone) -> World {
     let finger = Joint {
         axis: [1.0, 0.0, 0.0],
         mass: 0.045,
         com: [0.0, 0.0, 0.045],
         inertia: [3e-5, 3e-5, 1e-6],
-        collision: "<collision><origin xyz=\"0 0 0.09\"/><geometry><sphere radius=\"0.008\"/></geometry></collision>"
-            .into(),
+        collision: collision("<sphere radius=\"0.008\"/>", [0.0, 0.0, 0.09]),
         ..Joint::new("finger", "continuous")
     };
-    let mut world = world(&[finger.effort(LIMIT)], drive, cfg);
-    let files = tempfile::tempdir().unwrap();
-    let path = files.path().join("block.urdf");
-    let block = "<robot name=\"block\"><link name=\"block\"><collision><geometry><box size=\"0.1 0.04 0.1\"/></geometry>\
-                 </collision></link></robot>";
-    std::fs::write(&path, block).unwrap();
-    world
-        .sim
-        .add_robot(RobotCfg {
-            uid: "block".into(),
-            urdf: UrdfCfg::single(&path),
-            init_pose: from_xyz_rpy([0.0, -0.0556, 0.0846], [FACE, 0.0, 0.0]),
-            ..Default::default()
-        })
-        .unwrap_or_else(|e| panic!("{e}"));
+    let mut world = world(&[finger.effort(LIMIT)], drive, SimulationManagerCfg { cone, ..weightless() });
+    let shape = collision("<box size=\"0.1 0.04 0.1\"/>", [0.0; 3]);
+    let block = robot("block", &format!("<link name=\"block\">{shape}</link>"));
+    let (files, init_pose) = (Files::default(), from_xyz_rpy([0.0, -0.0556, 0.0846], [FACE, 0.0, 0.0]));
+    let block = RobotCfg { init_pose, ..testkit::worlds::text_robot(&files, "block", &block) };
+    world.sim.add_robot(block).unwrap_or_else(|e| panic!("{e}"));
     world
 }
 
-/// (mean normal force over the last 0.2 of 1 s, position, velocity, drive's effort)
-fn press(world: &World, mut outside: impl FnMut(&mj::Data) -> f64) -> (f64, f64, f64, f64) {
+/// Mean normal force over the last 0.2 of 1 s, position, velocity and the drive's effort.
+fn press(world: &World, mut outside: impl FnMut(&mj::Data) -> f64) -> [f64; 4] {
     let (model, mut drives) = world.sim.batch().read(0, |env| (env.data().model().clone(), env.drives.clone()));
     drives.position.fill(AIM);
     let mut data = mj::Data::new(&model).unwrap();
-    let (mut sum, mut count, mut efforts) = (0.0, 0, Vec::new());
+    let (mut sum, mut efforts) = (0.0, Vec::new());
     for k in 0..100 {
         data.step1().unwrap();
         drives.applied[0] = outside(&data);
@@ -66,34 +56,27 @@ fn press(world: &World, mut outside: impl FnMut(&mj::Data) -> f64) -> (f64, f64,
         drives.read_efforts(&data, &mut efforts);
         if k >= 80 {
             sum += (0..data.contact().len()).map(|i| data.contact_force(i)[0]).sum::<f64>();
-            count += 1;
         }
     }
-    let effort = efforts.first().copied().unwrap_or(0.0);
-    (sum / f64::from(count), data.qpos()[0], data.qvel()[0], effort)
+    [sum / 20.0, data.qpos()[0], data.qvel()[0], efforts.first().copied().unwrap_or(0.0)]
 }
 
 #[test]
-fn the_finger_pushes_with_its_limit() {
+fn limit_at_the_tip() {
     for cone in [Cone::Pyramidal, Cone::Elliptic] {
-        let world = scene(gains(KP, KD), SimulationManagerCfg { cone, ..weightless() });
-        let (force, q, v, effort) = press(&world, |_| 0.0);
-        println!("{cone:?}: {force:.2} N of {:.2} N at {q:.4} rad, {v:.1e} rad/s, {effort} N m", LIMIT / LEVER);
-        assert!((force / (LIMIT / LEVER) - 1.0).abs() < 0.05, "{force}");
+        let [force, q, v, effort] = press(&scene(gains(KP, KD), cone), |_| 0.0);
+        assert!((force / (LIMIT / LEVER) - 1.0).abs() < 0.05, "{cone:?}: {force} N");
         assert_eq!(effort, LIMIT);
-        assert!(v.abs() < 1e-3 && (q - FACE).abs() * LEVER < 8e-3, "{q} {v}");
+        assert!(v.abs() < 1e-3 && (q - FACE).abs() * LEVER < 8e-3, "{cone:?}: {q} {v}");
     }
 }
 
 #[test]
-fn a_torque_computed_without_the_contact_does_not_grip() {
-    let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
-    let world = scene(drive, weightless());
-    let (force, ..) = press(&world, |data| {
+fn torque_computed_without_the_contact() {
+    let [force, ..] = press(&scene(no_drive(), Cone::Pyramidal), |data| {
         let (q, v) = (data.qpos()[0], data.qvel()[0]);
         let a = (KP * (AIM - q - H * v) - KD * v) / (MOMENT + H * KD + H * H * KP);
         (KP * (AIM - q - H * v - H * H * a) - KD * (v + H * a)).clamp(-LIMIT, LIMIT)
     });
-    println!("computed torque: {force:.2} N");
     assert!(force < 0.5 * LIMIT / LEVER, "{force}");
 }

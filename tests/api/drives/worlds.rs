@@ -1,6 +1,5 @@
-//! Worlds for the drive laws: URDF chains written from a few numbers, loaded through the public API.
-//!
-//! Nothing here judges anything; the laws, derivations and tolerances stand at the top of each test file.
+//! Worlds for the drive laws: URDF chains written from a few numbers, loaded through the public API. Nothing here judges
+//! anything; the laws, derivations and tolerances stand at the top of each test file.
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
@@ -8,11 +7,15 @@ use kinetoscope::sim;
 use kinetoscope::sim::dynamics::{Configuration, Kinematics, MimicPositions};
 use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj;
-use nalgebra::{DVector, Vector3};
-use std::fmt::Write as _;
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::sync::Arc;
+use testkit::urdf::{Files, joint, robot};
+pub(crate) use testkit::worlds::{gains, no_drive};
+use testkit::worlds::{text_robot, weightless_cfg};
 
 pub(crate) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+/// Time step \[s\].
+pub(crate) const H: f64 = 0.01;
 
 /// One joint and the link it moves.
 #[derive(Clone, Debug)]
@@ -29,9 +32,9 @@ pub(crate) struct Joint {
     pub(crate) mimic: Option<(String, f64)>,
     pub(crate) mass: f64,
     pub(crate) com: [f64; 3],
-    /// Moments about the centre of mass.
+    /// Moments about the center of mass.
     pub(crate) inertia: [f64; 3],
-    /// Content of `<collision>`.
+    /// Content of the link.
     pub(crate) collision: String,
 }
 
@@ -74,6 +77,18 @@ impl Joint {
         Self { parent: parent.link(), origin, ..self }
     }
 
+    pub(crate) fn following(self, driver: &str, ratio: f64) -> Self {
+        Self { mimic: Some((driver.into(), ratio)), ..self }
+    }
+
+    pub(crate) fn rough(self, friction: f64) -> Self {
+        Self { friction, ..self }
+    }
+
+    pub(crate) fn damped(self, damping: f64) -> Self {
+        Self { damping, ..self }
+    }
+
     pub(crate) fn effort(self, effort: f64) -> Self {
         Self { limit: format!("{} effort=\"{effort}\" velocity=\"100\"", self.limit), ..self }
     }
@@ -91,97 +106,98 @@ impl Joint {
 /// The joints as URDF, `base` being the root.
 pub(crate) fn urdf(joints: &[Joint]) -> String {
     let v = |x: [f64; 3]| format!("{} {} {}", x[0], x[1], x[2]);
-    let mut out = String::from("<robot name=\"test\"><link name=\"base\"/>\n");
+    let mut elements = String::from("<link name=\"base\"/>\n");
     for j in joints {
-        let [ixx, iyy, izz] = j.inertia;
-        let _ = writeln!(
-            out,
-            "<link name=\"{}\"><inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{ixx}\" iyy=\"{iyy}\" \
-             izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>{}</link>",
-            j.link(),
+        let ([ixx, iyy, izz], link, mut more) = (j.inertia, j.link(), String::new());
+        elements += &format!(
+            "<link name=\"{link}\"><inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{ixx}\" \
+             iyy=\"{iyy}\" izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>{}</link>",
             v(j.com),
             j.mass,
             j.collision,
         );
-        let _ = write!(
-            out,
-            "<joint name=\"{}\" type=\"{}\"><parent link=\"{}\"/><child link=\"{}\"/><origin xyz=\"{}\"/>\
-             <axis xyz=\"{}\"/>",
-            j.name,
-            j.kind,
-            j.parent,
-            j.link(),
-            v(j.origin),
-            v(j.axis)
-        );
         if !j.limit.is_empty() {
-            let _ = write!(out, "<limit {}/>", j.limit);
+            more += &format!("<limit {}/>", j.limit);
         }
         if j.damping != 0.0 || j.friction != 0.0 {
-            let _ = write!(out, "<dynamics damping=\"{}\" friction=\"{}\"/>", j.damping, j.friction);
+            more += &format!("<dynamics damping=\"{}\" friction=\"{}\"/>", j.damping, j.friction);
         }
         if let Some((driver, multiplier)) = &j.mimic {
-            let _ = write!(out, "<mimic joint=\"{driver}\" multiplier=\"{multiplier}\"/>");
+            more += &format!("<mimic joint=\"{driver}\" multiplier=\"{multiplier}\"/>");
         }
-        out.push_str("</joint>\n");
+        elements += &joint(&j.name, j.kind, [&j.parent, &link], j.origin, &v(j.axis), &more);
     }
-    out + "</robot>\n"
+    robot("test", &elements)
 }
 
-/// One robot in one environment.
+/// A simulation with one robot.
 #[derive(Debug)]
 pub(crate) struct World {
     pub(crate) sim: SimulationManager,
     pub(crate) robot: RobotId,
-    _files: tempfile::TempDir,
 }
 
-/// 100 Hz, one thread, no ground, `gravity`.
-pub(crate) fn manager(gravity: Vector3<f64>) -> SimulationManagerCfg {
-    SimulationManagerCfg { gravity, ground: None, lights: Vec::new(), threads: Some(1), ..Default::default() }
-}
-
+/// 100 Hz, one environment, one thread, no ground, no gravity.
 pub(crate) fn weightless() -> SimulationManagerCfg {
-    manager(Vector3::zeros())
+    SimulationManagerCfg { threads: Some(1), ..weightless_cfg(1) }
+}
+
+/// The same in `num_envs` environments.
+pub(crate) fn weightless_envs(num_envs: usize) -> SimulationManagerCfg {
+    SimulationManagerCfg { num_envs, ..weightless() }
+}
+
+pub(crate) fn with_gravity(gravity: Vector3<f64>) -> SimulationManagerCfg {
+    SimulationManagerCfg { gravity, ..weightless() }
 }
 
 pub(crate) fn earth() -> SimulationManagerCfg {
-    manager(EARTH)
+    with_gravity(EARTH)
 }
 
 pub(crate) fn at_dt(dt: f64, cfg: SimulationManagerCfg) -> SimulationManagerCfg {
     SimulationManagerCfg { physics_dt: dt, ..cfg }
 }
 
-pub(crate) fn gains(kp: f64, kd: f64) -> DriveCfg {
-    DriveCfg { stiffness: kp.into(), damping: kd.into(), ..Default::default() }
+/// Gains with MuJoCo's own actuators.
+pub(crate) fn native(kp: f64, kd: f64) -> DriveCfg {
+    DriveCfg { model: DriveModel::Actuator, ..gains(kp, kd) }
+}
+
+/// Gains with an explicit model for the joints of a pattern, which may turn at up to 7.5 rad/s.
+pub(crate) fn modelled(joints: &str, model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
+    let actuators = vec![(joints.into(), model.into())];
+    DriveCfg { actuators, max_velocity: Some(7.5.into()), ..gains(kp, kd) }
 }
 
 /// A robot of `joints`.
+#[track_caller]
 pub(crate) fn world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> World {
     try_world(joints, drive, cfg).unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> Result<World, Box<Error>> {
-    let files = tempfile::tempdir().unwrap();
-    let path = files.path().join("robot.urdf");
-    std::fs::write(&path, urdf(joints)).unwrap();
+    let files = Files::default();
     let mut sim = SimulationManager::new(cfg)?;
-    let robot = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(&path), drive, ..Default::default() })?;
-    Ok(World { sim, robot, _files: files })
+    let robot = sim.add_robot(RobotCfg { drive, ..text_robot(&files, "robot", &urdf(joints)) })?;
+    Ok(World { sim, robot })
 }
 
 /// A robot of any configuration.
+#[track_caller]
 pub(crate) fn load(cfg: RobotCfg, manager: SimulationManagerCfg) -> World {
-    let files = tempfile::tempdir().unwrap();
-    let mut sim = SimulationManager::new(manager).unwrap_or_else(|e| panic!("{e}"));
+    let mut sim = testkit::worlds::sim(manager);
     let robot = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{e}"));
-    World { sim, robot, _files: files }
+    World { sim, robot }
 }
 
 impl World {
     pub(crate) fn view(&self) -> sim::Robot<'_> {
         self.sim.robot(self.robot)
+    }
+
+    pub(crate) fn robot(&mut self) -> sim::RobotMut<'_> {
+        self.sim.robot_mut(self.robot)
     }
 
     pub(crate) fn q(&self) -> Vec<f64> {
@@ -206,7 +222,16 @@ impl World {
 
     /// Position targets of all joints.
     pub(crate) fn aim(&mut self, targets: &[f64]) {
-        self.sim.robot_mut(self.robot).set_qpos(&row(targets), None, None).unwrap();
+        self.robot().set_qpos(&row(targets), None, None).unwrap();
+    }
+
+    /// Targets of position, velocity and effort of all joints.
+    pub(crate) fn command<const N: usize>(&mut self, targets: [[f64; 3]; N]) {
+        let of = |k: usize| row(&targets.map(|target| target[k]));
+        let mut robot = self.robot();
+        robot.set_qpos(&of(0), None, None).unwrap();
+        robot.set_qvel(&of(1), None, None).unwrap();
+        robot.set_qf(&of(2), None, None).unwrap();
     }
 
     pub(crate) fn step(&mut self, steps: u32) {
@@ -221,11 +246,13 @@ impl World {
         });
         let mut env = Env::new(&model, &Arc::clone(drives.table())).unwrap();
         env.drives = drives;
-        env.write(|data| {
-            data.qpos_mut().copy_from_slice(&qpos);
-            data.qvel_mut().copy_from_slice(&qvel);
-        });
+        push(&mut env, &qpos, &qvel);
         env
+    }
+
+    /// A warning says that the drives are unstable at this time step.
+    pub(crate) fn warned_unstable(&self) -> bool {
+        self.sim.warning_counts().keys().any(|name| name.contains("unstable"))
     }
 
     /// No environment diverged and MuJoCo raised no warning.
@@ -242,12 +269,11 @@ impl World {
     pub(crate) fn load_by_gravity(&self, gravity: &Vector3<f64>) -> Vec<f64> {
         let view = self.view();
         let mut at = Configuration::zero(view.description());
-        at.joint_positions = self.q();
-        at.mimic = MimicPositions::AsGiven;
+        (at.joint_positions, at.mimic) = (self.q(), MimicPositions::AsGiven);
         let kinematics = Kinematics::new(view.description(), &at).unwrap();
         let torque = kinematics.gravity_torque(gravity);
-        let own: Vec<f64> =
-            view.description().drivable_joints().map(|(id, _)| torque[kinematics.columns(id).start]).collect();
+        let joints = view.description().drivable_joints();
+        let own: Vec<f64> = joints.map(|(id, _)| torque[kinematics.columns(id).start]).collect();
         let mut load = vec![0.0; own.len()];
         for (i, (driver, multiplier, _)) in view.mimic_drivers().into_iter().enumerate() {
             load[driver.0] += multiplier * own[i];
@@ -256,12 +282,7 @@ impl World {
     }
 
     /// Mass matrix and bias force at a state, computed by `sim::dynamics` from the URDF.
-    pub(crate) fn dynamics(
-        &self,
-        q: &[f64],
-        v: &[f64],
-        gravity: &Vector3<f64>,
-    ) -> (nalgebra::DMatrix<f64>, DVector<f64>) {
+    pub(crate) fn dynamics(&self, q: &[f64], v: &[f64], gravity: &Vector3<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let view = self.view();
         let mut at = Configuration::zero(view.description());
         at.joint_positions = q.to_vec();
@@ -274,12 +295,17 @@ pub(crate) fn row(values: &[f64]) -> Array2<f64> {
     Array2::from_shape_vec((1, values.len()), values.to_vec()).unwrap()
 }
 
-/// Sets velocities of an environment made by hand.
+/// Sets the state of an environment made by hand.
 pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
     env.write(|data| {
         data.qpos_mut().copy_from_slice(q);
         data.qvel_mut().copy_from_slice(v);
     });
+}
+
+/// Sets the targets of the first drive of an environment made by hand.
+pub(crate) fn command(env: &mut Env, [position, velocity, effort]: [f64; 3]) {
+    (env.drives.position[0], env.drives.velocity[0], env.drives.feedforward[0]) = (position, velocity, effort);
 }
 
 #[track_caller]
@@ -301,55 +327,53 @@ pub(crate) fn plain(xml: &str) -> mj::Data {
     mj::Data::new(&compiled.into_model()).unwrap()
 }
 
+/// MJCF of one body on a hinge about y with these attributes, its mass \[kg\] at `length` along x.
+pub(crate) fn hinge_mjcf(option: &str, joint: &str, [mass, length, moment]: [f64; 3]) -> String {
+    format!(
+        "<mujoco><option timestep=\"{H}\" {option}/><worldbody><body><joint type=\"hinge\" axis=\"0 1 0\" {joint}/>\
+         <inertial pos=\"{length} 0 0\" mass=\"{mass}\" diaginertia=\"{moment} {moment} {moment}\"/></body></worldbody>\
+         </mujoco>"
+    )
+}
+
 /// Six links of 6 to 1 kg and four fingers of three links of 20, 15 and 10 g, with the effort limits of such an arm
 /// (150 N m down to 28) and hand (2 N m). No dry friction, no damping, no rotor inertia.
 pub(crate) fn arm_and_hand() -> Vec<Joint> {
-    // Name, height above the one before, axis, mass, moments, height of the centre of mass, effort limit.
-    type Row = (&'static str, f64, [f64; 3], f64, [f64; 3], f64, f64);
-    let arm: [Row; 6] = [
-        ("a1", 0.15, [0.0, 0.0, 1.0], 6.0, [0.03, 0.03, 0.02], 0.05, 150.0),
-        ("a2", 0.18, [0.0, 1.0, 0.0], 5.5, [0.08, 0.08, 0.012], 0.2, 150.0),
-        ("a3", 0.4, [0.0, 1.0, 0.0], 3.5, [0.04, 0.04, 0.006], 0.15, 100.0),
-        ("a4", 0.35, [0.0, 0.0, 1.0], 2.0, [0.006, 0.006, 0.004], 0.03, 28.0),
-        ("a5", 0.10, [0.0, 1.0, 0.0], 1.5, [0.005, 0.005, 0.003], 0.02, 28.0),
-        ("a6", 0.09, [0.0, 0.0, 1.0], 1.0, [0.005, 0.005, 0.002], 0.01, 28.0),
-    ];
+    const Y: [f64; 3] = [0.0, 1.0, 0.0];
+    const Z: [f64; 3] = [0.0, 0.0, 1.0];
     let mut joints: Vec<Joint> = Vec::new();
-    for (name, z, axis, mass, inertia, com, effort) in arm {
-        let joint = Joint { mass, inertia, com: [0.0, 0.0, com], axis, ..Joint::new(name, "continuous") };
-        let joint = Joint { origin: [0.0, 0.0, z], ..joint }.range(-3.0, 3.0).effort(effort);
+    // Name, height above the one before, axis, mass, moments, height of the center of mass, effort limit.
+    for (name, z, axis, mass, inertia, com, effort) in [
+        ("a1", 0.15, Z, 6.0, [0.03, 0.03, 0.02], 0.05, 150.0),
+        ("a2", 0.18, Y, 5.5, [0.08, 0.08, 0.012], 0.2, 150.0),
+        ("a3", 0.4, Y, 3.5, [0.04, 0.04, 0.006], 0.15, 100.0),
+        ("a4", 0.35, Z, 2.0, [0.006, 0.006, 0.004], 0.03, 28.0),
+        ("a5", 0.10, Y, 1.5, [0.005, 0.005, 0.003], 0.02, 28.0),
+        ("a6", 0.09, Z, 1.0, [0.005, 0.005, 0.002], 0.01, 28.0),
+    ] {
         let parent = joints.last().map_or("base".into(), Joint::link);
-        joints.push(Joint { parent, ..joint });
+        let joint = Joint { mass, inertia, com: [0.0, 0.0, com], axis, ..Joint::new(name, "continuous") };
+        joints.push(Joint { parent, origin: [0.0, 0.0, z], ..joint }.range(-3.0, 3.0).effort(effort));
     }
     let wrist = joints[5].link();
     for (k, x) in [-0.03, -0.01, 0.01, 0.03].into_iter().enumerate() {
-        let mut parent = wrist.clone();
-        let mut origin = [x, 0.0, 0.145];
+        let (mut parent, mut origin) = (wrist.clone(), [x, 0.0, 0.145]);
         for (s, (length, mass)) in [(0.04, 0.020), (0.03, 0.015), (0.025, 0.010_f64)].into_iter().enumerate() {
             // A rod of radius 8 mm.
             let across = mass * (length * length / 12.0 + 0.008 * 0.008 / 4.0);
-            let joint = Joint {
-                parent,
-                origin,
-                axis: [1.0, 0.0, 0.0],
-                mass,
-                com: [0.0, 0.0, length / 2.0],
-                inertia: [across, across, mass * 0.008 * 0.008 / 2.0],
-                ..Joint::new(&format!("h{k}{s}"), "continuous")
-            };
-            parent = joint.link();
-            origin = [0.0, 0.0, length];
+            let inertia = [across, across, mass * 0.008 * 0.008 / 2.0];
+            let (axis, com) = ([1.0, 0.0, 0.0], [0.0, 0.0, length / 2.0]);
+            let joint = Joint { axis, mass, com, inertia, ..Joint::new(&format!("h{k}{s}"), "continuous") };
+            let joint = Joint { parent, origin, ..joint };
+            (parent, origin) = (joint.link(), [0.0, 0.0, length]);
             joints.push(joint.range(-0.3, 1.6).effort(2.0));
         }
     }
     joints
 }
 
-/// The tutorial's gains.
-pub(crate) fn tutorial_gains() -> DriveCfg {
-    DriveCfg {
-        stiffness: [("a.*", 1e4), ("h.*", 1e3)].into(),
-        damping: [("a.*", 1e3), ("h.*", 1e2)].into(),
-        ..Default::default()
-    }
+/// The tutorial's gains: 1e4 and 1e3 for the joints of the arm, 1e3 and 1e2 for those of the hand.
+pub(crate) fn tutorial_gains(arm: &str, hand: &str) -> DriveCfg {
+    let (stiffness, damping) = ([(arm, 1e4), (hand, 1e3)].into(), [(arm, 1e3), (hand, 1e2)].into());
+    DriveCfg { stiffness, damping, ..Default::default() }
 }

@@ -1,84 +1,155 @@
-//! The bundled quadruped: the numbers that scripts for ANYmal C rely on, and that it stands.
+//! The bundled quadruped: the numbers that scripts for ANYmal C rely on, and that it stands still on four feet.
 
+use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use testkit::needs;
+use testkit::refusal::assert_error;
+use testkit::worlds::{gains, pose_in, sim, urdf_robot};
 
-pub(crate) fn cfg(urdf: std::path::PathBuf, stiffness: f64, damping: f64) -> RobotCfg {
+const LEGS: [&str; 4] = ["LF", "RF", "LH", "RH"];
+
+fn quadruped(uid: &str, urdf: std::path::PathBuf) -> RobotCfg {
+    let init_qpos = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
     RobotCfg {
-        urdf: UrdfCfg::single(urdf),
         fix_base: false,
         init_pose: Pose::translation(0.0, 0.0, 0.6),
-        init_qpos: [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)]
-            .map(|(joints, angle)| (joints.to_string(), angle))
-            .to_vec(),
-        drive: DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..Default::default() },
-        ..Default::default()
+        init_qpos: init_qpos.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
+        drive: gains(80.0, 5.0),
+        ..urdf_robot(uid, urdf)
     }
 }
 
-pub(crate) fn bundled() -> std::path::PathBuf {
-    assets::path("quadruped/quadruped.urdf").unwrap()
+fn bundled() -> RobotCfg {
+    quadruped("robot", assets::path("quadruped/quadruped.urdf").unwrap())
 }
 
-/// ANYbotics' own robot, where it is there.
-pub(crate) fn vendor() -> std::path::PathBuf {
-    testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf")
+/// ANYbotics' own robot.
+fn vendor() -> RobotCfg {
+    quadruped("vendor", needs::robot("anymal_c_simple_description/urdf/anymal.urdf"))
 }
 
 #[test]
-fn it_has_the_joints_limits_and_mass_of_the_tutorials_robot() {
-    let mut sim = SimulationManager::new(SimulationManagerCfg::legged()).unwrap();
-    let id = sim.add_robot(cfg(bundled(), 80.0, 5.0)).unwrap();
+fn numbers_of_the_tutorial() {
+    let mut sim = sim(SimulationManagerCfg::legged());
+    let id = sim.add_robot(bundled()).unwrap();
     assert_eq!(sim.diagnostics(), [], "nothing was repaired");
     let robot = sim.robot(id);
     assert!((robot.total_mass() - 52.13485).abs() < 1e-9, "{}", robot.total_mass());
-    let names: Vec<String> = ["LF", "RF", "LH", "RH"]
-        .iter()
-        .flat_map(|leg| ["HAA", "HFE", "KFE"].iter().map(move |joint| format!("{leg}_{joint}")))
-        .collect();
-    assert_eq!(robot.joint_names(), names);
+    let names = LEGS.iter().flat_map(|leg| ["HAA", "HFE", "KFE"].iter().map(move |joint| format!("{leg}_{joint}")));
+    assert_eq!(robot.joint_names(), names.collect::<Vec<_>>());
     assert!(robot.qf_limits().iter().all(|&limit| limit == 80.0));
     assert!(robot.qvel_limits().iter().all(|&limit| limit == 7.5));
     let limits = robot.qpos_limits();
-    for (joint, [low, high]) in [(0, [-0.72, 0.49]), (3, [-0.49, 0.72]), (6, [-0.72, 0.49]), (9, [-0.49, 0.72])] {
-        assert_eq!([limits[(0, joint, 0)], limits[(0, joint, 1)]], [low, high]);
+    for (joint, expected) in [(0, [-0.72, 0.49]), (3, [-0.49, 0.72]), (6, [-0.72, 0.49]), (9, [-0.49, 0.72])] {
+        assert_eq!([limits[(0, joint, 0)], limits[(0, joint, 1)]], expected);
     }
     // The tutorial's pose: the lowest point of each foot is 0.549 m below the base.
-    for leg in ["LF", "RF", "LH", "RH"] {
-        let foot = robot.link_pose(&format!("{leg}_FOOT")).unwrap();
-        let row: [f64; 7] = std::array::from_fn(|k| foot[(0, k)]);
-        let ball = kinetoscope::scene::pose::from_row(&row) * nalgebra::Point3::new(0.0, 0.0, 0.0225);
+    for leg in LEGS {
+        let foot = pose_in(&robot.link_pose(&format!("{leg}_FOOT")).unwrap(), 0);
+        let ball = foot * nalgebra::Point3::new(0.0, 0.0, 0.0225);
         assert!((0.6 - (ball.z - 0.03) - 0.549).abs() < 1e-3, "{leg}: {ball}");
     }
 }
 
-/// Where a leg is does not depend on whose file it is: the same angles put every foot of ours and of the vendor's robot
-/// at the same place.
+/// The same angles put every foot of the bundled and of the vendor's robot at the same place.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn its_feet_are_where_those_of_the_vendors_robot_are() {
-    let vendor = vendor();
-    let mut sim = SimulationManager::new(SimulationManagerCfg::legged()).unwrap();
-    let ours = sim.add_robot(cfg(bundled(), 80.0, 5.0)).unwrap();
-    let theirs = sim.add_robot(RobotCfg { uid: "vendor".into(), ..cfg(vendor, 80.0, 5.0) }).unwrap();
+fn feet_of_the_vendors_robot() {
+    let mut sim = sim(SimulationManagerCfg::legged());
+    let ids = [bundled(), vendor()].map(|robot| sim.add_robot(robot).unwrap());
     for k in 0..20 {
-        let angle = |joint: usize| 0.4 * (1.3 * k as f64 + 0.7 * joint as f64).sin();
-        for id in [ours, theirs] {
-            let angles: Vec<f64> = sim
-                .robot(id)
-                .joint_names()
-                .iter()
-                .map(|name| angle(sim.robot(ours).joint_id(name).unwrap().0))
-                .collect();
-            let row = kinetoscope::ndarray::Array2::from_shape_vec((1, 12), angles).unwrap();
-            sim.robot_mut(id).write_qpos(&row, None, None).unwrap();
+        for id in ids {
+            let column = |name: &String| sim.robot(ids[0]).joint_id(name).unwrap().0;
+            let columns: Vec<usize> = sim.robot(id).joint_names().iter().map(column).collect();
+            let angle = |(_, joint)| 0.4 * (1.3 * f64::from(k) + 0.7 * columns[joint] as f64).sin();
+            sim.robot_mut(id).write_qpos(&Array2::from_shape_fn((1, 12), angle), None, None).unwrap();
         }
-        for leg in ["LF", "RF", "LH", "RH"] {
-            let place = |id| sim.robot(id).link_pose(&format!("{leg}_FOOT")).unwrap();
-            let (a, b) = (place(ours), place(theirs));
-            for axis in 0..3 {
-                // Their angles of mounting are written with 12 digits.
-                assert!((a[(0, axis)] - b[(0, axis)]).abs() < 1e-9, "{leg}: {a} {b}");
+        for leg in LEGS {
+            let [a, b] = ids.map(|id| pose_in(&sim.robot(id).link_pose(&format!("{leg}_FOOT")).unwrap(), 0));
+            // The vendor's angles of mounting are written with 12 digits.
+            assert!((a.translation.vector - b.translation.vector).amax() < 1e-9, "{leg}: {a} {b}");
+        }
+    }
+}
+
+/// 60 s on the ground.
+struct Stood {
+    /// Largest less smallest height of the base in the last 30 s \[m\].
+    drift: f64,
+    /// Mean over the last second of the sum of the vertical forces on the feet, over the weight.
+    carried: f64,
+    /// Feet that carried something in all of the last second.
+    feet: usize,
+    /// Largest force on anything but a foot, in the last 30 s \[N\].
+    elsewhere: f64,
+}
+
+fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> Stood {
+    let (uid, dt, mut sim) = (robot.uid.clone(), cfg.physics_dt, sim(cfg));
+    let robot = sim.add_robot(robot).unwrap();
+    let all = sim.add_sensor("all", ContactSensorCfg::of(format!("{uid}/.*"))).unwrap();
+    let steps = |seconds: f64| (seconds / dt).round() as u32;
+    sim.update(steps(30.0));
+    let foot: Vec<bool> = sim.sensor(all).unwrap().body_names().iter().map(|name| name.ends_with("_FOOT")).collect();
+    assert_eq!(foot.iter().filter(|foot| **foot).count(), 4);
+    let (mut low, mut high, mut elsewhere, mut carried) = (f64::MAX, f64::MIN, 0.0f64, 0.0);
+    let mut least = vec![f64::MAX; foot.len()];
+    for step in 0..steps(30.0) {
+        sim.update(1);
+        let height = sim.robot(robot).get_root_pose()[(0, 2)];
+        (low, high) = (low.min(height), high.max(height));
+        let forces = sim.sensor(all).unwrap().net_forces_w();
+        for (body, foot) in foot.iter().enumerate() {
+            let force = nalgebra::Vector3::from_fn(|k, _| forces[(0, body, k)]);
+            if !foot {
+                elsewhere = elsewhere.max(force.norm());
+            } else if step >= steps(29.0) {
+                carried += force.z / f64::from(steps(1.0));
+                least[body] = least[body].min(force.z);
             }
         }
     }
+    let feet = (0..foot.len()).filter(|&b| foot[b] && least[b] > 1.0).count();
+    Stood { drift: high - low, carried: carried / (9.81 * sim.robot(robot).total_mass()), feet, elsewhere }
+}
+
+fn check(name: &str, robot: RobotCfg) {
+    let Stood { drift, carried, feet, elsewhere } = stand(robot, SimulationManagerCfg::legged());
+    assert!(drift < 5e-3, "{name}: the base drifts by {drift} m");
+    assert!((carried - 1.0).abs() < 0.01, "{name}: the feet carry {carried} of the weight");
+    assert!(feet == 4 && elsewhere == 0.0, "{name}: {feet} feet, {elsewhere} N elsewhere");
+}
+
+#[test]
+fn standing() {
+    for payload in [0.0, 10.0] {
+        check(&format!("{payload} kg"), RobotCfg { payload: vec![("base".into(), payload)], ..bundled() });
+    }
+}
+
+#[test]
+#[ignore = "needs real robots: cargo xtask test"]
+fn standing_of_the_vendors_robot() {
+    check("vendor", vendor());
+}
+
+/// The control: with MuJoCo's default contacts its feet creep apart.
+#[test]
+fn standing_without_the_preset() {
+    let stood = stand(bundled(), SimulationManagerCfg { physics_dt: 0.005, ..Default::default() });
+    assert!(stood.drift > 5e-3 || stood.elsewhere > 0.0, "drift {} m", stood.drift);
+}
+
+#[test]
+fn payloads() {
+    let mut sim = sim(SimulationManagerCfg::legged());
+    let mut add = |payload: &[(&str, f64)]| {
+        let payload = payload.iter().map(|(link, mass)| (link.to_string(), *mass)).collect();
+        sim.add_robot(RobotCfg { payload, ..bundled() }).map(|id| sim.robot(id).total_mass())
+    };
+    assert_error(add(&[("base", -1.0)]), "", &["payload", ">= 0"]);
+    assert_error(add(&[("base", f64::NAN)]), "", &["payload", "NaN"]);
+    assert_error(add(&[("bsae", 1.0)]), "", &["payload", "\"base\""]);
+    let mass = add(&[("base", 3.0), (".*_FOOT", 0.5)]).unwrap();
+    assert!((mass - 52.13485 - 3.0 - 4.0 * 0.5).abs() < 1e-9);
 }

@@ -1,26 +1,284 @@
-//! Terrain in a simulation: what rays measure, what lies on it, what is written, what is refused.
-
-mod contact;
-mod dump;
-mod refused;
-mod seen;
+//! Terrain in a simulation: heights that rays and cameras measure, against the array and against `mj_ray`; objects that lie
+//! on it; exports; and refused terrains.
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::scene::terrain::RoughTerrain;
+use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
+use kinetoscope::sim::mj::{TARGET, Target, compile_file};
+use nalgebra::Point3;
+use testkit::refusal::assert_error;
+use testkit::worlds::{ball, cfg, sim};
+
+const RADIUS: f64 = 0.25;
 
 /// A grid of heights that no two points share, 3 m by 2 m, moved and turned.
 fn bumps() -> TerrainCfg {
     let heights = Array2::from_shape_fn((21, 31), |(r, c)| 0.3 * (0.7 * c as f64).sin() * (0.4 * r as f64).cos() - 0.1);
-    TerrainCfg {
-        uid: "bumps".into(),
-        heights,
-        size: [3.0, 2.0],
-        init_pose: kinetoscope::scene::pose::from_xyz_rpy([0.4, -0.3, 0.2], [0.0, 0.0, 0.5]),
-        ..Default::default()
-    }
+    let init_pose = from_xyz_rpy([0.4, -0.3, 0.2], [0.0, 0.0, 0.5]);
+    TerrainCfg { uid: "bumps".into(), heights, size: [3.0, 2.0], init_pose, ..Default::default() }
+}
+
+/// A pit of four flat walls that rise by 1 m per meter from the middle, points 0.1 m apart.
+fn pit() -> TerrainCfg {
+    let at = |k: usize| 0.1 * k as f64 - 2.0;
+    let heights = Array2::from_shape_fn((41, 41), |(r, c)| at(c).abs().max(at(r).abs()));
+    TerrainCfg { uid: "pit".into(), heights, size: [4.0, 4.0], ..Default::default() }
 }
 
 /// Two environments with nothing else in them.
 fn empty() -> SimulationManager {
-    SimulationManager::new(SimulationManagerCfg { num_envs: 2, ground: None, ..Default::default() }).unwrap()
+    sim(SimulationManagerCfg { ground: None, ..cfg(2, 2) })
+}
+
+/// A ball beside the middle of the pit, above the surface.
+fn add_ball(sim: &mut SimulationManager) -> ObjectId {
+    sim.add_rigid_object(ball("ball", RADIUS, 0.5, [0.13, -0.08, 0.8])).unwrap()
+}
+
+fn height_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
+    sim.rigid_object(ball).get_pose()[(0, 2)]
+}
+
+/// Rays straight down over the whole field and beyond, none of them through a point of the grid.
+fn from_above() -> RayCasterCfg {
+    RayCasterCfg {
+        offset: Pose::translation(0.413, -0.287, 5.0),
+        pattern: Grid { resolution: 0.037, size: [4.0, 4.0], ..Grid::default() }.into(),
+        targets: HitTargets::Named(vec!["bumps".into()]),
+        ..RayCasterCfg::default()
+    }
+}
+
+/// Height of the surface as the configuration describes it, computed with barycentric weights; `None` beside it.
+fn height(cfg: &TerrainCfg, heights: &Array2<f64>, [x, y]: [f64; 2]) -> Option<f64> {
+    let local = cfg.init_pose.inverse() * Point3::new(x, y, 0.0);
+    let (rows, columns) = heights.dim();
+    let u = (local.x + cfg.size[0] / 2.0) / cfg.size[0] * (columns - 1) as f64;
+    let v = (local.y + cfg.size[1] / 2.0) / cfg.size[1] * (rows - 1) as f64;
+    if !(0.0..(columns - 1) as f64).contains(&u) || !(0.0..(rows - 1) as f64).contains(&v) {
+        return None;
+    }
+    let (c, r) = (u as usize, v as usize);
+    let (s, t) = (u.fract(), v.fract());
+    // The corner that the triangle does not share with its neighbor has weight |s - t|.
+    let lone = if s > t { heights[(r, c + 1)] } else { heights[(r + 1, c)] };
+    let shared = heights[(r, c)] * (1.0 - s.max(t)) + heights[(r + 1, c + 1)] * s.min(t);
+    Some(cfg.init_pose.translation.z + shared + lone * (s - t).abs())
+}
+
+/// MuJoCo keeps elevations in single precision: an error of 2^-25 of the range of 0.6 m, 2e-8 m. Control: heights of the
+/// neighboring points are found out. `height_at` is exact.
+#[test]
+fn rays() {
+    let cfg = bumps();
+    let last = cfg.heights.ncols() - 1;
+    let shifted = Array2::from_shape_fn(cfg.heights.dim(), |(r, c)| cfg.heights[(r, (c + 1).min(last))]);
+    let mut sim = empty();
+    let id = sim.add_terrain(cfg.clone()).unwrap();
+    let scanner = sim.add_sensor("scanner", from_above()).unwrap();
+    sim.update(1);
+    let (scanner, terrain) = (sim.sensor(scanner).unwrap(), sim.terrain(id));
+    let (start, hit, mask) = (scanner.ray_starts(), scanner.hits(), scanner.hit_mask());
+    assert_eq!(hit.dim().0, 2);
+    let (mut hits, mut worst, mut control) = (0, 0.0_f64, 0.0_f64);
+    for (at, &seen) in mask.indexed_iter() {
+        let [x, y] = [0, 1].map(|k| start[(at.0, at.1, k)]);
+        let expected = height(&cfg, &cfg.heights, [x, y]);
+        assert_eq!(expected.is_some(), seen, "({x}, {y})");
+        if let Some(expected) = expected {
+            let found = hit[(at.0, at.1, 2)];
+            hits += 1;
+            worst = worst.max((expected - found).abs());
+            control = control.max((height(&cfg, &shifted, [x, y]).unwrap() - found).abs());
+            assert_eq!(scanner.hit_ids()[at], terrain.mask_id());
+        }
+        if at.1 % 50 == 0 {
+            let local = cfg.init_pose.inverse() * Point3::new(x, y, 0.0);
+            let own = terrain.height_at([local.x, local.y]);
+            assert_eq!(own.is_some(), expected.is_some());
+            let apart = own.zip(expected).map_or(0.0, |(a, b)| (a - (b - cfg.init_pose.translation.z)).abs());
+            assert!(apart < 1e-12, "height_at is off by {apart}");
+        }
+    }
+    // 6 m² in squares of 37 mm, in two environments.
+    assert!(hits > 8000 && worst < 1e-6, "{hits} hits, {worst} m off");
+    assert!(control > 0.05, "the control: {control} m");
+}
+
+/// MuJoCo's own rays see the surface of the array too.
+#[test]
+fn mj_ray() {
+    let (cfg, mut sim) = (bumps(), empty());
+    sim.add_terrain(cfg.clone()).unwrap();
+    let (mut hits, mut worst) = (0, 0.0_f64);
+    for k in 0..2000 {
+        // Two irrational steps fill the square evenly.
+        let [x, y] = [0.618_034, 0.754_878].map(|step| 4.0 * ((f64::from(k) * step).fract() - 0.5));
+        let ray = sim.batch().read(0, |env| env.data().ray([x, y, 5.0], [0.0, 0.0, -1.0], 0b111)).unwrap();
+        match (height(&cfg, &cfg.heights, [x, y]), ray) {
+            (Some(expected), Some(hit)) => {
+                hits += 1;
+                worst = worst.max((5.0 - hit.distance - expected).abs());
+            }
+            (expected, hit) => assert!(expected.is_none() && hit.is_none(), "({x}, {y}): {expected:?} {hit:?}"),
+        }
+    }
+    assert!(hits > 600 && worst < 1e-6, "{hits} hits, {worst} m");
+}
+
+/// A camera above sees the terrain by its id, in the table by its name, and its depth is that of the highest point and below.
+#[test]
+fn camera() {
+    let (cfg, mut sim) = (bumps(), empty());
+    let id = sim.add_terrain(cfg.clone()).unwrap();
+    let [x, y] = [cfg.init_pose.translation.x, cfg.init_pose.translation.y];
+    let placement = Placement::LookAt { eye: [x, y, 4.2], target: [x, y, 0.0], up: [0.0, 1.0, 0.0] };
+    let camera = CameraCfg {
+        width: 120,
+        height: 90,
+        intrinsics: Intrinsics::Fovy { radians: 0.6 },
+        extrinsics: Extrinsics { placement, ..Default::default() },
+        channels: Channels { depth: true, mask: true, ..Channels::default() },
+        ..Default::default()
+    };
+    let camera = sim.add_sensor("camera", camera).unwrap();
+    sim.update(1);
+    let entry = sim.mask_ids().iter().find(|entry| entry.object == "bumps").unwrap();
+    assert_eq!((entry.id, entry.class.as_str()), (sim.terrain(id).mask_id(), "terrain"));
+    let (camera, [low, high]) = (sim.sensor(camera).unwrap(), sim.terrain(id).height_range());
+    let (mask, depth) = (camera.mask().unwrap(), camera.depth().unwrap());
+    let seen: Vec<f32> = mask.iter().zip(&depth).filter(|(mask, _)| **mask == entry.id).map(|(_, d)| *d).collect();
+    assert!(seen.len() > 1000, "{} pixels", seen.len());
+    // The frame is 4 m below the camera; at its rim walls go 1 m farther down.
+    let (nearest, farthest) = seen.iter().fold((f32::MAX, 0.0_f32), |(a, b), d| (a.min(*d), b.max(*d)));
+    assert!(f64::from(nearest) > 4.0 - high - 1e-5 && f64::from(nearest) < 4.0 - high + 0.02, "{nearest}");
+    assert!(f64::from(farthest) < 4.0 - low + 1.0 + 1e-5, "{farthest}");
+}
+
+/// Rough terrain is the same in every environment and every run; another seed is another terrain.
+#[test]
+fn seeds() {
+    let [five, again, six] = [5, 5, 6].map(|seed| {
+        let rough = RoughTerrain { size: [3.0, 2.0], cell: 0.1, seed, ..RoughTerrain::default() };
+        let mut sim = empty();
+        sim.add_terrain(TerrainCfg { heights: rough.heights().unwrap(), size: rough.size, ..bumps() }).unwrap();
+        let scanner = sim.add_sensor("scanner", from_above()).unwrap();
+        sim.update(1);
+        let rows = sim.sensor(scanner).unwrap().distances().mapv(f64::to_bits);
+        assert_eq!(rows.row(0), rows.row(1));
+        rows
+    });
+    assert_eq!(five, again);
+    assert_ne!(five, six);
+}
+
+/// The ball comes to rest on all four walls, each at 45 degrees, a radius away from its middle: which is sqrt(2) radii above
+/// the bottom. MuJoCo's soft contacts let a ball of 0.5 kg sink by less than a millimeter. Contact sensors feel the terrain
+/// as a part of the world: at rest, its walls together carry the ball's weight.
+#[test]
+fn ball_at_rest() {
+    let mut sim = empty();
+    let (terrain, ball) = (sim.add_terrain(pit()).unwrap(), add_ball(&mut sim));
+    let feel = ContactSensorCfg { filters: vec!["world".into()], ..ContactSensorCfg::of("ball") };
+    let sensor = sim.add_sensor("contact", feel).unwrap();
+    assert_eq!((sim.terrain(terrain).uid(), sim.terrain(terrain).cfg()), ("pit", &pit()));
+    sim.update(1000);
+    let (pose, velocity) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let sensor = sim.sensor(sensor).unwrap();
+    for env in 0..2 {
+        let center = [0, 1, 2].map(|k| pose[(env, k)]);
+        assert!(velocity.row(env).iter().all(|v| v.abs() < 1e-3), "{velocity}");
+        let place = [0.0, 0.0, 2.0_f64.sqrt() * RADIUS];
+        assert!(center.iter().zip(place).all(|(a, b)| (a - b).abs() < 2e-3), "{center:?}, not {place:?}");
+        // At the contacts, half a radius times sqrt(2) from the middle, the surface is a radius away.
+        let side = RADIUS / 2.0_f64.sqrt();
+        for [x, y] in [[side, 0.0], [-side, 0.0], [0.0, side], [0.0, -side]] {
+            let z = sim.terrain(terrain).height_at([x, y]).unwrap();
+            let distance = (Point3::new(x, y, z) - Point3::from(center)).norm();
+            assert!((distance - RADIUS).abs() < 2e-3, "{distance} at ({x}, {y})");
+        }
+        for (k, weight) in [0.0, 0.0, 0.5 * 9.81].into_iter().enumerate() {
+            // What is left of the motion, below 1e-3 m/s, is braked at some 0.01 s: below 0.05 N.
+            let total = sensor.total_forces_w()[(env, 0, k)];
+            assert!((total - weight).abs() < 0.05, "axis {k}: {total}");
+            let (normal, of_world) = (sensor.net_forces_w()[(env, 0, k)], sensor.force_matrix_w()[(env, 0, 0, k)]);
+            assert!((normal - of_world).abs() < 1e-9, "axis {k}: {normal} {of_world}");
+        }
+    }
+}
+
+/// It can be added when objects are falling already, which go on from their states. Control: without it they fall, g t² / 2.
+#[test]
+fn added_later() {
+    let mut sim = empty();
+    let ball = add_ball(&mut sim);
+    sim.update(10);
+    let state = |sim: &SimulationManager| (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let before = state(&sim);
+    sim.add_terrain(pit()).unwrap();
+    assert_eq!(before, state(&sim));
+    sim.update(300);
+    assert!(height_of(&sim, ball) > 0.2);
+    let mut sim = empty();
+    let ball = add_ball(&mut sim);
+    sim.update(100);
+    assert!(height_of(&sim, ball) < -4.0);
+}
+
+/// The exported files hold the terrain.
+#[test]
+fn export() {
+    let mut sim = empty();
+    sim.add_terrain(bumps()).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    assert_eq!(sim.dump(dir.path()).unwrap(), []);
+    let exported = if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
+    for file in [exported, "run.mjcf.xml"] {
+        let model = compile_file(&dir.path().join(file)).unwrap().into_model();
+        let (found, ours) = (model.height_field(0), sim.batch().model().height_field(0));
+        assert_eq!((model.nhfield(), found.rows, found.columns), (1, 21, 31));
+        assert_eq!((found.size, found.elevation), (ours.size, ours.elevation), "{file}");
+    }
+}
+
+#[test]
+fn mistakes() {
+    let mut sim = empty();
+    sim.add_terrain(bumps()).unwrap();
+    let with_height = |at, height| {
+        let mut cfg = bumps();
+        cfg.heights[at] = height;
+        cfg
+    };
+    let of_shape = |shape: (usize, usize)| TerrainCfg { heights: Array2::zeros(shape), ..bumps() };
+    for (uid, cfg, part) in [
+        ("bumps", bumps(), "taken"),
+        ("ground", bumps(), "taken"),
+        ("a/b", bumps(), "not usable"),
+        ("other", with_height((3, 7), f64::NAN), "heights[3, 7] (terrain \"other\") is NaN"),
+        ("other", with_height((0, 0), 1e9), "within 1e6 metres"),
+        ("other", of_shape((1, 5)), "at least 2 rows"),
+        ("other", of_shape((0, 0)), "at least 2 rows"),
+        ("other", of_shape((3000, 3000)), "at most 4194304 points"),
+        ("other", TerrainCfg { size: [0.0, 1.0], ..bumps() }, "size is [0.0, 1.0]"),
+        ("other", TerrainCfg { size: [1.0, f64::NAN], ..bumps() }, "size"),
+        ("other", TerrainCfg { thickness: -1.0, ..bumps() }, "thickness is -1.0"),
+        ("other", TerrainCfg { friction: Some([-1.0, 0.0, 0.0]), ..bumps() }, "friction"),
+        ("other", TerrainCfg { rgba: [2.0, 0.0, 0.0, 1.0], ..bumps() }, "rgba"),
+        ("other", TerrainCfg { init_pose: Pose::translation(f64::NAN, 0.0, 0.0), ..bumps() }, "init_pose"),
+    ] {
+        assert_error(sim.add_terrain(TerrainCfg { uid: uid.into(), ..cfg }), "", &[part]);
+    }
+    assert_eq!(sim.mask_ids().len(), 1);
+    // A name with characters that mean something in XML, and heights that are all the same.
+    let flat = TerrainCfg { uid: "<\"flat\" & wide>".into(), heights: Array2::from_elem((2, 2), 0.3), ..bumps() };
+    let flat = sim.add_terrain(flat).unwrap();
+    assert_eq!(sim.terrain(flat).height_at([0.0, 0.0]), Some(0.3));
+    assert_eq!(sim.terrain(flat).height_at([1.6, 0.0]), None);
+    assert_eq!(sim.mask_ids().len(), 2);
+    let object = RigidObjectCfg { uid: "bumps".into(), ..Default::default() };
+    assert!(sim.add_rigid_object(object).is_err(), "the name is a terrain's");
 }

@@ -1,0 +1,109 @@
+//! Joints that nothing drives. The cabinet's drawer has the mass m = 2 kg, the damping b = 8 N s/m and the dry friction
+//! f = 2 N of its file, so that m v' = F - b v - f sign v has closed forms. Euler's steps of 1 ms are off by about
+//! h b / 2m = 0.2 % of a distance, and MuJoCo's dry friction gives way a little before it slips: 1 % of tolerance.
+
+use super::*;
+use kinetoscope::ndarray::array;
+use testkit::worlds::no_drive;
+
+const MASS: f64 = 2.0;
+const DAMPING: f64 = 8.0;
+const FRICTION: f64 = 2.0;
+
+fn near(found: f64, expected: f64) {
+    assert!((found / expected - 1.0).abs() < 0.01, "{found} is not {expected}");
+}
+
+/// The way of a mass from a speed until it stands.
+fn slides(mass: f64, speed: f64, friction: f64) -> f64 {
+    let rest = friction / DAMPING;
+    mass / DAMPING * speed - rest * mass / DAMPING * (1.0 + speed / rest).ln()
+}
+
+/// Of its file; with friction and rotor inertia of its own, without a drive and with one whose numbers they replace; and with
+/// a robot's drive, which holds it at its target.
+#[test]
+fn sliding_drawer() {
+    let (mut sim, id) = with(2, cabinet());
+    sim.articulation_mut(id).write_qvel(&array![[0.5], [0.3]], None, None).unwrap();
+    sim.update(1000);
+    let (open, speed) = (sim.articulation(id).get_qpos(), sim.articulation(id).get_qvel());
+    near(open[(0, 0)], slides(MASS, 0.5, FRICTION));
+    near(open[(1, 0)], slides(MASS, 0.3, FRICTION));
+    assert!(speed.iter().all(|v| v.abs() < 1e-6), "{speed}");
+    assert_eq!(sim.articulation(id).get_qf(), array![[0.0], [0.0]], "no drive gives anything");
+    // Controls: with other numbers it would be elsewhere.
+    let (friction, rotor) = (3.0, 2.0);
+    assert!((open[(0, 0)] / slides(MASS, 0.5, 1.5 * FRICTION) - 1.0).abs() > 0.1);
+    assert!((open[(0, 0)] / slides(MASS + rotor, 0.5, friction) - 1.0).abs() > 0.1);
+
+    let other = DriveCfg { friction: Some(50.0.into()), armature: 70.0.into(), ..no_drive() };
+    for drive in [None, Some(other)] {
+        let armature = Some([("drawer_.*", rotor)].into());
+        let (mut sim, id) = with(1, ArticulationCfg { friction: Some(friction.into()), armature, drive, ..cabinet() });
+        assert_eq!(sim.articulation(id).get_friction(), array![[friction]]);
+        near(sim.articulation(id).get_armature()[(0, 0)], rotor);
+        sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
+        sim.update(1000);
+        near(sim.articulation(id).get_qpos()[(0, 0)], slides(MASS + rotor, 0.5, friction));
+        assert_eq!(sim.articulation(id).get_qf(), array![[0.0]], "no drive gives anything");
+    }
+    let (mut sim, id) = with(1, ArticulationCfg { drive: Some(DriveCfg::default()), ..cabinet() });
+    sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
+    sim.update(1000);
+    assert!(sim.articulation(id).get_qpos()[(0, 0)].abs() < 1e-3, "held at its target");
+}
+
+/// A push opens it where it exceeds the friction, also that of its own environment.
+#[test]
+fn pushed_drawer() {
+    let (mut sim, id) = with(2, cabinet());
+    sim.articulation_mut(id).set_qf(&array![[6.0], [1.5]], None, None).unwrap();
+    sim.update(500);
+    let open = sim.articulation(id).get_qpos();
+    // v' = (F - f)/m - b/m v from rest.
+    let (speed, time) = ((6.0 - FRICTION) / DAMPING, MASS / DAMPING);
+    near(open[(0, 0)], speed * (0.5 - time * (1.0 - (-0.5 / time).exp())));
+    // Dry friction is a soft constraint: below it there is a creep of less than a millimeter per second.
+    assert!(open[(1, 0)].abs() < 1e-3, "{open}");
+    sim.update(1500);
+    let open = sim.articulation(id).get_qpos();
+    assert!((open[(0, 0)] - 0.3).abs() < 2e-3, "open to its stop: {open}");
+
+    let (mut sim, id) = with(2, cabinet());
+    let sticky = Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", Draw::Set([6.0, 6.0]));
+    sim.randomize(&sticky, Some(&[EnvId(1)])).unwrap();
+    sim.articulation_mut(id).write_qvel(&array![[0.5], [0.5]], None, None).unwrap();
+    sim.update(1000);
+    let open = sim.articulation(id).get_qpos();
+    near(open[(0, 0)], slides(MASS, 0.5, FRICTION));
+    near(open[(1, 0)], slides(MASS, 0.5, 6.0));
+}
+
+/// Targets do nothing without a drive, and states are as written.
+#[test]
+fn targets_and_states() {
+    let (mut sim, id) = with(2, ArticulationCfg { init_qpos: vec![("drawer_.*".into(), 0.1)], ..cabinet() });
+    sim.articulation_mut(id).set_qpos(&array![[0.25], [0.25]], None, None).unwrap();
+    sim.update(100);
+    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.1]], "nothing has moved");
+    sim.articulation_mut(id).write_qpos(&array![[0.2]], None, Some(&[EnvId(1)])).unwrap();
+    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.2]]);
+    let drawer = sim.articulation(id).link_pose("drawer").unwrap();
+    assert!((drawer[(0, 0)] - 0.3).abs() < 1e-15 && (drawer[(1, 0)] - 0.4).abs() < 1e-15, "{drawer}");
+    sim.reset(None).unwrap();
+    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.1]]);
+}
+
+/// A spring closes a door, against 2.5 N m by all but 0.5 rad.
+#[test]
+fn sprung_door() {
+    let files = Files::default();
+    let (mut sim, id) = with(2, ArticulationCfg { drive: Some(testkit::worlds::gains(5.0, 8.0)), ..door(&files) });
+    sim.articulation_mut(id).write_qpos(&array![[1.0], [1.0]], None, None).unwrap();
+    sim.articulation_mut(id).set_qpos(&array![[0.0], [0.0]], None, None).unwrap();
+    sim.articulation_mut(id).set_qf(&array![[0.0], [2.5]], None, None).unwrap();
+    sim.update(20_000);
+    let angle = sim.articulation(id).get_qpos();
+    assert!(angle[(0, 0)].abs() < 1e-3 && (angle[(1, 0)] - 0.5).abs() < 1e-3, "{angle}");
+}
