@@ -252,3 +252,18 @@ pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Extrinsics {
 pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
     sim.mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
 }
+
+/// A configuration in which no joint has a drive.
+#[must_use]
+pub fn no_drive() -> DriveCfg {
+    DriveCfg { drive_type: DriveType::None, ..Default::default() }
+}
+
+/// Adds a small ball of the default density at `at`, which compiles the model again.
+///
+/// # Panics
+/// If it is refused.
+#[track_caller]
+pub fn add_ball(sim: &mut SimulationManager, uid: &str, at: [f64; 3]) -> ObjectId {
+    sim.add_rigid_object(object(uid, ObjectShape::Sphere { radius: 0.1 }, at)).unwrap()
+}
