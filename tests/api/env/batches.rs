@@ -4,35 +4,36 @@ use super::tasks::{cfg, everything, policy};
 use kinetoscope::env::Ended;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use testkit::bits::bits;
 
 /// All bits of 150 steps, by environment, and the reasons of all ends.
 fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
     let mut env = everything(settings);
     let n = env.num_envs();
     let mut seen = env.reset(None, Some(77)).unwrap();
-    let (mut bits, mut ends) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-    let put = |bits: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
-        bits.iter_mut().zip(of.rows()).for_each(|(bits, row)| bits.extend(row.iter().map(|x| x.to_bits())));
+    let (mut all, mut ends) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+    let put = |all: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
+        all.iter_mut().zip(of.rows()).for_each(|(all, row)| all.extend(bits(&row)));
     };
-    put(&mut bits, &seen);
+    put(&mut all, &seen);
     for _ in 0..150 {
         let step = env.step(&policy(seen.view())).unwrap();
-        put(&mut bits, &step.observations);
-        put(&mut bits, &step.final_observations);
-        put(&mut bits, &step.info.reward_terms);
-        for (e, bits) in bits.iter_mut().enumerate() {
-            bits.extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
+        for numbers in [&step.observations, &step.final_observations, &step.info.reward_terms] {
+            put(&mut all, numbers);
+        }
+        for (e, all) in all.iter_mut().enumerate() {
+            all.extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
         }
         for Ended { env, reason, steps, reward_sums } in step.info.ended {
             ends[env.0].push(format!("{reason} {steps} {reward_sums:?}"));
         }
         seen = step.observations;
     }
-    (bits, ends)
+    (all, ends)
 }
 
 #[test]
-fn threads_do_not_matter() {
+fn threads() {
     let one = run(cfg(9, 1));
     for threads in [2, 3, 5] {
         assert!(run(cfg(9, threads)) == one, "{threads} threads");
@@ -44,7 +45,7 @@ fn threads_do_not_matter() {
 }
 
 #[test]
-fn eight_environments_are_twice_four_and_eight_times_one() {
+fn shards() {
     let eight = run(cfg(8, 2));
     for world in [2, 8] {
         let share = |rank| run(SimulationManagerCfg { shard: Shard { rank, world }, ..cfg(8 / world, 1) });

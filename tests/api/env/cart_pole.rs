@@ -1,4 +1,4 @@
-//! A task is, bit for bit, what a loop over the plain API does that somebody wrote by hand.
+//! A task is, bit for bit, a hand-written loop over the plain API.
 
 use super::tasks::{cfg, world};
 use kinetoscope::env::{
@@ -7,13 +7,14 @@ use kinetoscope::env::{
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use testkit::bits::bits;
 
 const LIMIT: u64 = 60;
 const DECIMATION: u32 = 2;
 const FALLEN: f64 = 0.15;
 const BOUND: f64 = 2.0;
 
-/// Where an episode starts: both loops draw it by themselves.
+/// The start of an episode: both loops draw it by themselves.
 fn start(seed: u64, env: usize, episode: u64) -> Array2<f64> {
     let mut random = Random::keyed(seed, env as u64, &format!("my own start {episode}"));
     array![[0.4 * (random.uniform() - 0.5), 0.2 * (random.uniform() - 0.5)]]
@@ -36,8 +37,7 @@ fn look(sim: &SimulationManager, robot: RobotId) -> Array2<f64> {
 type Row = (Vec<u64>, Vec<u64>, u64, bool, bool);
 
 fn row(seen: &Array2<f64>, last: &Array2<f64>, env: usize, reward: f64, terminated: bool, truncated: bool) -> Row {
-    let bits = |of: &Array2<f64>| of.row(env).iter().map(|x| x.to_bits()).collect();
-    (bits(seen), bits(last), reward.to_bits(), terminated, truncated)
+    (bits(&seen.row(env)), bits(&last.row(env)), reward.to_bits(), terminated, truncated)
 }
 
 fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {
@@ -78,7 +78,7 @@ fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {
 }
 
 #[test]
-fn cart_and_pole_are_the_loop_that_is_written_by_hand() {
+fn loop_by_hand() {
     let (num_envs, steps, seed) = (6, 200, 41);
     let (sim, robot) = world(cfg(num_envs, 2), true);
     let slide = sim.robot(robot).joint_id("slide").unwrap();

@@ -1,4 +1,4 @@
-//! What `env::check` finds in good tasks (nothing) and in broken ones (what is broken).
+//! `env::check` finds nothing in good tasks, and the fault of broken ones.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, world};
 use super::vector_env::Carts;
@@ -6,14 +6,11 @@ use kinetoscope::env::{Env, EnvCfg, EnvError, Finding, Info, Space, Step, Vector
 use kinetoscope::ndarray::{Array2, ArrayView2, s};
 
 #[test]
-fn nothing_is_found_in_tasks_that_are_well() {
+fn good_tasks() {
     assert_eq!(check(&mut cart_env(3, Some(20)), 7), []);
     assert_eq!(check(&mut cart_env(1, None), 7), []);
     assert_eq!(check(&mut everything(cfg(4, 2)), 11), []);
-}
-
-#[test]
-fn what_carts_by_hand_take_without_a_word_is_found() {
+    // Carts by hand accept two mistakes.
     let taken = |finding: &Finding| matches!(finding, Finding::Accepted { .. });
     let found = check(&mut Carts::new(3, 1.0, 20), 7);
     assert!(found.iter().all(taken) && found.len() == 2, "{found:?}");
@@ -21,9 +18,9 @@ fn what_carts_by_hand_take_without_a_word_is_found() {
     assert!(said[0].contains("a column too many") && said[1].contains("no number"), "{said:?}");
 }
 
-/// What is wrong with an environment.
+/// The fault of an environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
+pub(super) enum Fault {
     None,
     RowMissing,
     Narrow,
@@ -39,7 +36,7 @@ enum Fault {
 }
 
 /// A good task with something wrong around it.
-struct Broken {
+pub(super) struct Broken {
     inner: Env,
     fault: Fault,
     narrow: Space,
@@ -51,7 +48,13 @@ struct Broken {
 impl Broken {
     fn new(fault: Fault) -> Self {
         let (sim, robot) = world(cfg(4, 1), false);
-        let inner = cart_task(sim, robot, EnvCfg { episode_steps: Some(30), ..Default::default() }).build().unwrap();
+        Self::around(
+            cart_task(sim, robot, EnvCfg { episode_steps: Some(30), ..Default::default() }).build().unwrap(),
+            fault,
+        )
+    }
+
+    pub(super) fn around(inner: Env, fault: Fault) -> Self {
         let narrow = Space::uniform(["place/x"], [-1e-6, 1e-6]).unwrap();
         Self { inner, fault, narrow, resets: 0, steps: 0, over: None }
     }
@@ -95,7 +98,10 @@ impl VectorEnv for Broken {
         }
         let mut step = self.inner.step(actions)?;
         match self.fault {
-            Fault::Neighbours => step.observations[(0, 0)] += 1e-9 * actions[(1, 0)],
+            Fault::Neighbours => {
+                step.observations[(0, 0)] += 1e-9 * actions[(1, 0)];
+                step.final_observations[(0, 0)] += 1e-9 * actions[(1, 0)];
+            }
             Fault::BeyondBounds => step.rewards += &actions.column(0),
             Fault::FinalIsZero => step.final_observations.fill(0.0),
             Fault::NoReward => step.rewards[2] = f64::NAN,
@@ -107,18 +113,15 @@ impl VectorEnv for Broken {
             }
             _ => {}
         }
-        if self.fault == Fault::Neighbours {
-            step.final_observations[(0, 0)] += 1e-9 * actions[(1, 0)];
-        }
         Ok(step)
     }
 }
 
-/// Whether a finding is the one that is looked for.
+/// True for the finding that is looked for.
 type Is = fn(&Finding) -> bool;
 
 #[test]
-fn what_is_broken_is_found_and_said() {
+fn broken_tasks() {
     assert_eq!(check(&mut Broken::new(Fault::None), 7), [], "the control");
     let cases: [(Fault, Is, &str); 11] = [
         (

@@ -1,4 +1,4 @@
-//! What is rewarded and seen against what follows from Newton's law.
+//! Rewards and observations against Newton's law.
 
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::env::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
@@ -7,7 +7,7 @@ use kinetoscope::ndarray::{Array2, array};
 const DT: f64 = 0.01;
 const FORCE: f64 = 4.0;
 
-/// Where a cart of 1 kg is after k steps under a constant force. MuJoCo's Euler is semi-implicit: v_k = k h F / m, and
+/// The place of a cart of 1 kg after k steps under a constant force. MuJoCo's Euler is semi-implicit: v_k = k h F / m, and
 /// x_k = x_(k-1) + h v_k, so x_k = h² F / m (1 + 2 + ... + k).
 fn place(k: u64) -> f64 {
     DT * DT * FORCE * (k * (k + 1) / 2) as f64
@@ -17,7 +17,7 @@ fn place(k: u64) -> f64 {
 const ROUNDING: f64 = 1e-12;
 
 #[test]
-fn a_pushed_cart_is_where_newton_says_and_rewards_sum_up() {
+fn pushed_cart() {
     let mut env = cart_env(3, Some(60));
     env.reset(None, None).unwrap();
     let forces = array![[FORCE], [0.0], [-FORCE]];
@@ -44,7 +44,7 @@ fn a_pushed_cart_is_where_newton_says_and_rewards_sum_up() {
 }
 
 #[test]
-fn decimation_is_physics_steps_and_actions_are_applied_once_or_before_each() {
+fn decimation() {
     let run = |every: bool| {
         let (sim, robot) = world(cfg(1, 1), false);
         let space = Space::uniform(["force"], [-10.0, 10.0]).unwrap();
@@ -73,7 +73,7 @@ fn decimation_is_physics_steps_and_actions_are_applied_once_or_before_each() {
 }
 
 #[test]
-fn actions_beyond_the_bounds_are_the_bounds() {
+fn clamped_actions() {
     let (sim, robot) = world(cfg(1, 1), false);
     let mut env = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
     let mut run = |force: f64| {

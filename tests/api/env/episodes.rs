@@ -1,17 +1,16 @@
-//! Where episodes begin and end, and what is seen there.
+//! Starts and ends of episodes, and the observations there.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
-use kinetoscope::env::{EndReason, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm, When};
+use kinetoscope::env::{
+    EndReason, Env, EnvBuilder, EnvCfg, EventTerm, Now, ObservationTerm, TermResult, TerminationTerm, When,
+};
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::prelude::*;
 use std::sync::{Arc, Mutex};
-
-fn bits(of: &Array2<f64>) -> Vec<u64> {
-    of.iter().map(|x| x.to_bits()).collect()
-}
+use testkit::bits::bits;
 
 #[test]
-fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_before_the_reset() {
+fn time_limit() {
     for limit in [1, 2, 7] {
         let mut env = cart_env(2, Some(limit));
         let start = env.reset(None, None).unwrap();
@@ -22,10 +21,8 @@ fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_be
                 let last = k == limit;
                 assert_eq!(step.truncated, Array1::from_elem(2, last), "step {k} of {limit}");
                 assert_eq!(step.terminated, Array1::from_elem(2, false));
-                assert_eq!(
-                    step.info.ended.iter().map(|e| e.steps).collect::<Vec<_>>(),
-                    vec![limit; 2 * usize::from(last)]
-                );
+                let ended: Vec<u64> = step.info.ended.iter().map(|ended| ended.steps).collect();
+                assert_eq!(ended, vec![limit; 2 * usize::from(last)]);
                 // h² F k (k + 1) / 2.
                 let away = |f: f64| 1e-4 * f * (k * (k + 1) / 2) as f64;
                 for (e, f) in [1.0, 2.0].into_iter().enumerate() {
@@ -44,10 +41,10 @@ fn the_limit_truncates_in_exactly_that_step_and_the_final_observation_is_from_be
 }
 
 #[test]
-fn both_ends_in_one_step_are_both_said_and_the_first_reason_counts() {
+fn two_ends_at_once() {
     let (sim, robot) = world(cfg(3, 1), false);
     let at = |step: u64| {
-        move |now: &kinetoscope::env::Now<'_>| -> kinetoscope::env::TermResult<Array1<bool>> {
+        move |now: &Now<'_>| -> TermResult<Array1<bool>> {
             Ok(now.episode_steps().iter().enumerate().map(|(env, &k)| env > 0 && k == step).collect())
         }
     };
@@ -68,22 +65,18 @@ fn both_ends_in_one_step_are_both_said_and_the_first_reason_counts() {
         step.info.ended.iter().map(|ended| format!("{} {}", ended.env.0, ended.reason)).collect();
     assert_eq!(reasons, ["1 seen enough", "2 seen enough"]);
     let step = env.step(&idle).unwrap();
-    assert_eq!(
-        (step.truncated.to_vec(), step.info.ended[0].reason.to_string()),
-        (vec![true, false, false], "time limit".into())
-    );
+    assert_eq!(step.truncated, array![true, false, false]);
+    assert_eq!(step.info.ended[0].reason.to_string(), "time limit");
 }
 
 #[test]
-fn a_seed_begins_the_same_episodes_again_and_no_seed_goes_on() {
-    let run = |env: &mut kinetoscope::env::Env, seed: Option<u64>| {
+fn seeds() {
+    let run = |env: &mut Env, seed: Option<u64>| {
         let mut seen = env.reset(None, seed).unwrap();
         let mut all = bits(&seen);
         for _ in 0..100 {
             let step = env.step(&policy(seen.view())).unwrap();
-            all.extend(bits(&step.observations));
-            all.extend(bits(&step.final_observations));
-            all.extend(step.rewards.iter().map(|x| x.to_bits()));
+            all.extend([bits(&step.observations), bits(&step.final_observations), bits(&step.rewards)].concat());
             seen = step.observations;
         }
         all
@@ -99,7 +92,7 @@ fn a_seed_begins_the_same_episodes_again_and_no_seed_goes_on() {
 }
 
 #[test]
-fn a_mask_resets_what_it_names_and_the_others_do_not_notice() {
+fn masks() {
     let (mut env, mut calm) = (everything(cfg(5, 2)), everything(cfg(5, 2)));
     let (mut seen, mut undisturbed) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
     for k in 0..60 {
@@ -114,8 +107,7 @@ fn a_mask_resets_what_it_names_and_the_others_do_not_notice() {
         seen = env.step(&policy(seen.view())).unwrap().observations;
         undisturbed = calm.step(&policy(undisturbed.view())).unwrap().observations;
         for e in [0, 2, 3] {
-            let same = seen.row(e).iter().zip(undisturbed.row(e)).all(|(a, b)| a.to_bits() == b.to_bits());
-            assert!(same, "step {k}, environment {e}");
+            assert_eq!(bits(&seen.row(e)), bits(&undisturbed.row(e)), "step {k}, environment {e}");
         }
     }
     // Those that were reset are where a batch with that seed is.
@@ -124,17 +116,14 @@ fn a_mask_resets_what_it_names_and_the_others_do_not_notice() {
     for _ in 17..60 {
         expected = with_seed.step(&policy(expected.view())).unwrap().observations;
     }
-    assert_eq!(
-        (bits(&expected.row(1).to_owned().insert_axis(kinetoscope::ndarray::Axis(0)))),
-        bits(&seen.row(1).to_owned().insert_axis(kinetoscope::ndarray::Axis(0)))
-    );
+    assert_eq!(bits(&expected.row(1)), bits(&seen.row(1)));
 }
 
 /// Environments and their steps, of each time that an event happened.
 type Log = Arc<Mutex<Vec<(usize, u64, u64)>>>;
 
 #[test]
-fn events_happen_when_they_should() {
+fn events() {
     let log = |times: &Log, name: &'static str, when: When| {
         let times = Arc::clone(times);
         EventTerm::new(name, when, move |_, dice| {
@@ -169,8 +158,7 @@ fn events_happen_when_they_should() {
         let of_episode = (k - 1) % 10 + 1;
         assert_eq!(step.final_observations[(0, 0)], of_episode as f64);
         // In steps 4 and 8; step 10 ends the episode, and events do not happen to what has ended.
-        let happened = if [4, 8].contains(&of_episode) { 3 } else { 0 };
-        assert_eq!(taken(&fixed).len(), happened, "step {of_episode}");
+        assert_eq!(taken(&fixed).len(), if of_episode % 4 == 0 { 3 } else { 0 }, "step {of_episode}");
         assert_eq!(taken(&reset).len(), if of_episode == 10 { 3 } else { 0 });
         for (e, _, _) in taken(&drawn) {
             gaps.push(of_episode - last[e]);
@@ -181,13 +169,13 @@ fn events_happen_when_they_should() {
         }
     }
     gaps.sort_unstable();
-    let distinct: std::collections::BTreeSet<u64> = gaps.iter().copied().collect();
-    assert_eq!(distinct.into_iter().collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6], "every wait was drawn at some time");
+    gaps.dedup();
+    assert_eq!(gaps, [1, 2, 3, 4, 5, 6], "every wait was drawn at some time");
     assert_eq!(taken(&startup), []);
 }
 
 #[test]
-fn commands_stay_for_an_episode() {
+fn commands() {
     let mut env = everything(cfg(4, 2));
     let mut seen = env.reset(None, Some(1)).unwrap();
     let goal = env.observation_space().column("goal/x").unwrap();

@@ -21,7 +21,7 @@ fn env(num_envs: usize) -> kinetoscope::env::Env {
 }
 
 #[test]
-fn a_diverged_environment_is_terminated_with_its_reason_and_revived() {
+fn diverged() {
     let (mut env, mut calm) = (env(8), env(8));
     env.reset(None, None).unwrap();
     calm.reset(None, None).unwrap();
@@ -60,7 +60,7 @@ fn a_diverged_environment_is_terminated_with_its_reason_and_revived() {
 
 /// A state that is written between steps and cannot be stepped on ends the same way.
 #[test]
-fn what_is_written_by_hand_can_diverge_too() {
+fn written_state() {
     let (sim, robot) = world(cfg(2, 1), false);
     let mut env = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
     env.reset(None, None).unwrap();

@@ -32,7 +32,7 @@ fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
 }
 
 #[test]
-fn an_environment_that_the_program_resets_begins_a_new_episode() {
+fn of_the_program() {
     let (mut env, mut calm) = disturbed(|env| env.sim_mut().reset(Some(&[EnvId(1)])).unwrap());
     // It goes on as if nothing had happened.
     let (mut a, mut b) = (env.observations().to_owned(), calm.observations().to_owned());
@@ -41,14 +41,14 @@ fn an_environment_that_the_program_resets_begins_a_new_episode() {
         assert_eq!((&one.observations, &one.info), (&other.observations, &other.info));
         (a, b) = (one.observations, other.observations);
     }
-    // The simulation is given back without whoever watched it.
+    // The simulation is given back without its observer.
     let mut sim = env.into_sim();
     sim.reset(None).unwrap();
     sim.update(1);
 }
 
 #[test]
-fn an_environment_that_a_viewer_resets_begins_a_new_episode() {
+fn of_a_viewer() {
     let mut viewer = None;
     disturbed(|env| {
         let watching = env.sim_mut().viewer(Wants { rate: 1.0, ..Wants::default() });
@@ -57,9 +57,9 @@ fn an_environment_that_a_viewer_resets_begins_a_new_episode() {
     });
 }
 
-/// A reset of the task's own, or of an episode that ended, is none of somebody else.
+/// A reset of the task itself, or of an episode that ended, does not count as a foreign one.
 #[test]
-fn the_tasks_own_resets_end_nothing() {
+fn of_the_task() {
     let mut env = cart_env(2, Some(3));
     env.reset(None, None).unwrap();
     for k in 1..=9 {

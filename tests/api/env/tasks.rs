@@ -4,9 +4,9 @@ use kinetoscope::env::{
     ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
     TerminationTerm, When, terms,
 };
-use kinetoscope::ndarray::{Array2, ArrayView2, array};
+use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::WrenchFrame;
+use testkit::worlds::{mjcf_robot, passive};
 
 /// A cart of 1 kg on a rail and, where it is wanted, a pole of 0.1 kg and 0.5 m on it.
 pub(crate) fn cart(with_pole: bool) -> String {
@@ -21,19 +21,13 @@ pub(crate) fn cart(with_pole: bool) -> String {
 }
 
 pub(crate) fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
-    SimulationManagerCfg { num_envs, threads: Some(threads), ground: None, seed: 3, ..Default::default() }
+    SimulationManagerCfg { ground: None, seed: 3, ..testkit::worlds::cfg(num_envs, threads) }
 }
 
 /// A world with a cart whose joints are passive.
 pub(crate) fn world(cfg: SimulationManagerCfg, with_pole: bool) -> (SimulationManager, RobotId) {
     let mut sim = SimulationManager::new(cfg).unwrap();
-    let robot = RobotCfg {
-        uid: "cart".into(),
-        mjcf: Some(MjcfFile::text(cart(with_pole))),
-        drive: DriveCfg { drive_type: DriveType::None, ..Default::default() },
-        ..Default::default()
-    };
-    let robot = sim.add_robot(robot).unwrap();
+    let robot = sim.add_robot(passive(mjcf_robot("cart", &cart(with_pole)))).unwrap();
     (sim, robot)
 }
 
@@ -43,7 +37,7 @@ pub(crate) fn cart_task(sim: SimulationManager, robot: RobotId, cfg: EnvCfg) -> 
     EnvBuilder::new(sim, cfg)
         .action(push)
         .observation(ObservationTerm::new("place", ["x"], move |now| {
-            Ok(now.sim().robot(robot).get_qpos().select(kinetoscope::ndarray::Axis(1), &[0]))
+            Ok(now.sim().robot(robot).get_qpos().select(Axis(1), &[0]))
         }))
         .reward(RewardTerm::new("x", -1.0, move |now| Ok(now.sim().robot(robot).get_qpos().column(0).to_owned())))
 }
@@ -84,9 +78,8 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         .event(EventTerm::new("gust", When::Interval { steps: [5, 15] }, move |sim, dice| {
             for die in dice {
                 let force = array![[[0.2 * die.normal(), 0.0, 0.0]]];
-                let none = Array2::zeros((1, 3)).insert_axis(kinetoscope::ndarray::Axis(0));
-                let frame = WrenchFrame::World;
-                sim.robot_mut(robot).set_external_wrench(&force, &none, frame, Some(&[pole]), Some(&[die.env()]))?;
+                let (none, world) = (Array3::zeros((1, 1, 3)), WrenchFrame::World);
+                sim.robot_mut(robot).set_external_wrench(&force, &none, world, Some(&[pole]), Some(&[die.env()]))?;
             }
             Ok(())
         }))
@@ -108,12 +101,9 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
 }
 
 /// A policy that holds the pole for a while: a function of the row alone.
-pub(crate) fn policy(observations: ArrayView2<'_, f64>) -> Array2<f64> {
-    let of = |env: usize| {
-        let row = observations.row(env);
-        25.0 * row[1] + 30.0 * row[2] + 3.0 * (row[0] - row[4])
-    };
-    Array2::from_shape_fn((observations.nrows(), 1), |(env, _)| of(env))
+pub(crate) fn policy(o: ArrayView2<'_, f64>) -> Array2<f64> {
+    let force = |(e, _): (usize, usize)| 25.0 * o[(e, 1)] + 30.0 * o[(e, 2)] + 3.0 * (o[(e, 0)] - o[(e, 4)]);
+    Array2::from_shape_fn((o.nrows(), 1), force)
 }
 
 /// An action that does nothing, of one column.

@@ -2,12 +2,11 @@
 
 use super::tasks::{cfg, idle};
 use kinetoscope::env::terms::{self, RootRanges};
-use kinetoscope::env::{
-    CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm,
-};
-use kinetoscope::ndarray::{Array2, Axis, array};
+use kinetoscope::env::{CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm};
+use kinetoscope::ndarray::{Array2, Axis, array, s};
 use kinetoscope::prelude::*;
 use std::f64::consts::FRAC_PI_2;
+use testkit::worlds::{mjcf_robot, passive};
 
 /// A box of 2 kg that floats, with a lever on a hinge from -1 to 2 rad.
 const FLOATER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="trunk" pos="0 0 1"><freejoint name="float"/>
@@ -19,22 +18,15 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
     let plain = cfg(num_envs, 1);
     let ground = if ground { SimulationManagerCfg::default().ground } else { None };
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground, ..plain }).unwrap();
-    let robot = RobotCfg {
-        uid: "floater".into(),
-        mjcf: Some(MjcfFile::text(FLOATER)),
-        fix_base: false,
-        // From -0.1 to 1.1: the middle of its range and 0.4 of its half.
-        soft_limit_factor: 0.4,
-        drive: DriveCfg { drive_type: DriveType::None, ..Default::default() },
-        ..Default::default()
-    };
+    // Soft limits from -0.1 to 1.1: the middle of its range and 0.4 of its half.
+    let robot = RobotCfg { fix_base: false, soft_limit_factor: 0.4, ..passive(mjcf_robot("floater", FLOATER)) };
     let robot = sim.add_robot(robot).unwrap();
     (sim, robot)
 }
 
 fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
     let height = ObservationTerm::new("z", ["z"], move |now| {
-        Ok(now.sim().robot(robot).get_root_pose().slice_move(kinetoscope::ndarray::s![.., 2..3]))
+        Ok(now.sim().robot(robot).get_root_pose().slice_move(s![.., 2..3]))
     });
     EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
 }
@@ -63,7 +55,7 @@ fn ended_at(term: impl FnOnce(&SimulationManager, RobotId) -> TerminationTerm, p
 }
 
 #[test]
-fn episodes_end_where_roots_are_low_or_lie_down() {
+fn low_and_lying_roots() {
     // In a step of 0.01 s or less they fall by no more than g h² = 1 mm.
     let poses = array![
         [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
@@ -84,7 +76,7 @@ fn episodes_end_where_roots_are_low_or_lie_down() {
 }
 
 #[test]
-fn episodes_end_after_their_time_and_where_joints_are_at_their_ends() {
+fn time_and_joint_limits() {
     let (sim, robot) = floater(3, false);
     let limits = terms::joint_out_of_limits(&sim, "limits", robot, &["hinge"]).unwrap();
     assert!(terms::joint_out_of_limits(&sim, "limits", robot, &["none"]).is_err());
@@ -102,7 +94,7 @@ fn episodes_end_after_their_time_and_where_joints_are_at_their_ends() {
 }
 
 #[test]
-fn episodes_end_where_a_body_is_touched() {
+fn illegal_contact() {
     let (mut sim, robot) = floater(2, true);
     let sensor = sim.add_sensor("touch", ContactSensorCfg::of("floater/trunk")).unwrap();
     let touched = terms::illegal_contact("touched", sensor, 5.0);
@@ -120,20 +112,16 @@ fn episodes_end_where_a_body_is_touched() {
     assert_eq!(all, [false, true]);
 }
 
-/// Where roots and joints begin in many environments, with an event.
-fn begun(
-    event: EventTerm,
-    robot: RobotId,
-    sim: SimulationManager,
-) -> (Array2<f64>, Array2<f64>, Array2<f64>, Array2<f64>) {
+/// Poses and velocities of roots, positions and velocities of joints, at the start of an episode with this event.
+fn begun(event: EventTerm, robot: RobotId, sim: SimulationManager) -> [Array2<f64>; 4] {
     let mut env = task(sim, robot).event(event).build().unwrap();
     env.reset(None, Some(5)).unwrap();
     let robot = env.sim().robot(robot);
-    (robot.get_root_pose(), robot.get_root_velocity(), robot.get_qpos(), robot.get_qvel())
+    [robot.get_root_pose(), robot.get_root_velocity(), robot.get_qpos(), robot.get_qvel()]
 }
 
 #[test]
-fn roots_begin_in_their_ranges_and_fill_them() {
+fn root_ranges() {
     const N: usize = 400;
     let ranges = RootRanges {
         position: [[-0.5, 0.5], [1.0, 2.0], [0.1, 0.1]],
@@ -142,7 +130,7 @@ fn roots_begin_in_their_ranges_and_fill_them() {
         angular: [[0.0; 2], [0.0; 2], [2.0, 3.0]],
     };
     let (sim, robot) = floater(N, false);
-    let (poses, speeds, ..) = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let [poses, speeds, ..] = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
     let yaw = poses.rows().into_iter().map(|row| 2.0 * row[6].atan2(row[3])).collect::<Vec<f64>>();
     let column = |table: &Array2<f64>, k: usize| table.column(k).to_vec();
     for (name, values, [low, high]) in [
@@ -160,21 +148,19 @@ fn roots_begin_in_their_ranges_and_fill_them() {
         assert!((mean - 0.5 * (low + high)).abs() < 5.0 * deviation, "{name}: {mean}");
         // None in the outer tenths has a chance of 0.9^N, below 1e-18.
         let width = high - low;
-        assert!(
-            values.iter().any(|x| *x < low + 0.1 * width) && values.iter().any(|x| *x > high - 0.1 * width),
-            "{name}"
-        );
+        assert!(values.iter().any(|x| *x < low + 0.1 * width), "{name}");
+        assert!(values.iter().any(|x| *x > high - 0.1 * width), "{name}");
     }
     assert!(column(&poses, 2).iter().all(|z| (z - 1.1).abs() < 1e-12));
     assert!(speeds.column(1).iter().chain(speeds.column(4)).all(|v| *v == 0.0));
 }
 
 #[test]
-fn joints_begin_beside_their_start_and_within_their_limits() {
+fn joint_ranges() {
     const N: usize = 300;
     let (sim, robot) = floater(N, false);
     let event = terms::reset_joints_by_offset(&sim, "start", robot, &["hinge"], [-3.0, 0.5], [1.0, 1.5]).unwrap();
-    let (_, _, places, speeds) = begun(event, robot, sim);
+    let [_, _, places, speeds] = begun(event, robot, sim);
     // From -3 to 0.5 about the start at 0; what is below the limit of -1 is there: 2 of 3.5 of them.
     let at_limit = places.iter().filter(|x| **x == -1.0).count() as f64 / N as f64;
     // Five standard deviations of a share p of N, sqrt(p (1 - p) / N).
@@ -185,19 +171,18 @@ fn joints_begin_beside_their_start_and_within_their_limits() {
 }
 
 #[test]
-fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
+fn root_state() {
     let (sim, robot) = floater(2, false);
-    let upright = terms::flat_orientation("flat", 1.0, robot);
-    let fast = terms::track_lin_vel("fast", 2.0, robot, "speed", 0.5);
-    let builder = |reward: RewardTerm, sim, robot| {
-        task(sim, robot)
-            .command(CommandTerm::new("speed", ["x", "y"], |_| [0.3, 0.0]))
-            .observation(terms::base_lin_vel("v", robot))
-            .observation(terms::base_ang_vel("w", robot))
-            .observation(terms::projected_gravity("down", robot))
-            .reward(reward)
-    };
-    let mut env = builder(upright, sim, robot).reward(fast).build().unwrap();
+    let speed = || CommandTerm::new("speed", ["x", "y"], |_| [0.3, 0.0]);
+    let mut env = task(sim, robot)
+        .command(speed())
+        .observation(terms::base_lin_vel("v", robot))
+        .observation(terms::base_ang_vel("w", robot))
+        .observation(terms::projected_gravity("down", robot))
+        .reward(terms::flat_orientation("flat", 1.0, robot))
+        .reward(terms::track_lin_vel("fast", 2.0, robot, "speed", 0.5))
+        .build()
+        .unwrap();
     env.reset(None, Some(1)).unwrap();
     // The second lies on its side: a quarter turn about x. Both go along the world's x and turn about it.
     let half = 0.5f64.sqrt();
@@ -210,12 +195,10 @@ fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
     // twentieth of the mass on its own hinge, moves them by less than a hundredth of that.
     let fall = 9.81 * dt;
     let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.02 * fall, "{found} {expected}");
-    let expected = [[0.3, 0.2, -fall], [0.3, -fall, -0.2]];
-    for (env, row) in expected.into_iter().enumerate() {
-        row.into_iter().enumerate().for_each(|(k, v)| near(seen[(env, 1 + k)], v));
-    }
-    for (env, down) in [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]].into_iter().enumerate() {
-        down.into_iter().enumerate().for_each(|(k, x)| near(seen[(env, 7 + k)], x));
+    for (env, first, expected) in
+        [(0, 1, [0.3, 0.2, -fall]), (1, 1, [0.3, -fall, -0.2]), (0, 7, [0.0, 0.0, -1.0]), (1, 7, [0.0, -1.0, 0.0])]
+    {
+        expected.into_iter().enumerate().for_each(|(k, x)| near(seen[(env, first + k)], x));
     }
     // 1 of being there, then the two; what is off is 0.2 m/s of 0.5 for the first and what it falls for the second.
     let rewards = &step.info.reward_terms;
@@ -225,18 +208,16 @@ fn what_is_seen_and_rewarded_of_a_root_is_what_its_state_says() {
     near(rewards[(1, 2)], 2.0 * (-(fall / 0.5).powi(2)).exp());
     let (sim, robot) = floater(2, false);
     let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
-    let mut env = builder(wrong, sim, robot).build().unwrap();
+    let mut env = task(sim, robot).command(speed()).reward(wrong).build().unwrap();
     env.reset(None, Some(1)).unwrap();
     let error = env.step(&Array2::zeros((2, 1))).unwrap_err().to_string();
     assert!(error.contains("nothing") && error.contains("speed"), "{error}");
 }
 
 #[test]
-fn efforts_of_drives_are_summed_as_squares() {
+fn effort_squares() {
     let (mut sim, _) = floater(1, false);
-    let cart =
-        RobotCfg { uid: "cart".into(), mjcf: Some(MjcfFile::text(super::tasks::cart(true))), ..Default::default() };
-    let cart = sim.add_robot(RobotCfg { drive: DriveCfg::default(), ..cart }).unwrap();
+    let cart = sim.add_robot(mjcf_robot("cart", &super::tasks::cart(true))).unwrap();
     let squares = terms::joint_effort_squares(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
     let mut env = task(sim, cart).reward(squares).build().unwrap();
     env.reset(None, Some(1)).unwrap();

@@ -90,14 +90,14 @@ impl VectorEnv for Carts {
     }
 }
 
-/// What came of a loop: everything that was seen, earned and ended.
+/// The log of a loop: observations, rewards and ends.
 #[derive(Debug, Default)]
 struct Log {
     numbers: Vec<f64>,
     ends: Vec<(usize, usize)>,
 }
 
-/// A loop as learning code has it: it knows nothing of who is driven. The middle cart begins anew after 13 steps.
+/// A loop as learning code has it, for any type of environments. The middle cart begins anew after 13 steps.
 fn drive<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
     let mut log = Log::default();
     let n = env.num_envs();
@@ -118,7 +118,7 @@ fn drive<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
 }
 
 #[test]
-fn a_task_of_terms_and_carts_by_hand_are_driven_by_the_same_loop_to_the_same_numbers() {
+fn one_loop() {
     let mut task = cart_env(3, Some(20));
     let mut carts = Carts::new(3, 1.0, 20);
     assert_eq!(VectorEnv::observation_space(&task), VectorEnv::observation_space(&carts));
@@ -136,7 +136,7 @@ fn a_task_of_terms_and_carts_by_hand_are_driven_by_the_same_loop_to_the_same_num
 }
 
 #[test]
-fn what_is_wrong_is_said_by_whoever_is_driven() {
+fn errors() {
     let mut carts = Carts::new(2, 1.0, 5);
     assert_eq!(carts.step(array![[1.0], [1.0]].view()).unwrap_err(), CartError::ResetFirst(0));
     assert_eq!(carts.reset(Some(&[true]), None).unwrap_err(), CartError::Count { found: 1, expected: 2 });

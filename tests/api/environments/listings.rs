@@ -1,8 +1,8 @@
-//! What a simulation holds, by name and by handle: for programs that did not build it themselves, such as views and recorders.
+//! Contents of a simulation by name and by handle: for programs that did not build it, such as views and recorders.
 
-use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use std::any::Any;
+use testkit::worlds::{ball, cube, row, sr5};
 
 struct World {
     sim: SimulationManager,
@@ -12,17 +12,11 @@ struct World {
 
 fn world() -> World {
     let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let urdf = || UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    let robots = ["left", "right"].map(|uid| {
-        let init_pose = Pose::translation(if uid == "left" { 0.8 } else { -0.8 }, 0.0, 0.0);
-        sim.add_robot(RobotCfg { uid: uid.into(), urdf: urdf(), init_pose, ..Default::default() }).unwrap()
-    });
-    for (uid, mass) in [("ball", 0.5), ("cube", 2.0)] {
-        let init_pose = Pose::translation(0.0, 0.0, 5.0 + mass);
-        let shape = if uid == "ball" { ObjectShape::Sphere { radius: 0.1 } } else { ObjectShape::cube(0.2) };
-        let cfg = RigidObjectCfg { uid: uid.into(), shape, mass: Some(mass), init_pose, ..Default::default() };
-        sim.add_rigid_object(cfg).unwrap();
-    }
+    let robots = [("left", 0.8), ("right", -0.8)]
+        .map(|(uid, x)| RobotCfg { init_pose: Pose::translation(x, 0.0, 0.0), ..sr5(uid) })
+        .map(|robot| sim.add_robot(robot).unwrap());
+    sim.add_rigid_object(ball("ball", 0.1, 0.5, [0.0, 0.0, 5.5])).unwrap();
+    sim.add_rigid_object(cube("cube", 0.2, 2.0, [0.0, 0.0, 7.0])).unwrap();
     sim.add_sensor("imu", ImuCfg::on("ball")).unwrap();
     let mut cfg = CameraCfg { width: 8, height: 6, ..CameraCfg::default() };
     cfg.update_period = 0.05;
@@ -31,7 +25,7 @@ fn world() -> World {
 }
 
 #[test]
-fn everything_is_listed_in_the_order_in_which_it_was_added() {
+fn in_order() {
     let World { sim, robots, camera } = world();
     assert_eq!(sim.jointed_uids(), ["left", "right"]);
     assert_eq!(sim.robot_ids(), [("left", robots[0]), ("right", robots[1])]);
@@ -52,7 +46,7 @@ fn everything_is_listed_in_the_order_in_which_it_was_added() {
 
 /// A camera of every fifth step, and an IMU of every step, after each of a dozen steps.
 #[test]
-fn sensors_say_when_they_measure_next() {
+fn due_sensors() {
     let World { mut sim, .. } = world();
     for step in 1..=12_u64 {
         sim.update(1);
@@ -63,11 +57,10 @@ fn sensors_say_when_they_measure_next() {
 
 /// A body that falls and turns, against the object's own state; a robot's base carries the whole robot.
 #[test]
-fn bodies_say_how_they_move() {
+fn body_motion() {
     let World { mut sim, robots, .. } = world();
     let cube = sim.rigid_object_id("cube").unwrap();
-    let velocity = [0.3, -0.2, 0.1, 0.0, 0.0, 1.5];
-    sim.rigid_object_mut(cube).write_velocity(&Array2::from_shape_fn((2, 6), |(_, k)| velocity[k]), None).unwrap();
+    sim.rigid_object_mut(cube).write_velocity(&row([0.3, -0.2, 0.1, 0.0, 0.0, 1.5]), None).unwrap();
     sim.update(10);
     let names = sim.body_names();
     let place = |name: &str| names.iter().position(|body| body == name).unwrap();

@@ -1,4 +1,4 @@
-//! What viewers ask of a simulation, and what checks its configuration: by MuJoCo's arrays and by closed forms.
+//! Questions of viewers, and checks of the configuration: by MuJoCo's arrays and by closed forms.
 
 use super::worlds::{all_bits, arm, cfg, cube};
 use kinetoscope::ndarray::array;
@@ -6,12 +6,13 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sim::Look;
 use nalgebra::Vector3;
+use testkit::worlds::pose_in;
 
 const G: f64 = 9.81;
 
 /// A cube at rest presses with its weight; one that falls touches nothing. Asking changes nothing.
 #[test]
-fn contacts_carry_what_rests_on_them() {
+fn contacts() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let mass = 2.0;
     let id = sim.add_rigid_object(cube("cube", mass, [0.0, 0.0, 0.05])).unwrap();
@@ -39,7 +40,7 @@ fn contacts_carry_what_rests_on_them() {
 
 /// Everything that a look holds is what MuJoCo's arrays and the readers of robots and objects say.
 #[test]
-fn a_look_is_the_environment_as_it_is() {
+fn look() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let robot = sim.add_robot(arm()).unwrap();
     let id = sim.add_rigid_object(cube("cube", 0.5, [1.0, 0.0, 2.0])).unwrap();
@@ -62,14 +63,8 @@ fn a_look_is_the_environment_as_it_is() {
         let (data, model) = (env.data(), env.data().model());
         assert_eq!(look.joints.len(), 6, "the free joint of the cube has no axis");
         for (joint, axis) in look.joints.iter().enumerate() {
-            assert_eq!(
-                (axis.anchor, axis.axis, axis.slides),
-                (
-                    std::array::from_fn(|k| data.xanchor()[3 * joint + k]),
-                    std::array::from_fn(|k| data.xaxis()[3 * joint + k]),
-                    false
-                )
-            );
+            let row = |of: &[f64]| std::array::from_fn(|k| of[3 * joint + k]);
+            assert_eq!((axis.anchor, axis.axis, axis.slides), (row(data.xanchor()), row(data.xaxis()), false));
         }
         let total: f64 = look.masses.iter().map(|(_, mass)| mass).sum();
         assert!((total - model.body_mass().iter().sum::<f64>()).abs() < 1e-12);
@@ -77,8 +72,7 @@ fn a_look_is_the_environment_as_it_is() {
         assert!((moment / total - data.subtree_com()[2]).abs() < 1e-12);
     });
     let instance = sim.visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
-    let pose = sim.rigid_object(id).get_pose();
-    let expected = PoseF32::from(&kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| pose[(1, k)])));
+    let expected = PoseF32::from(&pose_in(&sim.rigid_object(id).get_pose(), 1));
     assert_eq!(look.instances[instance].translation, expected.translation);
     assert!(matches!(sim.look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
 }
@@ -86,7 +80,7 @@ fn a_look_is_the_environment_as_it_is() {
 /// F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; again in the next; no more once
 /// it is let go.
 #[test]
-fn a_pull_accelerates_and_turns() {
+fn pull() {
     let settings = SimulationManagerCfg { gravity: [0.0; 3].into(), ground: None, ..cfg(2, 1) };
     let mut sim = SimulationManager::new(settings).unwrap();
     let mass = 2.0;
@@ -96,17 +90,14 @@ fn a_pull_accelerates_and_turns() {
     sim.pull(EnvId(1), 0, &[(point, force)]).unwrap();
     let h = sim.cfg().physics_dt;
     let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
-    let mut first = None;
-    for _ in 0..2 {
+    let mut step = || {
         sim.update(1);
-        let v = sim.rigid_object(id).get_velocity();
-        first.get_or_insert_with(|| v.clone());
-    }
-    let first = first.unwrap();
+        sim.rigid_object(id).get_velocity()
+    };
+    let (first, second) = (step(), step());
     for k in 0..3 {
         assert!((first[(1, k)] - h * force[k] / mass).abs() < 1e-14 && (first[(1, 3 + k)] - h * turn[k]).abs() < 1e-12);
     }
-    let second = sim.rigid_object(id).get_velocity();
     assert!((0..3).all(|k| (second[(1, k)] - 2.0 * first[(1, k)]).abs() < 1e-14), "{second}");
     assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
     sim.pull(EnvId(1), 0, &[]).unwrap();
@@ -115,15 +106,13 @@ fn a_pull_accelerates_and_turns() {
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
     let refused = sim.pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
     assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
-    assert!(matches!(
-        sim.pull(EnvId(0), 1, &[(point, force)]),
-        Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })
-    ));
+    let body = sim.pull(EnvId(0), 1, &[(point, force)]);
+    assert!(matches!(body, Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })), "{body:?}");
     assert!(matches!(sim.pull(EnvId(2), 0, &[(point, force)]), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
 #[test]
-fn steps_are_counted_whatever_is_reset() {
+fn counted_steps() {
     let mut sim = SimulationManager::new(SimulationManagerCfg { substeps: 2, ..cfg(2, 1) }).unwrap();
     assert_eq!(sim.steps(), 0);
     sim.update(3);
@@ -137,7 +126,7 @@ fn steps_are_counted_whatever_is_reset() {
 }
 
 #[test]
-fn every_number_of_a_configuration_is_checked() {
+fn bad_configurations() {
     let good = SimulationManagerCfg::default;
     good().validate().unwrap();
     SimulationManagerCfg::manipulation().validate().unwrap();

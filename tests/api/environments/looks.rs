@@ -1,31 +1,31 @@
-//! Sizes and colours of single environments: what cameras and rays see, and what bodies lie on.
+//! Sizes and colors of single environments: what cameras and rays see, and what bodies lie on.
 //!
-//! The judge of most of it is a scene that was built with the sizes and colours that an environment of another got: the same
-//! bits, in pictures and in motion.
+//! The judge of most of it is a scene that was built with the sizes and colors that an environment of another got: the same
+//! bits, in images and in motion.
 
+use super::worlds::{ALL, get, set};
 use kinetoscope::ndarray::{Array3, Array4, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Shape;
 use kinetoscope::scene::pose::from_wxyz;
 use kinetoscope::sensors::ray::pattern::Grid;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
+use testkit::urdf::Files;
+use testkit::worlds::{sr5, text_robot};
 
-const ALL: Option<&[EnvId]> = None;
-/// Where the camera is, above everything and looking straight down.
+/// The camera, above everything and looking straight down.
 const EYE: [f64; 3] = [0.1, -0.05, 2.0];
 
 fn cfg() -> SimulationManagerCfg {
-    SimulationManagerCfg { num_envs: 3, threads: Some(2), ..Default::default() }
+    testkit::worlds::cfg(3, 2)
 }
 
+/// An object whose mass and moments do not follow from its size.
 fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
-    let init_pose = Pose::translation(at[0], at[1], at[2]);
-    // Mass and moments of their own: they do not follow from the size.
-    let (mass, inertia) = (Some(1.0), Some([0.01, 0.012, 0.014]));
-    RigidObjectCfg { uid: uid.into(), shape, init_pose, mass, inertia, ..Default::default() }
+    RigidObjectCfg { inertia: Some([0.01, 0.012, 0.014]), mass: Some(1.0), ..testkit::worlds::object(uid, shape, at) }
 }
 
-/// What is the same in all environments but those that get their own.
+/// Sizes and colors, the same in all environments but those that get their own.
 #[derive(Clone, Copy)]
 struct Look {
     cube: [f64; 3],
@@ -43,33 +43,32 @@ const OWN: Look =
 /// Things of every kind that has sizes, far enough apart for both looks, above the ground; a mesh that has none.
 fn world(look: Look) -> SimulationManager {
     let mut sim = SimulationManager::new(cfg()).unwrap();
-    let [radius, length] = look.post;
-    let [across, along] = look.pill;
-    let box_ = ObjectShape::Box { size: look.cube };
-    sim.add_rigid_object(RigidObjectCfg { rgba: look.color, ..object("cube", box_, [0.0, 0.0, 0.3]) }).unwrap();
-    let ball = ObjectShape::Sphere { radius: look.ball };
-    sim.add_rigid_object(object("ball", ball, [0.5, 0.0, 0.4])).unwrap();
-    let post = ObjectShape::Cylinder { radius, length };
-    let post = RigidObjectCfg { body_type: BodyType::Static, ..object("post", post, [0.0, 0.5, 0.0]) };
-    sim.add_rigid_object(post).unwrap();
-    let pill = ObjectShape::Capsule { radius: across, length: along };
-    sim.add_rigid_object(object("pill", pill, [-0.5, 0.0, 0.5])).unwrap();
-    let cone = ObjectShape::Cone { radius: 0.1, height: 0.2 };
-    sim.add_rigid_object(object("cone", cone, [0.5, 0.5, 0.2])).unwrap();
+    let cube = object("cube", ObjectShape::Box { size: look.cube }, [0.0, 0.0, 0.3]);
+    let post = ObjectShape::Cylinder { radius: look.post[0], length: look.post[1] };
+    let pill = ObjectShape::Capsule { radius: look.pill[0], length: look.pill[1] };
+    for object in [
+        RigidObjectCfg { rgba: look.color, ..cube },
+        object("ball", ObjectShape::Sphere { radius: look.ball }, [0.5, 0.0, 0.4]),
+        testkit::worlds::fixed(object("post", post, [0.0, 0.5, 0.0])),
+        object("pill", pill, [-0.5, 0.0, 0.5]),
+        object("cone", ObjectShape::Cone { radius: 0.1, height: 0.2 }, [0.5, 0.5, 0.2]),
+    ] {
+        sim.add_rigid_object(object).unwrap();
+    }
     sim
 }
 
 /// Gives an environment the other look.
 fn dress(sim: &mut SimulationManager, env: usize, look: Look) {
-    sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| {
-        properties.set(Property::Size, "cube", &look.cube.map(|length| length / 2.0))?;
-        // What a ball has no use for is not kept.
-        properties.set(Property::Size, "ball", &[look.ball, 7.0, -1.0])?;
-        properties.set(Property::Size, "post", &[look.post[0], look.post[1] / 2.0, 0.0])?;
-        properties.set(Property::Size, "pill", &[look.pill[0], look.pill[1] / 2.0, 0.0])?;
-        properties.set(Property::Color, "cube", &look.color)
-    })
-    .unwrap();
+    let values: [(usize, Property, &str, &[f64]); 5] = [
+        (env, Property::Size, "cube", &look.cube.map(|length| length / 2.0)),
+        // Numbers that a ball does not use are not kept.
+        (env, Property::Size, "ball", &[look.ball, 7.0, -1.0]),
+        (env, Property::Size, "post", &[look.post[0], look.post[1] / 2.0, 0.0]),
+        (env, Property::Size, "pill", &[look.pill[0], look.pill[1] / 2.0, 0.0]),
+        (env, Property::Color, "cube", &look.color),
+    ];
+    set(sim, &values);
 }
 
 fn above() -> CameraCfg {
@@ -88,16 +87,16 @@ fn above() -> CameraCfg {
     }
 }
 
-type Pictures = (Array4<u8>, Array3<f32>, Array3<i32>, Array4<f32>);
+type Images = (Array4<u8>, Array3<f32>, Array3<i32>, Array4<f32>);
 
-fn pictures(sim: &SimulationManager, id: SensorId<Camera>) -> Pictures {
+fn images(sim: &SimulationManager, id: SensorId<Camera>) -> Images {
     let camera = sim.sensor(id).unwrap();
     let (color, depth) = (camera.color().unwrap(), camera.depth().unwrap());
     (color.to_owned(), depth.to_owned(), camera.mask().unwrap().to_owned(), camera.normal().unwrap().to_owned())
 }
 
-/// Whether environment `a` of one looks as environment `b` of the other, in every bit of every channel.
-fn same(one: &Pictures, a: usize, other: &Pictures, b: usize) -> bool {
+/// True if environment `a` of one looks as environment `b` of the other, in every bit of every channel.
+fn same(one: &Images, a: usize, other: &Images, b: usize) -> bool {
     one.0.index_axis(Axis(0), a) == other.0.index_axis(Axis(0), b)
         && one.1.index_axis(Axis(0), a) == other.1.index_axis(Axis(0), b)
         && one.2.index_axis(Axis(0), a) == other.2.index_axis(Axis(0), b)
@@ -105,12 +104,12 @@ fn same(one: &Pictures, a: usize, other: &Pictures, b: usize) -> bool {
 }
 
 #[test]
-fn an_environment_looks_and_moves_as_a_scene_that_was_built_so() {
+fn as_built() {
     let (mut sim, mut built) = (world(NOMINAL), world(OWN));
     let mut plain = world(NOMINAL);
     // One camera from before, one from after.
     let before = sim.add_sensor("before", above()).unwrap();
-    let nominal = pictures(&sim, before);
+    let nominal = images(&sim, before);
     dress(&mut sim, 1, OWN);
     let after = sim.add_sensor("after", above()).unwrap();
     let judge = built.add_sensor("camera", above()).unwrap();
@@ -119,9 +118,9 @@ fn an_environment_looks_and_moves_as_a_scene_that_was_built_so() {
         for sim in [&mut sim, &mut built, &mut plain] {
             sim.update(steps);
         }
-        let (expected, others) = (pictures(&built, judge), pictures(&plain, control));
+        let (expected, others) = (images(&built, judge), images(&plain, control));
         for camera in [before, after] {
-            let seen = pictures(&sim, camera);
+            let seen = images(&sim, camera);
             assert!(same(&seen, 1, &expected, 1), "after {steps} steps it looks as if built so");
             assert!(same(&seen, 0, &others, 0) && same(&seen, 2, &others, 2), "the others look as ever");
             assert!(!same(&seen, 1, &others, 1), "control: it does not look as ever");
@@ -134,23 +133,20 @@ fn an_environment_looks_and_moves_as_a_scene_that_was_built_so() {
     }
     // Back to what it was, through a reset, which leaves properties alone.
     sim.reset(None).unwrap();
-    assert!(!same(&pictures(&sim, before), 1, &nominal, 1));
+    assert!(!same(&images(&sim, before), 1, &nominal, 1));
     sim.reset_properties(ALL).unwrap();
-    assert!((0..3).all(|env| same(&pictures(&sim, before), env, &nominal, env)));
+    assert!((0..3).all(|env| same(&images(&sim, before), env, &nominal, env)));
 }
 
 /// MuJoCo's contacts are soft: on four or fewer corners a body of any mass sinks in by up to about
 /// (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) = 0.4 mm with its default reference (k = 1 / (0.95 · 0.02 s)²).
 #[test]
-fn bodies_rest_at_half_their_own_size() {
+fn resting_heights() {
     let mut sim = world(NOMINAL);
     let heights = [0.05, 0.11, 0.16];
     for (env, half) in heights.into_iter().enumerate() {
-        sim.randomize_with(Some(&[EnvId(env)]), |_, _, p| {
-            p.set(Property::Size, "cube", &[0.1, 0.12, half])?;
-            p.set(Property::Size, "ball", &[half, 0.0, 0.0])
-        })
-        .unwrap();
+        let sizes: [(&str, &[f64]); 2] = [("cube", &[0.1, 0.12, half]), ("ball", &[half, 0.0, 0.0])];
+        set(&mut sim, &sizes.map(|(name, size)| (env, Property::Size, name, size)));
     }
     sim.update(300);
     for uid in ["cube", "ball"] {
@@ -163,9 +159,9 @@ fn bodies_rest_at_half_their_own_size() {
 }
 
 /// A ray at (x, y) from the optical axis, per metre of depth, meets a ball of radius r below at distance d in the depth
-/// (d - sqrt(d² - (1 + x² + y²)(d² - r²))) / (1 + x² + y²). Pictures are in single precision.
+/// (d - sqrt(d² - (1 + x² + y²)(d² - r²))) / (1 + x² + y²). Images are in single precision.
 #[test]
-fn the_depth_of_a_ball_is_that_of_its_own_radius() {
+fn depth_of_ball() {
     let mut sim = SimulationManager::new(SimulationManagerCfg { gravity: [0.0; 3].into(), ..cfg() }).unwrap();
     let ball = ObjectShape::Sphere { radius: 0.1 };
     sim.add_rigid_object(object("ball", ball, [EYE[0], EYE[1], 0.7])).unwrap();
@@ -175,7 +171,7 @@ fn the_depth_of_a_ball_is_that_of_its_own_radius() {
     let radii = [0.1, 0.23, 0.05];
     for env in [1, 2] {
         let radius = radii[env];
-        sim.randomize_with(Some(&[EnvId(env)]), |_, _, p| p.set(Property::Size, "ball", &[radius, 0.0, 0.0])).unwrap();
+        set(&mut sim, &[(env, Property::Size, "ball", &[radius, 0.0, 0.0])]);
     }
     let id = sim.rigid_object(sim.rigid_object_id("ball").unwrap()).mask_id();
     let (raster, rays) = (sim.sensor(raster).unwrap(), sim.sensor(rays).unwrap());
@@ -208,7 +204,7 @@ fn the_depth_of_a_ball_is_that_of_its_own_radius() {
 /// MuJoCo's own rays in the environment's own model, beside ours from the sensor.
 /// MuJoCo's pass through what has an opacity of 0.
 #[test]
-fn rays_hit_what_mujocos_hit() {
+fn mujoco_rays() {
     let mut sim = world(NOMINAL);
     let rays = RayCasterCfg {
         pattern: Grid { resolution: 0.05, size: [1.6, 1.6], ..Grid::default() }.into(),
@@ -218,7 +214,7 @@ fn rays_hit_what_mujocos_hit() {
     };
     let id = sim.add_sensor("rays", rays).unwrap();
     dress(&mut sim, 1, OWN);
-    sim.randomize_with(Some(&[EnvId(2)]), |_, _, p| p.set(Property::Color, "cube", &[1.0, 0.0, 0.0, 0.0])).unwrap();
+    set(&mut sim, &[(2, Property::Color, "cube", &[1.0, 0.0, 0.0, 0.0])]);
     sim.update(30);
     let rays = sim.sensor(id).unwrap();
     let (starts, directions) = (rays.ray_starts(), rays.ray_directions());
@@ -257,61 +253,47 @@ fn arm(scale: f64) -> String {
 }
 
 #[test]
-fn links_of_robots_have_sizes_and_colours_too() {
-    let dir = tempfile::tempdir().unwrap();
+fn robot_links() {
     let build = |scale: f64| {
-        let path = dir.path().join(format!("arm{scale}.urdf"));
-        std::fs::write(&path, arm(scale)).unwrap();
         let mut sim = SimulationManager::new(cfg()).unwrap();
-        let robot = RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(path), ..Default::default() };
-        sim.add_robot(robot).unwrap();
+        sim.add_robot(text_robot(&Files::default(), "arm", &arm(scale))).unwrap();
         let camera = sim.add_sensor("camera", above()).unwrap();
         (sim, camera)
     };
     let ((mut sim, camera), (built, judge)) = (build(1.0), build(1.5));
-    let nominal = pictures(&sim, camera);
+    let nominal = images(&sim, camera);
     let larger = Randomization::new().with(Property::Size, "arm/fore", Draw::Scale([1.5, 1.5]));
     sim.randomize(&larger, Some(&[EnvId(2)])).unwrap();
-    let (seen, expected) = (pictures(&sim, camera), pictures(&built, judge));
+    let (seen, expected) = (images(&sim, camera), images(&built, judge));
     assert!(same(&seen, 2, &expected, 2) && same(&seen, 0, &nominal, 0) && !same(&seen, 2, &nominal, 2));
     // The shape that collides is scaled as well, and nothing weighs more.
     sim.batch().read(2, |env| {
         let model = env.data().model();
-        let geom = model.id(kinetoscope::sim::mj::ObjectKind::Geom, "arm/fore/collision0").unwrap();
+        let geom = model.id(ObjectKind::Geom, "arm/fore/collision0").unwrap();
         for (k, half) in [0.3, 0.15, 0.075].into_iter().enumerate() {
             assert!((model.geom_size()[3 * geom + k] - half).abs() < 1e-15);
         }
     });
-    let mass = |env| sim.properties(EnvId(env)).unwrap().get(Property::Mass, "arm/fore").unwrap().to_vec();
-    assert_eq!(mass(2), mass(0));
-    let color =
-        |sim: &SimulationManager| sim.properties(EnvId(2)).unwrap().get(Property::Color, "arm/fore").unwrap().to_vec();
+    assert_eq!(get(&sim, 2, Property::Mass, "arm/fore"), get(&sim, 0, Property::Mass, "arm/fore"));
     let red = [0.9_f64, 0.05, 0.05, 1.0];
-    sim.randomize_with(Some(&[EnvId(2)]), |_, _, p| p.set(Property::Color, "arm/fore", &red)).unwrap();
-    assert_eq!(color(&sim), red);
+    set(&mut sim, &[(2, Property::Color, "arm/fore", &red)]);
+    assert_eq!(get(&sim, 2, Property::Color, "arm/fore"), red);
     // Red instead of blue, in the mean over what is not ground; highlights are white.
-    let picture = pictures(&sim, camera);
+    let image = images(&sim, camera);
     let sum = |channel: usize| {
-        let arm = picture.2.index_axis(Axis(0), 2);
+        let arm = image.2.index_axis(Axis(0), 2);
         let pixels = arm.indexed_iter().filter(|(_, id)| **id != arm[(0, 0)]);
-        pixels.map(|((v, u), _)| u64::from(picture.0[(2, v, u, channel)])).sum::<u64>()
+        pixels.map(|((v, u), _)| u64::from(image.0[(2, v, u, channel)])).sum::<u64>()
     };
     assert!(sum(0) > 20_000 && sum(0) > 2 * sum(2), "{} {}", sum(0), sum(2));
-    assert_eq!(pictures(&sim, camera).1, seen.1, "a colour changes no depth");
+    assert_eq!(images(&sim, camera).1, seen.1, "a color changes no depth");
 }
 
-/// Meshes keep their sizes, but not their colours, and neither ground nor terrain has a size.
+/// Meshes keep their sizes, but not their colors, and neither ground nor terrain has a size.
 #[test]
-fn what_has_which() {
+fn names() {
     let mut sim = world(NOMINAL);
-    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    sim.add_robot(RobotCfg {
-        uid: "sr5".into(),
-        urdf,
-        init_pose: Pose::translation(3.0, 0.0, 0.0),
-        ..Default::default()
-    })
-    .unwrap();
+    sim.add_robot(RobotCfg { init_pose: Pose::translation(3.0, 0.0, 0.0), ..sr5("sr5") }).unwrap();
     let properties = sim.properties(EnvId(0)).unwrap();
     // The links of the arm are boxes, cylinders and balls as well.
     let mut sized = properties.names(Property::Size);
@@ -322,43 +304,32 @@ fn what_has_which() {
     assert!(!colored.contains(&"ground"));
     assert_eq!(properties.get(Property::Size, "pill").unwrap(), [0.08, 0.1, 0.0]);
     assert_eq!(properties.nominal(Property::Color, "cube").unwrap(), [0.6_f32, 0.6, 0.6, 1.0].map(f64::from));
-    // The colour of a mesh.
+    // The color of a mesh.
     let camera = sim.add_sensor("camera", above()).unwrap();
-    let before = pictures(&sim, camera);
+    let before = images(&sim, camera);
     let cone = sim.rigid_object(sim.rigid_object_id("cone").unwrap()).mask_id();
-    let seen = |p: &Pictures, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
-    // Draws are of colours, and leave the opacity: 1, though a factor of 1.5 would be beyond it.
-    let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0])).with(
-        Property::Color,
-        "cube",
-        Draw::Scale([1.5, 1.5]),
-    );
-    sim.randomize(&black, Some(&[EnvId(0)])).unwrap();
-    let color =
-        |sim: &SimulationManager, of| sim.properties(EnvId(0)).unwrap().get(Property::Color, of).unwrap().to_vec();
-    assert_eq!(color(&sim, "cone"), [0.0, 0.0, 0.0, 1.0]);
+    let seen = |p: &Images, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
+    // Draws are of colors, and leave the opacity: 1, though a factor of 1.5 would be beyond it.
+    let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
+    sim.randomize(&black.with(Property::Color, "cube", Draw::Scale([1.5, 1.5])), Some(&[EnvId(0)])).unwrap();
+    assert_eq!(get(&sim, 0, Property::Color, "cone"), [0.0, 0.0, 0.0, 1.0]);
     let brighter = f64::from(0.6_f32) * 1.5;
-    assert_eq!(color(&sim, "cube"), [brighter, brighter, brighter, 1.0]);
-    assert_eq!(seen(&pictures(&sim, camera), 0), seen(&before, 0));
-    sim.randomize_with(Some(&[EnvId(0)]), |_, _, p| p.set(Property::Color, "cone", &[0.0; 4])).unwrap();
-    let hidden = pictures(&sim, camera);
+    assert_eq!(get(&sim, 0, Property::Color, "cube"), [brighter, brighter, brighter, 1.0]);
+    assert_eq!(seen(&images(&sim, camera), 0), seen(&before, 0));
+    set(&mut sim, &[(0, Property::Color, "cone", &[0.0; 4])]);
+    let hidden = images(&sim, camera);
     assert!(seen(&before, 0) > 30 && seen(&hidden, 1) == seen(&before, 1));
     assert_eq!(seen(&hidden, 0), 0, "with an opacity of 0 it is not there");
 }
 
 #[test]
-fn draws_are_seeded_small_and_carried_over() {
-    let draw = Randomization::new().with(Property::Size, "cube|ball", Draw::Scale([0.5, 1.5])).with(
-        Property::Color,
-        "cube",
-        Draw::Set([0.2, 0.8]),
-    );
+fn draws() {
+    let sizes = Randomization::new().with(Property::Size, "cube|ball", Draw::Scale([0.5, 1.5]));
+    let draw = sizes.with(Property::Color, "cube", Draw::Set([0.2, 0.8]));
     let mut sim = world(NOMINAL);
     let camera = sim.add_sensor("camera", above()).unwrap();
     sim.randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
-    let sizes = |sim: &SimulationManager, env| {
-        sim.properties(EnvId(env)).unwrap().get(Property::Size, "cube").unwrap().to_vec()
-    };
+    let sizes = |sim: &SimulationManager, env| get(sim, env, Property::Size, "cube");
     let (first, third) = (sizes(&sim, 0), sizes(&sim, 2));
     assert!(first[0] == first[1] && first[0] != third[0] && (0.05..=0.15).contains(&first[0]), "{first:?}");
     let mut other = world(NOMINAL);
@@ -381,17 +352,17 @@ fn draws_are_seeded_small_and_carried_over() {
     assert!(rest.iter().all(follows), "{rest:?}");
     assert_eq!(sim.property_bytes(EnvId(1)).unwrap(), 0);
     assert!(sim.batch().read(1, |env| env.data().model().arrays_apart(&base).is_empty()));
-    // More is added: the look stays, in pictures too.
-    let before = pictures(&sim, camera);
+    // More is added: the look stays, in images too.
+    let before = images(&sim, camera);
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
     assert_eq!(sizes(&sim, 0), first);
-    let after = pictures(&sim, camera);
+    let after = images(&sim, camera);
     assert!((0..3).all(|env| same(&before, env, &after, env)) && !same(&before, 0, &before, 1));
 }
 
-/// What looks at an environment from outside sees the same.
+/// Views from outside show the same.
 #[test]
-fn stills_and_overviews_show_each_environment_as_it_is() {
+fn stills() {
     let mut sim = world(NOMINAL);
     dress(&mut sim, 1, OWN);
     let half = |still: &Still| {
@@ -410,35 +381,35 @@ fn stills_and_overviews_show_each_environment_as_it_is() {
 }
 
 #[test]
-fn sizes_and_colours_that_cannot_be_are_named() {
+fn mistakes() {
     let mut sim = world(NOMINAL);
-    let mut fault = |property, name: &str, value: &[f64]| {
+    let cube = ["environment 1", "\"cube\"", "1e-6"];
+    let rows: [(Property, &str, &[f64], &[&str]); 11] = [
+        (Property::Size, "cube", &[0.0, 0.1, 0.1], &cube),
+        (Property::Size, "cube", &[0.1, -0.1, 0.1], &cube),
+        (Property::Size, "cube", &[0.1, 0.1, f64::NAN], &cube),
+        (Property::Size, "cube", &[0.1, 2e6, 0.1], &cube),
+        // A capsule has a length.
+        (Property::Size, "pill", &[0.1, 0.0, 0.0], &["\"pill\""]),
+        (Property::Color, "cube", &[1.1, 0.0, 0.0, 1.0], &["opacity"]),
+        (Property::Color, "cube", &[0.0, -0.1, 0.0, 1.0], &["opacity"]),
+        (Property::Color, "cube", &[0.0, 0.0, f64::NAN, 1.0], &["opacity"]),
+        (Property::Size, "cone", &[0.1; 3], &["it is a mesh"]),
+        (Property::Size, "cube", &[0.1; 2], &["3 numbers"]),
+        (Property::Color, "ground", &[0.1; 4], &["body or terrain"]),
+    ];
+    for (property, name, value, parts) in rows {
         let done = sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, name, value));
-        match done {
-            Err(error) => error.to_string(),
-            Ok(()) => panic!("{property:?} {name} {value:?}"),
-        }
-    };
-    for bad in [[0.0, 0.1, 0.1], [0.1, -0.1, 0.1], [0.1, 0.1, f64::NAN], [0.1, 2e6, 0.1]] {
-        let said = fault(Property::Size, "cube", &bad);
-        assert!(said.contains("environment 1") && said.contains("\"cube\"") && said.contains("1e-6"), "{said}");
+        let said = done.expect_err(name).to_string();
+        assert!(parts.iter().all(|part| said.contains(part)), "{name} {value:?}: {said}");
     }
-    let said = fault(Property::Size, "pill", &[0.1, 0.0, 0.0]);
-    assert!(said.contains("\"pill\""), "a capsule has a length: {said}");
-    for bad in [[1.1, 0.0, 0.0, 1.0], [0.0, -0.1, 0.0, 1.0], [0.0, 0.0, f64::NAN, 1.0]] {
-        let said = fault(Property::Color, "cube", &bad);
-        assert!(said.contains("opacity"), "{said}");
-    }
-    assert!(fault(Property::Size, "cone", &[0.1; 3]).contains("it is a mesh"));
-    assert!(fault(Property::Size, "cube", &[0.1; 2]).contains("3 numbers"));
-    assert!(fault(Property::Color, "ground", &[0.1; 4]).contains("body or terrain"));
     assert!((0..3).all(|env| sim.property_bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
 }
 
-/// A pattern for nothing that can be seen is a mistake: draws of colours leave opacities, and rays pass what is invisible.
+/// A pattern for nothing that can be seen is a mistake: draws of colors leave opacities, and rays pass what is invisible.
 /// Once an environment shows it, rays hit it there.
 #[test]
-fn patterns_for_what_nobody_sees_are_refused() {
+fn invisible_patterns() {
     let mut sim = world(NOMINAL);
     let ghost = object("ghost", ObjectShape::cube(0.3), [-0.6, 0.6, 0.8]);
     sim.add_rigid_object(RigidObjectCfg { rgba: [1.0, 1.0, 1.0, 0.0], ..ghost }).unwrap();
@@ -457,11 +428,8 @@ fn patterns_for_what_nobody_sees_are_refused() {
     // Controls: with something that is seen, the pattern is right, and the ghost stays one.
     sim.randomize(&draw("ghost|cube"), ALL).unwrap();
     let both = sim.add_sensor("both", rays("ghost|cube")).unwrap();
-    assert_eq!(sim.properties(EnvId(1)).unwrap().get(Property::Color, "ghost").unwrap()[3], 0.0);
-    let show = |sim: &mut SimulationManager| {
-        let color = [0.5, 0.5, 0.5, 1.0];
-        sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "ghost", &color)).unwrap();
-    };
+    assert_eq!(get(&sim, 1, Property::Color, "ghost")[3], 0.0);
+    let show = |sim: &mut SimulationManager| set(sim, &[(1, Property::Color, "ghost", &[0.5, 0.5, 0.5, 1.0])]);
     show(&mut sim);
     let ghost = sim.add_sensor("ghost_rays", rays("ghost")).unwrap();
     let hit = |sim: &SimulationManager, id: SensorId<RayCaster>| {
@@ -473,7 +441,7 @@ fn patterns_for_what_nobody_sees_are_refused() {
     assert_eq!(hit(&sim, both), [0, 9, 0]);
     let late = sim.add_sensor("late", rays("ghost|cube")).unwrap();
     assert_eq!(hit(&sim, late), [0, 9, 0]);
-    // Nor does it that sensors are built again, be it when nobody sees the ghost.
+    // Nor does it that sensors are built again, even while the ghost is invisible.
     sim.add_rigid_object(object("first", ObjectShape::cube(0.1), [8.0, 8.0, 0.05])).unwrap();
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
     sim.reset_properties(ALL).unwrap();
@@ -481,7 +449,7 @@ fn patterns_for_what_nobody_sees_are_refused() {
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 0, 0]));
     show(&mut sim);
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
-    // Control: a new sensor is refused still, once nobody sees the ghost.
+    // Control: a new sensor is refused still, once the ghost is invisible.
     sim.reset_properties(ALL).unwrap();
     assert!(sim.add_sensor("refused", rays("ghost")).is_err());
 }

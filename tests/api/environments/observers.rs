@@ -2,8 +2,9 @@
 
 use kinetoscope::prelude::*;
 use std::sync::{Arc, Mutex};
+use testkit::worlds::{add_ball, object, row};
 
-/// What was told, and at which step of the first environment.
+/// The moments that were told, with the step of the first environment.
 type Diary = Arc<Mutex<Vec<(u64, Moment)>>>;
 
 /// Is due at every `every`-th step of the first environment, and does something then.
@@ -46,20 +47,14 @@ fn every(period: u64, up_to: u64) -> Vec<(u64, Moment)> {
 /// A tumbling box with a sensor on it.
 fn scene() -> (SimulationManager, ObjectId, SensorId<Imu>) {
     let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let cfg = RigidObjectCfg {
-        uid: "box".into(),
-        shape: ObjectShape::Box { size: [0.1, 0.2, 0.3] },
-        mass: Some(1.0),
-        init_pose: Pose::translation(0.0, 0.0, 0.4),
-        ..Default::default()
-    };
-    let object = sim.add_rigid_object(cfg).unwrap();
+    let cfg = object("box", ObjectShape::Box { size: [0.1, 0.2, 0.3] }, [0.0, 0.0, 0.4]);
+    let object = sim.add_rigid_object(RigidObjectCfg { mass: Some(1.0), ..cfg }).unwrap();
     let imu = sim.add_sensor("imu", ImuCfg { sampling: SamplingCfg::every(0.07), ..ImuCfg::on("box") }).unwrap();
     (sim, object, imu)
 }
 
 #[test]
-fn are_called_at_their_steps_and_change_nothing() {
+fn steps_of_their_own() {
     let (mut alone, object, imu) = scene();
     alone.update(100);
     for blocks in [vec![100], vec![1; 100], vec![33, 67]] {
@@ -78,9 +73,9 @@ fn are_called_at_their_steps_and_change_nothing() {
     }
 }
 
-/// By type, in the order of adding; one that was taken away is not there, and one of another simulation is no one here.
+/// By type, in the order of adding; a removed one is not found, nor one of another simulation.
 #[test]
-fn are_found_by_type() {
+fn by_type() {
     struct Other;
     impl Observer for Other {
         fn due_in(&self, _: &SimulationManager) -> u64 {
@@ -106,13 +101,13 @@ fn are_found_by_type() {
 }
 
 #[test]
-fn are_told_of_resets_and_of_what_was_written_before_the_next_step() {
+fn resets_and_writes() {
     let (mut sim, object, _) = scene();
     let (watch, diary) = Watch::new(1000, |_, _| {});
     sim.add_observer(watch);
     sim.update(2);
     sim.reset(Some(&[EnvId(1)])).unwrap();
-    let velocities = kinetoscope::ndarray::arr2(&[[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]);
+    let velocities = row([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(1)])).unwrap();
     sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(0)])).unwrap();
     let snapshot = sim.snapshot(None).unwrap();
@@ -126,13 +121,12 @@ fn are_told_of_resets_and_of_what_was_written_before_the_next_step() {
     sim.update(1);
     assert_eq!(entries(&diary)[2..], [(2, written)]);
     sim.add_sensor("another", ImuCfg::on("box")).unwrap();
-    let ball = ObjectShape::Sphere { radius: 0.1 };
-    sim.add_rigid_object(RigidObjectCfg { uid: "ball".into(), shape: ball, ..Default::default() }).unwrap();
+    add_ball(&mut sim, "ball", [0.0; 3]);
     assert_eq!(entries(&diary)[3..], [(3, Moment::Compiled)], "a sensor changes no model");
 }
 
 #[test]
-fn hear_of_what_others_do_and_not_of_what_they_do_themselves() {
+fn acts_of_others() {
     let (mut sim, ..) = scene();
     let (doer, doers) = Watch::new(5, |sim, moment| {
         if *moment == Moment::Stepped {
@@ -159,5 +153,5 @@ fn hear_of_what_others_do_and_not_of_what_they_do_themselves() {
     assert!(matches!(sim.remove_observer(hearer), Err(Error::NoObserver)));
     assert_eq!(sim.remove_observer(doer).unwrap().every, 5);
     sim.update(10);
-    assert_eq!(entries(&hearers), all, "nobody is there any more");
+    assert_eq!(entries(&hearers), all, "no observer is left");
 }

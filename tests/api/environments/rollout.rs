@@ -1,14 +1,21 @@
 //! A rollout gives what stepping by hand gives, and changes nothing.
 
-use super::worlds::{all_bits, cfg, world};
+use super::worlds::{ALL, Ids, all_bits, cfg, world};
 use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
 use kinetoscope::prelude::*;
 
-const ALL: Option<&[EnvId]> = None;
 const STEPS: usize = 60;
 
 fn controls(rows: usize) -> Array3<f64> {
     Array3::from_shape_fn((rows, STEPS, 7), |(n, t, k)| (0.7 * n as f64 + 0.05 * t as f64 + k as f64).sin() * 2.0)
+}
+
+/// Gives the controls of step `t` and steps.
+fn step(sim: &mut SimulationManager, ids: Ids, controls: &Array3<f64>, t: usize) {
+    let now = controls.index_axis(Axis(1), t);
+    sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
+    sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
+    sim.update(1);
 }
 
 /// Positions and velocities of all environments.
@@ -23,7 +30,7 @@ fn states(sim: &SimulationManager) -> Array2<f64> {
 }
 
 #[test]
-fn a_rollout_is_stepping_by_hand_and_disturbs_nothing() {
+fn steps_by_hand() {
     for (settings, threads) in [(cfg(3, 2), 2), (SimulationManagerCfg { substeps: 3, ..cfg(3, 1) }, 1)] {
         let (mut sim, ids) = world(settings);
         assert_eq!(sim.threads(), threads);
@@ -38,10 +45,7 @@ fn a_rollout_is_stepping_by_hand_and_disturbs_nothing() {
 
         let present = sim.snapshot(ALL).unwrap();
         for t in 0..STEPS {
-            let now = controls.index_axis(Axis(1), t);
-            sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
-            sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
-            sim.update(1);
+            step(&mut sim, ids, &controls, t);
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }
         let end = all_bits(&sim);
@@ -66,7 +70,7 @@ fn a_rollout_is_stepping_by_hand_and_disturbs_nothing() {
 }
 
 #[test]
-fn columns_have_names() {
+fn names() {
     let (sim, _) = world(cfg(1, 1));
     let names = sim.control_names();
     assert_eq!((names.len(), names[0].as_str(), names[6].as_str()), (7, "arm/JOINT1", "machine/motor"));
@@ -81,13 +85,11 @@ fn columns_have_names() {
     let first = 2.0 * 2.0_f64.sin() - 9.81 * 0.01;
     assert!((velocity - first).abs() < 1e-12 && (height - (0.4 + 0.01 * first)).abs() < 1e-12, "{height} {velocity}");
     assert_eq!(states[0], "qpos arm/JOINT1");
-    assert!(
-        states.contains(&"qvel machine/ball[2]".to_string()) && states.contains(&"qpos machine/ball[3]".to_string())
-    );
+    assert!(["qvel machine/ball[2]", "qpos machine/ball[3]"].iter().all(|name| states.iter().any(|n| n == name)));
 }
 
 #[test]
-fn targets_are_clamped_as_those_of_robots_are() {
+fn clamped_targets() {
     let (mut sim, ids) = world(cfg(1, 1));
     let rollout = sim.rollout(&Array3::from_elem((1, 5, 7), 100.0), None, ALL).unwrap();
     sim.restore(&rollout.end, ALL).unwrap();
@@ -98,7 +100,7 @@ fn targets_are_clamped_as_those_of_robots_are() {
 /// Controls were once clamped to the limits that the robot was added with, not to those that a row's state has:
 /// `set_qpos_limits` changes them in an environment, and they go with its state.
 #[test]
-fn targets_are_clamped_to_the_limits_of_the_state_that_a_row_starts_in() {
+fn limits_of_start() {
     let (mut sim, ids) = world(cfg(2, 1));
     let tight = Array3::from_shape_fn((1, 6, 2), |(_, joint, end)| 0.01 * (joint + 1) as f64 * [-1.0, 1.0][end]);
     let wide = sim.snapshot(ALL).unwrap();
@@ -111,10 +113,7 @@ fn targets_are_clamped_to_the_limits_of_the_state_that_a_row_starts_in() {
         let rollout = sim.rollout(&controls, start, ALL).unwrap();
         sim.restore(start.unwrap_or(present), ALL).unwrap();
         for t in 0..STEPS {
-            let now = controls.index_axis(Axis(1), t);
-            sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
-            sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
-            sim.update(1);
+            step(&mut sim, ids, &controls, t);
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }
         let end = all_bits(&sim);
@@ -139,7 +138,7 @@ fn targets_are_clamped_to_the_limits_of_the_state_that_a_row_starts_in() {
 }
 
 #[test]
-fn a_row_that_diverges_stays_where_it_was_and_the_others_go_on() {
+fn diverged_row() {
     // A slide without damping and a force of 1e12 newtons on 1 kg: beyond MuJoCo's largest acceleration.
     let text = r#"<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>
         </worldbody><actuator><motor name="push" joint="x" gear="1000000"/></actuator></mujoco>"#;
@@ -162,7 +161,7 @@ fn a_row_that_diverges_stays_where_it_was_and_the_others_go_on() {
 }
 
 #[test]
-fn wrong_arguments_are_named() {
+fn mistakes() {
     let (sim, _) = world(cfg(2, 1));
     let shape = |controls: &Array3<f64>| match sim.rollout(controls, None, ALL) {
         Err(Error::Shape { expected, .. }) => expected,

@@ -2,6 +2,7 @@
 
 use super::worlds::{Ids, all_bits, cfg, world};
 use kinetoscope::prelude::*;
+use testkit::bits::bits;
 
 /// Bits of states and of what a noisy sensor says, after draws, steps and resets. `first` is the global index of the
 /// manager's first environment.
@@ -23,9 +24,9 @@ fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)>
     sim.randomize(&random, Some(&again)).unwrap();
     sim.update(70);
     let read = sim.sensor(sensor).unwrap();
-    let said = |env| read.positions().row(env).iter().map(|x| x.to_bits()).collect();
+    let said = |env| bits(&read.positions().row(env));
     assert!(sim.rigid_object(ids.cube).mass() > 0.0);
-    all_bits(&sim).into_iter().enumerate().map(|(env, bits)| (bits, said(env))).collect()
+    all_bits(&sim).into_iter().enumerate().map(|(env, state)| (state, said(env))).collect()
 }
 
 /// The world of these tests with the same commands in every environment.
@@ -39,7 +40,7 @@ fn world_alike(settings: SimulationManagerCfg) -> (SimulationManager, Ids) {
 }
 
 #[test]
-fn eight_environments_are_twice_four() {
+fn twice_four() {
     for (rank, first) in [(0, 0), (1, 4)] {
         let settings = SimulationManagerCfg { num_envs: 4, shard: Shard { rank, world: 2 }, ..Default::default() };
         assert_eq!(settings.first_env(), first);
@@ -58,19 +59,18 @@ fn eight_environments_are_twice_four() {
 }
 
 #[test]
-fn a_shard_that_does_not_exist_is_refused() {
-    for shard in
-        [Shard { rank: 2, world: 2 }, Shard { rank: 0, world: 0 }, Shard { rank: usize::MAX - 1, world: usize::MAX }]
-    {
+fn refused() {
+    for (rank, world) in [(2, 2), (0, 0), (usize::MAX - 1, usize::MAX)] {
+        let shard = Shard { rank, world };
         let refused = SimulationManager::new(SimulationManagerCfg { shard, ..cfg(4, 1) });
         assert!(matches!(refused, Err(Error::Config { field: "shard", .. })), "{refused:?}");
     }
 }
 
 #[test]
-fn the_launchers_variables_are_read() {
+fn variables_of_launchers() {
     let ask = |variables: &[(&str, &str)]| {
-        let mut child = testkit::process::command(module_path!(), "says_its_shard");
+        let mut child = testkit::process::command(module_path!(), "child");
         let all =
             ["RANK", "WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE", "SLURM_PROCID", "SLURM_NTASKS"];
         for name in all.into_iter().chain(["SLURM_STEP_ID"]) {
@@ -88,7 +88,7 @@ fn the_launchers_variables_are_read() {
 /// The child of the test above.
 #[test]
 #[ignore = "runs in a process of its own"]
-fn says_its_shard() {
+fn child() {
     if testkit::process::is_child() {
         println!("{:?}", Shard::from_env());
     }

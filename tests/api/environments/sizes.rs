@@ -3,6 +3,8 @@
 use super::worlds::{cfg, cube};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::mj::ObjectKind;
+use testkit::worlds::object;
 
 /// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.
 const PART: &str = r#"<mujoco><asset><mesh name="spike" vertex="0 0 0  0.2 0 0  0 0.2 0  0 0 0.2"/></asset><worldbody>
@@ -16,13 +18,12 @@ const PART: &str = r#"<mujoco><asset><mesh name="spike" vertex="0 0 0  0.2 0 0  
 fn world() -> SimulationManager {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     sim.add_rigid_object(cube("cube", 1.0, [0.0, 3.0, 0.05])).unwrap();
-    let shape = ObjectShape::Cone { radius: 0.1, height: 0.2 };
-    let init_pose = Pose::translation(1.0, 3.0, 0.2);
-    sim.add_rigid_object(RigidObjectCfg { uid: "cone".into(), shape, init_pose, ..Default::default() }).unwrap();
+    let cone = ObjectShape::Cone { radius: 0.1, height: 0.2 };
+    sim.add_rigid_object(object("cone", cone, [1.0, 3.0, 0.2])).unwrap();
     let heights = array![[0.0, 0.1], [0.05, 0.0]];
     let init_pose = Pose::translation(-9.0, 0.0, 0.0);
-    sim.add_terrain(TerrainCfg { uid: "hills".into(), heights, size: [2.0; 2], init_pose, ..Default::default() })
-        .unwrap();
+    let hills = TerrainCfg { uid: "hills".into(), heights, size: [2.0; 2], init_pose, ..Default::default() };
+    sim.add_terrain(hills).unwrap();
     sim.add_mjcf(MjcfCfg::text("part", PART)).unwrap();
     sim
 }
@@ -33,7 +34,7 @@ fn size_of(sim: &SimulationManager, env: usize, name: &str) -> [f64; 3] {
 }
 
 #[test]
-fn what_has_no_size_of_its_own_says_why_and_what_to_do() {
+fn without_size() {
     let mut sim = world();
     let cases = [
         ("cone", ["it is a mesh", "once for each scale"]),
@@ -52,13 +53,10 @@ fn what_has_no_size_of_its_own_says_why_and_what_to_do() {
             sim.randomize_with(None, |_, _, all| all.set(Property::Size, name, &[0.1; 3])).unwrap_err(),
         ];
         for error in errors {
-            assert!(
-                matches!(&error, Error::Randomization(RandomizationError::Unsized { name: of, .. }) if of == name),
-                "{error:?}"
-            );
-            for part in parts {
-                assert!(error.to_string().contains(part), "{part:?} is not in {error}");
-            }
+            let Error::Randomization(RandomizationError::Unsized { name: of, .. }) = &error else {
+                panic!("{error:?}")
+            };
+            assert!(of == name && parts.iter().all(|part| error.to_string().contains(part)), "{error}");
         }
     }
     // Nothing of that name at all is another mistake.
@@ -70,7 +68,7 @@ fn what_has_no_size_of_its_own_says_why_and_what_to_do() {
 
 /// A pattern that reaches things of both kinds draws those that have sizes, and of a body the shapes that have.
 #[test]
-fn patterns_draw_what_has_sizes() {
+fn mixed_patterns() {
     let mut sim = world();
     let drawn = Randomization::new().with(Property::Size, "c.*|part/both", Draw::Scale([1.2, 1.2]));
     sim.randomize(&drawn, Some(&[EnvId(1)])).unwrap();
@@ -84,20 +82,17 @@ fn patterns_draw_what_has_sizes() {
 /// The reasons are true. A ball that falls beside a plane of half a metre comes to rest at the plane's height: MuJoCo's
 /// contacts yield by less than a millimetre under 40 N. Two bodies of one mesh share its vertices.
 #[test]
-fn planes_have_no_end_and_meshes_are_shared() {
+fn planes_and_meshes() {
     let mut sim = world();
     sim.update(300);
     sim.batch().read(0, |env| {
         let (data, model) = (env.data(), env.data().model());
-        let body = |name: &str| model.id(kinetoscope::sim::mj::ObjectKind::Body, name).unwrap();
+        let body = |name: &str| model.id(ObjectKind::Body, name).unwrap();
         let height = data.xpos()[3 * body("part/ball") + 2];
         assert!((height - 1.1).abs() < 1e-3, "{height}");
         let mesh_of = |name: &str| {
             let of = body(name) as i32;
-            (0..model.ngeom())
-                .find(|&geom| model.geom_bodyid()[geom] == of)
-                .map(|geom| model.geom_dataid()[geom])
-                .unwrap()
+            model.geom_dataid()[(0..model.ngeom()).find(|&geom| model.geom_bodyid()[geom] == of).unwrap()]
         };
         assert_eq!(mesh_of("part/one"), mesh_of("part/two"));
         assert_ne!(mesh_of("part/one"), mesh_of("cone"), "the control");

@@ -1,10 +1,12 @@
 //! Going on from a snapshot is going on: the same bits, wherever it is restored; and wrong ones are told apart.
 
-use super::worlds::{all_bits, arm, bits_of, cfg, cube, fewest_contacts, world};
-use kinetoscope::ndarray::{Array2, array};
+use super::worlds::{ALL, all_bits, arm, bits_of, cfg, cube, fewest_contacts, world};
+use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
-
-const ALL: Option<&[EnvId]> = None;
+use kinetoscope::sim::{Cone, Integrator};
+use testkit::refusal::assert_error;
+use testkit::urdf::{self, Files};
+use testkit::worlds::text_robot;
 
 /// A snapshot after 500 steps, and the bits there and 300 steps later.
 fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<u64>>, Vec<Vec<u64>>) {
@@ -19,10 +21,8 @@ fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<
 }
 
 #[test]
-fn going_on_from_a_snapshot_gives_the_same_bits() {
-    for settings in
-        [cfg(3, 2), SimulationManagerCfg { cone: kinetoscope::sim::Cone::Elliptic, substeps: 2, ..cfg(3, 1) }]
-    {
+fn same_bits() {
+    for settings in [cfg(3, 2), SimulationManagerCfg { cone: Cone::Elliptic, substeps: 2, ..cfg(3, 1) }] {
         let (mut sim, snapshot, there, end) = run(settings.clone());
         sim.restore(&snapshot, ALL).unwrap();
         assert!(all_bits(&sim) == there, "the state is back");
@@ -45,7 +45,7 @@ fn going_on_from_a_snapshot_gives_the_same_bits() {
 }
 
 #[test]
-fn a_state_may_go_to_other_environments_and_the_rest_stays() {
+fn other_environments() {
     let (mut sim, snapshot, there, end) = run(cfg(3, 2));
     // The first to the last, the last to the first.
     sim.restore(&snapshot, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
@@ -70,7 +70,7 @@ fn a_state_may_go_to_other_environments_and_the_rest_stays() {
 }
 
 #[test]
-fn a_file_holds_the_same_bits() {
+fn file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("state.kts");
     let (_, snapshot, there, end) = run(cfg(2, 2));
@@ -85,7 +85,7 @@ fn a_file_holds_the_same_bits() {
 }
 
 #[test]
-fn files_that_are_no_snapshots_of_this_are_told_apart() {
+fn bad_files() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("state.kts");
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
@@ -112,7 +112,7 @@ fn files_that_are_no_snapshots_of_this_are_told_apart() {
 }
 
 #[test]
-fn another_scene_or_number_is_refused_and_nothing_changes() {
+fn other_scenes() {
     let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
     sim.add_robot(arm()).unwrap();
     sim.update(5);
@@ -120,9 +120,7 @@ fn another_scene_or_number_is_refused_and_nothing_changes() {
     let before = all_bits(&sim);
     let mut other = SimulationManager::new(cfg(3, 1)).unwrap();
     other.add_robot(RobotCfg { uid: "leg".into(), ..arm() }).unwrap();
-    let Err(Error::Snapshot(fault)) = other.restore(&snapshot, ALL) else { panic!("accepted") };
-    assert!(matches!(fault, SnapshotError::OtherScene { .. }));
-    assert!(fault.to_string().contains("arm/") && fault.to_string().contains("leg/"), "{fault}");
+    assert_error(other.restore(&snapshot, ALL), "Snapshot(OtherScene", &["arm/", "leg/"]);
     let two = Some(&[EnvId(0), EnvId(1)][..]);
     let count = sim.restore(&snapshot, two);
     assert!(matches!(count, Err(Error::Snapshot(SnapshotError::Count { held: 3, wanted: 2 }))), "{count:?}");
@@ -138,8 +136,7 @@ fn another_scene_or_number_is_refused_and_nothing_changes() {
 }
 
 #[test]
-fn a_scene_that_is_stepped_otherwise_is_another_one() {
-    use kinetoscope::sim::{Cone, Integrator};
+fn other_settings() {
     let build = |settings| {
         let mut sim = SimulationManager::new(settings).unwrap();
         // No robot: the drives of `arm` go with Euler's integrator alone.
@@ -158,8 +155,7 @@ fn a_scene_that_is_stepped_otherwise_is_another_one() {
         (SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(1, 1) }, "elliptic"),
     ];
     for (settings, what) in others {
-        let Err(Error::Snapshot(fault)) = build(settings).restore(&snapshot, ALL) else { panic!("accepted: {what}") };
-        assert!(matches!(fault, SnapshotError::OtherScene { .. }) && fault.to_string().contains(what), "{fault}");
+        assert_error(build(settings).restore(&snapshot, ALL), "Snapshot(OtherScene", &[what]);
     }
     // Control.
     build(cfg(1, 1)).restore(&snapshot, ALL).unwrap();
@@ -167,16 +163,13 @@ fn a_scene_that_is_stepped_otherwise_is_another_one() {
 }
 
 #[test]
-fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
-    let dir = tempfile::tempdir().unwrap();
-    let urdf = r#"<robot name="wheel"><link name="post"/>
-      <joint name="spin" type="continuous"><parent link="post"/><child link="disc"/><axis xyz="0 1 0"/></joint>
-      <link name="disc"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
-        <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link></robot>"#;
-    let path = dir.path().join("wheel.urdf");
-    std::fs::write(&path, urdf).unwrap();
+fn diverged() {
+    let files = Files::default();
+    let spin = urdf::joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", "");
+    let disc = urdf::link("disc", 1.0, 0.01, [0.1, 0.0, 0.0], "");
+    let wheel = urdf::robot("wheel", &format!("<link name=\"post\"/>{spin}{disc}"));
     let mut sim = SimulationManager::new(cfg(3, 1)).unwrap();
-    let wheel = sim.add_robot(RobotCfg { urdf: UrdfCfg::single(path), ..Default::default() }).unwrap();
+    let wheel = sim.add_robot(text_robot(&files, "wheel", &wheel)).unwrap();
     sim.update(20);
     let good = sim.snapshot(ALL).unwrap();
     sim.robot_mut(wheel).write_qpos(&array![[1e11]], None, Some(&[EnvId(1)])).unwrap();
@@ -189,12 +182,12 @@ fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
     assert!(counts[1].iter().all(|(name, count)| sim.warning_counts()[*name] == *count), "{counts:?}");
     assert!(matches!(sim.env_warning_counts(EnvId(3)), Err(Error::UnknownIndex { index: 3, .. })));
     let bad = sim.snapshot(ALL).unwrap();
-    bad.save(dir.path().join("bad")).unwrap();
+    bad.save(files.folder().join("bad")).unwrap();
     sim.restore(&good, ALL).unwrap();
     assert!(sim.diverged().is_empty(), "revived");
     sim.update(25);
     assert!(sim.time().iter().all(|time| (time - 0.45).abs() < 1e-9), "and it goes on");
-    sim.restore(&Snapshot::load(dir.path().join("bad")).unwrap(), ALL).unwrap();
+    sim.restore(&Snapshot::load(files.folder().join("bad")).unwrap(), ALL).unwrap();
     assert_eq!(sim.diverged(), reason);
     let before = sim.batch().read(1, bits_of);
     sim.update(5);
@@ -203,7 +196,7 @@ fn a_diverged_environment_is_restored_as_diverged_and_a_good_one_revived() {
 }
 
 #[test]
-fn sensors_start_again_and_show_the_restored_state() {
+fn sensors() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let robot = sim.add_robot(arm()).unwrap();
     sim.robot_mut(robot).set_qpos(&Array2::from_elem((1, 6), 0.4), None, None).unwrap();
@@ -228,14 +221,9 @@ fn sensors_start_again_and_show_the_restored_state() {
 
 /// Delay lines, drives that were changed and wrenches are part of it, in memory and in a file.
 #[test]
-fn delays_changed_drives_and_wrenches_go_on() {
+fn drives_and_wrenches() {
     let delayed = DelayedPd { delay: 4, max_delay: 9 }.into();
-    let drive = DriveCfg {
-        actuators: vec![("JOINT[12]".into(), delayed)],
-        stiffness: 200.0.into(),
-        damping: 20.0.into(),
-        ..Default::default()
-    };
+    let drive = DriveCfg { actuators: vec![("JOINT[12]".into(), delayed)], ..testkit::worlds::gains(200.0, 20.0) };
     let build = || {
         let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
         let id = sim.add_robot(RobotCfg { drive: drive.clone(), ..arm() }).unwrap();
@@ -256,7 +244,7 @@ fn delays_changed_drives_and_wrenches_go_on() {
     let (mut sim, id) = build();
     let first = sim.robot(id).find_joints(&["JOINT[12]"]).unwrap();
     let links = sim.robot(id).link_names().len();
-    let force = kinetoscope::ndarray::Array3::from_elem((1, links, 3), 0.7);
+    let force = Array3::from_elem((1, links, 3), 0.7);
     let mut arm = sim.robot_mut(id);
     arm.set_delay(&array![[2_u32, 9]], Some(&first), Some(&[EnvId(1)])).unwrap();
     arm.set_drive_type(DriveType::Acceleration, Some(&[JointIndex(3)]), None).unwrap();
@@ -303,8 +291,10 @@ fn properties(sim: &SimulationManager) -> Vec<Vec<u64>> {
         let properties = sim.properties(EnvId(env)).unwrap();
         let numbers = |property| {
             let names = properties.names(property);
-            let values = names.into_iter().flat_map(|name| properties.get(property, name).unwrap().to_vec());
-            values.map(f64::to_bits).collect::<Vec<u64>>()
+            names
+                .into_iter()
+                .flat_map(|name| testkit::bits::bits(properties.get(property, name).unwrap()))
+                .collect::<Vec<u64>>()
         };
         Property::ALL.into_iter().flat_map(numbers).collect()
     };
@@ -314,7 +304,7 @@ fn properties(sim: &SimulationManager) -> Vec<Vec<u64>> {
 /// From memory and from a file, into the manager itself and one that was built alike: the same bits with the properties of
 /// then, and the next draws are those of then.
 #[test]
-fn going_on_with_the_properties_of_a_snapshot_gives_the_same_bits() {
+fn with_properties() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("drawn.kts");
     let (mut sim, ids) = world(cfg(3, 2));
@@ -358,7 +348,7 @@ fn going_on_with_the_properties_of_a_snapshot_gives_the_same_bits() {
     fresh.update(80);
     assert!(all_bits(&fresh) == [end[2].clone(), end[1].clone(), end[0].clone()]);
     // A rollout ends with the properties it was done with.
-    let rollout = fresh.rollout(&kinetoscope::ndarray::Array3::zeros((1, 5, 7)), None, ALL).unwrap();
+    let rollout = fresh.rollout(&Array3::zeros((1, 5, 7)), None, ALL).unwrap();
     fresh.reset_properties(ALL).unwrap();
     fresh.restore_with_properties(&rollout.end, ALL).unwrap();
     assert_eq!(properties(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
@@ -366,7 +356,7 @@ fn going_on_with_the_properties_of_a_snapshot_gives_the_same_bits() {
 
 /// A scene of the same states in which something has not the property any more: another scene, and nothing changes.
 #[test]
-fn properties_that_a_scene_has_not_are_named() {
+fn missing_properties() {
     let build = |size: bool| {
         let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
         let shape = if size { ObjectShape::cube(0.1) } else { ObjectShape::Cone { radius: 0.1, height: 0.1 } };
@@ -379,9 +369,8 @@ fn properties_that_a_scene_has_not_are_named() {
     let mut other = build(false);
     other.update(3);
     let before = all_bits(&other);
-    let Err(Error::Snapshot(fault)) = other.restore_with_properties(&snapshot, ALL) else { panic!("accepted") };
-    assert!(matches!(fault, SnapshotError::OtherScene { .. }), "{fault}");
-    assert!(fault.to_string().contains("size") && fault.to_string().contains("box"), "{fault}");
+    let result = other.restore_with_properties(&snapshot, ALL);
+    assert_error(result, "Snapshot(OtherScene", &["size", "box"]);
     assert_eq!(all_bits(&other), before);
     other.restore(&snapshot, ALL).unwrap();
     assert!(matches!(sim.restore_with_properties(&snapshot, Some(&[EnvId(2)])), Err(Error::UnknownIndex { .. })));

@@ -3,24 +3,14 @@
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
-
-pub(crate) fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
-    SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() }
-}
+pub(crate) use testkit::worlds::cfg;
 
 pub(crate) fn arm() -> RobotCfg {
-    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    RobotCfg { uid: "arm".into(), urdf, ..Default::default() }
+    testkit::worlds::sr5("arm")
 }
 
 pub(crate) fn cube(uid: &str, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
-    RigidObjectCfg {
-        uid: uid.into(),
-        shape: ObjectShape::cube(0.1),
-        mass: Some(mass),
-        init_pose: Pose::translation(at[0], at[1], at[2]),
-        ..Default::default()
-    }
+    testkit::worlds::cube(uid, 0.1, mass, at)
 }
 
 /// A pendulum with a filtered motor, which has an activation, and a hand that is moved.
@@ -83,6 +73,20 @@ pub(crate) fn all_bits(sim: &SimulationManager) -> Vec<Vec<u64>> {
     let mut bits = Vec::new();
     sim.batch().for_each(|_, env| bits.push(bits_of(env)));
     bits
+}
+
+/// All environments.
+pub(crate) const ALL: Option<&[EnvId]> = None;
+
+/// Sets properties of single environments.
+pub(crate) fn set(sim: &mut SimulationManager, values: &[(usize, Property, &str, &[f64])]) {
+    for &(env, property, name, value) in values {
+        sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| properties.set(property, name, value)).unwrap();
+    }
+}
+
+pub(crate) fn get(sim: &SimulationManager, env: usize, property: Property, name: &str) -> Vec<f64> {
+    sim.properties(EnvId(env)).unwrap().get(property, name).unwrap().to_vec()
 }
 
 /// The fewest contacts of any environment.

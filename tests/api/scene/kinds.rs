@@ -3,8 +3,9 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
 use kinetoscope::sensors::camera::imperfection::{Holes, ReadNoise, ShotNoise, Vignetting};
-use kinetoscope::sensors::ray::{HitTargets, RayPattern};
-use kinetoscope::sensors::{Channel, RayCasterCfg, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::ray::RayPattern;
+use kinetoscope::sensors::ray::pattern::{Bpearl, Custom, Grid, GridOrder, Lidar, Pinhole};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -12,15 +13,17 @@ fn read(text: &str) -> SceneCfg {
     SceneCfg::from_toml(text, "somewhere/scene.toml", &EntityTypes::default()).unwrap()
 }
 
-/// The configuration of the only entity, a sensor of this kind.
-fn only<C: 'static>(scene: &SceneCfg) -> &C {
+/// Asserts that a file of these lines declares a sensor `s` of this kind with this configuration.
+#[track_caller]
+fn assert_sensor<C: std::fmt::Debug + PartialEq + 'static>(kind: &str, lines: &str, expected: &C) {
+    let scene = read(&format!("[entities.s]\ntype = \"{kind}\"\n{lines}"));
     let [(_, EntityCfg::Sensor(sensor))] = scene.entities.as_slice() else { panic!("{scene:?}") };
     let any: &dyn std::any::Any = sensor.as_ref();
-    any.downcast_ref().unwrap()
+    assert_eq!(any.downcast_ref::<C>(), Some(expected), "{kind}");
 }
 
 #[test]
-fn the_simulation_starts_from_a_preset() {
+fn presets() {
     assert_eq!(read("").simulation, SimulationManagerCfg::default());
     assert_eq!(read("[simulation]\npreset = \"legged\"").simulation, SimulationManagerCfg::legged());
     let text = "[simulation]\nimpratio = 7\npreset = \"legged\"\nground = false\nlights = []\nintegrator = \"rk4\"\n\
@@ -38,7 +41,7 @@ fn the_simulation_starts_from_a_preset() {
 }
 
 #[test]
-fn a_robot_of_components_is_beside_the_file() {
+fn robot_of_components() {
     let text = r#"
         [entities.arm]
         type = "robot"
@@ -90,7 +93,7 @@ fn a_robot_of_components_is_beside_the_file() {
 }
 
 #[test]
-fn objects_have_their_shapes() {
+fn shapes() {
     for (shape, expected) in [
         ("shape.box.size = [1, 2, 3]", ObjectShape::Box { size: [1.0, 2.0, 3.0] }),
         ("shape.sphere.radius = 0.5", ObjectShape::Sphere { radius: 0.5 }),
@@ -106,87 +109,77 @@ fn objects_have_their_shapes() {
 }
 
 #[test]
-fn sensors_have_all_their_fields() {
-    let scene = read(
-        "[entities.s]\ntype = \"imu\"\nbody = \"base\"\ngravity_bias = [0, 0, 0]\n\
-         [entities.s.sampling]\nupdate_period = 0.01\nhistory_length = 3\nlatency_steps = 1\ndropout = 0.5\n\
-         noise.lin_acc_b = { std = 0.1, bias_walk = 0.01 }",
-    );
-    let noise = NoiseCfg { std: 0.1, bias_walk: 0.01, ..Default::default() };
+fn sensors() {
     let sampling = SamplingCfg {
         update_period: 0.01,
         history_length: 3,
         latency_steps: 1,
         dropout: 0.5,
-        noise: [("lin_acc_b".to_string(), noise)].into(),
+        noise: [("lin_acc_b".to_string(), NoiseCfg { std: 0.1, bias_walk: 0.01, ..Default::default() })].into(),
         ..Default::default()
     };
-    let expected = ImuCfg { gravity_bias: Some([0.0; 3].into()), sampling, ..ImuCfg::on("base") };
-    assert_eq!(*only::<ImuCfg>(&scene), expected);
-
-    let scene = read(
-        "[entities.s]\ntype = \"frame_transformer\"\nsource = \"base\"\n\
+    assert_sensor(
+        "imu",
+        "body = \"base\"\ngravity_bias = [0, 0, 0]\n\
+         [entities.s.sampling]\nupdate_period = 0.01\nhistory_length = 3\nlatency_steps = 1\ndropout = 0.5\n\
+         noise.lin_acc_b = { std = 0.1, bias_walk = 0.01 }",
+        &ImuCfg { gravity_bias: Some([0.0; 3].into()), sampling, ..ImuCfg::on("base") },
+    );
+    let (name, offset) = (Some("tool".into()), Pose::translation(0.0, 0.0, 1.0));
+    let tool = TargetFrameCfg { name, offset, ..TargetFrameCfg::of("tip") };
+    assert_sensor(
+        "frame_transformer",
+        "source = \"base\"\n\
          targets = [{ bodies = \".*_FOOT\" }, { bodies = \"tip\", name = \"tool\", offset = { pos = [0, 0, 1] } }]",
+        &FrameTransformerCfg::from("base", vec![TargetFrameCfg::of(".*_FOOT"), tool]),
     );
-    let tool = TargetFrameCfg {
-        name: Some("tool".into()),
-        offset: Pose::translation(0.0, 0.0, 1.0),
-        ..TargetFrameCfg::of("tip")
-    };
-    let expected = FrameTransformerCfg::from("base", vec![TargetFrameCfg::of(".*_FOOT"), tool]);
-    assert_eq!(*only::<FrameTransformerCfg>(&scene), expected);
-
-    let scene = read("[entities.s]\ntype = \"joint_state\"\njoints = [\"a\"]");
-    assert_eq!(only::<JointStateCfg>(&scene).joints, Some(vec!["a".into()]));
-    let scene = read("[entities.s]\ntype = \"joint_wrench\"\nlinks = [\"a\"]");
-    assert_eq!(only::<JointWrenchCfg>(&scene).links, ["a"]);
-
-    for (pattern, name) in [
-        ("grid.order = \"yx\"", "grid"),
-        ("lidar = { channels = 4 }", "lidar"),
-        ("bpearl.horizontal_fov_deg = 90", "bpearl"),
-        ("pinhole.intrinsics.fovy.radians = 0.9", "pinhole"),
-        ("custom = { starts = [[0, 0, 0]], directions = [[0, 0, -1]] }", "custom"),
-    ] {
-        let text = format!("[entities.s]\ntype = \"ray_caster\"\ntargets = \"static_only\"\npattern.{pattern}");
-        let scene = read(&text);
-        let cfg = only::<RayCasterCfg>(&scene);
-        assert_eq!((cfg.pattern.name(), &cfg.targets), (name, &HitTargets::StaticOnly));
-        assert!(cfg.pattern.rays().is_ok_and(|rays| !rays.is_empty()));
-        if let RayPattern::Lidar(lidar) = &cfg.pattern {
-            assert_eq!(lidar.channels, 4);
-        }
+    let joints = JointStateCfg { joints: Some(vec!["a".into()]), ..Default::default() };
+    assert_sensor("joint_state", "joints = [\"a\"]", &joints);
+    let links = JointWrenchCfg { links: vec!["a".into()], ..Default::default() };
+    assert_sensor("joint_wrench", "links = [\"a\"]", &links);
+    let down = Custom { starts: vec![[0.0; 3]], directions: vec![[0.0, 0.0, -1.0]] };
+    let intrinsics = Intrinsics::Fovy { radians: 0.9 };
+    let patterns: [(&str, &str, RayPattern); 5] = [
+        ("grid.order = \"yx\"", "grid", Grid { order: GridOrder::Yx, ..Default::default() }.into()),
+        ("lidar = { channels = 4 }", "lidar", Lidar { channels: 4, ..Default::default() }.into()),
+        ("bpearl.horizontal_fov_deg = 90", "bpearl", Bpearl { horizontal_fov_deg: 90.0, ..Default::default() }.into()),
+        ("pinhole.intrinsics.fovy.radians = 0.9", "pinhole", Pinhole { intrinsics, ..Default::default() }.into()),
+        ("custom = { starts = [[0, 0, 0]], directions = [[0, 0, -1]] }", "custom", down.into()),
+    ];
+    for (text, name, pattern) in patterns {
+        assert_eq!(pattern.name(), name);
+        assert!(pattern.rays().is_ok_and(|rays| !rays.is_empty()));
+        let expected = RayCasterCfg { pattern, targets: HitTargets::StaticOnly, ..Default::default() };
+        assert_sensor("ray_caster", &format!("targets = \"static_only\"\npattern.{text}"), &expected);
     }
+    // A kind without fields may be named alone or with an empty table; fields with defaults may be left out.
+    let expected =
+        RayCasterCfg { alignment: RayAlignment::World, targets: HitTargets::StaticOnly, ..RayCasterCfg::default() };
+    let text = "pattern.grid = {}\nalignment = { world = {} }\ntargets = \"static_only\"";
+    assert_sensor("ray_caster", text, &expected);
+}
 
-    let scene = read(
-        "[entities.s]\ntype = \"camera\"\nintrinsics.fovy.radians = 0.9\ndepth_miss = \"far\"\nraster.samples = 1\n\
-         extrinsics = { convention = \"opengl\", placement = { look_at = { eye = [1, 0, 1], target = [0, 0, 0] } } }",
-    );
+#[test]
+fn cameras() {
     let expected = CameraCfg {
         intrinsics: Intrinsics::Fovy { radians: 0.9 },
         depth_miss: DepthMiss::Far,
         raster: RasterCfg { samples: 1, ..CameraCfg::default().raster },
         extrinsics: Extrinsics {
             convention: CameraConvention::OpenGl,
-            placement: Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0; 3], up: [0.0, 0.0, 1.0] },
-            ..Default::default()
+            ..testkit::worlds::look_at([1.0, 0.0, 1.0], [0.0; 3])
         },
         ..Default::default()
     };
-    assert_eq!(*only::<CameraCfg>(&scene), expected);
-
-    let scene = read(
-        "[entities.s]\ntype = \"stereo_camera\"\nleft_to_right_pos = [0.1, 0, 0]\norigin = \"left\"\n\
-         left_to_right_rot = { rpy_deg = [0, 0, 90] }\nintrinsics_right.fovy.radians = 0.9\n\
-         channels_right = [\"mask\"]\nimperfections_right.read_noise.std = 0.01\nnoise_right.rgb.std = 2\n\
-         [entities.s.camera]\nwidth = 320\nchannels = [\"rgb\", \"depth\"]",
+    assert_sensor(
+        "camera",
+        "intrinsics.fovy.radians = 0.9\ndepth_miss = \"far\"\nraster.samples = 1\n\
+         extrinsics = { convention = \"opengl\", placement = { look_at = { eye = [1, 0, 1], target = [0, 0, 0] } } }",
+        &expected,
     );
+    let channels = Channels { color: true, depth: true, ..Default::default() };
     let expected = StereoCameraCfg {
-        camera: CameraCfg {
-            width: 320,
-            channels: Channels { color: true, depth: true, ..Default::default() },
-            ..Default::default()
-        },
+        camera: CameraCfg { width: 320, channels, ..Default::default() },
         intrinsics_right: Some(Intrinsics::Fovy { radians: 0.9 }),
         lens_right: None,
         channels_right: Some(Channels { mask: true, ..Default::default() }),
@@ -196,37 +189,35 @@ fn sensors_have_all_their_fields() {
         left_to_right_rot: nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, 90f64.to_radians()),
         origin: StereoOrigin::Left,
     };
-    assert_eq!(*only::<StereoCameraCfg>(&scene), expected);
-
-    let scene = read(
-        "[entities.s]\ntype = \"camera\"\nlatency_steps = 2\nhistory_length = 3\ndropout = 0.1\nnoise.depth.std = 0.01\n\
-         noise.rgb = { std = 2, resolution = 4 }\nimperfections.vignetting.strength = 0.5\nimperfections.shot_noise = {}\n\
-         imperfections.holes = { baseline = -0.05 }",
+    assert_sensor(
+        "stereo_camera",
+        "left_to_right_pos = [0.1, 0, 0]\norigin = \"left\"\n\
+         left_to_right_rot = { rpy_deg = [0, 0, 90] }\nintrinsics_right.fovy.radians = 0.9\n\
+         channels_right = [\"mask\"]\nimperfections_right.read_noise.std = 0.01\nnoise_right.rgb.std = 2\n\
+         [entities.s.camera]\nwidth = 320\nchannels = [\"rgb\", \"depth\"]",
+        &expected,
     );
-    let expected = CameraCfg {
-        latency_steps: 2,
-        history_length: 3,
-        dropout: 0.1,
-        noise: [
-            ("depth".to_string(), NoiseCfg::white(0.01)),
-            ("rgb".to_string(), NoiseCfg { std: 2.0, resolution: 4.0, ..Default::default() }),
-        ]
-        .into(),
-        imperfections: Imperfections {
-            vignetting: Some(Vignetting { strength: 0.5 }),
-            shot_noise: Some(ShotNoise::default()),
-            holes: Some(Holes { baseline: -0.05, ..Default::default() }),
-            ..Default::default()
-        },
+    let depth = ("depth".to_string(), NoiseCfg::white(0.01));
+    let rgb = ("rgb".to_string(), NoiseCfg { std: 2.0, resolution: 4.0, ..Default::default() });
+    let imperfections = Imperfections {
+        vignetting: Some(Vignetting { strength: 0.5 }),
+        shot_noise: Some(ShotNoise::default()),
+        holes: Some(Holes { baseline: -0.05, ..Default::default() }),
         ..Default::default()
     };
-    assert_eq!(*only::<CameraCfg>(&scene), expected);
-    let unknown = "[entities.s]\ntype = \"camera\"\nimperfections.vigneting = {}";
-    let error = SceneCfg::from_toml(unknown, "scene.toml", &EntityTypes::default()).unwrap_err().to_string();
-    assert!(error.contains("vigneting") && error.contains("`vignetting`"), "{error}");
+    let noise = [depth, rgb].into();
+    let expected =
+        CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, noise, imperfections, ..Default::default() };
+    assert_sensor(
+        "camera",
+        "latency_steps = 2\nhistory_length = 3\ndropout = 0.1\nnoise.depth.std = 0.01\n\
+         noise.rgb = { std = 2, resolution = 4 }\nimperfections.vignetting.strength = 0.5\nimperfections.shot_noise = {}\n\
+         imperfections.holes = { baseline = -0.05 }",
+        &expected,
+    );
 }
 
-/// A sensor that the library has never heard of: how high bodies are above a level.
+/// A sensor that is not of the library: heights of bodies above a level.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AltimeterCfg {
@@ -293,7 +284,7 @@ impl Sampled for Altimeter {
 }
 
 #[test]
-fn a_sensor_of_ones_own_is_an_entity_of_files() {
+fn own_sensor() {
     let types = EntityTypes::default().with_sensor::<AltimeterCfg>("altimeter");
     let text = "[entities.ball]\ntype = \"rigid_object\"\nshape.sphere.radius = 0.1\ninit_pose.pos = [0, 0, 5]\n\
                 [entities.height]\ntype = \"altimeter\"\nbody = \"{ENV}/ball\"\nlevel = 1\n";

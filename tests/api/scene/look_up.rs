@@ -1,6 +1,7 @@
-//! Entities by name and type, and what is said where either is wrong.
+//! Entities by name and type, and the errors where either is wrong.
 
 use kinetoscope::prelude::*;
+use testkit::worlds::row;
 
 fn cube(x: f64) -> RigidObjectCfg {
     RigidObjectCfg { shape: ObjectShape::cube(0.2), init_pose: Pose::translation(x, 0.0, 0.1), ..Default::default() }
@@ -15,7 +16,7 @@ fn two_cubes() -> SceneCfg {
 }
 
 #[test]
-fn names_keep_the_order_of_their_declaration() {
+fn names_in_order() {
     let scene = InteractiveScene::new(two_cubes()).unwrap();
     assert_eq!(scene.keys().collect::<Vec<_>>(), ["touch", "zebra", "apple"]);
     assert_eq!(scene.rigid_object("apple").unwrap().uid(), "apple");
@@ -23,9 +24,9 @@ fn names_keep_the_order_of_their_declaration() {
     assert_eq!(scene.sim().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
 }
 
-/// Where the type of a sensor is not known, its handle says it, and is that of the sensor for who asks rightly.
+/// A handle of a sensor of unknown type names the type, and converts to a handle of that type only.
 #[test]
-fn a_handle_of_a_sensor_says_its_type() {
+fn sensor_handles() {
     use kinetoscope::sim::interactive_scene::SensorEntity;
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
     sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), ..cube(0.0) }).unwrap();
@@ -41,7 +42,7 @@ fn a_handle_of_a_sensor_says_its_type() {
 }
 
 #[test]
-fn a_sensor_may_stand_before_what_it_watches() {
+fn forces_and_writers() {
     let mut scene = InteractiveScene::new(two_cubes()).unwrap();
     scene.update(100);
     // A cube of 8 kg at rest: 78.48 N, which a soft contact that settles for a second keeps to a thousandth.
@@ -49,20 +50,15 @@ fn a_sensor_may_stand_before_what_it_watches() {
     for env in 0..3 {
         assert!((forces[(env, 0, 2)] - 8.0 * 9.81).abs() < 0.08, "{forces}");
     }
-}
-
-#[test]
-fn writers_act_at_once() {
     let mut scene = InteractiveScene::new(two_cubes()).unwrap();
-    let pose = kinetoscope::ndarray::array![[3.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0]];
+    let pose = row([3.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     scene.rigid_object_mut("apple").unwrap().write_pose(&pose, Some(&[EnvId(2)])).unwrap();
     let poses = scene.rigid_object("apple").unwrap().get_pose();
-    assert_eq!(poses.row(2), pose.row(0));
-    assert_eq!(poses[(1, 0)], 1.0);
+    assert_eq!((poses.row(2), poses[(1, 0)]), (pose.row(0), 1.0));
 }
 
 #[test]
-fn a_wrong_type_says_what_it_is() {
+fn mistakes() {
     let mut scene = InteractiveScene::new(two_cubes()).unwrap();
     for (error, expected) in [
         (scene.robot("zebra").unwrap_err(), "\"zebra\" is a rigid object, not a robot"),
@@ -78,28 +74,12 @@ fn a_wrong_type_says_what_it_is() {
     }
     assert!(matches!(scene.robot_mut("zebra"), Err(Error::EntityType { .. })));
     assert!(matches!(scene.sensor_mut::<Camera>("touch"), Err(Error::EntityType { .. })));
-}
-
-#[test]
-fn an_unknown_name_lists_the_nearest() {
-    let scene = InteractiveScene::new(two_cubes()).unwrap();
     let message = scene.rigid_object("zebre").unwrap_err().to_string();
-    assert!(
-        message.starts_with("there is no entity of the scene called \"zebre\"; known are \"zebra\", "),
-        "{message}"
-    );
-    assert!(message.contains("apple") && message.contains("touch"), "{message}");
-}
-
-#[test]
-fn two_entities_of_one_name_are_an_error() {
+    let start = "there is no entity of the scene called \"zebre\"; known are \"zebra\", ";
+    assert!(message.starts_with(start) && message.contains("apple") && message.contains("touch"), "{message}");
     for cfg in [two_cubes().with("zebra", cube(2.0)), two_cubes().with("{ENV}/touch", cube(2.0))] {
         assert!(matches!(InteractiveScene::new(cfg), Err(Error::DuplicateUid(_))));
     }
-}
-
-#[test]
-fn what_a_sensor_misses_is_named() {
     let cfg = SceneCfg::default().with("touch", ContactSensorCfg::of("{ENV}/cube"));
     let message = InteractiveScene::new(cfg).unwrap_err().to_string();
     assert!(message.contains("\"touch\"") && message.contains("\"cube\""), "{message}");

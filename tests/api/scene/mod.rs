@@ -1,8 +1,8 @@
 //! Scenes that are declared: from Rust, from files, and the same from both.
 
-mod file_errors;
 mod kinds;
 mod look_up;
+mod mistakes;
 mod parts;
 mod quadruped;
 mod round_trip;

@@ -2,10 +2,11 @@
 
 use kinetoscope::ndarray::{Array3, Axis};
 use kinetoscope::prelude::*;
+use testkit::worlds::object;
 
 /// A ball above a block on the ground, two cubes in the air, of which a weld that stands before them may hold the first to the
 /// world.
-const TEXT: &str = r#"
+pub(crate) const TEXT: &str = r#"
 exclude_collisions = [
     ["{ENV}/ball", "block"],
 ]
@@ -43,10 +44,6 @@ objects = [
 "#;
 
 fn declared() -> SceneCfg {
-    let object = |uid: &str, shape, [x, y, z]: [f64; 3]| {
-        let init_pose = Pose::translation(x, y, z);
-        RigidObjectCfg { uid: uid.into(), shape, init_pose, ..Default::default() }
-    };
     let cube = |uid, x| object(uid, ObjectShape::cube(0.1), [x, 0.0, 1.0]);
     let touch = ContactSensorCfg { filters: vec!["block".into()], ..ContactSensorCfg::of("ball") };
     SceneCfg::new(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() })
@@ -81,10 +78,10 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     )
 }
 
-/// What is excluded falls through to the ground, what is welded hangs, what is not has landed; the controls are the scene
+/// An excluded pair falls through to the ground, the welded cube hangs, the others have landed; the controls are the scene
 /// without the pair and the first environment.
 #[test]
-fn they_do_what_they_say() {
+fn effects() {
     let ([ball, block], cubes, felt) = run(read(TEXT));
     assert!((ball - 0.1).abs() < 1e-3 && (block - 0.2).abs() < 1e-3 && !felt, "{ball} {block} {felt}");
     // A weld against the world gives way by 1e-4 of the acceleration of its load; a fall of a metre takes 0.45 s.
@@ -98,7 +95,7 @@ fn they_do_what_they_say() {
 }
 
 #[test]
-fn a_file_and_rust_give_the_same_bits() {
+fn same_bits() {
     let expected = run(declared());
     assert_eq!(run(read(TEXT)), expected);
     let types = EntityTypes::default();
@@ -107,7 +104,7 @@ fn a_file_and_rust_give_the_same_bits() {
 }
 
 #[test]
-fn they_are_found_by_name_and_kind() {
+fn look_up() {
     let mut scene = InteractiveScene::new(declared()).unwrap();
     let group = scene.rigid_object_group_id("{ENV}/cubes").unwrap();
     assert_eq!(scene.sim().rigid_object_group(group).names(), ["cubes.red", "cubes.blue"]);
@@ -127,42 +124,11 @@ fn they_are_found_by_name_and_kind() {
 
 /// Meshes of the objects of a group lie beside the file, as those of single objects do.
 #[test]
-fn paths_of_a_group_are_relative_to_the_file() {
+fn relative_paths() {
     let cfg = read(
         "[entities.g]\ntype = \"rigid_object_group\"\nobjects = [{ uid = \"cup\", shape.mesh.path = \"cup.stl\" }]",
     );
     let [(_, EntityCfg::Group(group))] = cfg.entities.as_slice() else { panic!("{cfg:?}") };
     let ObjectShape::Mesh { path, .. } = &group.objects[0].shape else { panic!("{group:?}") };
     assert_eq!(path, std::path::Path::new("dir/cup.stl"));
-}
-
-#[test]
-fn mistakes_are_named_with_their_line() {
-    // Found when the file is read.
-    for (text, line, parts) in [
-        ("exclude_collisions = 3", 1, &["list of pairs"][..]),
-        ("exclude_collisions = [\n[\"a\", \"b\"],\n[\"a\"]]", 3, &["array of length 2"]),
-        ("exclude_collisions = [[\"a\", 3]]", 1, &["integer `3`", "string"]),
-        ("exclude_collision = []", 1, &["`exclude_collision`", "`exclude_collisions`"]),
-        ("[entities.w]\ntype = \"weld\"\nfrist = \"a\"", 3, &["frist", "`first`", "`second`"]),
-        ("[entities.w]\ntype = \"weld\"\nuid = \"a\"", 3, &["\"w\"", "uid"]),
-        ("[entities.g]\ntype = \"rigid_object_group\"\nobjects = [\n{ uid = \"a\", mas = 1 }]", 4, &["mas", "`mass`"]),
-    ] {
-        let message = SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap_err().to_string();
-        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{text}\n{message}");
-    }
-    // Found when the scene is built.
-    for (text, line, parts) in [
-        (TEXT.replace("\"block\"],", "\"blok\"],"), 3, &["\"blok\"", "\"block\""][..]),
-        (TEXT.replace("\"block\"],", "\"ball\"],"), 3, &["exclude_collision", "different"]),
-        (TEXT.replace("cubes.red", "cubes.rod"), 10, &["\"nail\"", "\"cubes.red\""]),
-        (TEXT.replace("\"world\"", "\"cubes.red\""), 10, &["\"nail\"", "different"]),
-        (TEXT.replace("\"blue\"", "\"red\""), 30, &["\"cubes\"", "cubes.red"]),
-        ("[entities.g]\ntype = \"rigid_object_group\"".into(), 1, &["\"g\"", "at least 1 object"]),
-    ] {
-        let message = InteractiveScene::new(read(&text)).unwrap_err().to_string();
-        assert!(message.starts_with(&format!("dir/scene.toml:{line}: ")), "{text}\n{message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{text}\n{message}");
-    }
 }
