@@ -9,12 +9,17 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How far JOINT5 is from where a direction is lost \[rad\].
 const NEAR: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-4, -1e-4, 1e-2, -1e-2];
-/// What targets are away \[m\], \[rad\].
+/// Distance of targets \[m\], \[rad\].
 const AWAY: (f64, f64) = (1e-3, 2e-3);
 
 /// Solvers that have one start, and the usual number.
 fn solvers() -> [IkCfg; 2] {
     [IkCfg { num_seeds: 1, ..IkCfg::default() }, IkCfg::default()]
+}
+
+/// The solution for a target from these positions.
+fn solve(robot: &Robot<'_>, tip: Tip<'_>, cfg: &IkCfg, target: &Pose, from: &[f64]) -> kinetoscope::sim::IkResult {
+    robot.compute_ik(target, tip, cfg, Some(row(from).view()), None).unwrap()
 }
 
 /// The pose of the tip at these positions.
@@ -78,7 +83,7 @@ fn spherical_wrist_turn() {
                 turn * start.rotation,
             );
             for cfg in solvers() {
-                let found = robot.compute_ik(&about, tip, &cfg, Some(row(&q).view()), None).unwrap();
+                let found = solve(&robot, tip, &cfg, &about, &q);
                 let what = format!("j5 at {near}, phi {phi:.2}, {} seeds: {found:?}", cfg.num_seeds);
                 assert!(found.success[0] && found.seed[0] == 0, "{what}");
                 let slack = (found.rotation_error[0] / length).min(1.0).asin() + 1e-3;
@@ -117,7 +122,7 @@ fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) 
     fk(low)
 }
 
-/// What is lost is a fold: along the way n of the joints that moves the frame least, where the frame is in the lost direction is
+/// The lost direction is a fold: along the way n of the joints that moves the frame least, where the frame is in the lost direction is
 /// a parabola. A target beside it has two solutions, about as far from its vertex as each other, or none. Targets here are
 /// made of a solution; going down leads to it, or to the other, which is no farther from the start than twice as far. One
 /// start is enough for all of them.
@@ -144,7 +149,7 @@ fn nearby_solutions() {
             let away = largest(row(&there).view(), &q);
             farthest = farthest.max(away);
             for cfg in solvers() {
-                let found = robot.compute_ik(&target, tip, &cfg, Some(row(&q).view()), None).unwrap();
+                let found = solve(&robot, tip, &cfg, &target, &q);
                 let what = format!("JOINT5 at {near:e}, way {k}, a solution at {away}: {found:?}");
                 assert!(found.success[0] && found.seed[0] == 0, "{what}");
                 assert!(largest(found.qpos.view(), &q) <= 2.0 * away + 1e-4, "{what}");
@@ -172,8 +177,7 @@ fn far_solutions() {
             let turn = UnitQuaternion::from_scaled_axis(AWAY.1 * axis(k));
             let at = start.translation.vector + AWAY.0 * axis(k / 2 + k);
             let target = Pose::from_parts(at.into(), turn * start.rotation);
-            let [one, many] =
-                solvers().map(|cfg| robot.compute_ik(&target, tip, &cfg, Some(row(&q).view()), None).unwrap());
+            let [one, many] = solvers().map(|cfg| solve(&robot, tip, &cfg, &target, &q));
             assert!(many.success[0], "{near:e}, {k}: {many:?}");
             if one.success[0] {
                 nearby += 1;
@@ -193,7 +197,7 @@ fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
     let (mut q, mut longest) = (ends[0].to_vec(), 0.0_f64);
     for step in 1..=100 {
         let target = from.lerp_slerp(&to, f64::from(step) / 100.0);
-        let found = robot.compute_ik(&target, tip, &IkCfg::default(), Some(row(&q).view()), None).unwrap();
+        let found = solve(robot, tip, &IkCfg::default(), &target, &q);
         assert!(found.success[0] && found.seed[0] == 0, "step {step}: {found:?}");
         longest = longest.max(largest(found.qpos.view(), &q));
         q = found.qpos.row(0).to_vec();
@@ -234,7 +238,7 @@ fn half_a_turn() {
         there[joint] -= PI;
         let target = frame(&sim.robot(id), tip, &there);
         assert!((start.rotation.angle_to(&target.rotation) - PI).abs() < 1e-6);
-        let found = sim.robot(id).compute_ik(&target, tip, &IkCfg::default(), Some(row(&q).view()), None).unwrap();
+        let found = solve(&sim.robot(id), tip, &IkCfg::default(), &target, &q);
         assert!(found.success[0], "joint {joint}: {found:?}");
         let off = apart(&placed(&mut sim, id, &found.qpos, "ee_link"), &row(&to_row(&target)));
         assert!(reaches(off), "joint {joint}: {off:?}");

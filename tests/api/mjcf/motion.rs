@@ -48,7 +48,7 @@ fn copies() {
     assert!((a[0] - model.qpos0()[0]).abs() > 0.05, "it swings");
 }
 
-/// What MuJoCo compiled of the file is in the scene to the last digits, index by index.
+/// Every number that MuJoCo compiled of the file is in the scene to the last digits, index by index.
 #[test]
 fn numbers() {
     let file = alone(MACHINE);

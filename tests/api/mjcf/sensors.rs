@@ -131,16 +131,7 @@ fn names_units_and_rate() {
 }
 
 /// A block of 2 kg that stands on the ground, a light of 0.3 kg that hangs in the world.
-const AT_REST: &str = r#"<mujoco><worldbody>
-  <geom type="plane" size="1 1 1"/>
-  <body name="block" pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="2"/>
-    <site name="block" type="box" size="0.11 0.11 0.11"/></body>
-  <body name="ceiling" pos="1 0 2">
-    <body name="light" pos="0 0 -0.2"><geom type="sphere" size="0.05" mass="0.3" pos="0.1 0 -0.4"/><site name="mount"/></body>
-  </body></worldbody>
-  <sensor><accelerometer name="acc" site="block"/><touch name="touch" site="block"/><gyro name="gyro" site="block"/>
-    <force name="force" site="mount"/><torque name="torque" site="mount"/>
-    <framepos name="pos" objtype="site" objname="mount"/></sensor></mujoco>"#;
+const AT_REST: &str = include_str!("../../data/mjcf/at_rest.xml");
 
 /// At rest an accelerometer reads +g, what touches carries the weight, and a mount holds force and torque of its load.
 #[test]
@@ -170,14 +161,7 @@ fn at_rest() {
 }
 
 /// A joint of every type, and actuators without and with an activation.
-const MOVERS: &str = r#"<mujoco><worldbody>
-    <body name="drop" pos="2 0 1"><freejoint name="float"/><geom size="0.1"/></body>
-    <body name="a" pos="0 0 1"><joint name="turn" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/>
-      <body name="b" pos="0.5 0 0"><joint name="ball" type="ball"/><geom size="0.05"/>
-        <body name="c" pos="0.2 0 0"><joint name="push" type="slide" axis="1 0 0"/><geom size="0.05"/></body></body></body>
-  </worldbody>
-  <actuator><motor name="motor" joint="turn" gear="2"/><position name="servo" joint="push" kp="10"/>
-    <general name="lag" joint="turn" dyntype="filter" dynprm="0.1" gainprm="4"/></actuator></mujoco>"#;
+const MOVERS: &str = include_str!("../../data/mjcf/movers.xml");
 
 /// A motor exerts its control times its gear, a servo 10 N/m times its error at the beginning of the step, and a filter of
 /// 0.1 s comes near its control by one fiftieth in each step of 2 ms.

@@ -43,7 +43,7 @@ fn lines() {
     {
         assert!((found - expected).abs() < 1e-15, "{drivers:?}");
     }
-    // The start is the file's where nobody follows; followers start where they belong.
+    // Followers start where they belong, other joints where the file has them.
     let (left, right) = implied(0.1);
     let start = sim.robot(id).get_default_qpos();
     assert!((start - array![[0.1, left, right, 0.0]]).iter().all(|d| d.abs() < 1e-15));

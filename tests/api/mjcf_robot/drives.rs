@@ -6,19 +6,7 @@ use testkit::worlds::{count_diagnostics, empty_cfg, gains};
 
 /// Five joints: a servo with a gear, a motor, a servo of velocity, two on a tendon, and one that nothing acts on; the last
 /// two actuators are of one joint.
-const MACHINE: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="1"/>
-    <body name="a"><joint name="servo" axis="0 0 1" armature="0.1"/><geom size="0.05" mass="1"/></body>
-    <body name="b"><joint name="motor" axis="0 0 1" damping="0.2"/><geom size="0.05" mass="1"/></body>
-    <body name="c"><joint name="wheel" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
-    <body name="d"><joint name="finger1" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
-    <body name="e"><joint name="finger2" axis="0 0 1"/><geom size="0.05" mass="1"/></body>
-    <body name="f"><joint name="idle" axis="0 0 1" frictionloss="0.3"/><geom size="0.05" mass="1"/></body>
-  </body></worldbody>
-  <tendon><fixed name="both"><joint joint="finger1" coef="0.5"/><joint joint="finger2" coef="-2"/></fixed></tendon>
-  <actuator><position name="p" joint="servo" kp="30" gear="2" forcerange="-4 4"/>
-    <motor name="m" joint="motor" gear="-3" ctrlrange="-1 2"/><velocity name="v" joint="wheel" kv="0.7"/>
-    <position name="t" tendon="both" kp="100" forcerange="-10 10"/><motor name="m2" joint="motor" gear="1" ctrlrange="-5 5"/>
-  </actuator></mujoco>"#;
+const MACHINE: &str = include_str!("../../data/mjcf/actuators.xml");
 
 fn is_said(sim: &SimulationManager, words: &[&str]) {
     assert!(count_diagnostics(sim, words) > 0, "{words:?}: {:#?}", sim.diagnostics());
@@ -81,8 +69,30 @@ fn fine(text: &str) -> (SimulationManager, RobotId, Data) {
     (sim, id, Data::new(&mj::compile(text, &[]).unwrap().into_model()).unwrap())
 }
 
+/// Largest distance of the joints from those of the file alone under its actuator, at the ends of periods of `steps` steps, and
+/// the farthest position of its first joint.
+fn compared(
+    world: (SimulationManager, RobotId, Data),
+    target: f64,
+    control: f64,
+    [periods, steps]: [u32; 2],
+) -> [f64; 2] {
+    let (mut sim, id, mut data) = world;
+    sim.robot_mut(id).set_qpos(&row([target]), Some(&[JointIndex(0)]), None).unwrap();
+    data.ctrl_mut()[0] = control;
+    let [mut worst, mut farthest] = [0.0f64; 2];
+    for _ in 0..periods {
+        sim.update(steps);
+        (0..steps).for_each(|_| data.step().unwrap());
+        let off: Vec<f64> = sim.robot(id).get_qpos().iter().zip(data.qpos()).map(|(a, b)| a - b).collect();
+        (worst, farthest) = (worst.max(largest(&off)), farthest.max(data.qpos()[0]));
+    }
+    [worst, farthest]
+}
+
 /// The drive that stands for an actuator is its law. Ours is evaluated at the end of the step of h = 1e-4 s, which adds a damping
-/// of `h kp = 2e-3` to the 0.8 N m s/rad of joint and drive: a quarter of a percent, of which 2e-3 rad are left of 0.5.
+/// of `h kp = 2e-3` to the 0.8 N m s/rad of joint and drive: a quarter of a percent, of which 2e-3 rad are left of 0.5. The
+/// length of the actuator is twice the angle.
 #[test]
 fn servo() {
     let text = r#"<mujoco><option timestep="0.0001" gravity="0 0 0"/><default><geom contype="0" conaffinity="0"/></default>
@@ -91,34 +101,14 @@ fn servo() {
         </body></worldbody>
         <actuator><general joint="j" gear="2" gaintype="fixed" biastype="affine" gainprm="5" biasprm="0 -5 -0.1"/></actuator>
         </mujoco>"#;
-    let (mut sim, id, mut data) = fine(text);
+    let (sim, id, data) = fine(text);
     assert_eq!((sim.robot(id).get_stiffness()[(0, 0)], sim.robot(id).get_damping()[(0, 0)]), (20.0, 0.4));
-    sim.robot_mut(id).set_qpos(&array![[0.5]], None, None).unwrap();
-    // The length of the actuator is twice the angle.
-    data.ctrl_mut()[0] = 1.0;
-    let mut farthest = 0.0f64;
-    for _ in 0..50 {
-        sim.update(50);
-        (0..50).for_each(|_| data.step().unwrap());
-        let (ours, theirs) = (sim.robot(id).get_qpos()[(0, 0)], data.qpos()[0]);
-        assert!((ours - theirs).abs() < 2e-3, "{ours} {theirs}");
-        farthest = farthest.max(theirs);
-    }
-    assert!(farthest > 0.5, "it overshoots: {farthest}");
+    let [worst, farthest] = compared((sim, id, data), 0.5, 1.0, [50, 50]);
+    assert!(worst < 2e-3 && farthest > 0.5, "{worst} rad; it overshoots: {farthest}");
 }
 
 /// `a` follows `b` by -0.5 and `c` follows `a` by 3; the actuators are at the ends of the chain.
-pub(super) const CHAIN: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 0"/>
-  <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="base"><geom size="0.1" mass="1"/>
-    <body name="a"><joint name="a" axis="0 0 1"/><geom size="0.01" mass="0.01"/></body>
-    <body name="b"><joint name="b" axis="0 0 1" stiffness="61.25"/><geom size="0.05" mass="1"/></body>
-    <body name="c"><joint name="c" axis="0 0 1"/><geom size="0.01" mass="0.01"/></body>
-  </body></worldbody>
-  <equality><joint joint1="a" joint2="b" polycoef="0 -0.5 0 0 0" solref="0.004 1"/>
-    <joint joint1="c" joint2="a" polycoef="0 3 0 0 0" solref="0.004 1"/></equality>
-  <actuator><position name="pa" joint="a" kp="100" gear="2" forcerange="-30 30"/>
-    <general name="pc" joint="c" gaintype="fixed" biastype="affine" gainprm="10" biasprm="0 -10 -4" forcerange="-20 20"/></actuator>
-  </mujoco>"#;
+pub(super) const CHAIN: &str = include_str!("../../data/mjcf/chain.xml");
 
 /// An actuator of a follower drives the joint that it follows. By virtual work: `k = 100 (2 · 0.5)² + 10 · 1.5²`,
 /// `d = 4 · 1.5²`, `F = 30 · 2 · 0.5 + 20 · 1.5`. Against a spring of k / 2 the drive comes two thirds of the way.
@@ -163,27 +153,20 @@ pub(super) const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits=
 fn gripper() {
     let text = GRIPPER.replace('%', "1");
     let [same, half] = [1.0, 0.5].map(|scale| {
-        let (mut sim, id, mut data) = fine(&text);
-        let left = sim.robot(id).joint_id("left").unwrap();
-        if scale == 1.0 {
-            let of = sim.robot(id);
-            let drive = (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)], of.qf_limits()[(0, 0)]);
-            assert_eq!(drive, (100.0, 10.0, 100.0));
-            is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
-            assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
-        } else {
-            sim.robot_mut(id).set_stiffness(&array![[100.0 * scale]], Some(&[left]), None).unwrap();
+        let (mut sim, id, data) = fine(&text);
+        let of = sim.robot(id);
+        assert_eq!(of.joint_id("left").unwrap(), JointIndex(0));
+        assert_eq!(
+            (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)], of.qf_limits()[(0, 0)]),
+            (100.0, 10.0, 100.0)
+        );
+        is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
+        assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
+        if scale != 1.0 {
+            sim.robot_mut(id).set_stiffness(&row([100.0 * scale]), Some(&[JointIndex(0)]), None).unwrap();
         }
-        sim.robot_mut(id).set_qpos(&array![[0.03]], Some(&[left]), None).unwrap();
-        data.ctrl_mut()[0] = 0.03 * 100.0 / 0.01568627451;
-        let mut worst = 0.0f64;
-        for _ in 0..40 {
-            sim.update(100);
-            (0..100).for_each(|_| data.step().unwrap());
-            let off = sim.robot(id).get_qpos().iter().zip(data.qpos()).map(|(a, b)| a - b).collect::<Vec<f64>>();
-            worst = worst.max(largest(&off));
-        }
-        assert!(data.qpos()[0] > 0.025, "it came there: {:?}", data.qpos());
+        let [worst, farthest] = compared((sim, id, data), 0.03, 0.03 * 100.0 / 0.01568627451, [40, 100]);
+        assert!(farthest > 0.025, "it came there: {farthest}");
         worst
     });
     assert!(same < 1e-4 && half > 2e-3, "{same} m; the control, half the stiffness: {half} m");

@@ -82,14 +82,7 @@ fn self_collision() {
 }
 
 /// A leg that stands on a foot, with its body on a slide, and sensors of its own.
-const LEG: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="body" pos="0 0 0.6"><freejoint/>
-    <geom name="hull" type="box" size="0.2 0.15 0.05" mass="4" rgba="1 0 0 1"/><site name="imu" pos="0.05 0 0.02"/>
-    <body name="leg" pos="0 0 -0.05"><joint name="knee" type="slide" axis="0 0 1" range="-0.2 0.2" damping="2"/>
-      <geom name="shin" type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3" mass="0.5" contype="0" conaffinity="0"/>
-      <body name="foot" pos="0 0 -0.35"><geom name="foot" type="box" size="0.2 0.2 0.05" mass="0.5"/></body></body></body>
-  </worldbody><actuator><general name="k" joint="knee" biastype="affine" gainprm="4000" biasprm="0 -4000 -200"/></actuator>
-  <sensor><actuatorfrc name="gone" actuator="k"/><jointpos name="height" joint="knee"/>
-    <accelerometer name="acc" site="imu"/></sensor></mujoco>"#;
+const LEG: &str = include_str!("../../data/mjcf/leg.xml");
 
 fn standing(with_part: bool) -> (SimulationManager, RobotId) {
     let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
