@@ -37,3 +37,14 @@ pub fn run(module: &str, test: &str, dir: &Path, variables: &[(&str, &str)]) -> 
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
+
+/// Runs one test of this binary and asserts that it passes; its output is the message otherwise.
+///
+/// # Panics
+/// If it fails, or does not exist.
+#[track_caller]
+pub fn assert_passes(module: &str, test: &str, variables: &[(&str, &str)]) {
+    let output = run(module, test, &std::env::temp_dir(), variables);
+    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| text(bytes));
+    assert!(output.status.success() && out.contains("1 passed"), "{module}::{test}: {out}{err}");
+}

@@ -1,12 +1,16 @@
-//! A small simulation for tests: an arm with one joint, a cube on the ground, a camera over it.
+//! A small simulation for tests: an arm with one joint, a cube on the ground, a camera over it; and a thread that steps one.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+use crate::stage::Canvas;
 use scene::Pose;
 use sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
 use sim::{
     DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg,
     UrdfCfg,
 };
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
 
 /// Half the length of the cube's edges \[m\].
 pub(crate) const HALF: f64 = 0.1;
@@ -66,4 +70,48 @@ pub(crate) fn sample(num_envs: usize) -> Sample {
     };
     let camera = sim.add_sensor("eye", cfg).unwrap();
     Sample { sim, robot, camera }
+}
+
+/// Number of pixels that differ.
+pub(crate) fn unlike(one: &Canvas, other: &Canvas) -> usize {
+    one.bytes().chunks(4).zip(other.bytes().chunks(4)).filter(|(a, b)| a != b).count()
+}
+
+/// A simulation that a thread steps until it is stopped.
+pub(crate) struct Running {
+    steps: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<SimulationManager>,
+}
+
+impl Running {
+    pub(crate) fn start(mut sim: SimulationManager) -> Self {
+        let (steps, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+        let (count, ends) = (Arc::clone(&steps), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            while !ends.load(Ordering::SeqCst) {
+                sim.update(1);
+                count.fetch_add(1, Ordering::SeqCst);
+            }
+            sim
+        });
+        Self { steps, stop, thread }
+    }
+
+    /// Steps that are done.
+    pub(crate) fn steps(&self) -> u64 {
+        self.steps.load(Ordering::SeqCst)
+    }
+
+    /// Waits until it has done more than `steps` steps.
+    #[track_caller]
+    pub(crate) fn goes_on_beyond(&self, steps: u64) {
+        testkit::wait::until("it goes on", || self.steps() > steps);
+    }
+
+    /// The simulation, stopped; nothing may hold it any more.
+    pub(crate) fn end(self) -> SimulationManager {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.join().unwrap()
+    }
 }

@@ -103,44 +103,35 @@ mod tests {
     const DT: f64 = 0.01;
 
     #[test]
-    fn real_time_waits_for_what_is_left_of_each_step() {
+    fn waits() {
         let start = Instant::now();
+        let millis = Duration::from_millis;
         let mut pace = Pace::new(DT, 5, start);
         assert_eq!(pace.ahead(50, start), Duration::ZERO, "free speed never waits");
-        pace.set_speed(Speed::REAL, 5, start);
-        // Ten steps are 100 ms; 30 ms are gone.
-        let wait = pace.ahead(15, start + Duration::from_millis(30));
-        assert!(wait.abs_diff(Duration::from_millis(70)) < Duration::from_micros(1), "{wait:?}");
-        pace.set_speed(Speed::Times(0.1), 5, start);
-        let wait = pace.ahead(15, start);
-        assert!(wait.abs_diff(Duration::from_secs(1)) < Duration::from_micros(1), "{wait:?}");
+        for (what, speed, steps, passed, expected) in [
+            ("ten steps are 100 ms, 30 ms are gone", Speed::REAL, [5, 15].as_slice(), 30, 70),
+            ("slow motion", Speed::Times(0.1), &[5, 15], 0, 1000),
+            // A second behind: no wait, and from here on it counts anew.
+            ("lost time is given up", Speed::REAL, &[0, 1, 2], 1000, 10),
+        ] {
+            pace.set_speed(speed, steps[0], start);
+            let waits: Vec<_> = steps[1..].iter().map(|&steps| pace.ahead(steps, start + millis(passed))).collect();
+            let (last, before) = waits.split_last().expect("a step");
+            assert!(last.abs_diff(millis(expected)) < Duration::from_micros(1), "{what}: {last:?}");
+            assert!(before.iter().all(Duration::is_zero), "{what}: {before:?}");
+        }
     }
 
+    /// The speed is measured over half a second; looks at commands are some milliseconds apart.
     #[test]
-    fn what_was_lost_is_given_up() {
-        let start = Instant::now();
-        let mut pace = Pace::new(DT, 0, start);
-        pace.set_speed(Speed::REAL, 0, start);
-        // A second behind: no wait, and from here on it counts anew.
-        let late = start + Duration::from_secs(1);
-        assert_eq!(pace.ahead(1, late), Duration::ZERO);
-        let wait = pace.ahead(2, late);
-        assert!(wait.abs_diff(Duration::from_millis(10)) < Duration::from_micros(1), "{wait:?}");
-    }
-
-    #[test]
-    fn speed_is_measured_over_half_a_second() {
+    fn measured_speed() {
         let start = Instant::now();
         let mut pace = Pace::new(DT, 0, start);
         pace.note(10, start + Duration::from_millis(100));
         assert_eq!(pace.measured(), None);
         pace.note(100, start + Duration::from_millis(500));
         assert!(pace.measured().is_some_and(|speed| (speed - 2.0).abs() < 1e-9), "{:?}", pace.measured());
-    }
 
-    #[test]
-    fn looks_are_some_milliseconds_apart() {
-        let start = Instant::now();
         let mut pace = Pace::new(0.001, 0, start);
         // Steps of 20 µs, again and again.
         for k in 1..40u32 {

@@ -1,43 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
-
-/// Numbers of an attribute, such as `x="1.5"`.
-fn attribute(line: &str, name: &str) -> f64 {
-    let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
-    rest.split('"').next().unwrap().parse().unwrap()
-}
-
-/// The labels of an axis: those that stand at the frame's side. Values and pixels of the two that are farthest apart.
-fn two_ticks(svg: &str, anchor: &str, name: &str) -> [(f64, f64); 2] {
-    let labels = svg.lines().filter(|line| line.starts_with("<text") && line.contains(anchor));
-    let ticks: Vec<(f64, f64)> = labels
-        .filter_map(|line| {
-            let text = line.split_once('>').unwrap().1.trim_end_matches("</text>");
-            Some((text.parse().ok()?, attribute(line, name)))
-        })
-        .collect();
-    [ticks[0], ticks[ticks.len() - 1]]
-}
-
-/// From pixels back to values, as a reader does it who sees only the labels.
-pub(crate) fn values(svg: &str) -> Vec<Vec<[f64; 2]>> {
-    let along = two_ticks(svg, "\"middle\"", "x");
-    // Labels of rows stand 4 pixels below their lines.
-    let across = two_ticks(svg, "\"end\"", "y").map(|(value, y)| (value, y - 4.0));
-    let back = |[(a, x), (b, y)]: [(f64, f64); 2], pixel: f64| a + (pixel - x) / (y - x) * (b - a);
-    let lines = svg.lines().filter(|line| line.starts_with("<polyline"));
-    let points = lines.map(|line| line.split_once("points=\"").unwrap().1.trim_end_matches("\"/>"));
-    points
-        .map(|points| {
-            let of_one = |point: &str| {
-                let (x, y) = point.split_once(',').unwrap();
-                [back(along, x.parse().unwrap()), back(across, y.parse().unwrap())]
-            };
-            points.split(' ').map(of_one).collect()
-        })
-        .collect()
-}
+use testkit::svg::curves;
 
 fn sine(points: u32) -> Plot {
     let wave = (0..points).map(|k| f64::from(k) * 2.0 / f64::from(points)).map(|t| [t, 0.3 * (5.0 * t).sin()]);
@@ -45,9 +9,9 @@ fn sine(points: u32) -> Plot {
 }
 
 #[test]
-fn the_line_of_a_sine_lies_on_the_sine() {
+fn closed_form() {
     let svg = sine(300).to_svg().unwrap();
-    let lines = values(&svg);
+    let lines = curves(&svg);
     assert_eq!((lines.len(), lines[0].len()), (1, 300));
     // Pixels have two decimals, and so have the labels: 2 s on some 800 pixels, 0.6 rad on some 430.
     let (time, angle) = (0.02 * 2.0 / 700.0, 0.02 * 0.6 / 400.0);
@@ -62,7 +26,7 @@ fn the_line_of_a_sine_lies_on_the_sine() {
 }
 
 #[test]
-fn the_picture_has_ink_where_the_line_of_the_text_is() {
+fn ink() {
     let plot = sine(300);
     let (canvas, drawing) = (plot.to_canvas().unwrap(), plot.drawing().unwrap());
     let blue = |x: f64, y: f64| {
@@ -93,7 +57,7 @@ fn the_picture_has_ink_where_the_line_of_the_text_is() {
 }
 
 #[test]
-fn curves_stay_in_the_frame_and_break_where_there_is_no_number() {
+fn gaps_and_frame() {
     let points = [[0.0, 1.0], [1.0, f64::NAN], [2.0, -5.0], [3.0, 2.0], [f64::INFINITY, 0.0], [4.0, 1e3]];
     let plot = Plot::over_time("a < b & c", "x").with(Series::new("one", points)).with(Series::new("two", []));
     let svg = plot.to_svg().unwrap();
@@ -109,7 +73,7 @@ fn curves_stay_in_the_frame_and_break_where_there_is_no_number() {
 }
 
 #[test]
-fn many_curves_and_long_names_leave_room_for_the_plot() {
+fn long_legend() {
     let series =
         (0..90).map(|k| Series::new(format!("{}end{k}", "long/".repeat(40)), [[0.0, 1.0], [1.0, f64::from(k)]]));
     let plot = Plot { series: series.collect(), ..Plot::default() };
@@ -124,7 +88,7 @@ fn many_curves_and_long_names_leave_room_for_the_plot() {
 }
 
 #[test]
-fn files_are_what_their_names_say() {
+fn files() {
     let folder = tempfile::tempdir().unwrap();
     let plot = sine(50);
     let [svg, png] = ["a.svg", "a.PNG"].map(|name| folder.path().join(name));

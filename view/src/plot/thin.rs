@@ -25,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn four_points_of_each_column_stay() {
+    fn four_points_of_each_column() {
         let points: Vec<[f64; 2]> = (0..100_000).map(|k| 1e-4 * f64::from(k)).map(|x| [x, (977.0 * x).sin()]).collect();
         let few = thinned(points.clone());
         assert!(few.len() <= 40, "{}", few.len());

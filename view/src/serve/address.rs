@@ -88,11 +88,12 @@ pub(super) fn reachable(address: SocketAddr) -> SocketAddr {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
 
     #[test]
-    fn what_people_write_is_understood() {
+    fn parsing() {
         for (given, expected) in [
             ("127.0.0.1:8080", "127.0.0.1:8080"),
             ("localhost:9000", "127.0.0.1:9000"),
@@ -108,10 +109,6 @@ mod tests {
         ] {
             assert_eq!(parse(given).expect(given).to_string(), expected, "{given:?}");
         }
-    }
-
-    #[test]
-    fn what_is_no_address_is_refused_with_candidates() {
         for (given, says, candidate) in [
             ("127.0.0.1:99999", "is no port", "127.0.0.1:8080"),
             ("example.org:8080", "neither an IP address", "127.0.0.1:8080"),
@@ -126,21 +123,16 @@ mod tests {
     }
 
     #[test]
-    fn a_port_in_use_names_the_next_free_one() {
-        let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let address = taken.local_addr().expect("it listens");
-        let Err(ServeError::PortInUse { address: named, next: Some(next) }) = listen(address) else {
-            panic!("port {} is taken", address.port())
-        };
-        assert_eq!(named, address);
-        assert!(next.port() > address.port());
-        listen(next).expect("the candidate is free");
-    }
-
-    #[test]
-    fn an_address_of_another_machine_is_refused() {
-        // Of documentations (RFC 5737).
-        let error = listen("192.0.2.1:0".parse().expect("an address")).expect_err("nobody has it");
+    fn refused_by_the_system() {
+        // A port in use names the next free one.
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap();
+        let error = listen(address).unwrap_err();
+        let ServeError::PortInUse { address: named, next: Some(next) } = error else { panic!("{error}") };
+        assert!(named == address && next.port() > address.port());
+        listen(next).unwrap();
+        // An address of documentations (RFC 5737), of no machine.
+        let error = listen("192.0.2.1:0".parse().unwrap()).unwrap_err();
         assert!(matches!(&error, ServeError::Address { .. }), "{error}");
         assert!(error.to_string().contains("not an address of this machine"), "{error}");
     }

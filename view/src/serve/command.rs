@@ -97,7 +97,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_are_read() {
+    fn parse() {
+        let (robot, joint) = ("sr5".into(), "J1".into());
         for (text, expected) in [
             (r#"{"do":"pause"}"#, Command::Pause),
             (r#"{"do":"seen","what":"picture"}"#, Command::Seen { what: Seen::Picture }),
@@ -109,21 +110,15 @@ mod tests {
             (r#"{"do":"record","on":true}"#, Command::Record { on: true }),
             (r#"{"do":"seek","time":1.5}"#, Command::Seek { time: 1.5 }),
             (r#"{"do":"speed","factor":2}"#, Command::Speed { factor: Some(2.0) }),
-            (
-                r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#,
-                Command::Target { robot: "sr5".into(), joint: "J1".into(), value: 0.5 },
-            ),
+            (r#"{"do":"target","robot":"sr5","joint":"J1","value":0.5}"#, Command::Target { robot, joint, value: 0.5 }),
         ] {
             assert_eq!(Command::parse(text), Ok(expected), "{text}");
         }
-    }
-
-    #[test]
-    fn what_is_no_command_is_refused_in_words() {
         for (text, says) in [
             ("", "not understood"),
             ("pause", "not understood"),
             ("[]", "not understood"),
+            (&"[".repeat(10_000), ""),
             (r#"{"do":"fly"}"#, "unknown variant `fly`, expected one of `seen`"),
             (r#"{"do":"environment","env":-1}"#, "not understood"),
             (r#"{"do":"target","robot":"a","joint":"b","value":1e999}"#, "not understood"),
@@ -138,7 +133,5 @@ mod tests {
             let reason = Command::parse(text).expect_err(text);
             assert!(reason.contains(says), "{text}: {reason}");
         }
-        let deep = "[".repeat(10_000);
-        assert!(Command::parse(&deep).is_err());
     }
 }

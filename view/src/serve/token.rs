@@ -45,26 +45,23 @@ pub(super) fn random_hex() -> Result<String, ServeError> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
 
+    /// A token is equal to itself only, and is not printed.
     #[test]
-    fn a_token_is_itself_only() {
-        let token = Token::random().expect("random numbers");
-        assert_eq!(token.as_str().len(), 2 * BYTES);
-        assert!(token.is(token.as_str()));
-        for k in 0..token.as_str().len() {
-            let mut other = token.as_str().to_string().into_bytes();
-            other[k] = if other[k] == b'0' { b'1' } else { b'0' };
-            assert!(!token.is(&String::from_utf8(other).expect("ASCII")), "digit {k}");
+    fn equality() {
+        let [token, second] = [(); 2].map(|()| Token::random().unwrap());
+        let text = token.as_str();
+        assert_eq!(text.len(), 2 * BYTES);
+        assert!(token.is(text) && token != second && !format!("{token:?}").contains(text));
+        let changed = (0..text.len()).map(|k| {
+            let digit = if &text[k..=k] == "0" { "1" } else { "0" };
+            format!("{}{digit}{}", &text[..k], &text[k + 1..])
+        });
+        for other in changed.chain([String::new(), text[1..].into(), format!("{text}0")]) {
+            assert!(!token.is(&other), "{other}");
         }
-        assert!(!token.is("") && !token.is(&token.as_str()[1..]) && !token.is(&format!("{}0", token.as_str())));
-    }
-
-    #[test]
-    fn two_tokens_differ_and_are_not_printed() {
-        let [a, b] = [(); 2].map(|()| Token::random().expect("random numbers"));
-        assert_ne!(a, b);
-        assert!(!format!("{a:?}").contains(a.as_str()));
     }
 }

@@ -156,18 +156,17 @@ impl DrawTarget for Canvas {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
     use embedded_graphics::mono_font::ascii::FONT_6X10;
 
     #[test]
-    fn lines_reach_their_ends_and_stay_inside() {
+    fn lines() {
         let mut canvas = Canvas::new(10, 8);
         canvas.line([1.5, 2.5], [7.5, 5.5], [255, 0, 0]);
         assert_eq!([canvas.pixel(1, 2), canvas.pixel(7, 5)], [Some([255, 0, 0]); 2]);
         assert_eq!(canvas.pixel(7, 2), Some([0, 0, 0]));
-        // Through the whole picture, from far outside; and past it.
+        // Through the whole image, from far outside; and past it.
         canvas.line([-1e6, 3.5], [1e6, 3.5], [0, 255, 0]);
         assert!((0..10).all(|x| canvas.pixel(x, 3) == Some([0, 255, 0])));
         let before = canvas.clone();
@@ -177,7 +176,14 @@ mod tests {
     }
 
     #[test]
-    fn drawing_on_the_smallest_pictures_is_no_mistake() {
+    fn letters_and_smallest_images() {
+        let mut canvas = Canvas::new(40, 14);
+        canvas.text("H", [4, 2], &FONT_6X10, [255; 3]);
+        let places = (0..14).flat_map(|y| (0..40).map(move |x| (x, y)));
+        let white: Vec<_> = places.filter(|&(x, y)| canvas.pixel(x, y) == Some([255; 3])).collect();
+        // Two bars of seven pixels and a bar of three between them.
+        assert_eq!(white.len(), 17, "{white:?}");
+        assert!(white.iter().all(|&(x, y)| (4..10).contains(&x) && (2..12).contains(&y)));
         for size in [[0, 0], [1, 1], [1, 300]] {
             let mut canvas = Canvas::new(size[0], size[1]);
             canvas.text("Some words\nand more", [-5, -3], &FONT_6X10, [255; 3]);
@@ -186,18 +192,5 @@ mod tests {
             canvas.paste(&Canvas::new(4, 4), [3, 3]);
             assert_eq!(canvas.bytes().len(), 4 * size[0] * size[1]);
         }
-    }
-
-    #[test]
-    fn letters_are_readable() {
-        let mut canvas = Canvas::new(40, 14);
-        canvas.text("H", [4, 2], &FONT_6X10, [255; 3]);
-        let white = (0..14)
-            .flat_map(|y| (0..40).map(move |x| (x, y)))
-            .filter(|&(x, y)| canvas.pixel(x, y).unwrap() == [255; 3]);
-        let found: Vec<_> = white.collect();
-        // Two bars of seven pixels and a bar of three between them.
-        assert_eq!(found.len(), 17, "{found:?}");
-        assert!(found.iter().all(|&(x, y)| (4..10).contains(&x) && (2..12).contains(&y)));
     }
 }

@@ -163,20 +163,30 @@ mod tests {
         (0..3).all(|k| (a[k] - b[k]).abs() < 1e-9)
     }
 
+    /// True if a point is seen at this pixel of 960 by 540, to a hundredth: coordinates of some metres in single precision, at
+    /// 650 pixels a radian, have 1e-3 pixels.
+    fn seen_at(eye: &Eye, point: [f64; 3], pixel: [f32; 2]) -> bool {
+        project(&eye.view(960, 540), point).is_some_and(|at| (0..2).all(|k| (at[k] - pixel[k]).abs() < 0.01))
+    }
+
     #[test]
-    fn it_looks_from_where_it_was_put() {
+    fn places() {
         let eye = Eye::looking([3.0, -1.0, 2.0], [0.5, 0.5, 0.5]);
         assert!(eye.is_some_and(|eye| close(eye.position(), [3.0, -1.0, 2.0]) && close(eye.target, [0.5; 3])));
         assert_eq!(Eye::looking([1.0; 3], [1.0; 3]), None);
         assert_eq!(Eye::looking([f64::NAN; 3], [1.0; 3]), None);
+        for [width, height] in [[0, 0], [1, 1], [1, 10_000], [100_000, 1]] {
+            assert!(Eye::default().view(width, height).validate().is_ok(), "{width} x {height}");
+        }
     }
 
+    /// An orbit keeps the target in the middle, a turn keeps the place, and panning moves the plane of the target with the
+    /// mouse, pixel by pixel.
     #[test]
-    fn orbiting_keeps_the_target_in_the_middle_and_turning_keeps_the_place() {
+    fn drags() {
         let mut eye = Eye::default();
         eye.orbit([200.0, -35.0], 540);
-        let middle = project(&eye.view(960, 540), eye.target);
-        assert!(middle.is_some_and(|[x, y]| (x - 480.0).abs() < 0.01 && (y - 270.0).abs() < 0.01), "{middle:?}");
+        assert!(seen_at(&eye, eye.target, [480.0, 270.0]));
         let place = eye.position();
         eye.turn([33.0, 12.0], 540);
         assert!(close(place, eye.position()));
@@ -184,18 +194,10 @@ mod tests {
         (0..9).for_each(|_| eye.orbit([0.0, 540.0], 540));
         assert!((eye.elevation + STEEPEST).abs() < 1e-12);
         assert!(eye.view(960, 540).validate().is_ok());
-    }
-
-    /// A point at the target's distance moves with the mouse, pixel by pixel: the plane of the target is parallel to the
-    /// picture.
-    #[test]
-    fn panning_moves_the_scene_with_the_mouse() {
         let mut eye = Eye::default();
         let point = eye.target;
         eye.pan([40.0, -25.0], 540);
-        let seen = project(&eye.view(960, 540), point);
-        // f32 coordinates of some metres at 650 pixels a radian: 1e-3 pixels.
-        assert!(seen.is_some_and(|[x, y]| (x - 520.0).abs() < 0.01 && (y - 245.0).abs() < 0.01), "{seen:?}");
+        assert!(seen_at(&eye, point, [520.0, 245.0]));
     }
 
     #[test]
@@ -204,21 +206,14 @@ mod tests {
         let away = eye.distance;
         eye.zoom(1.0);
         assert!((eye.distance / away - 0.85).abs() < 1e-12);
-        eye.zoom(1e6);
-        assert!(eye.distance == DISTANCES[0] && eye.view(10, 10).validate().is_ok());
-        eye.zoom(-1e6);
-        assert!(eye.distance == DISTANCES[1] && eye.view(10, 10).validate().is_ok());
+        for (steps, expected) in [(1e6, DISTANCES[0]), (-1e6, DISTANCES[1])] {
+            eye.zoom(steps);
+            assert!(eye.distance == expected && eye.view(10, 10).validate().is_ok());
+        }
         let mut eye = Eye { azimuth: 0.0, elevation: 0.0, ..Eye::default() };
         let place = eye.position();
         eye.fly([1.0, 2.0, 3.0]);
         // Looking along x, right is -y.
         assert!(close(eye.position(), [place[0] + 1.0, place[1] - 2.0, place[2] + 3.0]));
-    }
-
-    #[test]
-    fn no_size_of_a_window_is_a_mistake() {
-        for [width, height] in [[0, 0], [1, 1], [1, 10_000], [100_000, 1]] {
-            assert!(Eye::default().view(width, height).validate().is_ok(), "{width} x {height}");
-        }
     }
 }

@@ -184,62 +184,61 @@ fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+    use crate::control::{Viewing, Wants};
+    use crate::stage::Eye;
     use scene::MarkerKind;
 
-    fn contact(force: [f64; 3]) -> Contact {
-        let (point, normal) = ([1.0, 2.0, 0.0], [0.0, 0.0, 1.0]);
-        Contact { bodies: [None, Some(0)], point, normal, distance: 0.0, force, normal_force: force[2] }
-    }
-
     #[test]
-    fn force_arrows_start_in_the_contact_and_point_along_the_force() {
+    fn force_arrows() {
+        let contact = |force: [f64; 3]| {
+            let (point, normal) = ([1.0, 2.0, 0.0], [0.0, 0.0, 1.0]);
+            Contact { bodies: [None, Some(0)], point, normal, distance: 0.0, force, normal_force: force[2] }
+        };
+        // It starts in the contact and points along the force.
         let marker = force_arrow(&contact([0.0, 0.0, 3.0]));
         let Some(Marker { kind: MarkerKind::Arrow { length, .. }, pose, .. }) = marker else { panic!("{marker:?}") };
         // log2(4) = 2.
         assert!((length - 0.1).abs() < 1e-6, "{length}");
         assert_eq!(pose.translation.vector, Vector3::new(1.0, 2.0, 0.0));
         assert!((pose.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
-        assert_eq!(force_arrow(&contact([0.0; 3])), None, "what only touches has no arrow");
-        assert_eq!(force_arrow(&contact([f64::NAN; 3])), None);
+        assert_eq!([[0.0; 3], [f64::NAN; 3]].map(|force| force_arrow(&contact(force))), [None, None]);
     }
 
-    /// A point two metres ahead is in the middle of the picture; the disc there has `pi r^2` pixels, half of them bright.
+    /// A point two metres ahead is in the middle of the image; the disc there has `pi r^2` pixels, half of them bright.
     #[test]
-    fn a_centre_of_mass_is_a_disc_where_it_is() {
-        let view = super::super::Eye::looking([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
-        let bright = |at: [f64; 3]| {
+    fn centre_of_mass() {
+        let view = Eye::looking([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
+        let disc = |at: [f64; 3]| {
             let mut canvas = Canvas::new(201, 201);
             dot(at, &view, &mut canvas);
             let all = (0..201).flat_map(|y| (0..201).map(move |x| [x, y]));
-            let of = |wanted: [u8; 3]| all.clone().filter(|[x, y]| canvas.pixel(*x, *y) == Some(wanted)).collect();
-            let [bright, dark]: [Vec<[usize; 2]>; 2] = [of(color::bytes(color::MASS)), of(color::DARK)];
-            (bright, dark)
+            [color::bytes(color::MASS), color::DARK]
+                .map(|wanted| all.clone().filter(|[x, y]| canvas.pixel(*x, *y) == Some(wanted)).collect::<Vec<_>>())
         };
-        let (pixels, dark) = bright([0.0; 3]);
+        let [bright, dark] = disc([0.0; 3]);
         let radius = (view.fx * 0.02 / 2.0).clamp(1.5, 7.0);
         let area = std::f32::consts::PI * radius * radius;
         // The rim is of pixels that are in it by their middle: off by less than its length.
-        let off = (pixels.len() + dark.len()) as f32 - area;
-        assert!(off.abs() < 2.0 * std::f32::consts::PI * radius && pixels.len() > 1, "{off} of {area}");
-        let middle =
-            pixels.iter().fold([0.0; 2], |sum, at| [0, 1].map(|k| sum[k] + at[k] as f32 / pixels.len() as f32));
+        let off = (bright.len() + dark.len()) as f32 - area;
+        assert!(off.abs() < 2.0 * std::f32::consts::PI * radius && bright.len() > 1, "{off} of {area}");
+        let middle = [0, 1].map(|k| bright.iter().map(|at| at[k] as f32).sum::<f32>() / bright.len() as f32);
         assert!(middle.iter().all(|at| (at - 100.0).abs() < 1.0), "{middle:?}");
-        assert!(bright([-5.0, 0.0, 0.0]).0.is_empty(), "behind the camera");
-        assert!(bright([f64::NAN; 3]).0.is_empty());
+        assert!(disc([-5.0, 0.0, 0.0])[0].is_empty(), "behind the camera");
+        assert!(disc([f64::NAN; 3])[0].is_empty());
     }
 
-    /// From the end of each axis of a frame back to its origin lies its colour, and from end to end of a joint's axis its own.
+    /// From the end of each axis of a frame back to its origin lies its color, and from end to end of a joint's axis its own.
     #[test]
-    fn axes_lie_where_they_point() {
+    fn axes() {
         let mut sample = crate::sample::sample(2);
-        let viewer = crate::control::Viewing::viewer(&mut sample.sim, crate::control::Wants::default());
-        let snapshot = viewer.newest().expect("a snapshot");
+        let snapshot = sample.sim.viewer(Wants::default()).newest().unwrap();
         // From near by, where axes that begin in one point have parted after a third of their length.
         let target = in_overview(&snapshot.envs[1], [0.5, 0.0, 0.3]);
         let eye = [target[0] + 0.7, target[1] + 1.3, target[2] + 0.9];
-        let view = super::super::Eye::looking(eye, target).expect("two points").view(1600, 1200);
+        let view = Eye::looking(eye, target).unwrap().view(1600, 1200);
         let colors_at = |overlays: Overlays, from: Vector3<f64>, to: Vector3<f64>, rgba: [f32; 4]| {
             let mut canvas = Canvas::new(1600, 1200);
             overlays.draw_over(&snapshot, Shown::One(1), &view, &mut canvas);
@@ -247,8 +246,7 @@ mod tests {
             // Within a pixel: lines are rounded to whole ones.
             (4..10).all(|k| {
                 let Some([x, y]) = at(f64::from(k) / 10.0) else { return false };
-                let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy)));
-                around.into_iter().any(|(dx, dy)| {
+                (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))).any(|(dx, dy)| {
                     let [x, y] = [x as i32 + dx, y as i32 + dy].map(|n| n.max(0) as usize);
                     canvas.pixel(x, y) == Some(color::bytes(rgba))
                 })
@@ -258,12 +256,12 @@ mod tests {
         let look = &snapshot.envs[1].look;
         let frames = Overlays { frames: true, ..none };
         let axes = [(Vector3::x(), color::X), (Vector3::y(), color::Y), (Vector3::z(), color::Z)];
-        let pose = look.bodies[snapshot.names.bodies.iter().position(|name| name.contains("cube")).expect("a cube")];
+        let pose = look.bodies[snapshot.names.bodies.iter().position(|name| name.contains("cube")).unwrap()];
         let origin = pose.translation.vector;
         for (k, (axis, rgba)) in axes.iter().enumerate() {
             let end = origin + pose.rotation * axis * f64::from(FRAME);
             assert!(colors_at(frames, origin, end, *rgba), "axis {k}");
-            assert!(!colors_at(frames, origin, end, axes[(k + 1) % 3].1), "axis {k} has another colour");
+            assert!(!colors_at(frames, origin, end, axes[(k + 1) % 3].1), "axis {k} has another color");
             assert!(!colors_at(none, origin, end, *rgba));
         }
         let joints = Overlays { joints: true, ..none };
@@ -277,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_are_those_of_the_shapes() {
+    fn groups() {
         let all = Overlays { collisions: true, ..Overlays::default() };
         let shapes = Overlays { visuals: false, ..all };
         assert_eq!([Overlays::default(), all, shapes].map(|o| o.groups()), [0b111, 0b11_1111, 0b11_1000]);

@@ -18,8 +18,9 @@ pub(crate) fn slider_range([low, high]: [f64; 2], slides: bool) -> [f64; 2] {
 mod tests {
     use super::*;
 
+    /// A slider ends at the limits, and a reach away where one is missing.
     #[test]
-    fn a_slider_ends_at_the_limits_and_where_one_is_missing_a_reach_away() {
+    fn ranges() {
         let none = f64::INFINITY;
         for (limits, turns, slides) in [
             ([-0.5, 2.0], [-0.5, 2.0], [-0.5, 2.0]),
@@ -31,7 +32,7 @@ mod tests {
             ([5.0, none], [5.0, 5.0 + PI], [5.0, 6.0]),
             ([-none, 0.5], [-PI, 0.5], [-1.0, 0.5]),
             ([-none, -5.0], [-5.0 - PI, -5.0], [-6.0, -5.0]),
-            // None to choose from.
+            // An empty range.
             ([1.0, 1.0], [-PI, PI], [-1.0, 1.0]),
             ([2.0, -2.0], [-PI, PI], [-1.0, 1.0]),
         ] {

@@ -55,7 +55,7 @@ mod tests {
     use crate::stage::Timeline;
 
     #[test]
-    fn physics_that_needs_its_time_gets_half_of_the_threads() {
+    fn half_of_the_threads() {
         let start = Instant::now();
         let at = |run: &Run, desks: &mut Desks, seconds: f64| desks.now(run, start + Duration::from_secs_f64(seconds));
         let real = |measured_speed| Run { speed: Speed::REAL, measured_speed, ..Run::default() };

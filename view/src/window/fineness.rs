@@ -64,20 +64,19 @@ mod tests {
     const LATE: Duration = Duration::from_millis(50);
     const QUICK: Duration = Duration::from_millis(20);
 
-    /// Pictures of something that moves, 50 ms apart, that took so long with all samples, and the samples of each.
+    /// Samples of each image of something that moves, 50 ms apart; with all samples an image takes as long as given.
     fn samples(fineness: &mut Fineness, start: Instant, fine: &[Duration]) -> Vec<u8> {
-        let mut now = start;
-        let mut one = |&took: &Duration| {
-            now += Duration::from_millis(50);
-            let samples = fineness.samples(true, now);
+        let one = |(k, &took): (u32, &Duration)| {
+            let samples = fineness.samples(true, start + k * Duration::from_millis(50));
             fineness.drew(samples, if samples == FINE { took } else { took / 3 });
             samples
         };
-        fine.iter().map(&mut one).collect()
+        (1..).zip(fine).map(one).collect()
     }
 
+    /// A slow image is coarse while it moves and fine when it rests.
     #[test]
-    fn what_moves_slowly_is_coarse_and_what_rests_is_fine() {
+    fn moving_and_resting() {
         let start = Instant::now();
         // Fast enough, but for two in a row: fine all the time.
         let quick = [vec![QUICK; 5], vec![LATE; 2], vec![QUICK; 5]].concat();
@@ -90,20 +89,19 @@ mod tests {
         assert_eq!(late.samples(false, at(550)), 4);
         late.drew(4, LATE);
         assert!(!late.wants_better(at(700)));
-        // It moves again: how long fine pictures take is known.
+        // It moves again: how long fine images take is known.
         assert_eq!(late.samples(true, at(800)), 1);
     }
 
     #[test]
-    fn all_samples_are_tried_again() {
+    fn retries() {
         let (start, mut fineness) = (Instant::now(), Fineness::default());
         // The third is at 150 ms, so that one at 5150 ms is tried, and the next one after as long.
         let found = samples(&mut fineness, start, &[LATE; 210]);
         let fine: Vec<usize> = (1..).zip(found).filter(|(_, samples)| *samples == FINE).map(|(k, _)| k).collect();
         assert_eq!(fine, [1, 2, 3, 103, 203]);
         // It has become faster: the next try is the last.
-        let later = start + Duration::from_millis(50 * 210);
-        let found = samples(&mut fineness, later, &[QUICK; 100]);
+        let found = samples(&mut fineness, start + Duration::from_millis(50 * 210), &[QUICK; 100]);
         assert_eq!((found[91], found[92], found[99]), (1, 4, 4));
     }
 }

@@ -62,8 +62,9 @@ mod tests {
         Snapshot { run: Run { timeline, ..Run::default() }, ..Snapshot::default() }
     }
 
+    /// The mark is where a click goes to; without a recording and in the smallest windows nothing is wrong.
     #[test]
-    fn the_mark_is_where_a_click_goes_to() {
+    fn mark() {
         let size = [400, 300];
         for now in [2.0, 3.0, 5.5, 6.0] {
             let mut canvas = Canvas::new(size[0], size[1]);
@@ -76,35 +77,31 @@ mod tests {
         }
         assert_eq!(time_at(&at(3.0), size, [200.0, 250.0]), None, "above the line");
         assert_eq!([-50.0, 900.0].map(|x| time_beside(&at(3.0), 400, x).unwrap()), [2.0, 6.0]);
-    }
-
-    #[test]
-    fn a_window_seeks_where_its_line_is_pressed_and_dragged() {
-        let mut app = App::new([400, 300], 1);
-        let mut press = |snapshot: Snapshot, at: [f64; 2]| {
-            app.show(Arc::new(snapshot));
-            app.handle(Input::ButtonPress(1, at, Modifiers::default()));
-            app.handle(Input::Move([200.0, 100.0]));
-            app.handle(Input::ButtonRelease(1, [200.0, 100.0]));
-            app.take_commands()
-        };
-        // The middle of 2 s to 6 s, wherever the mouse went above it.
-        assert_eq!(press(at(3.0), [70.0, 290.0]), [Command::Seek(2.0), Command::Seek(4.0)]);
-        // The controls: above the line, and where there is none.
-        assert_eq!(press(at(3.0), [70.0, 200.0]), []);
-        assert_eq!(press(Snapshot::default(), [70.0, 290.0]), []);
-    }
-
-    #[test]
-    fn without_a_recording_and_in_the_smallest_windows_nothing_is_wrong() {
         let mut canvas = Canvas::new(50, 50);
-        let plain = canvas.clone();
         draw(&mut canvas, &Snapshot::default());
-        assert_eq!(canvas, plain);
+        assert_eq!(canvas, Canvas::new(50, 50));
         assert_eq!(time_at(&Snapshot::default(), [50, 50], [25.0, 49.0]), None);
         for size in [[1, 1], [3, 100], [0, 0]] {
             draw(&mut Canvas::new(size[0], size[1]), &at(3.0));
             assert!(time_beside(&at(3.0), size[0], 1.0).unwrap().is_finite());
+        }
+    }
+
+    /// A window seeks where its line is pressed and dragged.
+    #[test]
+    fn seek() {
+        let mut app = App::new([400, 300], 1);
+        for (what, snapshot, y, expected) in [
+            // The middle of 2 s to 6 s, at any height of the mouse.
+            ("on the line", at(3.0), 290.0, &[Command::Seek(2.0), Command::Seek(4.0)][..]),
+            ("above the line", at(3.0), 200.0, &[]),
+            ("no line", Snapshot::default(), 290.0, &[]),
+        ] {
+            app.show(Arc::new(snapshot));
+            app.handle(Input::ButtonPress(1, [70.0, y], Modifiers::default()));
+            app.handle(Input::Move([200.0, 100.0]));
+            app.handle(Input::ButtonRelease(1, [200.0, 100.0]));
+            assert_eq!(app.take_commands(), expected, "{what}");
         }
     }
 }

@@ -406,38 +406,49 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signs_are_keys() {
-        let of = [0x20, 0x41, 0x61, 0x2e, 0xffbe, 0xff1b, 0xffab].map(key_of);
-        let keys =
-            [Key::Char(' '), Key::Char('a'), Key::Char('a'), Key::Char('.'), Key::F1, Key::Escape, Key::Char('+')];
-        assert_eq!(of, keys.map(Some));
-        assert_eq!(key_of(0xffe1), None, "shift alone is no key");
-        let keys = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
-        assert_eq!([keys.get(8, false), keys.get(8, true)], [Some(Key::Char('=')), Some(Key::Char('+'))]);
-        assert_eq!([keys.get(9, true), keys.get(7, false), keys.get(10, false)], [Some(Key::Char('a')), None, None]);
+    fn keys_of_signs() {
+        for (sign, key) in [
+            (0x20, Some(Key::Char(' '))),
+            (0x41, Some(Key::Char('a'))),
+            (0x61, Some(Key::Char('a'))),
+            (0x2e, Some(Key::Char('.'))),
+            (0xffbe, Some(Key::F1)),
+            (0xff1b, Some(Key::Escape)),
+            (0xffab, Some(Key::Char('+'))),
+            // Shift alone.
+            (0xffe1, None),
+        ] {
+            assert_eq!(key_of(sign), key, "{sign:x}");
+        }
+        let american = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
+        // A Russian alphabet before an American one: the key between Tab and W is "short i" in the first, Q in the second.
+        let two = Keys { first: 8, each: 4, signs: vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca] };
+        let russian = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
+        for (keys, code, shift, expected) in [
+            (&american, 8, false, Some('=')),
+            (&american, 8, true, Some('+')),
+            (&american, 9, true, Some('a')),
+            (&american, 7, false, None),
+            (&american, 10, false, None),
+            (&two, 8, false, Some('q')),
+            (&two, 8, true, Some('q')),
+            (&two, 9, false, Some(' ')),
+            (&russian, 8, false, None),
+        ] {
+            assert_eq!(keys.get(code, shift), expected.map(Key::Char), "{code} {shift}");
+        }
     }
 
-    /// A Russian alphabet before an American one: the key between Tab and W is "short i" in the first, Q in the second.
+    /// A window may be up to 65 535 pixels wide, an image 8192: its last column was repeated.
     #[test]
-    fn of_two_alphabets_that_counts_which_has_a_key() {
-        let signs = vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca];
-        let keys = Keys { first: 8, each: 4, signs };
-        assert_eq!([keys.get(8, false), keys.get(8, true)], [Some(Key::Char('q')); 2]);
-        assert_eq!(keys.get(9, false), Some(Key::Char(' ')));
-        let one = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
-        assert_eq!(one.get(8, false), None, "there is no other alphabet");
-    }
-
-    /// A window may be up to 65 535 pixels wide, a picture 8192: its last column was repeated.
-    #[test]
-    fn pictures_cover_windows_of_every_size() {
+    fn coarse_images() {
         for (size, k) in [([1, 1], 1), ([960, 540], 1), ([1920, 1200], 1), ([3840, 2160], 2), ([8192, 50], 1)] {
             assert_eq!(coarseness(size), k, "{size:?}");
         }
         for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535]] {
             let k = coarseness(size);
-            let picture = size.map(|n| n.div_ceil(k));
-            assert!(picture.iter().all(|n| *n <= View::MAX_SIDE) && picture[0] * k >= size[0], "{size:?}: {k}");
+            let image = size.map(|n| n.div_ceil(k));
+            assert!(image.iter().all(|n| *n <= View::MAX_SIDE) && image[0] * k >= size[0], "{size:?}: {k}");
         }
     }
 }

@@ -231,15 +231,6 @@ mod tests {
     use ndarray::array;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    /// Ends the showing, however it ends.
-    struct Ends<'a>(&'a AtomicBool);
-
-    impl Drop for Ends<'_> {
-        fn drop(&mut self) {
-            self.0.store(true, Ordering::Release);
-        }
-    }
-
     /// A cube that rises by a metre each second, seen ten times a second.
     struct Rising(Vec<f64>);
 
@@ -255,20 +246,12 @@ mod tests {
         }
     }
 
-    #[test]
-    fn films_without_a_line_of_times_are_refused() {
-        assert!(matches!(Playhead::new(&[]), Err(PlayError::Empty)));
-        for times in [[0.0, f64::NAN], [f64::NEG_INFINITY, 0.0], [1.0, 0.0]] {
-            assert!(matches!(Playhead::new(&times), Err(PlayError::Times)), "{times:?}");
-        }
-    }
-
     fn height(snapshot: &Snapshot) -> f64 {
         let cube = snapshot.names.bodies.iter().position(|name| name == "cube").unwrap();
         snapshot.envs[0].look.bodies[cube].translation.z
     }
 
-    /// What a viewer sees after commands, when the film rests: a copy, because who keeps snapshots gets no more.
+    /// The snapshot after commands, when the film rests: a copy, because a viewer that keeps snapshots gets no more.
     fn watched(viewer: &Viewer, commands: &[Command]) -> Snapshot {
         let before = viewer.newest().unwrap().number;
         commands.iter().for_each(|command| assert!(viewer.send(*command)));
@@ -280,6 +263,13 @@ mod tests {
     }
 
     fn playing(act: impl FnOnce(&Viewer) + Send) {
+        /// Ends the film in every case.
+        struct Ends<'a>(&'a AtomicBool);
+        impl Drop for Ends<'_> {
+            fn drop(&mut self) {
+                self.0.store(true, Ordering::Release);
+            }
+        }
         let mut sim = sample(1).sim;
         let steps = sim.steps();
         let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
@@ -301,33 +291,35 @@ mod tests {
     }
 
     #[test]
-    fn viewers_seek_step_and_play_to_the_end() {
+    fn seek_step_and_play() {
         playing(|viewer| {
             let seen = watched(viewer, &[Command::Pause, Command::Seek(5.05)]);
             let timeline = seen.run.timeline.unwrap();
             assert_eq!([timeline.start, timeline.end], [3.0, 7.0]);
-            // The last moment that is not later than what was asked for.
+            // The last frame that is not later than the time of the seek.
             assert!((timeline.now - 5.0).abs() < 1e-9 && (height(&seen) - 5.0).abs() < 1e-9, "{timeline:?}");
             assert!(seen.run.paused && (seen.envs[0].look.time - 5.0).abs() < 1e-9);
             let seen = watched(viewer, &[Command::Step(3)]);
             assert!((height(&seen) - 5.3).abs() < 1e-9 && seen.run.steps == 23);
-            for (time, expected) in [(-1e9, 3.0), (1e9, 7.0), (3.0, 3.0)] {
-                let seen = watched(viewer, &[Command::Seek(time)]);
-                assert!((height(&seen) - expected).abs() < 1e-9, "{time}");
+            for (commands, expected) in [
+                (&[Command::Seek(-1e9)][..], 3.0),
+                (&[Command::Seek(1e9)], 7.0),
+                (&[Command::Seek(3.0)], 3.0),
+                // Ten times as fast as time: at the end after less than half a second, where it holds.
+                (&[Command::SetSpeed(Speed::Times(10.0)), Command::Resume], 7.0),
+                // From there it begins again.
+                (&[Command::SetSpeed(Speed::Free), Command::TogglePause], 7.0),
+                (&[Command::Reset(None)], 3.0),
+            ] {
+                let seen = watched(viewer, commands);
+                assert!((height(&seen) - expected).abs() < 1e-9, "{commands:?}");
+                assert!(seen.run.paused || matches!(commands, [Command::Reset(_)]), "{:?}", seen.run);
             }
-            // Ten times as fast as time: at the end after less than half a second, where it holds.
-            let seen = watched(viewer, &[Command::SetSpeed(Speed::Times(10.0)), Command::Resume]);
-            assert!((height(&seen) - 7.0).abs() < 1e-9 && seen.run.paused, "{:?}", seen.run);
-            // From there it begins again.
-            let seen = watched(viewer, &[Command::SetSpeed(Speed::Free), Command::TogglePause]);
-            assert!((height(&seen) - 7.0).abs() < 1e-9 && seen.run.paused);
-            let seen = watched(viewer, &[Command::Reset(None)]);
-            assert!((height(&seen) - 3.0).abs() < 1e-9);
         });
     }
 
     #[test]
-    fn time_passes_as_it_does_outside() {
+    fn real_time() {
         playing(|viewer| {
             let begun = watched(viewer, &[Command::Pause, Command::Seek(3.0)]);
             assert!((height(&begun) - 3.0).abs() < 1e-9);
@@ -343,25 +335,27 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_for_a_recording_is_refused() {
+    fn refusals() {
         playing(|viewer| {
             for (command, words) in [
                 (Command::Seek(f64::NAN), "no time"),
                 (Command::SetSpeed(Speed::Times(0.0)), "factor"),
                 (Command::Drag { env: sim::EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] }, "recording"),
             ] {
-                let refused = watched(viewer, &[Command::Pause, command]).run.refused.clone().unwrap();
+                let refused = watched(viewer, &[Command::Pause, command]).run.refused.unwrap();
                 assert!(refused.contains(words), "{refused}");
             }
         });
-        let error = sample(1).sim.play(&mut Rising(Vec::new()), &mut || true).unwrap_err();
-        assert_eq!(error, PlayError::Empty);
-        // The control: a simulation that runs has no time line.
+        assert!(matches!(Playhead::new(&[]), Err(PlayError::Empty)));
+        for times in [[0.0, f64::NAN], [f64::NEG_INFINITY, 0.0], [1.0, 0.0]] {
+            assert!(matches!(Playhead::new(&times), Err(PlayError::Times)), "{times:?}");
+        }
         let mut sim = sample(1).sim;
+        assert_eq!(sim.play(&mut Rising(Vec::new()), &mut || true), Err(PlayError::Empty));
+        // The control: a simulation that runs has no time line.
         let viewer = sim.viewer(Wants::default());
         viewer.send(Command::Seek(1.0));
         sim.update(1);
-        let newest = viewer.newest().unwrap();
-        assert!(newest.run.timeline.is_none());
+        assert!(viewer.newest().unwrap().run.timeline.is_none());
     }
 }
