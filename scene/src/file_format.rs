@@ -296,7 +296,6 @@ pub mod or_false {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use crate::Pose;
     use nalgebra::{UnitQuaternion, Vector3};
@@ -325,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_again_bit_by_bit() {
+    fn round_trip() {
         for k in 0..100 {
             let angle = 0.1 + 0.37 * f64::from(k);
             let rotation = UnitQuaternion::from_euler_angles(angle, -0.3 * angle, 2.0);
@@ -343,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_have_several_forms() {
+    fn forms_of_poses() {
         let turned =
             read(r#"{"pose": {"pos": [1, 2, 3], "rpy_deg": [0, 0, 90]}, "rotation": {"rpy_deg": [0, 0, 90]}}"#);
         let row = read(r#"{"pose": [1, 2, 3, 2, 0, 0, 2], "rotation": [3, 0, 0, 3]}"#);
@@ -357,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_say_what_would_be_right() {
+    fn errors() {
         for (text, part) in [
             (r#"{"pose": [1, 2, 3]}"#, "array of length 7"),
             (r#"{"pose": [1, 2, 3, 0, 0, 0, 0]}"#, "no rotation"),

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn arrows_reach_from_tail_to_tip() {
+    fn arrows() {
         for vector in [[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [3.0, 0.0, 0.0]] {
             let marker = Marker::arrow([1.0, 2.0, 3.0], vector, [1.0; 4]).expect("a direction");
             let [lo, hi] = extent(&marker);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_point_along_the_axes_and_what_cannot_be_drawn_is_left_out() {
+    fn axes() {
         let [lo, hi] = extent(&Marker::axes(Pose::identity(), 0.5));
         for k in 0..3 {
             assert!((hi[k] - 0.5).abs() < 1e-5 && lo[k] > -0.06, "{lo:?} {hi:?}");

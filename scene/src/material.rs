@@ -251,7 +251,7 @@ mod tests {
     /// IEC 61966-2-1: a tenth of the scale on the line and beyond it, the ends, and the well known middle, where byte 188 is
     /// half of the light (0.5029).
     #[test]
-    fn bytes_of_srgb_are_linear_light() {
+    fn srgb() {
         let table = srgb_to_linear();
         assert_eq!((table[0], table[255]), (0.0, 1.0));
         assert!((table[188] - 0.5029).abs() < 5e-5, "{}", table[188]);
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_colour_is_the_default_in_that_colour() {
+    fn from_rgba() {
         let red = Material::from_rgba([0.9, 0.1, 0.2, 0.5]);
         assert_eq!(red.rgba, [0.9, 0.1, 0.2, 0.5]);
         assert_eq!(Material { rgba: Material::default().rgba, ..red.clone() }, Material::default());

@@ -44,7 +44,7 @@ mod tests {
 
     /// A quarter turn about z takes x to y: its quaternion is cos 45° and sin 45° about z.
     #[test]
-    fn both_orders_of_a_quaternion_are_the_same_turn() {
+    fn orders_of_quaternions() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         // Of any length: they are normalised.
         for scale in [1.0, 3.0] {

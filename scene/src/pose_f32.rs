@@ -110,7 +110,7 @@ mod tests {
 
     /// The same maps in double precision judge; numbers of size 5 rounded to 6e-8 of themselves, a few times.
     #[test]
-    fn it_maps_as_the_pose_does_and_back() {
+    fn maps() {
         let pose = from_xyz_rpy([2.0, -3.0, 0.5], [0.3, -1.1, 2.0]);
         let own = PoseF32::from(&pose);
         let v = [0.7_f32, -0.2, 1.5];
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn it_becomes_a_pose_again() {
+    fn round_trip() {
         // Half turns too, which have no trace to take a root of.
         for turn in [[0.3, -1.1, 2.0], [std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, std::f64::consts::PI], [0.0; 3]] {
             let pose = from_xyz_rpy([2.0, -3.0, 0.5], turn);
@@ -140,7 +140,7 @@ mod tests {
 
     /// Two poses 100 km out and 2 m apart: one number in f32 there is 8 mm wide, their difference is exact.
     #[test]
-    fn poses_far_out_keep_what_is_between_them() {
+    fn far_out() {
         let turn = from_xyz_rpy([0.0; 3], [0.4, 0.2, -0.9]);
         let at = |x: f32| PoseF32 { translation: [x, 65_536.0, 0.0], ..PoseF32::from(&turn) };
         let (a, b) = (at(131_072.0), at(131_074.0));
@@ -155,16 +155,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_rotation_is_not_rigid() {
+    fn not_rigid() {
         let good = PoseF32::from(&from_xyz_rpy([1.0, 2.0, 3.0], [0.3, -1.1, 2.0]));
         assert!(good.is_rigid() && PoseF32::IDENTITY.is_rigid());
-        let with = |rotation: [[f32; 3]; 3]| PoseF32 { rotation, ..PoseF32::IDENTITY };
-        let mirror = with([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]);
-        let scaled = with([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]);
-        let sheared = with([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let nowhere = PoseF32::from_translation([f32::NAN, 0.0, 0.0]);
-        for bad in [mirror, scaled, sheared, nowhere, with([[f32::NAN; 3]; 3])] {
-            assert!(!bad.is_rigid(), "{bad:?}");
+        assert!(!PoseF32::from_translation([f32::NAN, 0.0, 0.0]).is_rigid());
+        for (what, rotation) in [
+            ("mirror", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
+            ("scaled", [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]),
+            ("sheared", [[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+            ("no number", [[f32::NAN; 3]; 3]),
+        ] {
+            assert!(!PoseF32 { rotation, ..PoseF32::IDENTITY }.is_rigid(), "{what}");
         }
     }
 }

@@ -82,7 +82,7 @@ mod tests {
     use nalgebra::Point3;
 
     #[test]
-    fn it_maps_as_the_pose_does_and_back() {
+    fn maps() {
         let pose = from_xyz_rpy([20.0, -3.0, 0.5], [0.3, -1.1, 2.0]);
         let (exact, p) = (PoseF64::from(&pose), [0.3, -7.0, 2.5]);
         let mapped: [f64; 3] = (pose * Point3::from(p)).coords.into();

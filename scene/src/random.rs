@@ -44,7 +44,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_keys_give_equal_numbers_and_others_do_not() {
+    fn keys() {
         assert_eq!(first(1, 2, "imu"), first(1, 2, "imu"));
         for other in [first(2, 2, "imu"), first(1, 3, "imu"), first(1, 2, "imv"), first(2, 1, "imu")] {
             assert_ne!(first(1, 2, "imu"), other);
@@ -54,7 +54,7 @@ mod tests {
     /// Means of n numbers scatter by sigma / sqrt(n), variances of normal ones by sqrt(2 / n), those of uniform ones by
     /// sqrt(1/180 / n): six times that fails once in 5e8 seeds, and the seeds here are fixed.
     #[test]
-    fn moments_are_those_of_the_distributions() {
+    fn moments() {
         let n = 100_000;
         let moments = |mut next: Box<dyn FnMut() -> f64>| {
             let values: Vec<f64> = (0..n).map(|_| next()).collect();
@@ -73,7 +73,7 @@ mod tests {
 
     /// Neighbouring environments: the correlation of n independent pairs scatters by 1 / sqrt(n).
     #[test]
-    fn neighbours_are_not_correlated() {
+    fn correlation() {
         let n = 100_000;
         let (mut a, mut b) = (Random::keyed(0, 0, "x"), Random::keyed(0, 1, "x"));
         let sum: f64 = (0..n).map(|_| a.normal() * b.normal()).sum();

@@ -261,7 +261,6 @@ impl Instance {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
     use crate::RenderMesh;
     use crate::material::Texture;
@@ -277,7 +276,7 @@ mod tests {
     /// linear light by the law of sRGB: c / 12.92 up to 0.04045, ((c + 0.055) / 1.055)^2.4 above. A cube texture is on a cube
     /// of half length 1 around the shape; another one repeats so often over the shape's size, or a metre.
     #[test]
-    fn ids_colors_and_scales_of_textures_follow_from_the_instances() {
+    fn instances() {
         let half = [0.5, 0.25, 2.0];
         let mesh =
             Mesh { mesh: Arc::new(RenderMesh::new(&Shape::from(Box { half }).tessellate(1), RenderMesh::CREASE)) };

@@ -310,38 +310,32 @@ impl Contacts {
 mod tests {
     use super::*;
 
-    #[test]
-    fn contacts_belong_to_one_environment() {
-        let contact = |z| Contact {
+    fn contact(z: f64, who: f64) -> Contact {
+        Contact {
             bodies: [None, Some(0)],
-            point: [0.0, 0.0, z],
+            point: [who, z, 0.0],
             normal: [0.0, 0.0, 1.0],
             distance: 0.0,
             force: [0.0; 3],
-            normal_force: 0.0,
-        };
-        let contacts = Contacts { first: vec![0, 2, 2, 3], list: [0.0, 1.0, 2.0].map(contact).to_vec() };
-        assert_eq!(contacts.of(0), &contacts.list[..2]);
-        assert_eq!(contacts.of(1), []);
+            normal_force: who,
+        }
+    }
+
+    #[test]
+    fn contacts_of_one_environment() {
+        let contacts = Contacts { first: vec![0, 2, 2, 3], list: [0.0, 1.0, 2.0].map(|z| contact(z, 0.0)).to_vec() };
+        assert_eq!((contacts.of(0), contacts.of(1)), (&contacts.list[..2], &[][..]));
         assert_eq!(contacts.of(2), &contacts.list[2..]);
         assert_eq!(SceneState::new(3).num_envs(), 3);
     }
 
     /// A state of 3 environments, every number of which says the environment and whose it is.
     fn state(who: f64, contacts: [usize; 3]) -> SceneState {
-        let contact = |env: usize| Contact {
-            bodies: [None, Some(0)],
-            point: [who, env as f64, 0.0],
-            normal: [0.0, 0.0, 1.0],
-            distance: 0.0,
-            force: [0.0; 3],
-            normal_force: who,
-        };
         let first = (0..=3).map(|env| contacts[..env].iter().sum()).collect();
-        let list = (0..3).flat_map(|env| vec![contact(env); contacts[env]]).collect();
+        let list = (0..3).flat_map(|env| vec![contact(env as f64, who); contacts[env]]).collect();
         let rows = |width| Some(Array3::from_shape_fn((3, 2, width), |(env, b, k)| who + (10 * env + b + k) as f64));
         let numbers = |width| Some(Array2::from_shape_fn((3, width), |(env, k)| who + (10 * env + k) as f64));
-        let lamp = |env: usize| Light { direction: [who as f32, env as f32, 1.0], ..Light::default() };
+        let light = |env: usize| Light { direction: [who as f32, env as f32, 1.0], ..Light::default() };
         let at = |env: usize| [who as f32, env as f32, 0.0];
         SceneState {
             step: (0..3).map(|env| who as u64 + env).collect(),
@@ -363,7 +357,7 @@ mod tests {
             contacts: Some(Contacts { first, list }),
             visible: Some(VisibleState {
                 instance_poses: Array2::from_shape_fn((3, 2), |(env, _)| PoseF32::from_translation(at(env))),
-                lights: Array2::from_shape_fn((3, 1), |(env, _)| lamp(env)),
+                lights: Array2::from_shape_fn((3, 1), |(env, _)| light(env)),
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
             own_scenes: Vec::new(),
@@ -373,7 +367,7 @@ mod tests {
 
     /// Every field of an environment is taken over or none is: the judge is a state made of the numbers of both.
     #[test]
-    fn environments_are_taken_over_whole() {
+    fn take_over() {
         let mut kept = state(100.0, [1, 0, 2]);
         assert!(kept.take_over(&state(200.0, [0, 3, 5]), &[false, true, false]));
         let one = |s: &SceneState, env: usize| {
@@ -385,27 +379,24 @@ mod tests {
             let markers = s.markers.as_ref().map(|m| m[env].clone());
             (s.step[env], s.time[env], s.force_time[env], rows, numbers, (seen, markers), contacts)
         };
-        for (env, from) in
-            [state(100.0, [1, 0, 2]), state(200.0, [0, 3, 5]), state(100.0, [1, 0, 2])].iter().enumerate()
-        {
+        let (old, new) = (state(100.0, [1, 0, 2]), state(200.0, [0, 3, 5]));
+        for (env, from) in [&old, &new, &old].into_iter().enumerate() {
             assert_eq!(one(&kept, env), one(from, env), "environment {env}");
         }
         assert!(kept.take_over(&state(300.0, [2, 2, 2]), &[true; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
-        // The control: nobody is chosen.
+        // The control: no environment is chosen.
         assert!(kept.take_over(&state(400.0, [1, 1, 1]), &[false; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
     }
 
     #[test]
-    fn own_scenes_come_and_go_with_their_environment() {
+    fn own_scenes() {
         let own = || OwnScene(Some(Arc::new(RenderScene::empty())));
         let (red, large) = (own(), own());
         assert!(red != large && red == red.clone(), "the same in memory, or not");
-        let with = |scenes: [&OwnScene; 3]| SceneState {
-            own_scenes: scenes.map(OwnScene::clone).into(),
-            ..state(200.0, [1, 1, 1])
-        };
+        let with =
+            |own: [&OwnScene; 3]| SceneState { own_scenes: own.map(Clone::clone).into(), ..state(200.0, [1; 3]) };
         let nothing = OwnScene::default();
         let mut kept = state(100.0, [1, 1, 1]);
         assert_eq!(kept.own_scene(2), &nothing);
@@ -416,13 +407,13 @@ mod tests {
         // Back to what all look like.
         assert!(kept.take_over(&state(300.0, [1, 1, 1]), &[true; 3]));
         assert!((0..3).all(|env| kept.own_scene(env) == &nothing));
-        // Nobody looks: nothing is kept.
+        // Without a visual scene nothing is kept.
         let mut blind = SceneState::new(3);
         assert!(blind.take_over(&with([&nothing, &own(), &nothing]), &[true; 3]) && blind.own_scenes.is_empty());
     }
 
     #[test]
-    fn states_of_another_scene_are_not_taken_over() {
+    fn another_scene() {
         let mut kept = state(100.0, [1, 0, 2]);
         let mut other = state(200.0, [1, 0, 2]);
         other.joint_efforts = Some(Array2::zeros((3, 5)));

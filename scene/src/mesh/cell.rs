@@ -91,12 +91,11 @@ pub(super) fn winding(triangles: &[[V3; 3]], p: V3) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
 
     /// Cells of any cuts share out the box: of random points each is in one, and a cell has the corners of its hull.
     #[test]
-    fn halves_have_the_corners_of_their_planes() {
+    fn halves() {
         let all = |_| true;
         let cube = Cell::around([0.0; 3], [1.0; 3]);
         let s = 0.5f64.sqrt();
@@ -113,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tetrahedron_winds_around_its_inside_once() {
+    fn winding_number() {
         let p = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|t: [usize; 3]| t.map(|i| p[i]));
         assert!((winding(&faces, [0.1, 0.2, 0.3]) - 1.0).abs() < 1e-12);

@@ -156,11 +156,14 @@ pub(super) fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use std::fs;
 
     use super::*;
+    use crate::mesh::dae::tests::document;
     use crate::mesh::write_binary_stl;
+
+    const TETRAHEDRON: &str = r##"<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+        <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>"##;
 
     fn cube(dir: &Path) -> PathBuf {
         let points: Vec<[f32; 3]> = (0..8u8).map(|i| [0, 1, 2].map(|axis| f32::from(i >> axis & 1))).collect();
@@ -177,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hit_is_the_same_hull_and_damage_is_repaired() {
+    fn hits_and_damage() {
         let scratch = tempfile::tempdir().unwrap();
         let (mesh, cache) = (cube(scratch.path()), HullCache::at(scratch.path().join("a/cache")));
         let (scale, cfg) = ([1.0, -2.0, 3.0], HullCfg::default());
@@ -203,21 +206,13 @@ mod tests {
         assert_eq!(fs::read(only_file(cache.dir().unwrap())).unwrap(), good);
     }
 
-    /// A prism along y in a file that says that y is up: the hull stands where the option says, and each has a file of its own.
+    /// A tetrahedron along y in a file with y up: the hull stands where the option says, and each has a file of its own.
     #[test]
-    fn options_of_the_reader_count() {
+    fn reader_options() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path().join("prism.dae");
-        let text = r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-            <asset><up_axis>Y_UP</up_axis></asset>
-            <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12">
-              0 0 0  1 0 0  0 3 0  0 0 2</float_array><technique_common><accessor source="#a" count="4" stride="3">
-              <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>
-              </technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-              <triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
-              <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
-            <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
-            </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"##;
+        let node = r##"<node><matrix>1 0 0 0 0 3 0 0 0 0 2 0 0 0 0 1</matrix><instance_geometry url="#g"/></node>"##;
+        let text = document("<up_axis>Y_UP</up_axis>", "", TETRAHEDRON, node).replace("1 1 0<", "0 0 1<");
         fs::write(&path, text).unwrap();
         let cache = HullCache::at(scratch.path().join("cache"));
         let size = |dae_up_axis| {
@@ -228,28 +223,17 @@ mod tests {
             [0, 1, 2].map(|k| hi[k] - lo[k])
         };
         for _ in 0..2 {
-            // As the file has it; with y up, what was along y is along z, and is doubled there.
-            let close = |found: [f32; 3], expected: [f32; 3]| (0..3).all(|k| (found[k] - expected[k]).abs() < 1e-5);
-            assert!(close(size(DaeUpAxis::Ignore), [1.0, 3.0, 4.0]), "{:?}", size(DaeUpAxis::Ignore));
-            assert!(close(size(DaeUpAxis::Apply), [1.0, 2.0, 6.0]), "{:?}", size(DaeUpAxis::Apply));
+            // As the file has it; with y up, y of the file is z, which is doubled.
+            for (option, expected) in [(DaeUpAxis::Ignore, [1.0, 3.0, 4.0]), (DaeUpAxis::Apply, [1.0, 2.0, 6.0])] {
+                let found: [f32; 3] = size(option);
+                assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 1e-5), "{option:?}: {found:?}");
+            }
         }
         assert_eq!(fs::read_dir(cache.dir().unwrap()).unwrap().count(), 2);
     }
 
-    /// The folder of this process is one of those that the variables name, whichever are set.
     #[test]
-    fn the_default_place_is_that_of_the_environment() {
-        let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-        let expected = match (of("KINETOSCOPE_CACHE"), of("XDG_CACHE_HOME"), of("HOME")) {
-            (Some(dir), ..) => Some(dir),
-            (None, Some(dir), _) => Some(dir.join("kinetoscope")),
-            (None, None, home) => home.map(|dir| dir.join(".cache/kinetoscope")),
-        };
-        assert_eq!(HullCache::default_location().dir(), expected.as_deref());
-    }
-
-    #[test]
-    fn the_key_covers_everything_that_matters() {
+    fn keys() {
         let base = HullCfg::default();
         let configurations = [
             base,
@@ -259,21 +243,21 @@ mod tests {
             HullCfg { min_thickness: Some(2e-3), ..base },
         ];
         let mut keys = std::collections::BTreeSet::new();
-        let apply = MeshOptions { dae_up_axis: DaeUpAxis::Apply };
+        let [ignore, apply] = [DaeUpAxis::Ignore, DaeUpAxis::Apply].map(|dae_up_axis| MeshOptions { dae_up_axis });
         for (bytes, format, options, scale) in [
-            (&b"a"[..], Format::Stl, MeshOptions::default(), [1.0; 3]),
-            (b"b", Format::Stl, MeshOptions::default(), [1.0; 3]),
-            (b"a", Format::Obj, MeshOptions::default(), [1.0; 3]),
-            (b"a", Format::Stl, apply, [1.0; 3]),
-            (b"a", Format::Stl, MeshOptions::default(), [1.0, 1.0, -1.0]),
+            (&b"a"[..], Format::Stl, &ignore, [1.0; 3]),
+            (b"b", Format::Stl, &ignore, [1.0; 3]),
+            (b"a", Format::Obj, &ignore, [1.0; 3]),
+            (b"a", Format::Stl, &apply, [1.0; 3]),
+            (b"a", Format::Stl, &ignore, [1.0, 1.0, -1.0]),
         ] {
-            keys.extend(configurations.map(|cfg| key(bytes, format, &options, scale, &cfg)));
+            keys.extend(configurations.map(|cfg| key(bytes, format, options, scale, &cfg)));
         }
         assert_eq!(keys.len(), 25);
     }
 
     #[test]
-    fn a_folder_that_cannot_be_is_no_error() {
+    fn impossible_folder() {
         let scratch = tempfile::tempdir().unwrap();
         let mesh = cube(scratch.path());
         // The folder would have to be inside a file.
@@ -284,12 +268,20 @@ mod tests {
     }
 
     #[test]
-    fn the_default_place_follows_the_environment() {
-        let located = |set: &[&str]| {
-            let set: Vec<String> = set.iter().map(ToString::to_string).collect();
-            HullCache::located(move |name| set.iter().any(|s| s == name).then(|| Path::new("/").join(name)))
+    fn default_place() {
+        // The folder of this process is one of those that the variables name, whichever are set.
+        let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let expected = match (of("KINETOSCOPE_CACHE"), of("XDG_CACHE_HOME"), of("HOME")) {
+            (Some(dir), ..) => Some(dir),
+            (None, Some(dir), _) => Some(dir.join("kinetoscope")),
+            (None, None, home) => home.map(|dir| dir.join(".cache/kinetoscope")),
         };
+        assert_eq!(HullCache::default_location().dir(), expected.as_deref());
         let all = ["KINETOSCOPE_CACHE", "XDG_CACHE_HOME", "HOME"];
+        let located = |set: &[&'static str]| {
+            let set = set.to_vec();
+            HullCache::located(move |name| set.iter().any(|s| *s == name).then(|| Path::new("/").join(name)))
+        };
         assert_eq!(located(&all), HullCache::at("/KINETOSCOPE_CACHE"));
         assert_eq!(located(&all[1..]), HullCache::at("/XDG_CACHE_HOME/kinetoscope"));
         assert_eq!(located(&all[2..]), HullCache::at("/HOME/.cache/kinetoscope"));

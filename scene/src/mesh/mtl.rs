@@ -103,7 +103,6 @@ fn without_options(mut rest: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
     use crate::mesh::MeshOptions;
 
@@ -113,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_alpha_and_textures() {
+    fn materials() {
         let text = "# made by hand\nnewmtl light grey\nKd 0.5 .25 1\nd 0.5\nnewmtl b\r\nTr 0.25\nKd 0 0 0\n\
                     map_Kd -s 2 2 -clamp on tex\\my image.png\r\nnewmtl c\nKd 2 0 0\nillum 2\n";
         let materials = parse(text).unwrap();
@@ -125,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_mtl_and_its_line() {
+    fn errors() {
         let error = parse("newmtl a\nKd 1 x 0").unwrap_err().to_string();
         assert_eq!(error, "meshes/arm.mtl: line 2: \"x\" is not a number in 0..=1");
         assert!(parse("newmtl a\nKd 1 1").is_err());

@@ -328,9 +328,9 @@ pub(super) fn area(&[a, b, c]: &Triangle) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
     use crate::mesh::prisms;
+    use crate::shape::{HeightField, Shape, revolve};
 
     /// A prism over an outline in x and z, counter-clockwise, which `cut` divides into triangles.
     fn along_y(outline: &[[f32; 2]], cut: &[[u32; 3]], length: f32) -> TriMesh {
@@ -360,7 +360,7 @@ mod tests {
 
     /// An L is two boxes, whichever way it lies; the hull of it as a whole is a good deal more.
     #[test]
-    fn an_ell_is_two_boxes() {
+    fn two_boxes() {
         let volume = 0.5 * (0.25 + 0.75 * 0.25);
         let whole = convex_hull(&ell().positions, &HullCfg::default()).unwrap();
         assert!(whole.signed_volume() > 1.4 * volume, "the control: {}", whole.signed_volume());
@@ -378,45 +378,23 @@ mod tests {
         }
     }
 
-    /// A tube along y with an outer radius of 1 and an inner one of 0.8, of 32 sides.
+    /// A tube along z with an outer radius of 1 and an inner one of 0.8, of 32 sides.
     fn tube() -> TriMesh {
-        let ring = |r: f32, y: f32| {
-            (0..32).map(move |k| {
-                let (sin, cos) = (std::f32::consts::TAU * k as f32 / 32.0).sin_cos();
-                [r * cos, y, r * sin]
-            })
-        };
-        let positions: Vec<[f32; 3]> =
-            ring(1.0, 0.0).chain(ring(1.0, 1.0)).chain(ring(0.8, 0.0)).chain(ring(0.8, 1.0)).collect();
-        let faces = (0..32u32).flat_map(|k| {
-            let n = (k + 1) % 32;
-            let quad = |a: u32, b: u32, c: u32, d: u32| [[a, b, c], [a, c, d]];
-            let (o, i) = ([k, n, n + 32, k + 32], [k + 64, n + 64, n + 96, k + 96]);
-            let outer = quad(o[3], o[2], o[1], o[0]);
-            let inner = quad(i[0], i[1], i[2], i[3]);
-            let first = quad(o[0], o[1], i[1], i[0]);
-            let last = quad(o[3], i[3], i[2], o[2]);
-            [outer, inner, first, last].concat()
-        });
-        TriMesh::from_triangles(positions, faces.collect())
+        revolve(&[[0.8, 0.0], [1.0, 0.0], [1.0, 1.0], [0.8, 1.0], [0.8, 0.0]], 32)
     }
 
     /// Every point of the surface is in a piece, and many pieces leave the hollow free.
     #[test]
-    fn pieces_cover_the_surface_and_leave_the_hollow() {
+    fn surface_and_hollow() {
         // So many vertices that no hull is simplified by them.
         let (mesh, all) = (tube(), HullCfg { max_vertices: 1000, ..HullCfg::default() });
         assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
         let mut before = f64::INFINITY;
         for (max_pieces, tolerance) in [(4, 1e-6), (16, 1e-6), (64, 0.05)] {
             let pieces = convex_pieces(&mesh, &all, &PiecesCfg { max_pieces, tolerance }).unwrap();
-            assert!(
-                pieces.hulls.len() <= max_pieces && pieces.depth < before,
-                "{} {}",
-                pieces.hulls.len(),
-                pieces.depth
-            );
-            assert!(pieces.depth <= tolerance || pieces.hulls.len() == max_pieces);
+            let count = pieces.hulls.len();
+            assert!(count <= max_pieces && pieces.depth < before, "{count} {}", pieces.depth);
+            assert!(pieces.depth <= tolerance || count == max_pieces);
             before = if max_pieces == 16 { f64::INFINITY } else { pieces.depth };
             for triangle in &mesh.triangles {
                 let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].map(f64::from));
@@ -432,13 +410,13 @@ mod tests {
             let free = 0.8 * (std::f64::consts::PI / 32.0).cos() - 1.5 * pieces.depth - 1e-3;
             for k in 0..200 {
                 let (sin, cos) = (0.1 + 0.0314 * f64::from(k)).sin_cos();
-                let p = [free * cos, 0.5, free * sin];
+                let p = [free * cos, free * sin, 0.5];
                 assert!(!pieces.hulls.iter().any(|hull| within(hull, p, 0.0)), "{max_pieces} pieces: {p:?}");
             }
         }
         // The control: the hull fills the hollow.
         let whole = convex_hull(&mesh.positions, &all).unwrap();
-        assert!(within(&whole, [0.0, 0.5, 0.0], 0.0));
+        assert!(within(&whole, [0.0, 0.0, 0.5], 0.0));
         // What is convex stays whole.
         let one = convex_pieces(&whole, &all, &PiecesCfg::default()).unwrap();
         assert_eq!((one.hulls.len(), one.depth < 1e-3), (1, true), "{}", one.depth);
@@ -446,37 +424,10 @@ mod tests {
 
     /// A block of 1 x 1 x 0.2 m whose top is an egg carton of 5 mm.
     fn carton() -> TriMesh {
-        const N: u32 = 16;
-        let height = |i: u32, j: u32| {
-            let wave = |k: u32| (std::f32::consts::TAU * 2.0 * k as f32 / N as f32).cos();
-            0.2 + 0.005 * wave(i) * wave(j)
-        };
-        let side = N + 1;
-        let grid = |f: &dyn Fn(u32, u32) -> f32| -> Vec<[f32; 3]> {
-            (0..side * side)
-                .map(|k| (k % side, k / side))
-                .map(|(i, j)| [i as f32 / N as f32, j as f32 / N as f32, f(i, j)])
-                .collect()
-        };
-        let mut positions = grid(&height);
-        positions.extend(grid(&|_, _| 0.0));
-        let at = |i: u32, j: u32| j * side + i;
-        let down = side * side;
-        let mut faces = Vec::new();
-        for (i, j) in (0..N * N).map(|k| (k % N, k / N)) {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            faces.extend([[a, b, c], [a, c, d], [a + down, c + down, b + down], [a + down, d + down, c + down]]);
-        }
-        for k in 0..N {
-            let rim = [
-                (at(k, 0), at(k + 1, 0)),
-                (at(N, k), at(N, k + 1)),
-                (at(k + 1, N), at(k, N)),
-                (at(0, k + 1), at(0, k)),
-            ];
-            faces.extend(rim.iter().flat_map(|&(a, b)| [[a + down, b + down, b], [a + down, b, a]]));
-        }
-        TriMesh::from_triangles(positions, faces)
+        let wave = |k: usize| (std::f32::consts::TAU * 2.0 * k as f32 / 16.0).cos();
+        let elevation: Vec<f32> = (0..17 * 17).map(|k| 0.5 + 0.5 * wave(k % 17) * wave(k / 17)).collect();
+        let field = HeightField::new([0.5, 0.5, 0.01, 0.195], 17, 17, &elevation).unwrap();
+        Shape::from(field).tessellate(0)
     }
 
     fn inside_out(mut mesh: TriMesh) -> TriMesh {
@@ -486,7 +437,7 @@ mod tests {
 
     /// A solid stays one: of points all over its inside each is in a piece, however often it was cut.
     #[test]
-    fn pieces_keep_the_inside_of_a_solid() {
+    fn inside() {
         let mesh = carton();
         assert!(mesh.is_closed() && (mesh.signed_volume() - 0.2).abs() < 1e-3, "{}", mesh.signed_volume());
         // Hulls leave out what sticks out by less than half the tolerance, 1e-4 of their size, or less.
@@ -494,11 +445,13 @@ mod tests {
         let covered = |hulls: &[TriMesh]| {
             let points = (0..19 * 19 * 11).map(|k| (k % 19, k / 19 % 19, k / 361));
             let share = |i: i32, n: i32| (f64::from(i) + 0.5) / f64::from(n);
-            let all: Vec<V3> = points.map(|(i, j, k)| [share(i, 19), share(j, 19), 0.19 * share(k, 11)]).collect();
+            let at = |(i, j, k)| [share(i, 19) - 0.5, share(j, 19) - 0.5, 0.19 * share(k, 11) - 0.195];
+            let all: Vec<V3> = points.map(at).collect();
             let inside = all.iter().filter(|p| hulls.iter().any(|hull| within(hull, **p, near))).count();
             (inside, all.len())
         };
-        for cfg in [PiecesCfg { max_pieces: 24, tolerance: 1e-3 }, PiecesCfg { max_pieces: 64, tolerance: 1e-3 }] {
+        for max_pieces in [24, 64] {
+            let cfg = PiecesCfg { max_pieces, tolerance: 1e-3 };
             for mesh in [mesh.clone(), inside_out(mesh.clone())] {
                 let pieces = convex_pieces(&mesh, &HullCfg::default(), &cfg).unwrap();
                 assert!(pieces.hulls.len() >= 8, "{}", pieces.hulls.len());
@@ -517,12 +470,9 @@ mod tests {
 
     /// A cube is one piece whichever way its triangles turn, and prisms are within it.
     #[test]
-    fn a_mesh_that_is_inside_out_is_turned() {
-        let cube = convex_hull(
-            &[0, 1, 2, 3, 4, 5, 6, 7].map(|k: u8| [k & 1, k >> 1 & 1, k >> 2].map(f32::from)),
-            &HullCfg::default(),
-        );
-        let cube = cube.unwrap();
+    fn inside_out_cube() {
+        let corners: [[f32; 3]; 8] = std::array::from_fn(|k| [k & 1, k >> 1 & 1, k >> 2].map(|x| x as f32));
+        let cube = convex_hull(&corners, &HullCfg::default()).unwrap();
         for mesh in [cube.clone(), inside_out(cube)] {
             let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
             assert_eq!((pieces.hulls.len(), pieces.depth < 1e-6), (1, true), "{}", pieces.depth);
@@ -535,7 +485,7 @@ mod tests {
 
     /// A flat sheet is one piece whose front is the sheet: it gets thicker behind.
     #[test]
-    fn a_sheet_is_no_higher_than_it_is() {
+    fn sheet() {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let sheet = TriMesh::from_triangles(corners, vec![[0, 1, 2], [0, 2, 3]]);
         let cfg = PiecesCfg { tolerance: 1e-4, ..PiecesCfg::default() };
@@ -549,7 +499,7 @@ mod tests {
 
     /// A ball whose hull may have few vertices only is farther out than its hull, and the depth says so.
     #[test]
-    fn what_sticks_out_of_a_hull_is_depth() {
+    fn depth() {
         let points: Vec<[f32; 3]> = (0..600u16)
             .map(|k| {
                 let z = 1.0 - (2.0 * f32::from(k) + 1.0) / 600.0;
@@ -570,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn meshes_that_cannot_be_are_named() {
+    fn refusals() {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let wrong = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 9]]);
         let flat = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 1]]);
@@ -579,6 +529,15 @@ mod tests {
         for (mesh, says) in [(&wrong, "vertex 9"), (&flat, "area"), (&many, "50001")] {
             let error = convex_pieces(mesh, &hull, &cfg).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");
+        }
+        for (cfg, field) in [
+            (PiecesCfg { max_pieces: 0, ..cfg }, "max_pieces"),
+            (PiecesCfg { max_pieces: 5000, ..cfg }, "max_pieces"),
+            (PiecesCfg { tolerance: 0.0, ..cfg }, "tolerance"),
+            (PiecesCfg { tolerance: f64::NAN, ..cfg }, "tolerance"),
+        ] {
+            let error = convex_pieces(&ell(), &hull, &cfg).unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
         }
         let fine = HullCfg { max_vertices: 5000, ..hull };
         assert!(convex_pieces(&ell(), &fine, &cfg).unwrap_err().to_string().contains("max_vertices"));
@@ -592,7 +551,7 @@ mod tests {
     }
 
     #[test]
-    fn prisms_have_the_triangles_for_fronts() {
+    fn prism_fronts() {
         let mesh = ell();
         let prisms = prisms(&mesh, 0.01).unwrap();
         assert_eq!(prisms.len(), mesh.triangles.len());
@@ -607,19 +566,5 @@ mod tests {
         }
         let edge = TriMesh::from_triangles(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);
         assert!(crate::mesh::prisms(&edge, 0.01).unwrap().is_empty(), "an edge has no side");
-    }
-
-    #[test]
-    fn configurations_that_cannot_be_are_named() {
-        let base = PiecesCfg::default();
-        for (cfg, field) in [
-            (PiecesCfg { max_pieces: 0, ..base }, "max_pieces"),
-            (PiecesCfg { max_pieces: 5000, ..base }, "max_pieces"),
-            (PiecesCfg { tolerance: 0.0, ..base }, "tolerance"),
-            (PiecesCfg { tolerance: f64::NAN, ..base }, "tolerance"),
-        ] {
-            let error = convex_pieces(&ell(), &HullCfg::default(), &cfg).unwrap_err().to_string();
-            assert!(error.contains(field), "{error}");
-        }
     }
 }

@@ -91,7 +91,6 @@ fn pieces_in(bytes: &[u8], key: &[u8; KEY]) -> Option<Pieces> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
     use crate::mesh::{TriMesh, write_binary_stl};
     use std::fs;
@@ -105,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hit_is_the_same_pieces_and_damage_is_repaired() {
+    fn hits_and_damage() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path().join("tie.stl");
         write_binary_stl(&bow_tie(), fs::File::create(&path).unwrap()).unwrap();

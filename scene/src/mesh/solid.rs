@@ -84,7 +84,6 @@ impl TriMesh {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
     use super::*;
     use crate::pose::from_xyz_rpy;
 
@@ -95,8 +94,8 @@ mod tests {
 
     /// A brick as an STL file has it: no two triangles share a vertex.
     fn brick([x, y, z]: [f32; 3]) -> TriMesh {
-        let corners: Vec<[f32; 3]> =
-            (0..8).map(|k| [x * ((k & 1) as f32), y * ((k >> 1 & 1) as f32), z * ((k >> 2) as f32)]).collect();
+        let corners: [[f32; 3]; 8] =
+            std::array::from_fn(|k| [x * (k & 1) as f32, y * (k >> 1 & 1) as f32, z * (k >> 2) as f32]);
         let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
         let positions: Vec<[f32; 3]> = faces.flatten().map(|k: usize| corners[k]).collect();
@@ -106,7 +105,7 @@ mod tests {
 
     /// A tetrahedron with unit legs: ∫x² = 1/60, ∫xy = 1/120 about the corner, its centre at 1/4 (textbook integrals).
     #[test]
-    fn a_corner_has_the_integrals_of_a_simplex() {
+    fn simplex() {
         let solid = corner().solid().unwrap();
         assert!((solid.volume - 1.0 / 6.0).abs() < 1e-15);
         assert!((solid.center - Vector3::repeat(0.25)).norm() < 1e-15);
@@ -119,7 +118,7 @@ mod tests {
 
     /// A brick: V a²/12 along each axis, wherever it stands, however it is turned, whichever side is out.
     #[test]
-    fn a_brick_is_that_of_the_textbook_in_every_place() {
+    fn bricks() {
         let size = [0.25_f32, 0.5, 1.5];
         let volume: f64 = size.iter().map(|x| f64::from(*x)).product();
         let own = Matrix3::from_diagonal(&Vector3::from(size.map(|x| volume * f64::from(x).powi(2) / 12.0)));
@@ -135,8 +134,7 @@ mod tests {
         assert!((moved.center - (pose * nalgebra::Point3::from(middle)).coords).norm() < 1e-5);
         let expected = turned.matrix() * own * turned.matrix().transpose();
         assert!((moved.second_moment - expected).norm() < 1e-5 * expected.norm());
-        let mut inside_out = brick(size);
-        inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        let inside_out = turned_inside_out(brick(size));
         assert!((inside_out.signed_volume() + volume).abs() < 1e-12);
         assert!((inside_out.solid().unwrap().volume - volume).abs() < 1e-15);
     }
@@ -155,7 +153,7 @@ mod tests {
 
     /// Two closed shells of which one is inside out: no body has the difference of their volumes and moments.
     #[test]
-    fn a_part_that_is_inside_out_makes_no_solid() {
+    fn parts() {
         let at = |mesh: TriMesh, x| mesh.transformed(&from_xyz_rpy([x, 0.0, 0.0], [0.0; 3]));
         let (large, small) = (brick([1.0, 1.0, 1.0]), brick([0.5, 0.5, 0.5]));
         for part in [at(large.clone(), 1.5), at(small.clone(), 1.5)] {
@@ -172,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_a_rim_or_no_inside_is_no_solid() {
+    fn not_solid() {
         let mut open = brick([1.0, 1.0, 1.0]);
         assert!(open.is_closed());
         open.triangles.pop();

@@ -1,5 +1,4 @@
 //! Broken files: every reader answers with an error or a valid mesh, soon, and never panics.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -20,12 +19,8 @@ fn small_files() -> Vec<(&'static str, Vec<u8>)> {
     obj.extend(b"f 1/1/1 2 -3//-1 4/4 5\n");
     let ascii = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n\
                  facet normal 0 0 1\nouter loop\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
-    let dae = super::dae::tests::document(
-        r#"<unit meter="0.1"/><up_axis>Y_UP</up_axis>"#,
-        super::dae::tests::MATERIALS,
-        super::dae::tests::TWO_PARTS,
-        super::dae::tests::BOUND,
-    );
+    use super::dae::tests::{BOUND, MATERIALS, TWO_PARTS, document};
+    let dae = document(r#"<unit meter="0.1"/><up_axis>Y_UP</up_axis>"#, MATERIALS, TWO_PARTS, BOUND);
     let (json, buffer) = (super::glb::tests::SQUARE, super::glb::tests::buffer());
     let base64: String = buffer.chunks(3).map(base64_of).collect();
     let inline = format!("{{\"byteLength\": 136, \"uri\": \"data:application/octet-stream;base64,{base64}\"}}");
@@ -69,19 +64,19 @@ fn feed(folder: &Path, name: &str, bytes: &[u8]) -> bool {
 }
 
 #[test]
-fn truncated_at_every_length() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("beside.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
+fn truncated() {
+    let folder = testkit::urdf::Files::default();
+    folder.write("beside.mtl", "newmtl a\nKd 1 0 0\n");
     for (name, bytes) in small_files() {
-        assert!(feed(folder.path(), name, &bytes), "{name} itself must load");
+        assert!(feed(folder.folder(), name, &bytes), "{name} itself must load");
         for length in 0..bytes.len() {
-            feed(folder.path(), name, &bytes[..length]);
+            feed(folder.folder(), name, &bytes[..length]);
         }
     }
 }
 
 #[test]
-fn random_damage() {
+fn damaged() {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random(42);
     for (name, bytes) in small_files() {
@@ -106,20 +101,17 @@ fn random_damage() {
 }
 
 #[test]
-fn random_libraries() {
+fn damaged_libraries() {
     let lib = b"newmtl a\nKd 1 0.5 0\nd 0.5\nmap_Kd -s 1 1 1 tex.png\nnewmtl b\nTr 0.5\nKd 0 0 0\n";
     let options = MeshOptions::default();
     let mut random = Random(1);
     for round in 0..4000usize {
         let mut damaged = lib.to_vec();
-        if round < lib.len() {
-            damaged.truncate(round);
-        } else {
-            for _ in 0..3 {
-                let at = (random.next() % damaged.len() as u64) as usize;
-                damaged[at] = random.next() as u8;
-            }
+        for _ in 0..if round < lib.len() { 0 } else { 3 } {
+            let at = (random.next() % damaged.len() as u64) as usize;
+            damaged[at] = random.next() as u8;
         }
+        damaged.truncate(if round < lib.len() { round } else { lib.len() });
         let path = Path::new("a.mtl");
         let _ = super::mtl::read(path, &super::error::Ctx { path, options: &options }, &damaged);
     }

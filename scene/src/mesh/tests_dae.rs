@@ -1,9 +1,9 @@
 //! COLLADA by small documents with known answers.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::path::Path;
 
 use super::*;
+use crate::mesh::tests_robots::faces_up;
 use crate::mesh::{MeshOptions, TextureSource, load_bytes};
 
 fn parse(text: &str, dae_up_axis: DaeUpAxis) -> Result<TriMesh, MeshError> {
@@ -51,51 +51,42 @@ fn near(found: &[[f32; 3]], expected: &[[f32; 3]]) {
     }
 }
 
-#[test]
-fn parent_times_child_in_document_order() {
-    let turned = nodes(
-        r##"<node><rotate>0 0 1 90</rotate><translate>10 0 0</translate>
-            <node><translate>1 0 0</translate><instance_geometry url="#g"/></node></node>"##,
-    );
-    near(&turned.positions, &[[0., 11., 0.], [0., 12., 0.], [-1., 11., 0.]]);
-    let moved = nodes(
-        r##"<node><translate>10 0 0</translate><rotate>0 0 2 90</rotate>
-            <node><translate>1 0 0</translate><instance_geometry url="#g"/></node></node>"##,
-    );
-    near(&moved.positions, &[[10., 1., 0.], [10., 2., 0.], [9., 1., 0.]]);
-    let scaled = nodes(
-        r##"<node><scale>2 2 2</scale><node><translate>1 0 0</translate><instance_geometry url="#g"/></node></node>"##,
-    );
-    near(&scaled.positions, &[[2., 0., 0.], [4., 0., 0.], [2., 2., 0.]]);
-}
+const UP: [[f32; 3]; 3] = [[0., 0., 1.]; 3];
 
+/// Parent times child, in the order of the document; mirrors swap corners so that the front stays outside.
 #[test]
-fn one_geometry_twice_and_nodes_by_reference() {
+fn transforms() {
+    let child = r##"<node><translate>1 0 0</translate><instance_geometry url="#g"/></node>"##;
+    let shape = r##"<instance_geometry url="#g"/>"##;
+    for (transforms, inner, expected) in [
+        (
+            "<rotate>0 0 1 90</rotate><translate>10 0 0</translate>",
+            child,
+            [[0., 11., 0.], [0., 12., 0.], [-1., 11., 0.]],
+        ),
+        ("<translate>10 0 0</translate><rotate>0 0 2 90</rotate>", child, [[10., 1., 0.], [10., 2., 0.], [9., 1., 0.]]),
+        ("<scale>2 2 2</scale>", child, [[2., 0., 0.], [4., 0., 0.], [2., 2., 0.]]),
+        ("<scale>-1 1 1</scale>", shape, [[0., 0., 0.], [0., 1., 0.], [-1., 0., 0.]]),
+    ] {
+        let mesh = nodes(&format!("<node>{transforms}{inner}</node>"));
+        near(&mesh.positions, &expected);
+        near(mesh.normals.as_ref().unwrap(), &UP);
+    }
+    // x is sheared along z: the plane stays z = 0, so the normal stays +z, which the plain matrix would tilt.
+    let shear = "<matrix>.001 0 .001 0 0 .001 0 0 0 0 .001 0 0 0 0 1</matrix>";
+    near(nodes(&format!("<node>{shear}{shape}</node>")).normals.as_ref().unwrap(), &UP);
+    // One geometry three times, once by a node of another node.
     let mesh = nodes(
         r##"<node id="a"><instance_geometry url="#g"/></node>
             <node><matrix>1 0 0 0  0 1 0 0  0 0 1 5  0 0 0 1</matrix><instance_geometry url="#g"/>
               <node><translate>0 0 1</translate><instance_node url="#a"/></node></node>"##,
     );
-    assert_eq!(mesh.triangles.len(), 3);
     let z: Vec<f32> = mesh.triangles.iter().map(|t| mesh.positions[t[0] as usize][2]).collect();
     assert_eq!(z, [0.0, 5.0, 6.0]);
 }
 
 #[test]
-fn mirrors_and_sheared_normals() {
-    let mesh = nodes(r##"<node><scale>-1 1 1</scale><instance_geometry url="#g"/></node>"##);
-    near(&mesh.positions, &[[0., 0., 0.], [0., 1., 0.], [-1., 0., 0.]]);
-    near(mesh.normals.as_ref().unwrap(), &[[0., 0., 1.]; 3]);
-    // x is sheared along z: the plane stays z = 0, so the normal stays +z, which the plain matrix would tilt.
-    let mesh = nodes(
-        r##"<node><matrix>.001 0 .001 0 0 .001 0 0 0 0 .001 0 0 0 0 1</matrix>
-        <instance_geometry url="#g"/></node>"##,
-    );
-    near(mesh.normals.as_ref().unwrap(), &[[0., 0., 1.]; 3]);
-}
-
-#[test]
-fn unit_and_up_axis() {
+fn units_and_axes() {
     for (asset, option, expected) in [
         (r#"<unit meter="0.01"/>"#, DaeUpAxis::Ignore, [0., 0.01, 0.]),
         ("<up_axis>Y_UP</up_axis>", DaeUpAxis::Ignore, [0., 1., 0.]),
@@ -112,7 +103,7 @@ fn unit_and_up_axis() {
 }
 
 #[test]
-fn polygons_strips_and_fans() {
+fn primitives() {
     let input = r##"<input semantic="VERTEX" source="#v" offset="0"/>"##;
     for (primitive, triangles) in [
         (format!("<polylist count='2'>{input}<vcount>4 3</vcount><p>0 1 3 2 0 3 2</p></polylist>"), 3),
@@ -123,10 +114,8 @@ fn polygons_strips_and_fans() {
     ] {
         let mesh = parse(&document("", "", &primitive, HERE), DaeUpAxis::Ignore).unwrap();
         assert_eq!(mesh.triangles.len(), triangles, "{primitive}");
-        // All of them face +z.
         for t in &mesh.triangles {
-            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
-            assert!((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0, "{primitive}");
+            assert!(faces_up(t.map(|i| mesh.positions[i as usize])), "{primitive} faces +z");
         }
     }
 }
@@ -162,7 +151,7 @@ pub(crate) const TWO_PARTS: &str = r##"
   <triangles material="c"><input semantic="VERTEX" source="#v" offset="0"/><p>1 2 3</p></triangles>"##;
 
 #[test]
-fn materials_textures_and_the_bound_coordinates() {
+fn materials() {
     let mesh = parse(&document("", MATERIALS, TWO_PARTS, BOUND), DaeUpAxis::Ignore).unwrap();
     assert_eq!(mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
     assert_eq!(mesh.materials[0].name, "wood");
@@ -174,7 +163,7 @@ fn materials_textures_and_the_bound_coordinates() {
 }
 
 #[test]
-fn errors_name_the_element() {
+fn errors() {
     let text = document("", "", TRIANGLE, HERE);
     for (from, to, expected) in [
         ("1 0 2 0</p>", "1 0 4 0</p>", "line 15, <triangles>, POSITION index: index 4 is out of range, there are 4"),

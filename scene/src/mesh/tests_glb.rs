@@ -1,9 +1,10 @@
 //! glTF by small files with known answers.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::path::Path;
+use testkit::urdf::Files;
 
 use super::*;
+use crate::mesh::tests_robots::faces_up;
 use crate::mesh::{MeshOptions, load, load_bytes};
 
 pub(crate) fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
@@ -69,10 +70,7 @@ fn check(mesh: &TriMesh) {
     assert_eq!(at(0), [[2., 0., 0.], [4., 0., 0.], [4., 2., 0.]]);
     // A quarter turn, 5 up, then twice the size; strip and fan keep the winding.
     assert_eq!(at(2), [[0., 0., 10.], [0., 2., 10.], [-2., 0., 10.]]);
-    for t in 0..6 {
-        let [a, b, c] = at(t);
-        assert!((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0);
-    }
+    assert!((0..6).map(at).all(faces_up));
     assert_eq!(mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
     // From the top in the file, from the bottom here.
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
@@ -83,67 +81,48 @@ fn check(mesh: &TriMesh) {
 }
 
 #[test]
-fn square_in_a_container() {
+fn square() {
     let mesh = parse(SQUARE).unwrap();
     check(&mesh);
     assert_eq!(mesh.materials[0].texture, Some(TextureSource::Embedded(b"PNG!".to_vec())));
-}
-
-#[test]
-fn square_in_separate_files() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("my data.bin"), buffer()).unwrap();
+    // Mirrored nodes turn the triangles.
+    let mesh = parse(&SQUARE.replace("\"scale\": [2, 2, 2]", "\"scale\": [-2, 2, 2]")).unwrap();
+    assert!(mesh.triangles.iter().all(|t| faces_up(t.map(|i| mesh.positions[i as usize]))));
+    assert_eq!(mesh.normals.unwrap()[0], [0., 0., 1.]);
+    // In separate files.
+    let files = Files::default();
+    let data = files.write("my data.bin", buffer());
     let json = SQUARE
         .replace("{\"byteLength\": 136}", "{\"byteLength\": 136, \"uri\": \"my%20data.bin\"}")
         .replace("{\"bufferView\": 4, \"mimeType\": \"image/png\"}", "{\"uri\": \"tex/wood.jpg\"}");
-    let path = dir.path().join("part.gltf");
-    std::fs::write(&path, &json).unwrap();
+    let path = files.write("part.gltf", &json);
     let mesh = load(&path).unwrap();
     check(&mesh);
-    assert_eq!(mesh.materials[0].texture, Some(TextureSource::File(dir.path().join("tex/wood.jpg"))));
-    std::fs::remove_file(dir.path().join("my data.bin")).unwrap();
+    assert_eq!(mesh.materials[0].texture, Some(TextureSource::File(files.folder().join("tex/wood.jpg"))));
+    std::fs::remove_file(data).unwrap();
     assert!(matches!(load(&path), Err(MeshError::Io { path, .. }) if path.ends_with("my data.bin")));
 }
 
 #[test]
-fn mirrored_nodes_flip_the_winding() {
-    let mesh = parse(&SQUARE.replace("\"scale\": [2, 2, 2]", "\"scale\": [-2, 2, 2]")).unwrap();
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
-        assert!((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0);
-    }
-    assert_eq!(mesh.normals.unwrap()[0], [0., 0., 1.]);
-}
-
-#[test]
-fn errors_name_the_element() {
+fn errors() {
     let draco = "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"scene\"";
+    let most = "\"count\": 18446744073709551615";
+    let index = "mesh 0, primitive 0, index into accessors: index 9 is out of range, there are 6";
+    let infinite = "mesh 0, primitive 0, triangle 0: vertex position [inf, 0.0, 0.0] is not finite";
     for (from, to, expected) in [
         ("\"scene\"", draco, "the required glTF extension \"KHR_draco_mesh_compression\" is not supported"),
         ("\"count\": 4", "\"count\": 5", "accessor 0 ends early: expected 108 bytes, found 96"),
-        (
-            "\"count\": 4",
-            "\"count\": 18446744073709551615",
-            "accessor 0 ends early: expected 18446744073709551615 bytes",
-        ),
+        ("\"count\": 4", most, "accessor 0 ends early: expected 18446744073709551615 bytes"),
         ("\"byteLength\": 136", "\"byteLength\": 137", "buffer 0 ends early: expected 137 bytes, found 136"),
         ("\"byteOffset\": 112", "\"byteOffset\": 132", "bufferView 2 ends early: expected 144 bytes, found 136"),
         ("\"byteOffset\": 112", "\"byteOffset\": 16", "mesh 0, primitive 0, vertex index: index"),
         ("\"byteStride\": 24", "\"byteStride\": 8", "accessor 0: byteStride 8 is less than the element, 12 bytes"),
-        (
-            "\"POSITION\": 0",
-            "\"POSITION\": 9",
-            "mesh 0, primitive 0, index into accessors: index 9 is out of range, there are 6",
-        ),
+        ("\"POSITION\": 0", "\"POSITION\": 9", index),
         ("\"POSITION\": 0", "\"POSITION\": 2", "accessor 2: type \"VEC2\"; expected \"VEC3\""),
         ("\"POSITION\": 0", "\"POSITION\": -1", "mesh 0, primitive 0: \"POSITION\" is not a whole number"),
         ("\"children\": [1, 2]", "\"children\": [0]", "node 0: nodes nest deeper than 64"),
         ("[2, 2, 2]", "[2, 2]", "node 0: \"scale\" must be 3 numbers"),
-        (
-            "[2, 2, 2]",
-            "[1e300, 2, 2]",
-            "mesh 0, primitive 0, triangle 0: vertex position [inf, 0.0, 0.0] is not finite",
-        ),
+        ("[2, 2, 2]", "[1e300, 2, 2]", infinite),
         ("\"mode\": 5", "\"mode\": 7", "mesh 1, primitive 0: mode 7; expected 0 to 6"),
         ("\"count\": 6", "\"count\": 5", "mesh 0, primitive 0: 5 indices of triangles; expected a multiple of 3"),
         ("\"asset\"", "asset", "JSON line 2, column 2: not valid JSON"),

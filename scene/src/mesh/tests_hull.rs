@@ -1,28 +1,22 @@
 //! Hulls against closed forms and brute force.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use super::*;
-use crate::mesh::tests_robots::{Random, stl_files};
+use crate::mesh::tests_robots::{Random, files, load_of};
 
 /// Largest distance of any of `points` in front of any face.
 fn outside(hull: &TriMesh, points: &[[f32; 3]]) -> f64 {
-    let at = |p: [f32; 3]| p.map(f64::from);
     let mut worst = f64::NEG_INFINITY;
     for triangle in &hull.triangles {
-        let [a, b, c] = triangle.map(|i| at(hull.positions[i as usize]));
+        let [a, b, c] = triangle.map(|i| hull.positions[i as usize].map(f64::from));
         let n = cross(sub(b, a), sub(c, a));
         let length = norm(n);
         assert!(length > 0.0, "a face has no area");
-        worst = points.iter().fold(worst, |w, &p| w.max(dot(n, sub(at(p), a)) / length));
+        worst = points.iter().fold(worst, |w, &p| w.max(dot(n, sub(p.map(f64::from), a)) / length));
     }
     worst
-}
-
-fn size(points: &[[f32; 3]]) -> f64 {
-    diagonal(&points.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>())
 }
 
 /// Closed, oriented, of one piece (Euler), convex, outward; all points inside unless the number of vertices was bounded.
@@ -38,17 +32,12 @@ fn verify(points: &[[f32; 3]], cfg: &HullCfg) -> TriMesh {
     assert_eq!(hull.positions.len() + hull.triangles.len(), edges.len() / 2 + 2, "Euler");
     assert!(hull.positions.len() <= cfg.max_vertices);
     assert!(hull.signed_volume() > 0.0, "inside out");
-    let diagonal = size(points);
+    let diagonal = diagonal(&points.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>());
     let convexity = outside(&hull, &hull.positions);
     assert!(convexity <= 2e-7 * diagonal, "a vertex is {:e} of the diagonal outside", convexity / diagonal);
-    if hull.positions.len() < cfg.max_vertices {
-        let worst = outside(&hull, points);
-        assert!(
-            worst <= (cfg.tolerance + 2e-7) * diagonal,
-            "a point is {:e} of the diagonal outside",
-            worst / diagonal
-        );
-    }
+    let worst = outside(&hull, points) / diagonal;
+    let bounded = hull.positions.len() == cfg.max_vertices;
+    assert!(bounded || worst <= cfg.tolerance + 2e-7, "a point is {worst:e} of the diagonal outside");
     hull
 }
 
@@ -62,7 +51,7 @@ fn cube_grid(n: u8) -> Vec<[f32; 3]> {
 }
 
 #[test]
-fn cubes_with_points_on_faces_and_edges() {
+fn cubes() {
     for n in [1, 2, 5] {
         let mut points = cube_grid(n);
         points.extend(points.clone());
@@ -73,6 +62,8 @@ fn cubes_with_points_on_faces_and_edges() {
             assert!((hull.signed_volume() - 1.0).abs() < 1e-12);
         }
     }
+    let four = HullCfg { max_vertices: 4, ..HullCfg::default() };
+    assert_eq!(verify(&cube_grid(3), &four).triangles.len(), 4);
 }
 
 #[test]
@@ -91,7 +82,7 @@ fn random_clouds() {
 }
 
 #[test]
-fn rotated_grids_and_snapped_clouds() {
+fn grids_and_snapped_clouds() {
     // Many points nearly, but not quite, in the planes and lines of the hull.
     let mut random = Random(11);
     for _ in 0..40 {
@@ -112,7 +103,7 @@ fn rotated_grids_and_snapped_clouds() {
 }
 
 #[test]
-fn spheres_and_cylinders_approach_their_volume() {
+fn spheres_and_cylinders() {
     let mut random = Random(3);
     let sphere: Vec<[f32; 3]> = (0..5000)
         .map(|_| {
@@ -146,7 +137,7 @@ fn spheres_and_cylinders_approach_their_volume() {
 }
 
 #[test]
-fn thin_plates_and_flat_sets() {
+fn thin_plates() {
     let mut random = Random(5);
     let mut plate = |thickness: f64| -> Vec<[f32; 3]> {
         (0..500)
@@ -170,10 +161,8 @@ fn thin_plates_and_flat_sets() {
     assert!(convexity < 1e-5, "{convexity:e}");
     assert!((hull.signed_volume() / 0.5e-3 - 1.0).abs() < 0.05, "{}", hull.signed_volume());
     assert!(hull.positions.len() <= 64);
-    assert!(matches!(
-        convex_hull(&flat, &HullCfg { min_thickness: None, ..HullCfg::default() }),
-        Err(HullError::Coplanar { .. })
-    ));
+    let never = HullCfg { min_thickness: None, ..HullCfg::default() };
+    assert!(matches!(convex_hull(&flat, &never), Err(HullError::Coplanar { .. })));
     // A square of four points, and a plate so large that its tolerance exceeds the thickness.
     for side in [0.1f32, 200.0] {
         let square = [[0., 0., 1.], [side, 0., 1.], [0., side, 1.], [side, side, 1.]];
@@ -186,7 +175,7 @@ fn thin_plates_and_flat_sets() {
 }
 
 #[test]
-fn what_has_no_hull_says_why() {
+fn refusals() {
     let cfg = HullCfg::default();
     let line: Vec<[f32; 3]> = (0..9u8).map(|i| [f32::from(i), 2.0 * f32::from(i), 1.0]).collect();
     assert!(matches!(convex_hull(&line, &cfg), Err(HullError::Collinear { .. })));
@@ -210,12 +199,6 @@ fn what_has_no_hull_says_why() {
     assert_eq!(convex_hull(&tiny, &cfg).unwrap().triangles.len(), 4);
 }
 
-#[test]
-fn four_vertices_are_enough_to_stop() {
-    let cfg = HullCfg { max_vertices: 4, ..HullCfg::default() };
-    assert_eq!(verify(&cube_grid(3), &cfg).triangles.len(), 4);
-}
-
 /// Volumes of the exact hulls by Qhull (SciPy), in the units of the files.
 const QHULL: [(&str, f64); 11] = [
     ("xMateSR5_base.stl", 2084907.3686896092),
@@ -234,14 +217,11 @@ const QHULL: [(&str, f64); 11] = [
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendor_meshes() {
-    let files = stl_files();
-    for (name, volume) in QHULL.iter() {
-        let path = files.iter().find(|p| p.ends_with(name)).unwrap();
-        let mesh = crate::mesh::load(path).unwrap();
-        let few = verify(&mesh.positions, &HullCfg::default()).signed_volume() / volume;
-        let all = verify(&mesh.positions, &unbounded(1e-4)).signed_volume() / volume;
-        let exact = verify(&mesh.positions, &unbounded(0.0)).signed_volume() / volume;
-        println!("{name}: {few:.4} of the volume with 64 vertices, {all:.6} with all");
+    let files = files("stl");
+    for (name, volume) in QHULL {
+        let points = load_of(&files, name).positions;
+        let share = |cfg| verify(&points, &cfg).signed_volume() / volume;
+        let (few, all, exact) = (share(HullCfg::default()), share(unbounded(1e-4)), share(unbounded(0.0)));
         assert!((exact - 1.0).abs() < 1e-6, "{name}: {exact}");
         assert!(few > 0.93 && few < 1.0 + 1e-9 && all > 0.998, "{name}: {few} {all}");
     }

@@ -1,7 +1,7 @@
 //! OBJ and MTL, and what is written by [`crate::mesh::write_obj`].
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::path::Path;
+use testkit::urdf::Files;
 
 use super::*;
 use crate::mesh::{MeshOptions, TextureSource, load, load_bytes, write_binary_stl, write_obj};
@@ -15,7 +15,7 @@ const SQUARE: &str = "# a square and a triangle\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 
                       -1//-1\n";
 
 #[test]
-fn faces_of_all_kinds() {
+fn faces() {
     let mesh = parse(SQUARE).unwrap();
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 4, 5]]);
     assert_eq!(mesh.positions.len(), 6);
@@ -27,21 +27,20 @@ fn faces_of_all_kinds() {
 }
 
 #[test]
-fn libraries_beside_the_file() {
-    let dir = tempfile::tempdir().unwrap();
+fn libraries() {
+    let files = Files::default();
     let lib = "newmtl unused\nKd 1 1 0\nnewmtl blue\nKd 0 0 1\nmap_Kd tex/blue.png\nnewmtl red\nKd 1 0 0\n";
-    std::fs::write(dir.path().join("my colours.mtl"), lib).unwrap();
-    let path = dir.path().join("part.obj");
-    std::fs::write(&path, format!("mtllib missing.mtl\nmtllib my colours.mtl\n{SQUARE}usemtl red\nf 2 3 4\n")).unwrap();
-    let mesh = load(&path).unwrap();
+    files.write("my colours.mtl", lib);
+    let text = format!("mtllib missing.mtl\nmtllib my colours.mtl\n{SQUARE}usemtl red\nf 2 3 4\n");
+    let mesh = load(&files.write("part.obj", text)).unwrap();
     assert_eq!(mesh.parts.len(), 2);
     assert_eq!((mesh.parts[0].triangles.clone(), mesh.parts[1].triangles.clone()), (0..3, 3..4));
     assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["red", "blue"]);
-    assert_eq!(mesh.materials[1].texture, Some(TextureSource::File(dir.path().join("tex/blue.png"))));
+    assert_eq!(mesh.materials[1].texture, Some(TextureSource::File(files.folder().join("tex/blue.png"))));
 }
 
 #[test]
-fn errors_name_line_and_element() {
+fn errors() {
     for (text, expected) in [
         ("v 0 0\n", "line 1: expected 3 numbers"),
         ("v 0 0 x\n", "line 1: \"x\" is not a number"),
@@ -60,7 +59,7 @@ fn errors_name_line_and_element() {
 }
 
 #[test]
-fn agrees_with_tobj() {
+fn tobj() {
     // Every face corner of a random file in order, with the single index of both readers undone.
     let mut random = crate::mesh::tests_robots::Random(9);
     let mut text = String::new();
@@ -69,8 +68,8 @@ fn agrees_with_tobj() {
         text += &format!("v {} {} {}\nvt {} {}\nvn {} {} {}\n", x(), x(), x(), x(), x(), x(), x(), x());
     }
     for i in 0..200 {
-        let mut corner =
-            || format!("{}/{}/-{}", random.next() % 60 + 1, random.next() % 60 + 1, random.next() % 60 + 1);
+        let mut number = || random.next() % 60 + 1;
+        let mut corner = || format!("{}/{}/-{}", number(), number(), number());
         text += &format!("f {} {} {}\n", corner(), corner(), corner());
         if i == 100 {
             text += "g second\n";
@@ -78,16 +77,14 @@ fn agrees_with_tobj() {
     }
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).unwrap();
-    let theirs: Vec<([f32; 3], [f32; 2])> = models
-        .iter()
-        .flat_map(|m| m.mesh.indices.chunks(3).map(move |t| (m, t)))
-        .filter(|(_, t)| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
-        .flat_map(|(m, t)| t.iter().map(move |&i| (m, i as usize)))
-        .map(|(m, i)| {
-            let (p, t) = (&m.mesh.positions[3 * i..], &m.mesh.texcoords[2 * i..]);
+    let corners = |mesh: &tobj::Mesh| -> Vec<([f32; 3], [f32; 2])> {
+        let at = |&i: &u32| {
+            let (p, t) = (&mesh.positions[3 * i as usize..], &mesh.texcoords[2 * i as usize..]);
             ([p[0], p[1], p[2]], [t[0], t[1]])
-        })
-        .collect();
+        };
+        mesh.indices.iter().map(at).collect()
+    };
+    let theirs: Vec<_> = models.iter().flat_map(|model| corners(&model.mesh)).collect();
     // Triangles with two corners at one position have no area and are gone here.
     let theirs: Vec<_> =
         theirs.chunks(3).filter(|t| t[0].0 != t[1].0 && t[1].0 != t[2].0 && t[2].0 != t[0].0).flatten().collect();
@@ -99,7 +96,7 @@ fn agrees_with_tobj() {
 }
 
 #[test]
-fn what_is_written_reads_back() {
+fn round_trip() {
     let mut mesh = parse(SQUARE).unwrap().scaled([1e-3, 1e10, 0.1]);
     mesh.positions[1][2] = 1e-30;
     let mut text = Vec::new();

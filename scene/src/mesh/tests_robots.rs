@@ -1,9 +1,9 @@
-//! The vendors' meshes, where they are present, against numbers from an independent reader.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+//! The vendors' meshes against numbers from an independent reader.
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
 use std::path::PathBuf;
 
+use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};
 
 /// A small generator (xorshift64*) so that every run tests the same.
@@ -21,6 +21,11 @@ impl Random {
     pub(super) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
+}
+
+/// True if a triangle in the plane of x and y is counter-clockwise from above.
+pub(super) fn faces_up([a, b, c]: [[f32; 3]; 3]) -> bool {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
 }
 
 /// All files below the robots with an extension, sorted.
@@ -41,8 +46,9 @@ pub(super) fn files(extension: &str) -> Vec<PathBuf> {
     found
 }
 
-pub(super) fn stl_files() -> Vec<PathBuf> {
-    files("stl")
+/// The first of `files` with this name.
+pub(super) fn load_of(files: &[PathBuf], name: &str) -> TriMesh {
+    load(files.iter().find(|path| path.ends_with(name)).unwrap()).unwrap()
 }
 
 /// ANYmal by pycollada: triangles with an area, smallest and largest coordinates \[m\].
@@ -97,43 +103,35 @@ fn assert_bounds(name: &str, mesh: &TriMesh, lo: [f32; 3], hi: [f32; 3]) {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn anymal_agrees_with_pycollada() {
+fn anymal_by_pycollada() {
     let files = files("dae");
-    for (name, triangles, lo, hi) in ANYMAL.into_iter() {
-        let path = files.iter().find(|p| p.ends_with(name)).unwrap();
-        let mesh = load(path).unwrap();
+    for (name, triangles, lo, hi) in ANYMAL {
+        let mesh = load_of(&files, name);
         assert_eq!(mesh.triangles.len(), triangles, "{name}");
         assert_bounds(name, &mesh, lo, hi);
         assert!(mesh.normals.is_some() && mesh.uvs.is_some());
         // One textured part each, but for the base.
         let Some(TextureSource::File(image)) = &mesh.materials[0].texture else { panic!("{name} has no texture") };
         assert!(image.is_file(), "{}", image.display());
-        assert_eq!(mesh.materials.len(), if name == "base.dae" { 6 } else { 1 });
-        assert_eq!(mesh.parts.len(), mesh.materials.len());
+        let parts = if name == "base.dae" { 6 } else { 1 };
+        assert_eq!((mesh.materials.len(), mesh.parts.len()), (parts, parts));
         // Normals agree with the winding, on the whole.
         let normals = mesh.normals.as_ref().unwrap();
         let agree = mesh.triangles.iter().filter(|t| {
             let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
-            let face = super::builder::cross(super::builder::sub(b, a), super::builder::sub(c, a));
-            super::builder::dot(face, normals[t[0] as usize].map(f64::from)) > 0.0
+            dot(cross(sub(b, a), sub(c, a)), normals[t[0] as usize].map(f64::from)) > 0.0
         });
         let share = agree.count() as f64 / triangles as f64;
         assert!(share > 0.9, "{name}: {share}");
     }
-}
-
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn anymal_base_has_six_materials_in_three_instances() {
-    let robots = testkit::needs::robots_dir();
-    let mesh = load(&robots.join("anymal_c_simple_description/meshes/base.dae")).unwrap();
+    // Six materials in three instances.
+    let mesh = load_of(&files, "base.dae");
     let counts: Vec<usize> = mesh.parts.iter().map(|p| p.triangles.len()).collect();
     assert_eq!(counts, [234, 329, 2221, 658, 746, 88]);
     let names: Vec<&str> = mesh.materials.iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["base", "LWL", "Black plastic", "E-Stop red", "E-Stop yellow", "E-Stop green"]);
     let MeshMaterial { rgba, texture, .. } = &mesh.materials[5];
     assert_eq!((*rgba, texture), ([0.05232929, 0.1788523, 0.03373989, 1.0], &None));
-    // The texture is there and decodes.
     let Some(TextureSource::File(path)) = &mesh.materials[0].texture else { panic!("no texture") };
     let image = image::open(path).unwrap();
     assert_eq!((image.width(), image.height()), (2048, 2048));
@@ -141,11 +139,10 @@ fn anymal_base_has_six_materials_in_three_instances() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn vendor_stl_agrees_with_trimesh() {
-    let files = stl_files();
-    for ((name, triangles, vertices), lo, hi) in STL.into_iter() {
-        let path = files.iter().find(|p| p.ends_with(name)).unwrap();
-        let mesh = load(path).unwrap();
+fn stl_by_trimesh() {
+    let files = files("stl");
+    for ((name, triangles, vertices), lo, hi) in STL {
+        let mesh = load_of(&files, name);
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (triangles, vertices), "{name}");
         assert_bounds(name, &mesh, lo, hi);
     }

@@ -1,5 +1,4 @@
 //! What holds for every shape.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 use super::*;
 use std::sync::Arc;
 
@@ -18,7 +17,7 @@ fn all() -> Vec<Shape> {
 }
 
 #[test]
-fn tessellations_are_closed_face_outward_and_fill_the_bounds() {
+fn tessellations() {
     let volumes = [0.0, 0.524, 0.13404, 0.02513, 0.10053, 0.048, 0.10077, 2.8];
     assert_eq!(all().len(), Shape::MODULES.len(), "one of each");
     assert_eq!(all()[5].name(), "box");
@@ -39,7 +38,7 @@ fn tessellations_are_closed_face_outward_and_fill_the_bounds() {
 }
 
 #[test]
-fn clusters_hold_every_triangle_once() {
+fn clusters() {
     let mesh = Sphere { radius: 1.0 }.tessellate(64);
     let drawn = RenderMesh::new(&mesh, RenderMesh::CREASE);
     assert_eq!(drawn.triangles().len(), mesh.triangles.len());
@@ -66,37 +65,34 @@ fn clusters_hold_every_triangle_once() {
 }
 
 #[test]
-fn sizes_must_be_positive() {
+fn sizes() {
     assert_eq!(Shape::from(Sphere { radius: -1.0 }).bad_size(), Some(-1.0));
     assert!(Shape::from(Box { half: [1.0, f32::NAN, 1.0] }).bad_size().unwrap().is_nan());
     assert_eq!(Shape::from(Plane::INFINITE).bad_size(), None);
     assert!(HeightField::new([1.; 4], 1, 3, &[0.; 3]).is_none());
 }
 
-/// What is drawn of a mesh is the mesh: as many triangles, each with its corners where they were, its winding and its texture
-/// coordinates, in whatever order; with a normal for each vertex.
+/// The same triangles in any order, with their corners, winding and texture coordinates, and a normal for each vertex.
 #[test]
-fn a_mesh_that_is_drawn_can_be_had_back() {
+fn mesh_of_a_render_mesh() {
     let mut mesh = Box { half: [0.1, 0.2, 0.3] }.tessellate(1);
     mesh.uvs = Some(mesh.positions.iter().map(|p| [p[0] + 1.0, p[1] - p[2]]).collect());
     let back = RenderMesh::new(&mesh, RenderMesh::CREASE).to_tri_mesh();
     back.validate().unwrap();
     let corners = |mesh: &TriMesh| {
         let uvs = mesh.uvs.as_ref().unwrap();
-        let mut triangles: Vec<_> = mesh
-            .triangles
-            .iter()
-            .map(|triangle| {
-                let mut corners = triangle.map(|i| {
-                    let (p, uv) = (mesh.positions[i as usize], uvs[i as usize]);
-                    [p[0], p[1], p[2], uv[0], uv[1]].map(|x| (x * 1000.0).round() as i64)
-                });
-                // The winding stays when the least corner comes first.
-                let least = (0..3).min_by_key(|&k| corners[k]).unwrap();
-                corners.rotate_left(least);
-                corners
-            })
-            .collect();
+        let corner = |&i: &u32| {
+            let (p, uv) = (mesh.positions[i as usize], uvs[i as usize]);
+            [p[0], p[1], p[2], uv[0], uv[1]].map(|x| (x * 1000.0).round() as i64)
+        };
+        let triangle = |triangle: &[u32; 3]| {
+            let mut corners = triangle.each_ref().map(corner);
+            // The winding stays when the least corner comes first.
+            let least = (0..3).min_by_key(|&k| corners[k]).unwrap();
+            corners.rotate_left(least);
+            corners
+        };
+        let mut triangles: Vec<_> = mesh.triangles.iter().map(triangle).collect();
         triangles.sort_unstable();
         triangles
     };

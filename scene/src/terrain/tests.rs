@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn rough_heights_are_multiples_of_the_step_and_every_level_is_as_likely() {
+fn rough() {
     let terrain = RoughTerrain { size: [20.0, 10.0], cell: 0.1, range: [-0.04, 0.06], step: 0.02, seed: 3 };
     let heights = terrain.heights().expect("heights");
     assert_eq!(heights.dim(), (101, 201));
@@ -20,7 +20,7 @@ fn rough_heights_are_multiples_of_the_step_and_every_level_is_as_likely() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_bits_and_another_one_does_not() {
+fn seeds() {
     let bits = |seed| {
         let heights = RoughTerrain { seed, ..RoughTerrain::default() }.heights().expect("heights");
         heights.iter().map(|h| h.to_bits()).collect::<Vec<u64>>()
@@ -33,7 +33,7 @@ fn the_same_seed_gives_the_same_bits_and_another_one_does_not() {
 }
 
 #[test]
-fn a_slope_rises_as_it_says() {
+fn slope() {
     let heights = Slope { size: [4.0, 2.0], cell: 0.5, gradient: [0.3, -0.1] }.heights().expect("heights");
     assert_eq!(heights.dim(), (5, 9));
     for ((r, c), height) in heights.indexed_iter() {
@@ -43,7 +43,7 @@ fn a_slope_rises_as_it_says() {
 }
 
 #[test]
-fn stairs_lead_up_to_the_platform() {
+fn stairs() {
     let stairs = PyramidStairs { size: [4.0, 4.0], cell: 0.1, step_height: 0.15, tread: 0.3, platform: 1.0 };
     let heights = stairs.heights().expect("heights");
     // 1.5 m from the rim to the platform are five treads of 0.3 m; the third point of each is one step higher.
@@ -56,9 +56,12 @@ fn stairs_lead_up_to_the_platform() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn refusals() {
     let rough = RoughTerrain::default;
-    let message = |result: Result<ndarray::Array2<f64>, TerrainError>| result.expect_err("refused").to_string();
+    let refused = |result: Result<ndarray::Array2<f64>, TerrainError>, says: &str| {
+        let message = result.expect_err(says).to_string();
+        assert!(message.contains(says), "{message} lacks {says}");
+    };
     for (terrain, says) in [
         (RoughTerrain { cell: 0.0, ..rough() }, "cell is 0"),
         (RoughTerrain { size: [f64::NAN, 1.0], ..rough() }, "size is NaN"),
@@ -72,8 +75,7 @@ fn what_cannot_be_is_refused() {
         (RoughTerrain { range: [0.1, 0.0], ..rough() }, "no multiple of the step"),
         (RoughTerrain { range: [0.0, f64::INFINITY], ..rough() }, "range is inf"),
     ] {
-        let text = message(terrain.heights());
-        assert!(text.contains(says), "{text}");
+        refused(terrain.heights(), says);
     }
     let stairs = PyramidStairs::default;
     for (terrain, says) in [
@@ -81,8 +83,7 @@ fn what_cannot_be_is_refused() {
         (PyramidStairs { platform: 9.0, ..stairs() }, "fit into the field"),
         (PyramidStairs { step_height: f64::NAN, ..stairs() }, "step_height is NaN"),
     ] {
-        let text = message(terrain.heights());
-        assert!(text.contains(says), "{text}");
+        refused(terrain.heights(), says);
     }
-    assert!(message(Slope { gradient: [f64::NAN, 0.0], ..Slope::default() }.heights()).contains("gradient"));
+    refused(Slope { gradient: [f64::NAN, 0.0], ..Slope::default() }.heights(), "gradient");
 }
