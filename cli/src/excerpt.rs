@@ -105,72 +105,58 @@ fn marked(text: &str, message: &str) -> Range<usize> {
 mod tests {
     use super::*;
 
-    fn file(content: &str) -> (tempfile::TempDir, String) {
+    /// The line is shown, and the part of it that the message quotes is underlined, or else all of it.
+    #[test]
+    fn excerpts() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a:b.urdf");
-        std::fs::write(&path, content).unwrap();
-        let path = path.to_str().unwrap().to_owned();
-        (folder, path)
-    }
-
-    #[test]
-    fn the_line_is_shown_and_what_is_quoted_is_underlined() {
-        let (_folder, path) = file("<robot>\n\t<joint name=\"hip\" type=\"rotary\"/>\n</robot>\n");
-        let text = render(Level::ERROR, &format!("{path}:2: joint type \"rotary\" is unknown: x"), None, false);
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0], "error: joint type \"rotary\" is unknown: x");
-        assert!(lines[1].contains(&format!("{path}:2:")), "{text}");
-        let line = lines.iter().position(|line| line.contains("<joint")).unwrap();
-        assert!(lines[line].starts_with("2 |"), "{text}");
-        let under = lines[line + 1];
-        assert_eq!(under.find('^'), lines[line].find("rotary"), "{text}");
-        assert_eq!(under.matches('^').count(), "rotary".len(), "{text}");
-    }
-
-    #[test]
-    fn what_mujoco_quotes_is_underlined() {
-        let line = "  <geom type=\"box\" sise=\"1\"/>";
-        let said = "robot \"arm\": MuJoCo refuses the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
-        assert_eq!(&line[marked(line, said)], "sise");
-    }
-
-    #[test]
-    fn of_equal_words_the_one_that_is_meant_is_underlined() {
-        let at = |line: &str, message: &str| marked(line, message).start;
-        let line = "<joint name=\"arm\" parent=\"arm\"/>";
-        assert_eq!(at(line, "joint \"arm\": no link"), line.find("arm").unwrap());
-        assert_eq!(at(line, "parent \"arm\" is no link"), line.rfind("arm").unwrap());
-        let line = "<box size=\"0.5 0 0.25\" rgba=\"0\"/>";
-        assert_eq!(at(line, "\"0\" is no colour"), line.rfind('0').unwrap(), "a whole value, not a digit of another");
-        assert_eq!(at("<a b='0.5'/>", "\"5\": x"), "<a b='0.".len());
-    }
-
-    #[test]
-    fn without_a_quoted_word_the_whole_line_is_underlined() {
-        let (_folder, path) = file("  <robot/>  \n");
-        let text = render(Level::WARNING, &format!("{path}:1: no links"), Some("empty"), false);
-        assert!(text.starts_with("warning[empty]: no links"), "{text}");
-        assert_eq!(text.matches('^').count(), "<robot/>".len(), "{text}");
-    }
-
-    #[test]
-    fn a_place_that_is_not_there_stays_in_the_message() {
-        let (_folder, path) = file("<robot/>\n");
+        let file = |name: &str, content: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).unwrap();
+            path.to_str().unwrap().to_owned()
+        };
+        let path = file("a:b.urdf", b"<robot>\n\t<joint name=\"hip\" type=\"rotary\"/>\n  <robot/>  \n");
+        for (level, kind, line, message, title, under) in [
+            (Level::ERROR, None, 2, "joint type \"rotary\" is unknown: x", "error: ", "rotary"),
+            (Level::WARNING, Some("empty"), 3, "no links", "warning[empty]: ", "<robot/>"),
+        ] {
+            let text = render(level, &format!("{path}:{line}: {message}"), kind, false);
+            let lines: Vec<&str> = text.lines().collect();
+            assert_eq!(lines[0], format!("{title}{message}"));
+            assert!(lines[1].contains(&format!("{path}:{line}:")), "{text}");
+            let at = lines.iter().position(|shown| shown.starts_with(&format!("{line} |"))).unwrap();
+            assert_eq!(lines[at + 1].find('^'), lines[at].find(under), "{text}");
+            assert_eq!(text.matches('^').count(), under.len(), "{text}");
+        }
+        // A place that is not there stays in the message.
         for message in
             [format!("{path}:9: too far"), "gone.urdf:1: gone".into(), "no place: 1: 2".into(), String::new()]
         {
             assert_eq!(render(Level::ERROR, &message, None, false).trim_end(), format!("error: {message}").trim_end());
         }
+        // Lines of any bytes are shown.
+        let path = file("x.urdf", b"\xff\xfe \"\xc3\xa4\"\r\n\n");
+        for line in [1, 2, 3] {
+            let message = format!("{path}:{line}: \"\u{e4}\" is wrong");
+            assert!(render(Level::ERROR, &message, None, false).starts_with("error: "));
+        }
     }
 
+    /// Of equal words the one that is meant is underlined.
     #[test]
-    fn lines_of_any_bytes_are_shown() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x.urdf");
-        std::fs::write(&path, b"\xff\xfe \"\xc3\xa4\"\r\n\n").unwrap();
-        for line in [1, 2, 3] {
-            let message = format!("{}:{line}: \"\u{e4}\" is wrong", path.display());
-            assert!(render(Level::ERROR, &message, None, false).starts_with("error: "));
+    fn underlined_word() {
+        let (arms, zeros) = ("<joint name=\"arm\" parent=\"arm\"/>", "<box size=\"0.5 0 0.25\" rgba=\"0\"/>");
+        let mujoco = "robot \"arm\": MuJoCo refuses the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
+        for (line, message, before) in [
+            ("  <geom type=\"box\" sise=\"1\"/>", mujoco, "  <geom type=\"box\" "),
+            (arms, "joint \"arm\": no link", "<joint name=\""),
+            (arms, "parent \"arm\" is no link", "<joint name=\"arm\" parent=\""),
+            // A whole value, not a digit of another.
+            (zeros, "\"0\" is no color", "<box size=\"0.5 0 0.25\" rgba=\""),
+            ("<a b='0.5'/>", "\"5\": x", "<a b='0."),
+        ] {
+            let marked = marked(line, message);
+            assert_eq!(&line[..marked.start], before, "{message}");
+            assert!(message.contains(&line[marked]), "{message}");
         }
     }
 }

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_due_every_ten_seconds_and_says_how_far_it_is() {
+    fn lines() {
         let start = Instant::now();
         let mut lines = Lines::from(start);
         let due: Vec<u64> = (0..35).filter(|s| lines.is_due(start + Duration::from_secs(*s))).collect();

@@ -85,16 +85,9 @@ fn malformed_frames() {
     wait::until("no viewer is left", || running.viewers() == 0);
 }
 
-/// Runs a scenario in a process of its own.
-fn assert_passes(test: &str) {
-    let output = process::run(module_path!(), test, &std::env::temp_dir(), &[]);
-    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| process::text(bytes));
-    assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");
-}
-
 #[test]
 fn huge_heads() {
-    assert_passes("huge_heads_scenario");
+    process::assert_passes(module_path!(), "huge_heads_scenario", &[]);
 }
 
 /// In a process of its own: it measures memory.
@@ -130,7 +123,7 @@ fn huge_heads_scenario() {
 
 #[test]
 fn leaks() {
-    assert_passes("leaks_scenario");
+    process::assert_passes(module_path!(), "leaks_scenario", &[]);
 }
 
 /// Viewers that vanish leave nothing behind, nor does the end of the simulation. In a process of its own: it counts threads
