@@ -13,7 +13,7 @@ fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
     let mut seen = env.reset(None, Some(77)).unwrap();
     let (mut all, mut ends) = (vec![Vec::new(); n], vec![Vec::new(); n]);
     let put = |all: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
-        all.iter_mut().zip(of.rows()).for_each(|(all, row)| all.extend(bits(&row)));
+        all.iter_mut().zip(of.rows()).for_each(|(all, row)| all.extend(bits(row)));
     };
     put(&mut all, &seen);
     for _ in 0..150 {

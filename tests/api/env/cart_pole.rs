@@ -37,7 +37,7 @@ fn look(sim: &SimulationManager, robot: RobotId) -> Array2<f64> {
 type Row = (Vec<u64>, Vec<u64>, u64, bool, bool);
 
 fn row(seen: &Array2<f64>, last: &Array2<f64>, env: usize, reward: f64, terminated: bool, truncated: bool) -> Row {
-    (bits(&seen.row(env)), bits(&last.row(env)), reward.to_bits(), terminated, truncated)
+    (bits(seen.row(env)), bits(last.row(env)), reward.to_bits(), terminated, truncated)
 }
 
 fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {

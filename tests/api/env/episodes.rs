@@ -2,10 +2,12 @@
 
 use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
 use kinetoscope::env::{
-    EndReason, Env, EnvBuilder, EnvCfg, EventTerm, Now, ObservationTerm, TermResult, TerminationTerm, When,
+    ActionTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, Now, ObservationTerm, RewardTerm, Space, TermResult,
+    TerminationTerm, When,
 };
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::view::{Command, Viewing, Wants};
 use std::sync::{Arc, Mutex};
 use testkit::bits::bits;
 
@@ -107,7 +109,7 @@ fn masks() {
         seen = env.step(&policy(seen.view())).unwrap().observations;
         undisturbed = calm.step(&policy(undisturbed.view())).unwrap().observations;
         for e in [0, 2, 3] {
-            assert_eq!(bits(&seen.row(e)), bits(&undisturbed.row(e)), "step {k}, environment {e}");
+            assert_eq!(bits(seen.row(e)), bits(undisturbed.row(e)), "step {k}, environment {e}");
         }
     }
     // Those that were reset are where a batch with that seed is.
@@ -116,7 +118,7 @@ fn masks() {
     for _ in 17..60 {
         expected = with_seed.step(&policy(expected.view())).unwrap().observations;
     }
-    assert_eq!(bits(&expected.row(1)), bits(&seen.row(1)));
+    assert_eq!(bits(expected.row(1)), bits(seen.row(1)));
 }
 
 /// Environments and their steps, of each time that an event happened.
@@ -194,4 +196,135 @@ fn commands() {
         seen = step.observations;
     }
     assert!(changes >= 12, "{changes}");
+}
+
+/// Steps two tasks alike; `act`, a reset that the task has not asked for, is done to the first after 10 steps.
+fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
+    let (mut env, mut calm) = (everything(cfg(3, 2)), everything(cfg(3, 2)));
+    let (mut seen, mut same) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
+    for _ in 0..10 {
+        seen = env.step(&policy(seen.view())).unwrap().observations;
+        same = calm.step(&policy(same.view())).unwrap().observations;
+    }
+    act(&mut env);
+    let step = env.step(&policy(seen.view())).unwrap();
+    let other = calm.step(&policy(same.view())).unwrap();
+    let [ended] = &step.info.ended[..] else { panic!("{:?}", step.info.ended) };
+    assert_eq!((ended.env, &ended.reason, ended.steps), (EnvId(1), &EndReason::Reset, 11));
+    assert_eq!((step.truncated, step.terminated), (array![false, true, false], array![false, false, false]));
+    assert!(other.info.ended.is_empty());
+    assert_eq!(env.now().episode_steps(), [11, 0, 11]);
+    for e in [0, 2] {
+        assert_eq!(step.observations.row(e), other.observations.row(e), "the others do not notice");
+    }
+    // The next episode is the one that follows a reset of the task's own: with its start, its command, its noise.
+    let again = calm.reset(Some(&[false, true, false]), None).unwrap();
+    assert_eq!(step.observations.row(1), again.row(1));
+    (env, calm)
+}
+
+#[test]
+fn reset_by_program() {
+    let (mut env, mut calm) = disturbed(|env| env.sim_mut().reset(Some(&[EnvId(1)])).unwrap());
+    // It goes on as if nothing had happened.
+    let (mut a, mut b) = (env.observations().to_owned(), calm.observations().to_owned());
+    for _ in 0..20 {
+        let (one, other) = (env.step(&policy(a.view())).unwrap(), calm.step(&policy(b.view())).unwrap());
+        assert_eq!((&one.observations, &one.info), (&other.observations, &other.info));
+        (a, b) = (one.observations, other.observations);
+    }
+    // The simulation is given back without its observer.
+    let mut sim = env.into_sim();
+    sim.reset(None).unwrap();
+    sim.update(1);
+}
+
+#[test]
+fn reset_by_viewer() {
+    let mut viewer = None;
+    disturbed(|env| {
+        let watching = env.sim_mut().viewer(Wants { rate: 1.0, ..Wants::default() });
+        watching.send(Command::Reset(Some(EnvId(1))));
+        viewer = Some(watching);
+    });
+}
+
+/// A reset of the task itself does not count as a foreign one; `time_limit` asserts the same of ends of episodes.
+#[test]
+fn reset_by_task() {
+    let mut env = cart_env(2, Some(3));
+    env.reset(None, None).unwrap();
+    for _ in 0..9 {
+        env.step(&array![[1.0], [2.0]]).unwrap();
+    }
+    env.step(&array![[1.0], [2.0]]).unwrap();
+    env.reset(Some(&[true, false]), None).unwrap();
+    assert!(env.step(&array![[1.0], [2.0]]).unwrap().info.ended.is_empty());
+}
+
+/// A cart that can be pushed by any finite number.
+fn free_cart(num_envs: usize) -> Env {
+    let (sim, robot) = world(cfg(num_envs, 2), false);
+    let space = Space::uniform(["force"], [-1e308, 1e308]).unwrap();
+    EnvBuilder::new(sim, EnvCfg { decimation: 3, episode_steps: Some(50) })
+        .action(ActionTerm::new("push", space, move |sim, forces| {
+            Ok(sim.robot_mut(robot).set_qf(forces, None, None)?)
+        }))
+        .observation(ObservationTerm::new("x", ["x"], move |now| Ok(now.sim().robot(robot).get_qpos())))
+        .observation(ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).get_qvel())))
+        .reward(RewardTerm::new("v", 1.0, move |now| Ok(now.sim().robot(robot).get_qvel().column(0).to_owned())))
+        .build()
+        .unwrap()
+}
+
+#[test]
+fn diverged() {
+    let (mut env, mut calm) = (free_cart(8), free_cart(8));
+    env.reset(None, None).unwrap();
+    calm.reset(None, None).unwrap();
+    let actions = |k: u64, blow_up: bool| {
+        let of = |e: usize| if blow_up && k == 20 && e == 5 { 1e307 } else { (e as f64 + 0.1 * k as f64).sin() };
+        Array2::from_shape_fn((8, 1), |(e, _)| of(e))
+    };
+    let mut before = env.observations().to_owned();
+    for k in 1..=49 {
+        let (step, expected) = (env.step(&actions(k, true)).unwrap(), calm.step(&actions(k, false)).unwrap());
+        assert!(step.observations.iter().chain(&step.final_observations).chain(&step.rewards).all(|x| x.is_finite()));
+        for e in (0..8).filter(|&e| e != 5 || k < 20) {
+            assert_eq!(step.observations.row(e), expected.observations.row(e), "step {k}, environment {e}");
+            assert_eq!(step.rewards[e], expected.rewards[e]);
+        }
+        let bad = k == 20;
+        assert_eq!(step.terminated.iter().filter(|t| **t).count(), usize::from(bad), "step {k}");
+        assert!(!step.truncated.iter().any(|t| *t));
+        if bad {
+            let [ended] = &step.info.ended[..] else { panic!("{:?}", step.info.ended) };
+            assert_eq!((ended.env, ended.steps), (EnvId(5), 20));
+            let EndReason::Diverged(why) = &ended.reason else { panic!("{}", ended.reason) };
+            // Three physics steps in a step: 19 went well.
+            assert!(why.starts_with("step 57: "), "{why}");
+            assert_eq!(step.final_observations.row(5), before.row(5), "the last good state");
+            assert_eq!(step.observations.row(5).to_vec(), [0.0, 0.0], "revived");
+            assert!(env.sim().diverged().is_empty());
+        }
+        before = step.observations;
+    }
+    // The revived episode is 29 steps old, the others end now.
+    let step = env.step(&actions(50, false)).unwrap();
+    assert_eq!(step.truncated.iter().filter(|t| **t).count(), 7);
+    assert!(!step.truncated[5] && env.now().episode_steps()[5] == 30);
+}
+
+/// A state that is written between steps and cannot be stepped on ends the same way.
+#[test]
+fn diverged_by_hand() {
+    let (sim, robot) = world(cfg(2, 1), false);
+    let mut env = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
+    env.reset(None, None).unwrap();
+    let far = Array2::from_elem((1, 1), 1e11);
+    env.sim_mut().robot_mut(robot).write_qpos(&far, None, Some(&[EnvId(1)])).unwrap();
+    let step = env.step(&Array2::zeros((2, 1))).unwrap();
+    assert_eq!(step.terminated.to_vec(), [false, true]);
+    assert!(matches!(&step.info.ended[..], [ended] if matches!(ended.reason, EndReason::Diverged(_))));
+    assert!(env.step(&Array2::zeros((2, 1))).unwrap().info.ended.is_empty());
 }

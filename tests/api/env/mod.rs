@@ -7,8 +7,6 @@ mod closed_forms;
 mod episodes;
 mod mistakes;
 mod observations;
-mod quarantine;
-mod resets;
 mod tasks;
 mod terms;
 mod train_reach;

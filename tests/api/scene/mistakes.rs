@@ -1,7 +1,7 @@
 //! Mistakes in scene files: each error names the file, the line, and what would be right.
 
 use super::parts;
-use super::yaml::QUADRUPED;
+use super::round_trip::QUADRUPED;
 use kinetoscope::prelude::*;
 
 fn toml(text: &str) -> Result<SceneCfg> {

@@ -7,4 +7,3 @@ mod parts;
 mod quadruped;
 mod round_trip;
 mod terrain;
-mod yaml;

@@ -72,8 +72,8 @@ pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
     let camera = scene.sensor::<Camera>("camera").unwrap();
     let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
     let contacts = scene.sensor::<ContactSensor>("contact_forces").unwrap();
-    let images = [bits(&camera.depth().unwrap()), bits(&camera.color().unwrap())];
-    let others = [bits(&scanner.distances()), bits(&contacts.net_forces_w())];
+    let images = [bits(camera.depth().unwrap()), bits(camera.color().unwrap())];
+    let others = [bits(scanner.distances()), bits(contacts.net_forces_w())];
     state.iter().map(bits).chain(images).chain(others).collect()
 }
 

@@ -5,6 +5,28 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::ray::pattern::Lidar;
 
+pub(crate) const QUADRUPED: &str = r#"# As assets/scenes/quadruped.toml begins.
+simulation:
+  preset: legged
+  num_envs: 2
+  ground: {color: [0.1, 0.1, 0.1]}
+entities:
+  robot:
+    type: robot
+    urdf: ../quadruped/quadruped.urdf
+    fix_base: false
+    init_pose:
+      pos: [0, 0, .6]
+    init_qpos: {.*HAA: 0.0, ".*F_HFE": 0.4, .*H_HFE: -0.4, ".*F_KFE": -0.8, ".*H_KFE": 0.8}
+    drive: &soft
+      stiffness: 80.0
+      damping: 5.0
+  contact_forces:
+    type: contact_sensor
+    bodies: ["{ENV_REGEX_NS}/robot/.*_FOOT"]
+    sampling.history_length: 6
+"#;
+
 /// Every kind of entity, with numbers that need all their digits.
 fn every_kind() -> SceneCfg {
     let third = 1.0 / 3.0;
@@ -134,4 +156,26 @@ fn in_yaml() {
         let without_places = |cfg: SceneCfg| format!("{:#?}", SceneCfg { sources: Default::default(), ..cfg });
         assert_eq!(without_places(read), without_places(again(&cfg)));
     }
+}
+
+#[test]
+fn yaml_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let text =
+        QUADRUPED.replace("    sampling.history_length: 6\n", "    sampling:\n      history_length: 6\n").replace(
+            "../quadruped/quadruped.urdf",
+            &assets::path("quadruped/quadruped.urdf").unwrap().display().to_string(),
+        );
+    for name in ["scene.yaml", "scene.YML"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &text).unwrap();
+        let mut scene = InteractiveScene::from_file(&path).unwrap();
+        assert_eq!((scene.num_envs(), scene.sim().cfg().physics_dt), (2, 0.005));
+        scene.update(1);
+        assert_eq!(scene.robot("robot").unwrap().get_stiffness()[(0, 0)], 80.0);
+    }
+    // The same text is no TOML.
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, &text).unwrap();
+    assert!(matches!(SceneCfg::from_file(&path), Err(Error::SceneFile { .. })));
 }

@@ -110,7 +110,7 @@ fn says(cfg: SceneCfg) -> Vec<Vec<u64>> {
     // Every second step a image; that of step 100 arrives with the next.
     assert_eq!(eye.frame_counts().to_vec(), [49, 49]);
     let ball = scene.rigid_object("ball").unwrap().get_pose();
-    vec![bits(&ball), bits(&scanner.distances()), bits(&eye.depth()), bits(&eye.normal()), bits(&eye.mask())]
+    vec![bits(&ball), bits(scanner.distances()), bits(eye.depth()), bits(eye.normal()), bits(eye.mask())]
 }
 
 #[test]
