@@ -1,202 +1,252 @@
-//! Contact forces against Newton's laws, in a running simulation.
+//! Contact forces, points and times in a running simulation, against Newton's laws and closed forms.
 
-use crate::sensors::worlds::{G, assert_near, cfg, cube, joint, link, robot, row};
-use kinetoscope::ndarray::{Axis, array};
+use super::worlds::{G, add_robot, assert_near, ball, cfg, cube, fixed, joint, link, pose_in, row, sim};
+use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::Cone;
 use nalgebra::Vector3;
+use testkit::worlds;
 
 /// Rounding of forces of tens of newtons, from velocities divided by the step of 5 ms.
 const EXACT: f64 = 1e-9;
+/// Relative error of forces at rest. Contacts forget motion with their time constant of 20 ms: after five seconds e^-250 of
+/// it is left. The rest is the solver's tolerance of 1e-8.
+const REST: f64 = 1e-8;
+/// Distance of contact points, which are in the middle of the overlap, from the face \[m\]. At rest MuJoCo's contact has
+/// `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 / (0.95 * 0.02)² = 2490 /s²: r is 0.44 mm at most, half of it 0.22 mm.
+const OVERLAP: f64 = 2.2e-4;
+
+fn strings(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_string()).collect()
+}
+
+fn velocity(sim: &SimulationManager, object: ObjectId) -> Vector3<f64> {
+    row(&sim.rigid_object(object).get_velocity(), 0, 0)
+}
 
 /// In every step of a fall, a bounce and the rest after it: the force of the contacts is what the change of velocity needs,
 /// `m (dv / dt - g)`, and at rest it is the weight.
 #[test]
-fn forces_are_those_that_change_the_velocity() {
-    let mut sim = SimulationManager::new(cfg(1)).unwrap();
+fn newtons_second_law() {
+    let mut sim = sim(1);
     let (mass, dt) = (2.5, sim.cfg().physics_dt);
-    let box_ = sim.add_rigid_object(cube("box", mass, 0.2, [0.0, 0.0, 0.3])).unwrap();
+    let box_ = sim.add_rigid_object(cube("box", 0.2, mass, [0.0, 0.0, 0.3])).unwrap();
     let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
-    let mut before = row(&sim.rigid_object(box_).get_velocity(), 0, 0);
+    let mut before = velocity(&sim, box_);
     let (mut touched, mut flying) = (0, 0);
     for _ in 0..600 {
         sim.update(1);
-        let velocity = row(&sim.rigid_object(box_).get_velocity(), 0, 0);
-        let expected = mass * ((velocity - before) / dt - Vector3::new(0.0, 0.0, -G));
-        let sensor = sim.sensor(id).unwrap();
-        assert_near(sensor.total_forces_w().iter().copied(), expected.as_slice(), EXACT * 1e3);
+        let after = velocity(&sim, box_);
+        let expected = mass * ((after - before) / dt - Vector3::new(0.0, 0.0, -G));
+        assert_near(sim.sensor(id).unwrap().total_forces_w(), expected.as_slice(), EXACT * 1e3);
         touched += u32::from(expected.z > 1.0);
         flying += u32::from(expected.z.abs() < 1e-6);
-        before = velocity;
+        before = after;
     }
     assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
-    let net = sim.sensor(id).unwrap().net_forces_w().to_owned();
     // What is left of the motion after two seconds is far below a thousandth of gravity.
-    assert_near(net, &[0.0, 0.0, mass * G], 1e-3 * mass * G);
+    assert_near(sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], 1e-3 * mass * G);
 }
 
 /// A slope of 20 degrees, as a tilted gravity: the normal force is m g cos, friction m g sin. Net forces are normal ones
 /// only: with friction in them they would have an x component.
 #[test]
-fn on_a_slope_normal_force_and_friction_are_told_apart() {
+fn normal_and_friction() {
     let (sin, cos) = 20.0_f64.to_radians().sin_cos();
     let gravity = G * Vector3::new(sin, 0.0, -cos);
     let settings = SimulationManagerCfg { gravity, cone: Cone::Elliptic, impratio: 10.0, ..cfg(1) };
-    let mut sim = SimulationManager::new(settings).unwrap();
+    let mut sim = worlds::sim(settings);
     let mass = 1.5;
-    sim.add_rigid_object(cube("box", mass, 0.2, [0.0, 0.0, 0.1])).unwrap();
-    let watch =
-        ContactSensorCfg { track_contact_points: true, filters: vec!["ground".into()], ..ContactSensorCfg::of("box") };
+    sim.add_rigid_object(cube("box", 0.2, mass, [0.0, 0.0, 0.1])).unwrap();
+    let filters = strings(&["ground"]);
+    let watch = ContactSensorCfg { track_contact_points: true, filters, ..ContactSensorCfg::of("box") };
     let id = sim.add_sensor("contact", watch).unwrap();
     sim.update(1000);
     let sensor = sim.sensor(id).unwrap();
     let weight = mass * G;
     // At rest up to a creep that changes by less than a thousandth of gravity.
     let near = 1e-3 * weight;
-    assert_near(sensor.net_forces_w().to_owned(), &[0.0, 0.0, weight * cos], near);
-    assert_near(sensor.friction_forces_w().to_owned(), &[-weight * sin, 0.0, 0.0], near);
-    assert_near(sensor.total_forces_w().to_owned(), &[-weight * sin, 0.0, weight * cos], near);
+    assert_near(sensor.net_forces_w(), &[0.0, 0.0, weight * cos], near);
+    assert_near(sensor.friction_forces_w(), &[-weight * sin, 0.0, 0.0], near);
+    assert_near(sensor.total_forces_w(), &[-weight * sin, 0.0, weight * cos], near);
     assert_eq!(sensor.net_forces_w()[(0, 0, 0)], 0.0, "the normal of the ground is z, to the last bit");
-    assert_eq!(sensor.force_matrix_w().iter().collect::<Vec<_>>(), sensor.net_forces_w().iter().collect::<Vec<_>>());
+    assert!(sensor.force_matrix_w().iter().eq(sensor.net_forces_w()));
     let points = sensor.contact_points_w().unwrap();
     assert!(points[(0, 0, 2)].abs() < 0.01 && sensor.contact_counts().unwrap()[(0, 0)] >= 3.0, "{points}");
 }
 
-/// Three boxes on top of each other, every pair at once: what one exerts on another is minus what the other exerts on it.
-#[test]
-fn pairs_of_bodies_act_and_react() {
-    let mut sim = SimulationManager::new(cfg(2)).unwrap();
-    let masses = [3.0, 2.0, 1.0];
-    for (k, mass) in masses.into_iter().enumerate() {
-        sim.add_rigid_object(cube(&format!("box{k}"), mass, 0.2, [0.0, 0.0, 0.1 + 0.2 * k as f64])).unwrap();
+fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
+    let filters = strings(filters);
+    ContactSensorCfg {
+        filters,
+        track_friction_forces: true,
+        track_contact_points: true,
+        ..ContactSensorCfg::of(bodies)
     }
-    let filters = vec!["box0".into(), "box1".into(), "box2".into(), "ground".into(), "box.".into()];
-    let id = sim.add_sensor("contact", ContactSensorCfg { filters, ..ContactSensorCfg::of("box.") }).unwrap();
-    sim.update(1000);
-    let sensor = sim.sensor(id).unwrap();
-    let matrix = sensor.force_matrix_w();
-    for env in 0..2 {
-        for a in 0..3 {
-            for b in 0..3 {
-                for k in 0..3 {
-                    // The same sums of the same contacts, in the same order.
-                    assert_eq!(matrix[(env, a, b, k)], -matrix[(env, b, a, k)]);
-                }
-            }
-            let above: f64 = masses[a..].iter().sum();
-            let below = if a == 0 { 3 } else { a - 1 };
-            assert_near([matrix[(env, a, below, 2)]], &[above * G], 1e-3 * above * G);
-            assert_near([sensor.net_forces_w()[(env, a, 2)]], &[masses[a] * G], 1e-3 * above * G);
-            let others: f64 = (0..3).map(|b| matrix[(env, a, b, 2)]).sum();
-            assert_near([matrix[(env, a, 4, 2)]], &[others], EXACT * 1e2);
+}
+
+/// A box of 1.5 kg on a plank that leans. The plank holds it with m g cos along its normal and m g sin up the slope, at the
+/// middle of the face that lies on it. The control is a level plank, without friction.
+#[test]
+fn leaning_plank() {
+    for degrees in [20.0_f64, 0.0] {
+        let mut sim = sim(2);
+        let lean = from_xyz_rpy([0.0, 0.0, 1.0], [0.0, -degrees.to_radians(), 0.0]);
+        let plank = fixed(worlds::object("plank", ObjectShape::Box { size: [2.0, 1.0, 0.1] }, [0.0; 3]));
+        sim.add_rigid_object(RigidObjectCfg { init_pose: lean, ..plank }).unwrap();
+        let on_top = lean * Pose::translation(0.3, -0.1, 0.05 + 0.1);
+        let box_ = RigidObjectCfg { init_pose: on_top, ..cube("box", 0.2, 1.5, [0.0; 3]) };
+        let box_ = sim.add_rigid_object(box_).unwrap();
+        let id = sim.add_sensor("contact", pairs("box", &["plank", "ground"])).unwrap();
+        sim.update(1000);
+        let sensor = sim.sensor(id).unwrap();
+        let counts = sensor.contact_count_matrix().unwrap();
+        assert_eq!((counts[(0, 0, 1)], counts[(0, 0, 0)]), (0.0, counts[(1, 0, 0)]));
+        let matrices = [sensor.force_matrix_w(), sensor.friction_matrix_w().unwrap()];
+        let [normal_force, friction, point] =
+            [matrices[0], matrices[1], sensor.contact_point_matrix_w().unwrap()].map(|matrix| {
+                assert!(matrix.index_axis(Axis(2), 1).iter().all(|x| *x == 0.0), "the ground is a metre below");
+                let plank = matrix.index_axis(Axis(2), 0);
+                assert_eq!(plank.index_axis(Axis(0), 0), plank.index_axis(Axis(0), 1), "the same in both environments");
+                Vector3::from_fn(|k, _| plank[(0, 0, k)])
+            });
+        let weight = 1.5 * G;
+        if degrees == 0.0 {
+            assert_near(&normal_force, &[0.0, 0.0, weight], REST * weight);
+            assert!(friction.norm() < REST * weight, "{friction}");
+            continue;
         }
-        assert_eq!((matrix[(env, 1, 3, 2)], matrix[(env, 0, 2, 2)]), (0.0, 0.0), "these do not touch");
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let (normal, up_the_slope) = (Vector3::new(-sin, 0.0, cos), Vector3::new(cos, 0.0, sin));
+        assert_near(&normal_force, (weight * cos * normal).as_slice(), REST * weight);
+        assert_near(&friction, (weight * sin * up_the_slope).as_slice(), REST * weight);
+        assert_eq!(counts[(0, 0, 0)], 4.0, "the corners of the face");
+        let pose = pose_in(&sim.rigid_object(box_).get_pose(), 0);
+        let face = pose * nalgebra::Point3::new(0.0, 0.0, -0.1);
+        assert_near(&point, face.coords.as_slice(), OVERLAP);
+        assert!((point - pose.translation.vector).norm() > 0.09, "the control: not the middle of the box");
+    }
+}
+
+fn vector(array: &Array3<f64>, a: usize, b: usize) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| array[(a, b, k)])
+}
+
+/// Three boxes on top of each other under a gravity that leans, every pair at once: actions and reactions are equal to the
+/// last bit, at the same points; normal force and friction together are what everything above needs to move as it does,
+/// `m (dv / dt - g)`.
+#[test]
+fn action_and_reaction() {
+    let (sin, cos) = 10.0_f64.to_radians().sin_cos();
+    let gravity = G * Vector3::new(sin, 0.0, -cos);
+    let mut sim = worlds::sim(SimulationManagerCfg { gravity, ..cfg(1) });
+    let (masses, dt) = ([3.0, 2.0, 1.0], sim.cfg().physics_dt);
+    let boxes = [0, 1, 2].map(|k| {
+        let at = [0.0, 0.0, 0.1 + 0.2 * k as f64];
+        sim.add_rigid_object(cube(&format!("box{k}"), 0.2, masses[k], at)).unwrap()
+    });
+    let id = sim.add_sensor("contact", pairs("box.", &["box0", "box1", "box2", "ground", "box."])).unwrap();
+    sim.update(999);
+    let before = boxes.map(|id| velocity(&sim, id));
+    sim.update(1);
+    let after = boxes.map(|id| velocity(&sim, id));
+    let needed: Vec<Vector3<f64>> = (0..3).map(|k| masses[k] * ((after[k] - before[k]) / dt - gravity)).collect();
+    let sensor = sim.sensor(id).unwrap();
+    let matrices = [sensor.force_matrix_w(), sensor.friction_matrix_w().unwrap()];
+    let [force, friction, points] = [matrices[0], matrices[1], sensor.contact_point_matrix_w().unwrap()]
+        .map(|matrix| matrix.index_axis_move(Axis(0), 0).to_owned());
+    let counts = sensor.contact_count_matrix().unwrap().index_axis_move(Axis(0), 0).to_owned();
+    for a in 0..3 {
+        for b in 0..3 {
+            // The same sums of the same contacts, in the same order.
+            assert_eq!(vector(&force, a, b), -vector(&force, b, a));
+            assert_eq!(vector(&friction, a, b), -vector(&friction, b, a));
+            assert_eq!((vector(&points, a, b), counts[(a, b)]), (vector(&points, b, a), counts[(b, a)]));
+        }
+        let below = if a == 0 { 3 } else { a - 1 };
+        let above = needed[a..].iter().sum::<Vector3<f64>>();
+        // Rounding of 60 N in some hundred sums, and of velocities of 1e-2 m/s divided by the step of 5 ms: 1e-12.
+        assert_near(&(vector(&force, a, below) + vector(&friction, a, below)), above.as_slice(), 1e-11);
+        assert_near(sensor.total_forces_w().slice(s![0, a, ..]), needed[a].as_slice(), 1e-11);
+        let others = (0..3).map(|b| vector(&force, a, b)).sum::<Vector3<f64>>();
+        assert_near(&vector(&force, a, 4), others.as_slice(), EXACT * 1e2);
+        // Up the slope, which is -x. The stack still rocks a little: by what moves the boxes, and by the lean of their faces,
+        // which turns normal forces, but for a twentieth at most.
+        let weight: f64 = masses[a..].iter().sum::<f64>() * G;
+        let rocking = (above + weight / G * gravity).x.abs() + force[(a, below, 0)].abs();
+        assert!(rocking < 0.05 * weight * sin, "{rocking} of {weight}");
+        assert_near(&[friction[(a, below, 0)]], &[-weight * sin], rocking + 1e-11);
+        let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).get_pose(), 0, 0);
+        // What lies on a contact presses it with up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
+        assert!((at.z + 0.1).abs() < 2.5 * OVERLAP && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
+        let net = sensor.friction_forces_w();
+        let all = vector(&friction, a, 3) + vector(&friction, a, 4);
+        assert_near(net.slice(s![0, a, ..]), all.as_slice(), 1e-9);
+        assert!((net[(0, a, 0)] - friction[(a, below, 0)]).abs() > 1.0 || a == 2, "the control: a pair is not the sum");
+    }
+    for (a, b) in [(0, 2), (1, 3)] {
+        let none = Vector3::zeros();
+        assert_eq!((counts[(a, b)], vector(&force, a, b), vector(&points, a, b)), (0.0, none, none), "no contact");
     }
 }
 
 /// A foot behind a fixed joint is a body of its own: it carries the robot, and the body that it is fused to nothing.
 #[test]
-fn fused_feet_report_their_own_contacts() {
-    let files = tempfile::tempdir().unwrap();
-    let ball = r#"<collision><geometry><sphere radius="0.05"/></geometry></collision>"#;
+fn fused_feet() {
     let mut content = link("base", 4.0, 0.1, [0.0; 3], "");
     for (k, at) in [[0.2, 0.0, -0.3], [-0.1, 0.17, -0.3], [-0.1, -0.17, -0.3]].into_iter().enumerate() {
-        content += &link(&format!("FOOT{k}"), 0.1, 1e-4, [0.0; 3], ball);
-        content += &joint(&format!("fixed{k}"), "fixed", &format!("FOOT{k}"), at, "0 0 1");
+        let (foot, ball) = (format!("FOOT{k}"), testkit::urdf::collision(r#"<sphere radius="0.05"/>"#, [0.0; 3]));
+        content += &link(&foot, 0.1, 1e-4, [0.0; 3], &ball);
+        content += &joint(&format!("fixed{k}"), "fixed", ["base", &foot], at, "0 0 1");
     }
-    let mut sim = SimulationManager::new(cfg(1)).unwrap();
-    let start =
-        RobotCfg { init_pose: Pose::translation(0.0, 0.0, 0.35), ..robot(files.path(), "dog", &content, false) };
-    let dog = sim.add_robot(start).unwrap();
-    let watch = ContactSensorCfg { bodies: vec![".*FOOT.".into(), "dog/base".into()], ..Default::default() };
-    let id = sim.add_sensor("feet", ContactSensorCfg { track_pose: true, ..watch }).unwrap();
+    let mut sim = sim(1);
+    let dog = add_robot(&mut sim, "dog", &content, |cfg| {
+        (cfg.fix_base, cfg.init_pose) = (false, Pose::translation(0.0, 0.0, 0.35));
+    });
+    let bodies = strings(&[".*FOOT.", "dog/base"]);
+    let id = sim.add_sensor("feet", ContactSensorCfg { bodies, track_pose: true, ..Default::default() }).unwrap();
     sim.update(1000);
     let sensor = sim.sensor(id).unwrap();
     assert_eq!(sensor.body_names(), ["dog/FOOT0", "dog/FOOT1", "dog/FOOT2", "dog/base"]);
     let net = sensor.net_forces_w();
     let weight = 4.3 * G;
-    assert_near([(0..3).map(|foot| net[(0, foot, 2)]).sum::<f64>()], &[weight], 1e-3 * weight);
+    assert_near(&[(0..3).map(|foot| net[(0, foot, 2)]).sum::<f64>()], &[weight], 1e-3 * weight);
     assert!((0..3).all(|foot| net[(0, foot, 2)] > 0.2 * weight), "{net}");
-    assert_eq!(net.index_axis(Axis(1), 3).iter().copied().collect::<Vec<_>>(), [0.0; 3]);
+    assert!(net.index_axis(Axis(1), 3).iter().all(|force| *force == 0.0));
     let pose = sim.robot(dog).link_pose("FOOT1").unwrap();
-    assert_eq!(sensor.pos_w().unwrap().index_axis(Axis(1), 1), pose.slice(kinetoscope::ndarray::s![.., ..3]));
-}
-
-/// A ball that falls from `z` is at `z - g dt² k (k + 1) / 2` after k steps (semi-implicit Euler), and touches in the first
-/// step that begins below its radius: air times are exact to one step, at any period and for any number of steps at once.
-#[test]
-fn air_times_are_exact_to_one_step() {
-    let (radius, height) = (0.1, 0.5);
-    for (period, stride) in [(1_u32, 1_u32), (10, 1), (10, 7)] {
-        let mut sim = SimulationManager::new(cfg(2)).unwrap();
-        let dt = sim.cfg().physics_dt;
-        let ball =
-            RigidObjectCfg { shape: ObjectShape::Sphere { radius }, ..cube("ball", 1.0, 0.1, [0.0, 0.0, height]) };
-        let ball = sim.add_rigid_object(ball).unwrap();
-        let sampling = SamplingCfg::every(f64::from(period) * dt);
-        let watch = ContactSensorCfg { track_air_time: true, sampling, ..ContactSensorCfg::of("ball") };
-        let id = sim.add_sensor("contact", watch).unwrap();
-        // Environment 1 stays far up.
-        let up = array![[0.0, 0.0, 50.0, 1.0, 0.0, 0.0, 0.0]];
-        sim.rigid_object_mut(ball).write_pose(&up, Some(&[EnvId(1)])).unwrap();
-        let fall = |k: u32| height - G * dt * dt * f64::from(k) * f64::from(k + 1) / 2.0;
-        let first = (0..).find(|&k| fall(k) < radius).unwrap();
-        let mut told = Vec::new();
-        let mut step = 0;
-        while step < first + 30 {
-            sim.update(stride);
-            step += stride;
-            let sensor = sim.sensor(id).unwrap();
-            if sensor.first_contact().unwrap()[(0, 0)] {
-                told.push(step);
-                assert_eq!(sensor.last_air_time().unwrap()[(0, 0)], f64::from(first) * dt, "period {period}");
-                let since = f64::from(step / period * period - first);
-                assert_near(sensor.current_contact_time().unwrap().row(0).to_vec(), &[since * dt], 1e-12);
-            }
-            assert!(!sensor.first_contact().unwrap()[(1, 0)]);
-            assert_eq!(sensor.current_contact_time().unwrap()[(1, 0)], 0.0, "environments are apart");
-            assert_eq!(sensor.net_forces_w()[(1, 0, 2)], 0.0);
-        }
-        // The step that begins at `first` is told by the next measurement.
-        let due = (first + 1).div_ceil(period) * period;
-        let expected: Vec<u32> =
-            (1..).map(|n| n * stride).take_while(|s| *s < due + period).filter(|s| *s >= due).collect();
-        assert_eq!(told[..expected.len()], expected, "period {period}, stride {stride}, contact begins at {first}");
-    }
+    assert_eq!(sensor.pos_w().unwrap().index_axis(Axis(1), 1), pose.slice(s![.., ..3]));
 }
 
 /// Right after a write, forces are those of the state that was written, and so are their stamps.
 #[test]
-fn forces_after_a_write_belong_to_what_was_written() {
-    let mut sim = SimulationManager::new(cfg(2)).unwrap();
-    let box_ = sim.add_rigid_object(cube("box", 1.0, 0.2, [0.0, 0.0, 5.0])).unwrap();
+fn forces_after_a_write() {
+    let mut sim = sim(2);
+    let box_ = sim.add_rigid_object(cube("box", 0.2, 1.0, [0.0, 0.0, 5.0])).unwrap();
     let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+    let stamps = |sim: &SimulationManager| sim.sensor(id).unwrap().force_stamps().to_owned();
     sim.update(10);
-    let stamps = |sim: &SimulationManager| {
-        let sensor = sim.sensor(id).unwrap();
-        (sensor.stamps().to_vec(), sensor.force_stamps().to_vec())
-    };
-    assert_near(stamps(&sim).1, &[0.045, 0.045], 1e-12);
+    assert_near(&stamps(&sim), &[0.045, 0.045], 1e-12);
     let down = array![[0.0, 0.0, 0.0995, 1.0, 0.0, 0.0, 0.0]];
     sim.rigid_object_mut(box_).write_pose(&down, Some(&[EnvId(1)])).unwrap();
     let written = sim.sensor(id).unwrap().net_forces_w().to_owned();
     assert!(written[(1, 0, 2)] > 1.0 && written[(0, 0, 2)] == 0.0, "{written}");
-    assert_near(stamps(&sim).1, &[0.045, 0.05], 1e-12);
+    assert_near(&stamps(&sim), &[0.045, 0.05], 1e-12);
     // The next step solves the same state.
     sim.update(1);
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], written[(1, 0, 2)]);
-    assert_near(stamps(&sim).1, &[0.05, 0.05], 1e-12);
+    assert_near(&stamps(&sim), &[0.05, 0.05], 1e-12);
     sim.reset(Some(&[EnvId(1)])).unwrap();
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], 0.0, "up again");
-    assert_near(stamps(&sim).1, &[0.05, 0.0], 1e-12);
+    assert_near(&stamps(&sim), &[0.05, 0.0], 1e-12);
 }
 
-/// RK4 solves its steps in the middle of them; what sensors get is solved for their beginning, as with Euler.
+/// RK4 solves its steps in the middle of them; sensors get forces solved for the beginning, as with Euler.
 #[test]
-fn forces_of_rk4_are_those_of_the_beginning_of_the_step() {
+fn forces_of_rk4() {
     let first = |integrator| {
-        let mut sim = SimulationManager::new(SimulationManagerCfg { integrator, ..cfg(1) }).unwrap();
-        sim.add_rigid_object(cube("box", 2.0, 0.2, [0.0, 0.0, 0.0995])).unwrap();
+        let mut sim = worlds::sim(SimulationManagerCfg { integrator, ..cfg(1) });
+        sim.add_rigid_object(cube("box", 0.2, 2.0, [0.0, 0.0, 0.0995])).unwrap();
         let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
         sim.update(1);
         let sensor = sim.sensor(id).unwrap();
@@ -207,12 +257,12 @@ fn forces_of_rk4_are_those_of_the_beginning_of_the_step() {
     assert_eq!((force, stamp), first(Integrator::Euler));
 }
 
-/// An environment that is put aside measures nothing more until it is reset, and the others do not notice.
+/// A diverged environment measures nothing more until it is reset, and the others do not notice.
 #[test]
-fn a_diverged_environment_keeps_its_last_measurement() {
+fn diverged_environment() {
     let forces = |blow_up: bool| {
-        let mut sim = SimulationManager::new(cfg(2)).unwrap();
-        let box_ = sim.add_rigid_object(cube("box", 1.0, 0.2, [0.0, 0.0, 0.0995])).unwrap();
+        let mut sim = sim(2);
+        let box_ = sim.add_rigid_object(cube("box", 0.2, 1.0, [0.0, 0.0, 0.0995])).unwrap();
         let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
         let imu = sim.add_sensor("imu", ImuCfg::on("box")).unwrap();
         sim.update(10);
@@ -231,19 +281,17 @@ fn a_diverged_environment_keeps_its_last_measurement() {
         if blow_up {
             let values = |sim: &SimulationManager| {
                 let (contact, imu) = (sim.sensor(id).unwrap(), sim.sensor(imu).unwrap());
-                let numbers = contact.net_forces_w().index_axis_move(Axis(0), 1).iter().copied().collect::<Vec<f64>>();
-                let imu = [imu.quat_w(), imu.lin_acc_b(), imu.lin_vel_b()];
-                numbers
-                    .into_iter()
-                    .chain(imu.iter().flat_map(|a| a.row(1).to_vec()))
-                    .map(f64::to_bits)
-                    .collect::<Vec<_>>()
+                let mut values: Vec<f64> = contact.net_forces_w().index_axis(Axis(0), 1).iter().copied().collect();
+                for readings in [imu.quat_w(), imu.lin_acc_b(), imu.lin_vel_b()] {
+                    values.extend(readings.row(1));
+                }
+                values
             };
             let last = values(&sim);
-            assert!(last.iter().all(|bits| f64::from_bits(*bits).is_finite()));
-            // Nor does a write to an environment that is put aside change what is read of it.
+            assert!(last.iter().all(|value| value.is_finite()));
+            // Nor does a write to a diverged environment change what is read of it.
             sim.rigid_object_mut(box_).write_velocity(&array![[0.0; 6]], Some(&[EnvId(1)])).unwrap();
-            assert_eq!(values(&sim), last, "the last measurement stays");
+            testkit::bits::assert_same_bits("the last measurement", &values(&sim), &last);
             let late = sim.add_sensor("late", ImuCfg::on("box")).unwrap();
             assert!(sim.sensor(late).unwrap().quat_w().iter().all(|q| q.is_finite()), "a sensor that comes later");
             let sensor = sim.sensor(id).unwrap();
@@ -255,4 +303,142 @@ fn a_diverged_environment_keeps_its_last_measurement() {
         told
     };
     assert_eq!(forces(true), forces(false));
+}
+
+/// A history holds the measurements since the reset of its environment, newest first, and zeros after them.
+#[test]
+fn history_and_reset() {
+    const T: usize = 4;
+    let mut sim = sim(3);
+    sim.add_rigid_object(cube("box", 0.2, 2.0, [0.0, 0.0, 0.0995])).unwrap();
+    let sampling = SamplingCfg { history_length: T, ..SamplingCfg::every(0.01) };
+    let watch = ContactSensorCfg { sampling, filters: strings(&["ground"]), ..ContactSensorCfg::of("box") };
+    let id = sim.add_sensor("contact", watch).unwrap();
+    // Vertical forces and stamps since the reset, newest first.
+    let mut told: [Vec<(f64, f64)>; 3] = Default::default();
+    let check = |sim: &SimulationManager, told: &[Vec<(f64, f64)>; 3]| {
+        let sensor = sim.sensor(id).unwrap();
+        let (net, pairs) = (sensor.net_forces_w_history(), sensor.force_matrix_w_history());
+        for (env, told) in told.iter().enumerate() {
+            assert_eq!(sensor.history_filled(env), told.len().min(T));
+            for age in 0..T {
+                let (force, stamp) = told.get(age).copied().unwrap_or_default();
+                let found = [net[(env, age, 0, 2)], pairs[(env, age, 0, 0, 2)], sensor.stamp_history()[(env, age)]];
+                assert_eq!(found, [force, force, stamp], "environment {env}, age {age}");
+            }
+        }
+    };
+    for step in 1..=40 {
+        sim.update(1);
+        let sensor = sim.sensor(id).unwrap();
+        for (env, told) in told.iter_mut().enumerate() {
+            if sensor.sample_counts()[env] as usize > told.len() {
+                told.insert(0, (sensor.net_forces_w()[(env, 0, 2)], sensor.stamps()[env]));
+            }
+        }
+        check(&sim, &told);
+        // One in the middle of a period, then two others.
+        let reset: &[EnvId] = match step {
+            13 => &[EnvId(1)],
+            26 => &[EnvId(2), EnvId(0)],
+            _ => continue,
+        };
+        sim.reset(Some(reset)).unwrap();
+        reset.iter().for_each(|env| told[env.0].clear());
+        check(&sim, &told);
+    }
+    assert_eq!(told.each_ref().map(Vec::len), [7, 13, 7], "27 steps since a reset are 13 periods, 14 are 7");
+    assert!(told[1].iter().all(|(force, _)| *force > G), "there was something to remember");
+}
+
+/// Two balls that bounce, from different heights. A fall from `z` is at `z - g dt² k (k + 1) / 2` after k steps
+/// (semi-implicit Euler), and touches in the first step that begins below the radius. After that the judge is Newton: the
+/// ground pushed in the steps that changed the velocity more than gravity does. Times of all phases in the air and on the
+/// ground are exact to the step, at any period and stride, and every beginning is reported once.
+#[test]
+fn bounces() {
+    let heights = [0.6, 0.9];
+    for (period, stride) in [(1_u32, 1_u32), (5, 1), (5, 3), (10, 1), (10, 7)] {
+        let world = || {
+            let mut sim = sim(2);
+            let ball = RigidObjectCfg { restitution: Some(0.8), ..ball("ball", 0.1, 1.0, [0.0, 0.0, heights[0]]) };
+            let ball = sim.add_rigid_object(ball).unwrap();
+            let up = array![[0.0, 0.0, heights[1], 1.0, 0.0, 0.0, 0.0]];
+            sim.rigid_object_mut(ball).write_pose(&up, Some(&[EnvId(1)])).unwrap();
+            (sim, ball)
+        };
+        // The same world without a sensor, step by step.
+        let ((mut sim, ball), (mut judge, other)) = (world(), world());
+        let dt = sim.cfg().physics_dt;
+        let sampling = SamplingCfg::every(f64::from(period) * dt);
+        let watch = ContactSensorCfg { track_air_time: true, sampling, ..ContactSensorCfg::of("ball") };
+        let id = sim.add_sensor("contact", watch).unwrap();
+        let first = heights.map(|height| {
+            let fall = |k: u32| height - G * dt * dt * f64::from(k) * f64::from(k + 1) / 2.0;
+            (0..).find(|&k| fall(k) < 0.1).unwrap()
+        });
+        let mut speed: Array2<f64> = Array2::zeros((2, 6));
+        // Of each environment: does it touch, since how many steps, and the lengths of finished phases [air, contact].
+        let mut phases = [(false, 0_u32, [0_u32; 2]); 2];
+        let mut measured = phases;
+        let (mut begun, mut told) = ([[0_u32; 2]; 2], [[0_u32; 2]; 2]);
+        let (mut told_at, mut step) = ([const { Vec::new() }; 2], 0_u32);
+        while step < 600 {
+            sim.update(stride);
+            for _ in 0..stride {
+                step += 1;
+                judge.update(1);
+                let now = judge.rigid_object(other).get_velocity();
+                for (env, (touches, since, last)) in phases.iter_mut().enumerate() {
+                    // One newton on one kilogram.
+                    let pushed = (now[(env, 2)] - speed[(env, 2)]) / dt + G > 1.0;
+                    if pushed != *touches {
+                        assert!(begun[env] != [0; 2] || *since == first[env], "{since} steps of fall, not {first:?}");
+                        last[usize::from(*touches)] = *since;
+                        begun[env][usize::from(pushed)] += 1;
+                        (*touches, *since) = (pushed, 0);
+                    }
+                    *since += 1;
+                }
+                speed = now;
+                if step.is_multiple_of(period) {
+                    measured = phases;
+                }
+            }
+            let sensor = sim.sensor(id).unwrap();
+            assert_eq!(sim.rigid_object(ball).get_velocity(), speed, "the same motion");
+            let flags = [sensor.first_air().unwrap(), sensor.first_contact().unwrap()];
+            for env in 0..2 {
+                let (touches, since, last) = measured[env];
+                let [air, contact] = if touches { [0, since] } else { [since, 0] };
+                let at = |times: Option<ArrayView2<'_, f64>>| times.unwrap()[(env, 0)];
+                let found = [sensor.current_air_time(), sensor.current_contact_time()].map(at);
+                assert_eq!(found, [air, contact].map(|n| f64::from(n) * dt), "step {step}");
+                let found = [sensor.last_air_time(), sensor.last_contact_time()].map(at);
+                assert_eq!(found, last.map(|n| f64::from(n) * dt), "step {step}");
+                if flags[1][(env, 0)] {
+                    told_at[env].push(step);
+                }
+                if step.is_multiple_of(period) {
+                    (0..2).for_each(|kind| told[env][kind] += u32::from(flags[kind][(env, 0)]));
+                }
+            }
+        }
+        for env in 0..2 {
+            assert!(begun[env][1] > 3, "it bounces: {begun:?}");
+            // Each beginning once; several within one period are told together, and with strides some are told between.
+            if (period, stride) == (1, 1) {
+                assert_eq!(told[env], begun[env]);
+            } else if (period, stride) == (5, 1) {
+                assert!(told[env][1] > 3 && told[env][1] <= begun[env][1], "{told:?} of {begun:?}");
+            }
+            // The step that begins at `first` is reported by the next measurement, until the one after it.
+            let due = (first[env] + 1).div_ceil(period) * period;
+            let expected: Vec<u32> =
+                (1..).map(|n| n * stride).take_while(|s| *s < due + period).filter(|s| *s >= due).collect();
+            assert_eq!(told_at[env][..expected.len()], expected, "period {period}, stride {stride}");
+        }
+        let last = sim.sensor(id).unwrap().last_air_time().unwrap();
+        assert_ne!(last[(0, 0)], last[(1, 0)], "the control: environments bounce differently");
+    }
 }

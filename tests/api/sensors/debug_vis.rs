@@ -1,6 +1,6 @@
-//! What sensors show, against closed forms, and the switch for it.
+//! Markers of sensors, against closed forms, and the switch for them.
 
-use crate::sensors::worlds::{G, cfg, cube, joint, link, robot};
+use super::worlds::{G, add_robot, cfg, cube, joint, link, look_at, sim};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, MarkerKind};
 use kinetoscope::sensors::SensorCfg;
@@ -9,17 +9,16 @@ use nalgebra::Vector3;
 
 /// A load that hangs from a crane, and a box that has come to rest on the ground.
 fn world() -> SimulationManager {
-    let files = tempfile::tempdir().unwrap();
     let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("load", 3.0, 0.01, [0.0, 0.0, -0.4], "");
-    content += &joint("pivot", "continuous", "load", [0.0, 0.0, 2.0], "0 1 0");
-    let mut sim = SimulationManager::new(cfg(2)).unwrap();
-    sim.add_robot(robot(files.path(), "crane", &content, true)).unwrap();
-    sim.add_rigid_object(cube("box", 2.0, 0.2, [1.0, 0.5, 0.1])).unwrap();
+    content += &joint("pivot", "continuous", ["base", "load"], [0.0, 0.0, 2.0], "0 1 0");
+    let mut sim = sim(2);
+    add_robot(&mut sim, "crane", &content, |_| ());
+    sim.add_rigid_object(cube("box", 0.2, 2.0, [1.0, 0.5, 0.1])).unwrap();
     sim.update(400);
     sim
 }
 
-/// What one sensor shows in environment 1; nothing where it is not told to.
+/// Markers of one sensor in environment 1; none where `debug_vis` is off.
 fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> {
     let mut sim = world();
     sim.add_sensor("quiet", cfg(false)).unwrap();
@@ -27,119 +26,119 @@ fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> 
     assert_eq!(sim.markers(), [], "off is off");
     sim.add_sensor("shown", cfg(true)).unwrap();
     sim.update(4);
-    let [first, second] = [0, 1].map(|env| {
-        let markers = sim.markers();
-        markers.into_iter().filter(|(of, _)| *of == EnvId(env)).map(|(_, m)| m).collect::<Vec<Marker>>()
-    });
-    assert_eq!(first.len(), second.len());
-    second
+    let of = |env| sim.markers().into_iter().filter(move |(of, _)| *of == EnvId(env)).map(|(_, marker)| marker);
+    assert_eq!(of(0).count(), of(1).count());
+    of(1).collect()
 }
 
-/// An arrow's tail and what it points out.
+fn wrench_of_load(debug_vis: bool) -> JointWrenchCfg {
+    JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() }
+}
+
+/// The tail of an arrow and its vector.
 fn arrow(marker: &Marker) -> (Vector3<f64>, Vector3<f64>) {
     let MarkerKind::Arrow { length, .. } = marker.kind else { panic!("{marker:?} is no arrow") };
-    (marker.pose.translation.vector, marker.pose.rotation * (Vector3::z() * f64::from(length)))
+    (place(marker), marker.pose.rotation * (Vector3::z() * f64::from(length)))
+}
+
+fn place(marker: &Marker) -> Vector3<f64> {
+    marker.pose.translation.vector
+}
+
+fn is_axes(marker: &Marker) -> bool {
+    matches!(marker.kind, MarkerKind::Axes { .. })
 }
 
 /// Lengths are in single precision: 2 m times 6e-8.
 #[track_caller]
-fn near((tail, vector): (Vector3<f64>, Vector3<f64>), at: [f64; 3], expected: [f64; 3], tolerance: f64) {
+fn assert_arrow(marker: &Marker, at: [f64; 3], expected: [f64; 3], tolerance: f64) {
+    let (tail, vector) = arrow(marker);
     let apart = (tail - Vector3::from(at)).norm().max((vector - Vector3::from(expected)).norm());
     assert!(apart < tolerance, "{tail} {vector}, not {at:?} {expected:?}");
 }
 
 #[test]
-fn an_imu_shows_its_frame_and_what_it_feels() {
-    let on = |debug_vis| {
-        let offset = Pose::translation(0.1, 0.2, 0.3);
-        ImuCfg { offset, debug_vis, ..ImuCfg::on("base") }
-    };
-    let markers = shown(on);
-    assert!(markers.len() == 2 && matches!(markers[0].kind, MarkerKind::Axes { .. }), "{markers:?}");
-    near(arrow(&markers[1]), [0.1, 0.2, 0.3], [0.0, 0.0, G / 20.0], 1e-6);
-}
-
-#[test]
-fn a_wrench_shows_what_carries_the_load() {
-    let on = |debug_vis| JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() };
-    let markers = shown(on);
-    // The load hangs: a force of its weight in the pivot, and no torque but what rounding leaves.
-    near(arrow(&markers[0]), [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
+fn imu_and_wrench() {
+    let offset = Pose::translation(0.1, 0.2, 0.3);
+    let markers = shown(|debug_vis| ImuCfg { offset, debug_vis, ..ImuCfg::on("base") });
+    assert!(markers.len() == 2 && is_axes(&markers[0]), "{markers:?}");
+    assert_arrow(&markers[1], [0.1, 0.2, 0.3], [0.0, 0.0, G / 20.0], 1e-6);
+    let markers = shown(wrench_of_load);
+    // The load hangs: a force of its weight in the pivot, and no torque except for rounding.
+    assert_arrow(&markers[0], [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
     assert!(markers[1..].iter().all(|torque| arrow(torque).1.norm() < 1e-6), "{markers:?}");
 }
 
+/// Nothing touches the load: its ball is green. The ball of the box is red, with an arrow.
 #[test]
-fn a_contact_sensor_shows_who_is_touched() {
+fn contacts() {
     let markers = shown(|debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box|load") });
-    // Nothing touches the load: red is the ball of the box, which has an arrow, green that of the load.
     let (balls, arrows): (Vec<&Marker>, Vec<&Marker>) =
         markers.iter().partition(|m| matches!(m.kind, MarkerKind::Sphere { .. }));
     let ball = |red: bool| {
-        let mut found = balls.iter().filter(|m| (m.rgba[0] > m.rgba[1]) == red);
-        let ball = found.next().expect("a ball of this colour");
-        assert!(found.next().is_none(), "{markers:?}");
-        ball.pose.translation.vector
+        let found: Vec<_> = balls.iter().filter(|m| (m.rgba[0] > m.rgba[1]) == red).collect();
+        assert_eq!(found.len(), 1, "{markers:?}");
+        place(found[0])
     };
     // The box has sunk into its soft contact by less than a millimetre, and rests to a thousandth of its weight.
     assert!((ball(true) - Vector3::new(1.0, 0.5, 0.1)).norm() < 1e-3, "{markers:?}");
     assert!((ball(false) - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-6, "{markers:?}");
     assert_eq!(arrows.len(), 1, "{markers:?}");
-    near(arrow(arrows[0]), [1.0, 0.5, 0.1], [0.0, 0.0, 2.0 * G / 500.0], 1e-3);
+    assert_arrow(arrows[0], [1.0, 0.5, 0.1], [0.0, 0.0, 2.0 * G / 500.0], 1e-3);
 }
 
 #[test]
-fn frames_and_rays_show_where_they_are() {
+fn frames_and_rays() {
     let targets = || vec![TargetFrameCfg::of("box"), TargetFrameCfg::of("load")];
     let frames = shown(|debug_vis| FrameTransformerCfg { debug_vis, ..FrameTransformerCfg::from("base", targets()) });
-    assert_eq!(frames.iter().filter(|m| matches!(m.kind, MarkerKind::Axes { .. })).count(), 3);
-    assert!((frames[2].pose.translation.vector - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-9);
-    let grid = Grid { resolution: 0.5, size: [0.5; 2], ..Grid::default() };
-    let rays = shown(|debug_vis| RayCasterCfg {
-        offset: Pose::translation(5.0, 5.0, 1.0),
-        pattern: grid.into(),
-        debug_vis,
-        ..Default::default()
-    });
-    let mut places: Vec<[f64; 3]> = rays.iter().map(|m| m.pose.translation.vector.into()).collect();
-    places.iter_mut().flatten().for_each(|x| *x = (*x * 1e6).round() / 1e6);
+    assert_eq!(frames.iter().filter(|marker| is_axes(marker)).count(), 3);
+    assert!((place(&frames[2]) - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-9);
+    let pattern = RayPattern::from(Grid { resolution: 0.5, size: [0.5; 2], ..Grid::default() });
+    let offset = Pose::translation(5.0, 5.0, 1.0);
+    let rays = shown(|debug_vis| RayCasterCfg { offset, pattern: pattern.clone(), debug_vis, ..Default::default() });
+    let mut places: Vec<[f64; 3]> = rays.iter().map(|m| place(m).map(|x| (x * 1e6).round() / 1e6).into()).collect();
     places.sort_by(|a, b| a.partial_cmp(b).unwrap());
     assert_eq!(places, [[4.75, 4.75, 0.0], [4.75, 5.25, 0.0], [5.25, 4.75, 0.0], [5.25, 5.25, 0.0]]);
 }
 
-/// A camera that looks at the origin from (1, 0, 1) along -x, drawn or made of rays.
-const EYE: Placement = Placement::LookAt { eye: [1.0, 0.0, 1.0], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] };
-
-/// A lens whose corners are half as far to the sides and three eighths as far up and down as they are away: the arrows end
-/// 0.3 m before the eye.
+/// A camera at (1, 0, 1) that looks along -x, of either kind. The corners of its image are half as far to the sides and three
+/// eighths as far up and down as they are away: the arrows end 0.3 m before the camera.
 #[test]
-fn cameras_show_what_their_pictures_cover() {
-    let extrinsics = || Extrinsics { placement: EYE, ..Default::default() };
+fn cameras() {
+    let extrinsics = || look_at([1.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
     let (width, height) = (40, 30);
     let intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 40.0, cx: 20.0, cy: 15.0 };
-    let raster = shown(|debug_vis| {
-        let (extrinsics, rest) = (extrinsics(), CameraCfg::default());
-        CameraCfg { width, height, intrinsics, extrinsics, debug_vis, ..rest }
+    let raster = shown(|debug_vis| CameraCfg {
+        width,
+        height,
+        intrinsics,
+        extrinsics: extrinsics(),
+        debug_vis,
+        ..Default::default()
     });
-    let rays = shown(|debug_vis| {
-        let (extrinsics, rest) = (extrinsics(), RayCasterCameraCfg::default());
-        RayCasterCameraCfg { width, height, intrinsics, extrinsics, debug_vis, ..rest }
+    let rays = shown(|debug_vis| RayCasterCameraCfg {
+        width,
+        height,
+        intrinsics,
+        extrinsics: extrinsics(),
+        debug_vis,
+        ..Default::default()
     });
-    assert_eq!(raster, rays, "placed alike, shown alike");
-    assert!(raster.len() == 5 && matches!(raster[0].kind, MarkerKind::Axes { .. }));
+    assert_eq!(raster, rays);
+    assert!(raster.len() == 5 && is_axes(&raster[0]));
     for (marker, (y, z)) in raster[1..].iter().zip([(-0.5, 0.375), (0.5, 0.375), (0.5, -0.375), (-0.5, -0.375)]) {
-        near(arrow(marker), [1.0, 0.0, 1.0], [-0.3, 0.3 * y, 0.3 * z], 1e-6);
+        assert_arrow(marker, [1.0, 0.0, 1.0], [-0.3, 0.3 * y, 0.3 * z], 1e-6);
     }
 }
 
-/// The switch is at hand while the simulation runs: what is shown is what a sensor shows that was configured so, wherever
-/// the bodies have come to meanwhile, and nothing of what is measured changes.
+/// Markers that are switched on while the simulation runs are those of a sensor that was configured so, wherever the bodies
+/// are by then, and no measurement changes.
 #[test]
-fn what_is_shown_can_be_switched_while_it_runs() {
+fn switch() {
     let mut sim = world();
     let contact = |debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box") };
-    let wrench = |debug_vis| JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() };
     let (off, on) = (sim.add_sensor("off", contact(false)).unwrap(), sim.add_sensor("on", contact(true)).unwrap());
-    let load = sim.add_sensor("load", wrench(false)).unwrap();
+    let load = sim.add_sensor("load", wrench_of_load(false)).unwrap();
     assert_eq!([sim.debug_vis(off).unwrap(), sim.debug_vis(on).unwrap()], [false, true]);
     sim.update(4);
     // Two environments with a ball and an arrow each.
@@ -149,7 +148,7 @@ fn what_is_shown_can_be_switched_while_it_runs() {
     assert_eq!(sim.markers(), []);
     sim.set_debug_vis(off, true).unwrap();
     assert_eq!(sim.markers(), of_on, "the same, of a sensor that was built without");
-    // What all but one show: without itself where it shows anything, all of them where it does not.
+    // Markers of all sensors but one.
     assert_eq!(sim.markers_beside(off), []);
     assert_eq!(sim.markers_beside(load), of_on);
     sim.set_debug_vis(load, true).unwrap();
@@ -159,24 +158,22 @@ fn what_is_shown_can_be_switched_while_it_runs() {
     assert_eq!(sim.markers_beside(load), of_on);
     sim.set_debug_vis(off, false).unwrap();
     assert_eq!(sim.markers(), of_load);
-    let (first, marker) = &sim.markers()[0];
-    assert_eq!(*first, EnvId(0));
-    near(arrow(marker), [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
-    assert!(sim.sensor(off).unwrap().pos_w().is_none(), "poses are for show, and not measured");
-    assert_eq!(sim.sensor(off).unwrap().sample_counts().to_vec(), [4, 4], "nothing started anew");
-    // The switch stays where a robot is added later, and all is built anew.
-    sim.add_rigid_object(cube("late", 1.0, 0.2, [3.0, 3.0, 0.1])).unwrap();
+    assert_eq!(of_load[0].0, EnvId(0));
+    assert_arrow(&of_load[0].1, [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
+    assert!(sim.sensor(off).unwrap().pos_w().is_none(), "poses are for markers, and not measured");
+    assert_eq!(sim.sensor(off).unwrap().sample_counts().to_vec(), [4, 4], "no sensor was restarted");
+    // The switch stays where an object is added later, which builds all sensors again.
+    sim.add_rigid_object(cube("late", 0.2, 1.0, [3.0, 3.0, 0.1])).unwrap();
     assert_eq!([off, on].map(|id| sim.debug_vis(id).unwrap()), [false, false]);
     assert!(sim.debug_vis(load).unwrap());
 }
 
-/// In a scene, by the name of the sensor, whatever its kind.
+/// In a scene, by the name of the sensor.
 #[test]
-fn what_is_shown_can_be_switched_by_name() {
-    let mut scene = InteractiveScene::new(
-        SceneCfg::new(cfg(1)).with("box", cube("box", 2.0, 0.2, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box")),
-    )
-    .unwrap();
+fn switch_by_name() {
+    let scene =
+        SceneCfg::new(cfg(1)).with("box", cube("box", 0.2, 2.0, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box"));
+    let mut scene = InteractiveScene::new(scene).unwrap();
     assert_eq!(scene.sim().markers(), []);
     // It stands: the arrow is there.
     scene.update(50);

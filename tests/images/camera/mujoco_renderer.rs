@@ -1,37 +1,41 @@
-//! Our pictures against those of MuJoCo's own renderer, where there is a python that can draw with it
-//! (`cargo xtask test --mujoco 4` makes one; it has MuJoCo 4).
+//! Our images against those of MuJoCo's own renderer, drawn by a Python with MuJoCo 4
+//! (`cargo xtask test --mujoco 4` makes it).
 //!
 //! Pixels at silhouettes are left out: where the 3 by 3 pixels around one do not all show the same geom, or where depth
 //! has a step or a kink among them. The renderers differ in what they round: MuJoCo draws round shapes as polyhedra and
 //! pixels through a depth buffer.
 
+use super::view;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, Shot, look_at_pose};
-use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::Visible;
 use kinetoscope::sim::mj::{self, ObjectKind};
+use nalgebra::Vector3;
 use std::path::Path;
 use std::process::Command;
 use testkit::needs::{python_renderer, robot, sample_model};
+use testkit::urdf::Files;
 
 const SIZE: [usize; 2] = [640, 480];
 const FOVY_DEG: f64 = 45.0;
 
-/// What a renderer shows.
-struct Pictures {
+/// Images of a renderer.
+struct Images {
     depth: Vec<f32>,
     /// The geom that MuJoCo's renderer shows, or -1; of ours, the mask.
     ids: Vec<i32>,
     color: Vec<[u8; 3]>,
 }
 
-fn theirs(python: &Path, model: &Path, folder: &Path) -> Pictures {
+fn theirs(model: &Path, folder: &Path) -> Images {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/camera/mujoco_renderer.py");
     let [width, height] = SIZE.map(|n| n.to_string());
-    let status = Command::new(python).arg(script).arg(model).args(["judge", &width, &height]).arg(folder).status();
+    let mut command = Command::new(python_renderer());
+    let status = command.arg(script).arg(model).args(["judge", &width, &height]).arg(folder).status();
     assert!(status.unwrap().success(), "MuJoCo's renderer did not draw");
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap();
-    Pictures {
+    Images {
         depth: bytes("depth").as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
         ids: bytes("geom").as_chunks().0.iter().map(|b| i32::from_le_bytes(*b)).collect(),
         color: bytes("color").as_chunks().0.to_vec(),
@@ -39,54 +43,46 @@ fn theirs(python: &Path, model: &Path, folder: &Path) -> Pictures {
 }
 
 /// Ours of the same file, with a table that turns the number of a geom into its mask id.
-fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Pictures, Vec<i32>) {
+fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, Vec<i32>) {
     let model = mj::compile_file(model).unwrap().into_model();
     let mut data = mj::Data::new(&model).unwrap();
     data.forward().unwrap();
-    let visible = kinetoscope::sim::Visible::of_model(&model);
+    let visible = Visible::of_model(&model);
     let scene = visible.scene();
     let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
     visible.read(&data, &mut poses, &mut lights);
-    let pixels = Intrinsics::Fovy { radians: FOVY_DEG.to_radians() }.to_pixels(SIZE[0], SIZE[1]).unwrap();
-    let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
-    let [near, far] = model.clip().map(|c| c as f32);
-    let world_from_camera = PoseF32::from(&look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap());
-    let view = View { width: SIZE[0], height: SIZE[1], fx, fy, cx, cy, near, far, world_from_camera };
+    let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap();
+    let view = view(SIZE, FOVY_DEG.to_radians(), &pose, model.clip());
     let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
     let cfg = RasterCfg { shadows: false, samples: 1, lod: false, ..RasterCfg::default() };
     let shot = Shot { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, before: None };
     Rasterizer::new(cfg).render_shot(&shot, &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap().as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-    let pictures = Pictures { depth: frame.depth.unwrap(), ids: frame.mask.unwrap(), color };
+    let images = Images { depth: frame.depth.unwrap(), ids: frame.mask.unwrap(), color };
     let mask_of = |geom: usize| {
         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"));
         visible.ids().iter().find(|id| id.geoms.contains(&name)).map_or(0, |id| id.id)
     };
-    (pictures, (0..model.ngeom()).map(mask_of).collect())
+    (images, (0..model.ngeom()).map(mask_of).collect())
 }
 
 /// The MJCF with a camera "judge" in its world.
 fn with_camera(mjcf: &str, eye: [f64; 3], target: [f64; 3]) -> String {
     let rotation = look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap().rotation;
     // MuJoCo's cameras look along -z, with y up.
-    let (right, up) = (rotation * nalgebra::Vector3::x(), rotation * -nalgebra::Vector3::y());
+    let (right, up) = (rotation * Vector3::x(), rotation * -Vector3::y());
     let words = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-    let end = mjcf.rfind("</worldbody>").unwrap();
-    format!(
-        "{}<camera name=\"judge\" pos=\"{}\" xyaxes=\"{} {}\" fovy=\"{FOVY_DEG}\"/>\n{}",
-        &mjcf[..end],
-        words(&eye),
-        words(right.as_slice()),
-        words(up.as_slice()),
-        &mjcf[end..]
-    )
+    let [eye, right, up] = [&eye[..], right.as_slice(), up.as_slice()].map(words);
+    let camera = format!("<camera name=\"judge\" pos=\"{eye}\" xyaxes=\"{right} {up}\" fovy=\"{FOVY_DEG}\"/>\n");
+    let (world, end) = mjcf.split_at(mjcf.rfind("</worldbody>").unwrap());
+    format!("{world}{camera}{end}")
 }
 
-/// The colours of a pixel in two pictures.
+/// The colours of a pixel in two images.
 type Pair = ([f64; 3], [f64; 3]);
 
-/// How two pictures of one scene agree.
+/// How two images of one scene agree.
 #[derive(Debug)]
 struct Agreement {
     /// Pixels that show something, and those of them that are off silhouettes.
@@ -105,7 +101,7 @@ struct Agreement {
 /// a plane: 0.4 mm, of depths above 1 m.
 const DEPTH: f64 = 5e-4;
 
-fn compare(theirs: &Pictures, ours: &Pictures, mask_of: &[i32]) -> Agreement {
+fn compare(theirs: &Images, ours: &Images, mask_of: &[i32]) -> Agreement {
     let [width, height] = SIZE;
     let (mut seen, mut compared, mut same) = (0, 0, 0);
     let mut pairs: Vec<Pair> = Vec::new();
@@ -151,22 +147,20 @@ fn compare(theirs: &Pictures, ours: &Pictures, mask_of: &[i32]) -> Agreement {
     Agreement { seen, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
 }
 
-fn check(name: &str, mjcf: &str, folder: &Path, eye: [f64; 3], target: [f64; 3]) {
-    let python = python_renderer();
-    let file = folder.join("judged.xml");
-    std::fs::write(&file, with_camera(mjcf, eye, target)).unwrap();
-    let theirs = theirs(&python, &file, folder);
-    let (pictures, mask_of) = ours(&file, eye, target);
-    let agreement = compare(&theirs, &pictures, &mask_of);
+fn check(name: &str, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
+    let files = Files::default();
+    let file = files.write("judged.xml", with_camera(mjcf, eye, target));
+    let theirs = theirs(&file, files.folder());
+    let (images, mask_of) = ours(&file, eye, target);
+    let agreement = compare(&theirs, &images, &mask_of);
     println!("{name}: {agreement:?}");
     assert!(agreement.seen > 20_000 && agreement.compared > SIZE[0] * SIZE[1] / 2, "{name}: {agreement:?}");
     assert!(agreement.same >= 0.999, "{name}: {agreement:?}");
-    // Light differs: ours has an ambient light by height, bends highlights and encodes for the screen. What must be alike
-    // is what is bright and what is dark, and the hue of things.
+    // Light differs: ours has an ambient light by height, bends highlights and encodes for the screen. Bright and dark
+    // areas and hues must be alike.
     assert!(agreement.brightness > 0.7 && agreement.hue < 0.2, "{name}: {agreement:?}");
-    let exchanged = Pictures { color: pictures.color.iter().map(|&[r, g, b]| [b, r, g]).collect(), ..pictures };
+    let exchanged = Images { color: images.color.iter().map(|&[r, g, b]| [b, r, g]).collect(), ..images };
     let wrong = compare(&theirs, &exchanged, &mask_of);
-    println!("{name}, colours exchanged: {wrong:?}");
     assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colours go unnoticed: {wrong:?}");
     // The control: a camera that looks 5 mm past the target.
     let aside = ours(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
@@ -176,22 +170,19 @@ fn check(name: &str, mjcf: &str, folder: &Path, eye: [f64; 3], target: [f64; 3])
 
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
-fn the_humanoid_looks_as_in_mujocos_renderer() {
-    let file = sample_model("humanoid/humanoid.xml");
-    let folder = tempfile::tempdir().unwrap();
-    let mjcf = std::fs::read_to_string(&file).unwrap();
-    check("humanoid", &mjcf, folder.path(), [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
+fn humanoid() {
+    let mjcf = std::fs::read_to_string(sample_model("humanoid/humanoid.xml")).unwrap();
+    check("humanoid", &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
 }
 
 /// The vendor's arm with its real meshes, as it is exported.
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
-fn the_arm_looks_as_in_mujocos_renderer() {
-    let vendor = robot("rokae_description/urdf/SR5.urdf");
-    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
-    sim.add_robot(RobotCfg { urdf: UrdfCfg::single(vendor), ..Default::default() }).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    sim.dump(folder.path()).unwrap();
-    let mjcf = std::fs::read_to_string(folder.path().join("robot.mjcf4.xml")).unwrap();
-    check("vendor SR5", &mjcf, folder.path(), [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
+fn arm() {
+    let mut sim = testkit::worlds::sim(SimulationManagerCfg::default());
+    sim.add_robot(testkit::worlds::urdf_robot("robot", robot("rokae_description/urdf/SR5.urdf"))).unwrap();
+    let files = Files::default();
+    sim.dump(files.folder()).unwrap();
+    let mjcf = std::fs::read_to_string(files.folder().join("robot.mjcf4.xml")).unwrap();
+    check("vendor SR5", &mjcf, [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
 }

@@ -1,19 +1,16 @@
-//! When cameras capture, and when they draw.
+//! The instants that cameras capture, and the images that they draw.
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::camera::imperfection::DepthNoise;
+use testkit::worlds::{cfg, look_at, object};
 
-fn sim(num_envs: usize) -> (SimulationManager, ObjectId) {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs, ..Default::default() }).unwrap();
-    let ball = RigidObjectCfg {
-        uid: "ball".into(),
-        shape: ObjectShape::Sphere { radius: 0.1 },
-        init_pose: Pose::translation(0.0, 0.0, 3.0),
-        ..Default::default()
-    };
-    let ball = sim.add_rigid_object(ball).unwrap();
-    (sim, ball)
+/// A camera on the ground, below a ball that falls.
+fn world(num_envs: usize, camera: CameraCfg) -> (SimulationManager, SensorId<Camera>) {
+    let mut sim = testkit::worlds::sim(cfg(num_envs, 2));
+    sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 3.0])).unwrap();
+    let id = sim.add_sensor("camera", camera).unwrap();
+    (sim, id)
 }
 
 fn below(update_period: f64) -> CameraCfg {
@@ -21,10 +18,7 @@ fn below(update_period: f64) -> CameraCfg {
         width: 32,
         height: 32,
         intrinsics: Intrinsics::Fovy { radians: 0.6 },
-        extrinsics: Extrinsics {
-            placement: Placement::LookAt { eye: [0.0, 0.0, 0.1], target: [0.0, 0.0, 1.0], up: [0.0, 0.0, 1.0] },
-            ..Default::default()
-        },
+        extrinsics: look_at([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]),
         channels: Channels { depth: true, ..Default::default() },
         update_period,
         ..Default::default()
@@ -43,113 +37,87 @@ fn gap(step: u64) -> f64 {
     (c - (c * c - square * (c * c - r * r)).sqrt()) / square
 }
 
-/// Single precision of the renderer.
-fn near(found: f32, expected: f64) -> bool {
-    (f64::from(found) / expected - 1.0).abs() < 1e-5
+/// True if a depth is that of a step, to single precision of the renderer.
+fn is_of(found: f64, step: u64) -> bool {
+    (found / gap(step) - 1.0).abs() < 1e-5
 }
 
-/// Pictures show the instant that was due, however late they are read, and are drawn once.
+fn middle(sim: &SimulationManager, id: SensorId<Camera>) -> [f64; 2] {
+    let depth = sim.sensor(id).unwrap().depth().unwrap();
+    [0, 1].map(|env| f64::from(depth[(env, 15, 15)]))
+}
+
+/// An image shows the instant at which it was due, however late it is read, and is drawn once. A reset of one environment
+/// refreshes its image and restarts its clock, and leaves the other's alone.
 #[test]
-fn a_picture_shows_the_instant_it_was_due_at() {
-    let (mut sim, _) = sim(2);
-    let id = sim.add_sensor("camera", below(0.05)).unwrap();
-    let middle = |sim: &SimulationManager| {
-        let camera = sim.sensor(id).unwrap();
-        camera.depth().unwrap()[(1, 15, 15)]
-    };
-    assert!(near(middle(&sim), gap(0)));
+fn due_instant_and_reset() {
+    let (mut sim, id) = world(2, below(0.05));
+    assert!(is_of(middle(&sim, id)[1], 0));
     sim.update(7);
-    assert!(near(middle(&sim), gap(5)), "{} {}", middle(&sim), gap(5));
-    assert!(!near(gap(7) as f32, gap(5)), "the control: seven steps are told from five");
+    assert!(is_of(middle(&sim, id)[1], 5), "{:?} {}", middle(&sim, id), gap(5));
+    assert!(!is_of(gap(7), 5), "the control: seven steps are told from five");
     let camera = sim.sensor(id).unwrap();
     assert!((camera.stamps()[0] - 0.05).abs() < 1e-12 && camera.frame_counts()[0] == 1);
     let draws = camera.draws();
-    middle(&sim);
     sim.update(2);
-    middle(&sim);
+    middle(&sim, id);
     assert_eq!(sim.sensor(id).unwrap().draws(), draws, "nothing new to draw");
     sim.update(40);
-    assert_eq!(sim.sensor(id).unwrap().draws(), draws, "nobody looked");
-    assert!(near(middle(&sim), gap(45)));
+    assert_eq!(sim.sensor(id).unwrap().draws(), draws, "no read");
+    assert!(is_of(middle(&sim, id)[1], 45));
     assert_eq!(sim.sensor(id).unwrap().draws(), draws + 2);
     assert_eq!(sim.sensor(id).unwrap().frame_counts()[0], 9);
-}
-
-/// `update(n)` is n times `update(1)`, pictures included.
-#[test]
-fn many_steps_at_once_give_the_same_pictures() {
-    let noise = [("depth".to_string(), NoiseCfg { std: 0.01, bias_walk: 0.1, ..Default::default() })];
-    let imperfections = Imperfections { depth_noise: Some(DepthNoise::default()), ..Default::default() };
-    let troubled = CameraCfg {
-        latency_steps: 4,
-        history_length: 2,
-        dropout: 0.2,
-        noise: noise.into(),
-        imperfections,
-        ..below(0.03)
-    };
-    let late = |stride: u32| {
-        let (mut sim, _) = sim(1);
-        let id = sim.add_sensor("camera", troubled.clone()).unwrap();
-        (0..36 / stride).for_each(|_| sim.update(stride));
-        let camera = sim.sensor(id).unwrap();
-        (camera.depth().unwrap().to_owned(), camera.history::<Depth>().unwrap().to_owned(), camera.stamps()[0])
-    };
-    assert_eq!(late(36), late(1));
-    assert_eq!(late(12), late(1));
-    let pictures = |stride: u32| {
-        let (mut sim, _) = sim(1);
-        let id = sim.add_sensor("camera", below(0.03)).unwrap();
-        let joints = sim.add_sensor("every step", JointStateCfg::default()).unwrap();
-        for _ in 0..36 / stride {
-            sim.update(stride);
-        }
-        assert_eq!(sim.sensor(joints).unwrap().sample_counts()[0], 36);
-        let camera = sim.sensor(id).unwrap();
-        (camera.depth().unwrap().to_owned(), camera.frame_counts()[0], camera.stamps()[0].to_bits())
-    };
-    assert_eq!(pictures(36), pictures(1));
-    assert_eq!(pictures(12), pictures(1));
-    assert_eq!(pictures(1).1, 12);
-}
-
-/// A reset of one environment refreshes its picture and restarts its clock, and leaves the other's alone.
-#[test]
-fn a_reset_is_seen_at_once_and_alone() {
-    let (mut sim, _) = sim(2);
-    let id = sim.add_sensor("camera", below(0.05)).unwrap();
-    sim.update(13);
+    sim.update(4);
     sim.reset(Some(&[EnvId(0)])).unwrap();
-    let camera = sim.sensor(id).unwrap();
-    let depth = camera.depth().unwrap();
-    assert!(near(depth[(0, 15, 15)], gap(0)));
-    assert!(near(depth[(1, 15, 15)], gap(10)));
-    assert_eq!(camera.frame_counts().to_vec(), [0, 2]);
+    let [of_reset, other] = middle(&sim, id);
+    assert!(is_of(of_reset, 0) && is_of(other, 50));
+    assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [0, 10]);
     sim.update(5);
-    assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 3]);
+    assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 11]);
 }
 
-/// Steps are 10 ms, pictures two steps apart and three steps late: after 20 steps, the newest to be seen is that of step 16.
-/// What somebody writes is seen at once.
+/// `update(n)` is n times `update(1)`, images included.
 #[test]
-fn a_late_camera_sees_the_ball_where_it_was() {
-    let (mut sim, _) = sim(2);
-    let id = sim.add_sensor("camera", CameraCfg { latency_steps: 3, history_length: 4, ..below(0.02) }).unwrap();
+fn strides() {
+    let noise = [("depth".to_string(), NoiseCfg { std: 0.01, bias_walk: 0.1, ..Default::default() })].into();
+    let imperfections = Imperfections { depth_noise: Some(DepthNoise::default()), ..Default::default() };
+    let exact = CameraCfg { history_length: 2, ..below(0.03) };
+    let noisy = CameraCfg { latency_steps: 4, dropout: 0.2, noise, imperfections, ..exact.clone() };
+    for cfg in [exact, noisy] {
+        let images = |stride: u32| {
+            let (mut sim, id) = world(1, cfg.clone());
+            let joints = sim.add_sensor("every step", JointStateCfg::default()).unwrap();
+            (0..36 / stride).for_each(|_| sim.update(stride));
+            assert_eq!(sim.sensor(joints).unwrap().sample_counts()[0], 36);
+            let camera = sim.sensor(id).unwrap();
+            let (depth, history) = (camera.depth().unwrap().to_owned(), camera.history::<Depth>().unwrap().to_owned());
+            (depth, history, camera.frame_counts()[0], camera.stamps()[0].to_bits())
+        };
+        let one = images(1);
+        assert_eq!(images(36), one);
+        assert_eq!(images(12), one);
+        assert!(one.2 == 12 || cfg.latency_steps > 0, "{} images", one.2);
+    }
+}
+
+/// Steps are 10 ms, images two steps apart and three steps late: after 20 steps, the newest to be seen is that of step 16. A
+/// write to the state is seen at once.
+#[test]
+fn latency() {
+    let (mut sim, id) = world(2, CameraCfg { latency_steps: 3, history_length: 4, ..below(0.02) });
     sim.update(20);
+    assert!(is_of(middle(&sim, id)[1], 16), "{:?}", middle(&sim, id));
+    assert!(!is_of(gap(20), 16), "the control: a ball without delay is elsewhere");
     let camera = sim.sensor(id).unwrap();
-    let depth = camera.depth().unwrap();
-    assert!(near(depth[(1, 15, 15)], gap(16)), "{}", depth[(1, 15, 15)]);
-    assert!(!near(gap(20) as f32, gap(16)), "the control: a ball without delay is elsewhere");
     assert!((camera.stamps()[1] - 0.16).abs() < 1e-12);
     let history = camera.history::<Depth>().unwrap();
     assert_eq!(history.dim(), (2, 4, 32, 32));
     for (age, step) in [16, 14, 12, 10].into_iter().enumerate() {
-        assert!(near(history[(1, age, 15, 15)], gap(step)), "{age}");
+        assert!(is_of(f64::from(history[(1, age, 15, 15)]), step), "{age}");
     }
     assert_eq!(camera.frame_counts().to_vec(), [8, 8]);
     sim.reset(Some(&[EnvId(0)])).unwrap();
-    let camera = sim.sensor(id).unwrap();
-    assert!(near(camera.depth().unwrap()[(0, 15, 15)], gap(0)));
-    assert!(near(camera.depth().unwrap()[(1, 15, 15)], gap(16)));
-    assert_eq!((camera.history_filled(0).unwrap(), camera.history_filled(1).unwrap()), (0, 4));
+    let [of_reset, other] = middle(&sim, id);
+    assert!(is_of(of_reset, 0) && is_of(other, 16));
+    assert_eq!([0, 1].map(|env| sim.sensor(id).unwrap().history_filled(env).unwrap()), [0, 4]);
 }

@@ -1,31 +1,23 @@
-//! Segments and boxes of a simulation: ids, classes and frames are those of what was added.
+//! Segments and boxes of a simulation: ids, classes and frames are those of its robots and objects.
 
-use kinetoscope::ndarray::Axis;
+use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::pose::from_row;
 use kinetoscope::sensors::camera::{Box3d, Thing};
 use nalgebra::Point3;
+use testkit::worlds::{cfg, look_at, object, pose_in, sr5};
 
 fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    let robot = sim.add_robot(RobotCfg { uid: "sr5".into(), urdf, ..Default::default() }).unwrap();
+    let mut sim = testkit::worlds::sim(cfg(2, 2));
+    let robot = sim.add_robot(sr5("sr5")).unwrap();
     for (uid, x, class) in [("table", 0.8, None), ("shelf", -0.8, None), ("cup", 0.5, Some("toy".to_string()))] {
-        let cfg = RigidObjectCfg {
-            uid: uid.into(),
-            shape: ObjectShape::Box { size: [0.2, 0.3, 0.4] },
-            init_pose: Pose::translation(x, 0.6, 0.2),
-            semantic_class: class,
-            ..Default::default()
-        };
-        sim.add_rigid_object(cfg).unwrap();
+        let cfg = object(uid, ObjectShape::Box { size: [0.2, 0.3, 0.4] }, [x, 0.6, 0.2]);
+        sim.add_rigid_object(RigidObjectCfg { semantic_class: class, ..cfg }).unwrap();
     }
-    let placement = Placement::LookAt { eye: [1.8, 1.8, 1.3], target: [0.0, 0.2, 0.4], up: [0.0, 0.0, 1.0] };
     let camera = CameraCfg {
         width: 160,
         height: 120,
         intrinsics: Intrinsics::Fovy { radians: 1.0 },
-        extrinsics: Extrinsics { placement, ..Default::default() },
+        extrinsics: look_at([1.8, 1.8, 1.3], [0.0, 0.2, 0.4]),
         channels: Channels { mask: true, position: true, ..Default::default() },
         ..Default::default()
     };
@@ -33,8 +25,9 @@ fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
     (sim, robot, id)
 }
 
+/// Classes are those of the configuration of an object, and those of labels.
 #[test]
-fn classes_are_those_of_labels_and_of_what_was_added() {
+fn classes() {
     let (sim, _, id) = world();
     let names = |cfg: &SegmentationCfg, level| -> Vec<String> {
         sim.segmentation(cfg).unwrap().segments(level).iter().map(|segment| segment.name.clone()).collect()
@@ -42,14 +35,15 @@ fn classes_are_those_of_labels_and_of_what_was_added() {
     let plain = SegmentationCfg::default();
     assert_eq!(names(&plain, SegmentLevel::Instance), ["ground", "sr5", "table", "shelf", "cup"]);
     assert_eq!(names(&plain, SegmentLevel::Semantic), ["ground", "robot", "object", "toy"]);
+    let class = |object: &str| sim.mask_ids().iter().find(|entry| entry.object == object).unwrap().class.as_str();
+    assert_eq!((class("cup"), class("table")), ("toy", "object"));
     let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture"), ("sr5/link6", "tip")]);
     assert_eq!(names(&cfg, SegmentLevel::Semantic), ["ground", "robot", "tip", "furniture", "toy"]);
     let links = names(&plain, SegmentLevel::Link);
     assert!(links.iter().any(|name| name == "sr5/link6"), "{links:?}");
     // Every mask id is in the table; colours differ where classes do.
     let all = sim.segmentation(&cfg).unwrap();
-    let camera = sim.sensor(id).unwrap();
-    let mask = camera.mask().unwrap();
+    let mask = sim.sensor(id).unwrap().mask().unwrap();
     let classes = all.segment(SegmentLevel::Semantic, mask);
     let colors = all.colorize(SegmentLevel::Semantic, mask);
     assert_eq!(colors.dim(), (2, 120, 160, 4));
@@ -71,50 +65,41 @@ fn classes_are_those_of_labels_and_of_what_was_added() {
 
 /// Boxes are in the links' own frames: they stay the same however the arm moves, and hold all that is seen of the link.
 #[test]
-fn boxes_of_links_move_with_them() {
+fn boxes() {
     let (mut sim, robot, id) = world();
     let all = sim.segmentation(&SegmentationCfg::default()).unwrap();
     let boxes = |sim: &SimulationManager, env| all.boxes_3d(SegmentLevel::Link, sim.sensor(id).unwrap(), env).unwrap();
     let before = boxes(&sim, 0);
-    let turned = kinetoscope::ndarray::Array2::from_shape_fn((2, sim.robot(robot).dof()), |(env, k)| {
-        0.15 * (k as f64 + 1.0) * (env as f64 + 1.0)
-    });
+    let angle = |(env, k): (usize, usize)| 0.15 * (k as f64 + 1.0) * (env as f64 + 1.0);
+    let turned = Array2::from_shape_fn((2, sim.robot(robot).dof()), angle);
     sim.robot_mut(robot).write_qpos(turned.view(), None, None).unwrap();
+    let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-6);
     let mut moved = 0;
     for env in 0..2 {
         let camera = sim.sensor(id).unwrap();
         let (mask, position) = (camera.mask().unwrap(), camera.position().unwrap());
         for found in boxes(&sim, env) {
-            let Box3d { id, pose, min, max } = found;
+            let Box3d { id, pose: of_box, min, max } = found;
             let entry = sim.mask_ids().iter().find(|entry| entry.id == id).unwrap();
             let expected = match &entry.link {
                 Some(link) => sim.robot(robot).link_pose(link).unwrap(),
                 None if entry.object == "ground" => continue,
                 None => sim.rigid_object(sim.rigid_object_id(&entry.object).unwrap()).get_pose(),
             };
-            let expected = from_row(&std::array::from_fn(|k| expected[(env, k)]));
+            let expected = pose_in(&expected, env);
             // Poses that are drawn are in single precision.
-            assert!(
-                (pose.translation.vector - expected.translation.vector).norm() < 1e-6,
-                "{entry:?}: {pose} {expected}"
-            );
-            assert!(pose.rotation.angle_to(&expected.rotation) < 1e-6, "{entry:?}: {pose} {expected}");
+            let apart = (of_box.translation.vector - expected.translation.vector).norm();
+            let angle = of_box.rotation.angle_to(&expected.rotation);
+            assert!(apart < 1e-6 && angle < 1e-6, "{entry:?}: {of_box} {expected}");
             let then = before.iter().find(|then| then.id == id).unwrap();
-            for axis in 0..3 {
-                assert!(
-                    (then.min[axis] - min[axis]).abs() < 1e-6 && (then.max[axis] - max[axis]).abs() < 1e-6,
-                    "{entry:?}"
-                );
-            }
+            assert!(near(then.min, min) && near(then.max, max), "{entry:?}");
             moved += usize::from((then.center()[0] - found.center()[0]).abs() > 0.01);
             if entry.link.is_none() {
-                for (axis, half) in [0.1, 0.15, 0.2].into_iter().enumerate() {
-                    assert!((max[axis] - half).abs() < 1e-6 && (min[axis] + half).abs() < 1e-6);
-                }
+                assert!(near(max, [0.1, 0.15, 0.2]) && near(min, [-0.1, -0.15, -0.2]));
             }
             for ((v, u), _) in mask.index_axis(Axis(0), env).indexed_iter().filter(|(_, seen)| **seen == id) {
                 let p = Point3::from([0, 1, 2].map(|k| f64::from(position[(env, v, u, k)])));
-                let local = pose.inverse() * p;
+                let local = of_box.inverse() * p;
                 // Level of detail moves no point by more than 1 mm.
                 assert!((0..3).all(|k| local[k] > min[k] - 1.1e-3 && local[k] < max[k] + 1.1e-3), "{entry:?}: {local}");
             }
@@ -123,9 +108,8 @@ fn boxes_of_links_move_with_them() {
     assert!(moved > 5, "{moved} boxes of links moved");
     // The robot as a whole is in the box of its base.
     let whole = all.boxes_3d(SegmentLevel::Instance, sim.sensor(id).unwrap(), 0).unwrap();
-    let names: Vec<i32> = whole.iter().map(|found| found.id).collect();
     let ids: Vec<i32> = all.segments(SegmentLevel::Instance).iter().map(|segment| segment.id).collect();
-    assert_eq!(names, ids);
+    assert!(whole.iter().map(|found| found.id).eq(ids.iter().copied()));
     assert_eq!((whole[0].min, whole[0].max), ([-50.0, -50.0, 0.0], [50.0, 50.0, 0.0]), "the ground");
     let base = before.iter().find(|found| found.id == ids[1]).unwrap();
     assert!((whole[1].pose.translation.vector - base.pose.translation.vector).norm() < 1e-6);

@@ -1,94 +1,92 @@
-//! Surfaces and lamps of a configuration are those of the scene that is drawn, on both lines of MuJoCo.
+//! Surfaces and lights of a configuration are those of the scene that is drawn, on both versions of MuJoCo.
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::material::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
+use testkit::worlds::{cfg, object, sim, sr5};
 
 const PART: &str = r#"<mujoco><asset><material name="brass" specular="0.9" emission="0.25"/></asset><worldbody>
     <geom name="plate" type="box" size="1 1 0.01"/>
     <body name="bell" pos="0 0 1"><freejoint/><geom size="0.1" material="brass"/></body></worldbody></mujoco>"#;
 
-fn material(sim: &mut SimulationManager, name: &str) -> Material {
+/// A surface with these fields, the others by default.
+macro_rules! surface {
+    ($($field:ident: $value:expr),+) => {
+        SurfaceCfg { $($field: Some($value),)+ ..Default::default() }
+    };
+}
+
+fn on_ground(surface: SurfaceCfg) -> SimulationManagerCfg {
+    SimulationManagerCfg { ground: Some(GroundCfg { surface, ..Default::default() }), ..cfg(2, 2) }
+}
+
+fn part(surfaces: Vec<(String, SurfaceCfg)>) -> MjcfCfg {
+    MjcfCfg { surfaces, ..MjcfCfg::text("part", PART) }
+}
+
+fn of(name: &str, surface: SurfaceCfg) -> (String, SurfaceCfg) {
+    (name.into(), surface)
+}
+
+fn materials(sim: &mut SimulationManager, name: &str) -> Vec<Material> {
     let visible = sim.visible();
     let found: Vec<_> = visible.scene().instances().iter().filter(|instance| &*instance.name == name).collect();
-    assert!(!found.is_empty(), "{name}");
-    found[0].material.clone()
+    found.into_iter().map(|instance| instance.material.clone()).collect()
 }
 
 fn scene() -> SceneCfg {
-    let ground =
-        GroundCfg { surface: SurfaceCfg { reflectance: Some(0.5), ..Default::default() }, ..Default::default() };
-    let simulation = SimulationManagerCfg { num_envs: 2, ground: Some(ground), ..Default::default() };
-    let robot = RobotCfg {
-        urdf: UrdfCfg::single(kinetoscope::assets::path("sr5/SR5.urdf").unwrap()),
-        surfaces: vec![("link[12]".into(), SurfaceCfg::metal(0.25)), ("base_link".into(), SurfaceCfg::glass())],
-        ..Default::default()
-    };
-    let part = MjcfCfg {
-        surfaces: vec![
-            ("bell".into(), SurfaceCfg { metallic: Some(0.5), ..Default::default() }),
-            ("world".into(), SurfaceCfg { emission: Some(2.0), ..Default::default() }),
-        ],
-        ..MjcfCfg::text("part", PART)
-    };
-    let water = SurfaceCfg { refractive_index: Some(1.33), transmission: Some(0.75), ..Default::default() };
-    SceneCfg::new(simulation)
-        .with("robot", robot)
-        .with("part", part)
+    let surfaces = vec![of("link[12]", SurfaceCfg::metal(0.25)), of("base_link", SurfaceCfg::glass())];
+    let bell = vec![of("bell", surface!(metallic: 0.5)), of("world", surface!(emission: 2.0))];
+    let water = surface!(refractive_index: 1.33, transmission: 0.75);
+    SceneCfg::new(on_ground(surface!(reflectance: 0.5)))
+        .with("robot", RobotCfg { surfaces, ..sr5("robot") })
+        .with("part", part(bell))
         .with("drop", RigidObjectCfg { surface: water, ..Default::default() })
-        .with(
-            "hills",
-            TerrainCfg { surface: SurfaceCfg { shininess: Some(0.125), ..Default::default() }, ..Default::default() },
-        )
+        .with("hills", TerrainCfg { surface: surface!(shininess: 0.125), ..Default::default() })
 }
 
 fn check(sim: &mut SimulationManager) {
     let links: Vec<String> = sim.body_names().iter().filter(|name| name.starts_with("robot/")).cloned().collect();
-    let (mut metal, mut glass, mut others) = (0, 0, 0);
+    let mut kinds = [0; 3];
     for link in &links {
-        let visible = sim.visible();
-        for instance in visible.scene().instances().iter().filter(|instance| *instance.name == **link) {
-            let m = &instance.material;
-            let polished = link.ends_with("/link1") || link.ends_with("/link2");
+        for m in materials(sim, link) {
+            let (polished, glass) = (link.ends_with("/link1") || link.ends_with("/link2"), link.contains("base"));
             assert_eq!((m.metallic, m.roughness == Some(0.25)), (f32::from(u8::from(polished)), polished), "{link}");
-            assert_eq!(m.transmission, f32::from(u8::from(link.contains("base"))), "{link}");
-            metal += usize::from(polished);
-            glass += usize::from(link.contains("base"));
-            others += usize::from(!polished && !link.contains("base"));
+            assert_eq!(m.transmission, f32::from(u8::from(glass)), "{link}");
+            kinds[if polished { 0 } else { 1 + usize::from(glass) }] += 1;
         }
     }
-    assert!(metal >= 2 && glass >= 1 && others >= 1, "{links:?}");
-    let bell = material(sim, "part/bell");
-    // What the file says, and what the configuration says besides.
+    assert!(kinds[0] >= 2 && kinds[1] >= 1 && kinds[2] >= 1, "{links:?}");
+    let mut material = |name: &str| materials(sim, name).remove(0);
+    let (bell, plate, water) = (material("part/bell"), material("part"), material("drop"));
+    // The numbers of the file, and those of the configuration besides.
     assert_eq!((bell.specular, bell.emission, bell.metallic), (0.9, 0.25, 0.5));
-    let plate = material(sim, "part");
     assert_eq!((plate.emission, plate.metallic, plate.specular), (2.0, 0.0, 0.5));
-    let water = material(sim, "drop");
     assert_eq!((water.refractive_index, water.transmission), (1.33, 0.75));
-    assert_eq!(material(sim, "hills").shininess, 0.125);
-    assert_eq!(material(sim, "ground").reflectance, 0.5);
+    assert_eq!((material("hills").shininess, material("ground").reflectance), (0.125, 0.5));
 }
 
 #[test]
-fn surfaces_of_everything_are_drawn_as_they_were_asked_for() {
+fn surfaces_of_everything() {
     let types = EntityTypes::default();
     let text = scene().to_toml(&types).unwrap();
     for cfg in [scene(), SceneCfg::from_toml(&text, "scene.toml", &types).unwrap()] {
         let mut scene = InteractiveScene::new(cfg).unwrap();
         let sim = scene.sim_mut();
         check(sim);
-        // Something more compiles everything again.
+        // One more object compiles everything again.
         sim.add_rigid_object(RigidObjectCfg { uid: "more".into(), ..Default::default() }).unwrap();
         check(sim);
-        assert_eq!(material(sim, "more").transmission, 0.0, "only what was asked for");
+        assert_eq!(materials(sim, "more")[0].transmission, 0.0, "of no other object");
     }
 }
 
-/// An environment with a colour of its own has the surface of all.
+/// An environment with a colour of its own keeps the surface of all.
 #[test]
-fn a_colour_of_ones_own_keeps_the_surface() {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    sim.add_rigid_object(RigidObjectCfg { surface: SurfaceCfg::metal(0.5), ..Default::default() }).unwrap();
+fn own_colour() {
+    let mut sim = sim(cfg(2, 2));
+    let metal = object("object", ObjectShape::cube(0.1), [0.0; 3]);
+    sim.add_rigid_object(RigidObjectCfg { surface: SurfaceCfg::metal(0.5), ..metal }).unwrap();
     sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "object", &[1.0, 0.0, 0.0, 1.0])).unwrap();
     let own = sim.scene_of(EnvId(1)).unwrap();
     let ball = own.instances().iter().find(|instance| &*instance.name == "object").unwrap();
@@ -96,51 +94,43 @@ fn a_colour_of_ones_own_keeps_the_surface() {
 }
 
 #[test]
-fn what_surfaces_cannot_be_is_refused() {
-    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+fn refused_surfaces() {
+    let mut sim = sim(cfg(1, 1));
     let fields = [
-        ("surface.emission", SurfaceCfg { emission: Some(-1.0), ..Default::default() }),
-        ("surface.specular", SurfaceCfg { specular: Some(1.5), ..Default::default() }),
-        ("surface.shininess", SurfaceCfg { shininess: Some(f64::NAN), ..Default::default() }),
-        ("surface.reflectance", SurfaceCfg { reflectance: Some(-0.1), ..Default::default() }),
-        ("surface.metallic", SurfaceCfg { metallic: Some(2.0), ..Default::default() }),
-        ("surface.roughness", SurfaceCfg { roughness: Some(f64::INFINITY), ..Default::default() }),
-        ("surface.transmission", SurfaceCfg { transmission: Some(1.1), ..Default::default() }),
-        ("surface.refractive_index", SurfaceCfg { refractive_index: Some(0.9), ..Default::default() }),
+        ("surface.emission", surface!(emission: -1.0)),
+        ("surface.specular", surface!(specular: 1.5)),
+        ("surface.shininess", surface!(shininess: f64::NAN)),
+        ("surface.reflectance", surface!(reflectance: -0.1)),
+        ("surface.metallic", surface!(metallic: 2.0)),
+        ("surface.roughness", surface!(roughness: f64::INFINITY)),
+        ("surface.transmission", surface!(transmission: 1.1)),
+        ("surface.refractive_index", surface!(refractive_index: 0.9)),
     ];
     for (expected, surface) in fields {
-        let urdf = UrdfCfg::single(kinetoscope::assets::path("sr5/SR5.urdf").unwrap());
-        let surfaces = vec![(".*".to_string(), surface)];
+        let surfaces = || vec![of(".*", surface)];
+        let urdf = sr5("robot").urdf;
         let errors = [
             sim.add_rigid_object(RigidObjectCfg { surface, ..Default::default() }).unwrap_err(),
             sim.add_terrain(TerrainCfg { surface, ..Default::default() }).unwrap_err(),
-            sim.add_robot(RobotCfg { urdf: urdf.clone(), surfaces: surfaces.clone(), ..Default::default() })
-                .unwrap_err(),
-            sim.add_articulation(ArticulationCfg { urdf, surfaces: surfaces.clone(), ..Default::default() })
-                .unwrap_err(),
-            sim.add_mjcf(MjcfCfg { surfaces, ..MjcfCfg::text("part", PART) }).unwrap_err(),
-            SimulationManager::new(SimulationManagerCfg {
-                ground: Some(GroundCfg { surface, ..Default::default() }),
-                ..Default::default()
-            })
-            .unwrap_err(),
+            sim.add_robot(RobotCfg { surfaces: surfaces(), ..sr5("robot") }).unwrap_err(),
+            sim.add_articulation(ArticulationCfg { urdf, surfaces: surfaces(), ..Default::default() }).unwrap_err(),
+            sim.add_mjcf(part(surfaces())).unwrap_err(),
+            SimulationManager::new(on_ground(surface)).unwrap_err(),
         ];
         for error in errors {
             assert!(matches!(error, Error::Config { field, .. } if field == expected), "{expected}: {error}");
         }
     }
-    let surfaces = vec![("bel".to_string(), SurfaceCfg::glass())];
-    let error = sim.add_mjcf(MjcfCfg { surfaces, ..MjcfCfg::text("part", PART) }).unwrap_err().to_string();
+    let error = sim.add_mjcf(part(vec![of("bel", SurfaceCfg::glass())])).unwrap_err().to_string();
     assert!(error.contains("part \"part\", surfaces") && error.contains("bell"), "{error}");
-    let urdf = UrdfCfg::single(kinetoscope::assets::path("sr5/SR5.urdf").unwrap());
-    let surfaces = vec![("lefthand".to_string(), SurfaceCfg::glass())];
-    let error = sim.add_robot(RobotCfg { urdf, surfaces, ..Default::default() }).unwrap_err().to_string();
+    let surfaces = vec![of("lefthand", SurfaceCfg::glass())];
+    let error = sim.add_robot(RobotCfg { surfaces, ..sr5("robot") }).unwrap_err().to_string();
     assert!(error.contains("robot \"robot\", surfaces") && error.contains("lefthand"), "{error}");
 }
 
 #[test]
-fn lamps_are_what_they_were_asked_for() {
-    let lamp = LightCfg {
+fn lights() {
+    let light = LightCfg {
         position: [1.0, 2.0, 3.0].into(),
         direction: [0.0, 3.0, -4.0].into(),
         color: [1.0, 0.5, 0.0],
@@ -150,13 +140,12 @@ fn lamps_are_what_they_were_asked_for() {
     };
     let lights = vec![
         LightCfg { radius: 0.00465, ..Default::default() },
-        LightCfg { kind: LampKind::Point, ..lamp.clone() },
-        LightCfg { kind: LampKind::Spot { cutoff_deg: 30.0, exponent: 5.0 }, cast_shadow: false, ..lamp },
+        LightCfg { kind: LampKind::Point, ..light.clone() },
+        LightCfg { kind: LampKind::Spot { cutoff_deg: 30.0, exponent: 5.0 }, cast_shadow: false, ..light },
     ];
     let cfg = SceneCfg::new(SimulationManagerCfg { lights, ..Default::default() });
     let types = EntityTypes::default();
-    let text = cfg.to_toml(&types).unwrap();
-    let again = SceneCfg::from_toml(&text, "scene.toml", &types).unwrap();
+    let again = SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "scene.toml", &types).unwrap();
     assert_eq!(again.simulation, cfg.simulation);
     let mut scene = InteractiveScene::new(cfg).unwrap();
     let mut look = kinetoscope::sim::Look::default();
@@ -164,17 +153,17 @@ fn lamps_are_what_they_were_asked_for() {
     let [sun, bulb, spot] = look.lights[..] else { panic!("{:?}", look.lights) };
     assert_eq!((sun.kind, sun.radius, sun.cast_shadow), (LightKind::Directional, 0.00465, true));
     assert_eq!((bulb.kind, bulb.radius, bulb.cast_shadow), (LightKind::Point, 0.0625, true));
-    assert_eq!(spot.kind, LightKind::Spot { cutoff_deg: 30.0, exponent: 5.0 });
-    assert_eq!((spot.radius, spot.cast_shadow), (0.0625, false));
-    for lamp in [bulb, spot] {
-        assert_eq!((lamp.position, lamp.attenuation), ([1.0, 2.0, 3.0], [0.5, 0.25, 0.125]));
-        assert!((0..3).all(|k| (lamp.direction[k] - [0.0, 0.6, -0.8][k]).abs() < 1e-6), "{:?}", lamp.direction);
-        assert_eq!(lamp.diffuse, [1.0, 0.5, 0.0].map(decode_srgb));
+    let kind = LightKind::Spot { cutoff_deg: 30.0, exponent: 5.0 };
+    assert_eq!((spot.kind, spot.radius, spot.cast_shadow), (kind, 0.0625, false));
+    for light in [bulb, spot] {
+        assert_eq!((light.position, light.attenuation), ([1.0, 2.0, 3.0], [0.5, 0.25, 0.125]));
+        assert!((0..3).all(|k| (light.direction[k] - [0.0, 0.6, -0.8][k]).abs() < 1e-6), "{:?}", light.direction);
+        assert_eq!(light.diffuse, [1.0, 0.5, 0.0].map(decode_srgb));
     }
 }
 
 #[test]
-fn what_lamps_cannot_be_is_refused() {
+fn refused_lights() {
     let spot = |cutoff_deg, exponent| LightCfg { kind: LampKind::Spot { cutoff_deg, exponent }, ..Default::default() };
     let bad = [
         ("lights.kind.spot.cutoff_deg", spot(0.0, 1.0)),
@@ -190,12 +179,10 @@ fn what_lamps_cannot_be_is_refused() {
         ("lights.radius", LightCfg { radius: f64::INFINITY, ..Default::default() }),
     ];
     for (expected, light) in bad {
-        let error =
-            SimulationManager::new(SimulationManagerCfg { lights: vec![light], ..Default::default() }).unwrap_err();
+        let error = SimulationManager::new(SimulationManagerCfg { lights: vec![light], ..cfg(1, 1) }).unwrap_err();
         assert!(matches!(error, Error::Config { field, .. } if field == expected), "{expected}: {error}");
     }
-    let types = EntityTypes::default();
     let text = "[simulation]\nlights = [{ kind = \"pont\" }]";
-    let error = SceneCfg::from_toml(text, "scene.toml", &types).unwrap_err().to_string();
+    let error = SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).unwrap_err().to_string();
     assert!(error.contains("scene.toml:2") && error.contains("point"), "{error}");
 }

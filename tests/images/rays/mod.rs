@@ -1,6 +1,6 @@
-//! Ray casters in a simulation, held against MuJoCo's own rays and against closed forms.
+//! Ray casters in a simulation, against MuJoCo's own rays and closed forms.
 
 mod cameras;
-mod judge;
+pub(crate) mod judge;
 mod primitives;
 mod scanner;
