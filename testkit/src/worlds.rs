@@ -228,13 +228,11 @@ pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
 /// The number of diagnostics whose text contains all of these words.
 #[must_use]
 pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
-    sim.diagnostics().iter().map(ToString::to_string).filter(|text| words.iter().all(|word| text.contains(word))).count()
-}
-
-/// The pose in row `env` of a batch of poses.
-#[must_use]
-pub fn pose(rows: &Array2<f64>, env: usize) -> Pose {
-    kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| rows[(env, k)]))
+    sim.diagnostics()
+        .iter()
+        .map(ToString::to_string)
+        .filter(|text| words.iter().all(|word| text.contains(word)))
+        .count()
 }
 
 /// Extrinsics of a camera without a parent at `eye` that looks at `target`, z up.
