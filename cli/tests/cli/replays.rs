@@ -78,7 +78,6 @@ fn verification() {
         let (force, link) = (Array3::from_shape_vec((1, 1, 3), vec![0.0, 5.0, 0.0]).unwrap(), LinkId(1));
         let mut cart = sim.robot_mut(cart);
         cart.set_external_wrench(&force, &(0.0 * &force), WrenchFrame::World, Some(&[link]), None).unwrap();
-        drop(cart);
         sim.update(20);
     });
     for file in ["run.npz", "run.mcap"] {
