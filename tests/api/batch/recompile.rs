@@ -24,8 +24,10 @@ fn bits_of_robot(env: &Env, prefix: &str) -> Vec<u64> {
     bits
 }
 
-/// Bits, targets and efforts of both robots in all environments.
-fn state(sim: &SimulationManager, robots: [RobotId; 2]) -> ([Vec<Vec<u64>>; 2], [[Array2<f64>; 2]; 2]) {
+/// Bits by robot and environment, and targets and efforts by robot.
+type State = ([Vec<Vec<u64>>; 2], [[Array2<f64>; 2]; 2]);
+
+fn state(sim: &SimulationManager, robots: [RobotId; 2]) -> State {
     let bits = ["sr5/", "walker/"].map(|prefix| {
         let mut bits = Vec::new();
         sim.batch().for_each(|_, env| bits.push(bits_of_robot(env, prefix)));

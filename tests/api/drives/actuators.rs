@@ -441,65 +441,56 @@ const ENVS: usize = 3;
 const MOMENTS: [f64; 3] = [0.2, 0.5, 0.3];
 const LIMIT: f64 = 0.9;
 
-/// Settings of each drive, by environment and joint.
-#[derive(Clone, Debug, PartialEq)]
-struct Settings {
-    stiffness: Array2<f64>,
-    damping: Array2<f64>,
-    limit: Array2<f64>,
-    kind: Array2<DriveType>,
+/// Stiffness, damping, effort limit and type of each drive, by environment and joint.
+type Settings = ([Array2<f64>; 3], Array2<DriveType>);
+
+fn settings_of(world: &World) -> Settings {
+    let view = world.view();
+    ([view.get_stiffness(), view.get_damping(), view.qf_limits()], view.get_drive_types())
 }
 
-impl Settings {
-    fn at_first() -> Self {
-        let all = |value| Array2::from_elem((ENVS, 3), value);
-        Self { stiffness: all(3.0), damping: all(0.4), limit: all(LIMIT), kind: Array2::default((ENVS, 3)) }
-    }
+fn first_settings() -> Settings {
+    ([3.0, 0.4, LIMIT].map(|value| Array2::from_elem((ENVS, 3), value)), Array2::default((ENVS, 3)))
+}
 
-    fn of(world: &World) -> Self {
-        let view = world.view();
-        let (stiffness, damping) = (view.get_stiffness(), view.get_damping());
-        Self { stiffness, damping, limit: view.qf_limits(), kind: view.get_drive_types() }
-    }
-
-    /// Changes of step n, of single joints in single environments.
-    fn change(&mut self, world: &mut World, n: i32) {
-        const A: Option<&[JointIndex]> = Some(&[JointIndex(0)]);
-        const B: Option<&[JointIndex]> = Some(&[JointIndex(1)]);
-        const ONE: Option<&[EnvId]> = Some(&[EnvId(1)]);
-        const TWO: Option<&[EnvId]> = Some(&[EnvId(2)]);
-        let mut robot = world.robot();
-        match n {
-            40 => {
-                robot.set_stiffness(&array![[6.0], [1.5]], A, Some(&[EnvId(2), EnvId(1)])).unwrap();
-                (self.stiffness[(2, 0)], self.stiffness[(1, 0)]) = (6.0, 1.5);
-            }
-            80 => {
-                robot.set_damping(&array![[0.9]], B, ONE).unwrap();
-                robot.set_qf_limits(&array![[0.3]], B, TWO).unwrap();
-                (self.damping[(1, 1)], self.limit[(2, 1)]) = (0.9, 0.3);
-            }
-            120 => {
-                robot.set_drive_type(DriveType::Acceleration, A, ONE).unwrap();
-                robot.set_drive_type(DriveType::None, B, TWO).unwrap();
-                (self.kind[(1, 0)], self.kind[(2, 1)]) = (DriveType::Acceleration, DriveType::None);
-            }
-            160 => {
-                // A number that is set while it does not act, acts when it does.
-                robot.set_stiffness(&array![[5.0]], B, TWO).unwrap();
-                robot.set_drive_type(DriveType::Force, None, None).unwrap();
-                self.stiffness[(2, 1)] = 5.0;
-                self.kind.fill(DriveType::Force);
-            }
-            200 => {
-                let limit = Randomization::new().with(Property::MaxEffort, "robot/a", Draw::Set([0.5, 0.5]));
-                world.sim.randomize(&limit, ONE).unwrap();
-                self.limit[(1, 0)] = 0.5;
-            }
-            _ => return,
+/// Changes of step n, of single joints in single environments.
+fn change(world: &mut World, settings: &mut Settings, n: i32) {
+    const A: Option<&[JointIndex]> = Some(&[JointIndex(0)]);
+    const B: Option<&[JointIndex]> = Some(&[JointIndex(1)]);
+    const ONE: Option<&[EnvId]> = Some(&[EnvId(1)]);
+    const TWO: Option<&[EnvId]> = Some(&[EnvId(2)]);
+    let ([stiffness, damping, limit], kind) = &mut *settings;
+    let mut robot = world.robot();
+    match n {
+        40 => {
+            robot.set_stiffness(&array![[6.0], [1.5]], A, Some(&[EnvId(2), EnvId(1)])).unwrap();
+            (stiffness[(2, 0)], stiffness[(1, 0)]) = (6.0, 1.5);
         }
-        assert_eq!(Self::of(world), *self, "step {n}");
+        80 => {
+            robot.set_damping(&array![[0.9]], B, ONE).unwrap();
+            robot.set_qf_limits(&array![[0.3]], B, TWO).unwrap();
+            (damping[(1, 1)], limit[(2, 1)]) = (0.9, 0.3);
+        }
+        120 => {
+            robot.set_drive_type(DriveType::Acceleration, A, ONE).unwrap();
+            robot.set_drive_type(DriveType::None, B, TWO).unwrap();
+            (kind[(1, 0)], kind[(2, 1)]) = (DriveType::Acceleration, DriveType::None);
+        }
+        160 => {
+            // A number that is set while it does not act, acts when it does.
+            robot.set_stiffness(&array![[5.0]], B, TWO).unwrap();
+            robot.set_drive_type(DriveType::Force, None, None).unwrap();
+            stiffness[(2, 1)] = 5.0;
+            kind.fill(DriveType::Force);
+        }
+        200 => {
+            let drawn = Randomization::new().with(Property::MaxEffort, "robot/a", Draw::Set([0.5, 0.5]));
+            world.sim.randomize(&drawn, ONE).unwrap();
+            limit[(1, 0)] = 0.5;
+        }
+        _ => return,
     }
+    assert_eq!(settings_of(world), *settings, "step {n}");
 }
 
 fn three_wheels(model: ActuatorModel) -> World {
@@ -521,15 +512,15 @@ fn changes_at_run_time() {
     for (model, delay) in models(3) {
         let (name, delay) = (model.law().name(), delay as i32);
         let [mut world, mut unchanged] = [(); 2].map(|()| three_wheels(model));
-        let mut settings = Settings::at_first();
-        assert_eq!(Settings::of(&world), settings, "{name}");
+        let mut settings = first_settings();
+        assert_eq!(settings_of(&world), settings, "{name}");
         // In the second round every change before the reset holds from the start.
         for round in 0..2 {
             let mut laws = Array2::from_elem((ENVS, 2), law(0.0, 0.0));
             let (mut saturated, mut free, mut apart) = (0, 0, 0.0_f64);
             for n in 0..240 {
                 if round == 0 {
-                    settings.change(&mut world, n);
+                    change(&mut world, &mut settings, n);
                 }
                 for world in [&mut world, &mut unchanged] {
                     world.command([0, 1, 2].map(|joint| wobble(n, joint)));
@@ -539,13 +530,14 @@ fn changes_at_run_time() {
                 let others = unchanged.view().get_qpos();
                 for (at, law) in laws.indexed_iter_mut() {
                     let m = MOMENTS[at.1];
-                    let unit = match settings.kind[at] {
+                    let ([stiffness, damping, limit], kind) = &settings;
+                    let unit = match kind[at] {
                         DriveType::Force => 1.0,
                         DriveType::Acceleration => m,
                         DriveType::None => 0.0,
                     };
-                    let (kp, kd) = (unit * settings.stiffness[at], unit * settings.damping[at]);
-                    *law = Law { m, kp, kd, limit: settings.limit[at], ..*law };
+                    let (kp, kd) = (unit * stiffness[at], unit * damping[at]);
+                    *law = Law { m, kp, kd, limit: limit[at], ..*law };
                     let (tau, bound) = law.step_to(if n < delay { [0.0; 3] } else { wobble(n - delay, at.1) });
                     if bound {
                         saturated += 1
@@ -567,7 +559,7 @@ fn changes_at_run_time() {
             for world in [&mut world, &mut unchanged] {
                 world.sim.reset(None).unwrap();
             }
-            assert_eq!(Settings::of(&world), settings, "{name}: they stay through a reset");
+            assert_eq!(settings_of(&world), settings, "{name}: they stay through a reset");
         }
         world.assert_well();
     }
@@ -591,7 +583,7 @@ fn randomized_limits() {
                 "",
                 &["environment 2", "max_effort", "\"robot/b\"", "dc_motor", "finite"],
             );
-            assert_eq!(Settings::of(&world), Settings::at_first(), "nothing is set");
+            assert_eq!(settings_of(&world), first_settings(), "nothing is set");
             // The wheel without a model may have no limit.
             unlimited(&mut world.sim, "robot/c", None).unwrap();
         } else {

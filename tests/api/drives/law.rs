@@ -126,7 +126,8 @@ fn one_step() {
             case.check("a drive", &joint, gains(case.kp, case.kd), 1);
         }
         let [mut implicit, mut explicit] = [false, true].map(|explicit| Law { explicit, ..*case });
-        (implicit.step(), explicit.step());
+        implicit.step();
+        explicit.step();
         let distinct = case.kp > 0.0 || case.kd > 0.0;
         assert!(!distinct || (explicit.v - implicit.v).abs() > 1e-3 * implicit.v.abs(), "the control: {case:?}");
     }
