@@ -82,8 +82,10 @@ fn clamped_actions() {
         let now = env.now();
         (seen, now.actions()[(0, 0)])
     };
-    let (bound, beyond): ((Vec<u64>, f64), _) = (run(10.0), run(1e9));
-    assert_eq!(bound, beyond);
-    assert_eq!(bound.1, 10.0);
-    assert_ne!(run(9.0).0, bound.0);
+    for sign in [1.0, -1.0] {
+        let (bound, beyond): ((Vec<u64>, f64), _) = (run(sign * 10.0), run(sign * 1e9));
+        assert_eq!(bound, beyond);
+        assert_eq!(bound.1, sign * 10.0);
+        assert_ne!(run(sign * 9.0).0, bound.0, "control");
+    }
 }

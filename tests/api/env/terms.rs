@@ -31,6 +31,13 @@ fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
     EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
 }
 
+/// Builds a task and begins its episodes.
+fn begin(task: EnvBuilder) -> Env {
+    let mut env = task.build().unwrap();
+    env.reset(None, Some(1)).unwrap();
+    env
+}
+
 /// One step in which nothing is done: why each environment ended, if it did.
 fn ends(env: &mut Env) -> Vec<Option<String>> {
     let n = env.num_envs();
@@ -48,8 +55,7 @@ fn ends(env: &mut Env) -> Vec<Option<String>> {
 fn ended_at(term: impl FnOnce(&SimulationManager, RobotId) -> TerminationTerm, poses: &Array2<f64>) -> Vec<bool> {
     let (sim, robot) = floater(poses.nrows(), false);
     let term = term(&sim, robot);
-    let mut env = task(sim, robot).termination(term).build().unwrap();
-    env.reset(None, Some(1)).unwrap();
+    let mut env = begin(task(sim, robot).termination(term));
     env.sim_mut().robot_mut(robot).write_root_pose(poses, None).unwrap();
     ends(&mut env).iter().map(Option::is_some).collect()
 }
@@ -80,8 +86,7 @@ fn time_and_joint_limits() {
     let (sim, robot) = floater(3, false);
     let limits = terms::joint_out_of_limits(&sim, "limits", robot, &["hinge"]).unwrap();
     assert!(terms::joint_out_of_limits(&sim, "limits", robot, &["none"]).is_err());
-    let mut env = task(sim, robot).termination(limits).termination(terms::time_out("late", 4)).build().unwrap();
-    env.reset(None, Some(1)).unwrap();
+    let mut env = begin(task(sim, robot).termination(limits).termination(terms::time_out("late", 4)));
     let places = array![[1.0], [1.2], [-0.2]];
     env.sim_mut().robot_mut(robot).write_qpos(&places, None, None).unwrap();
     assert_eq!(ends(&mut env), [None, Some("limits".into()), Some("limits".into())]);
@@ -98,8 +103,7 @@ fn illegal_contact() {
     let (mut sim, robot) = floater(2, true);
     let sensor = sim.add_sensor("touch", ContactSensorCfg::of("floater/trunk")).unwrap();
     let touched = terms::illegal_contact("touched", sensor, 5.0);
-    let mut env = task(sim, robot).termination(touched).build().unwrap();
-    env.reset(None, Some(1)).unwrap();
+    let mut env = begin(task(sim, robot).termination(touched));
     // One stands on the ground to a tenth of a millimetre, which carries its 2.1 kg, one is a metre above it.
     let poses = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0499, 1.0, 0.0, 0.0, 0.0]];
     env.sim_mut().robot_mut(robot).write_root_pose(&poses, None).unwrap();
@@ -208,8 +212,7 @@ fn root_state() {
     near(rewards[(1, 2)], 2.0 * (-(fall / 0.5).powi(2)).exp());
     let (sim, robot) = floater(2, false);
     let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
-    let mut env = task(sim, robot).command(speed()).reward(wrong).build().unwrap();
-    env.reset(None, Some(1)).unwrap();
+    let mut env = begin(task(sim, robot).command(speed()).reward(wrong));
     let error = env.step(&Array2::zeros((2, 1))).unwrap_err().to_string();
     assert!(error.contains("nothing") && error.contains("speed"), "{error}");
 }
@@ -219,8 +222,7 @@ fn effort_squares() {
     let (mut sim, _) = floater(1, false);
     let cart = sim.add_robot(mjcf_robot("cart", &super::tasks::cart(true))).unwrap();
     let squares = terms::joint_effort_squares(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
-    let mut env = task(sim, cart).reward(squares).build().unwrap();
-    env.reset(None, Some(1)).unwrap();
+    let mut env = begin(task(sim, cart).reward(squares));
     env.sim_mut().robot_mut(cart).set_qpos(&array![[0.1, -0.2]], None, None).unwrap();
     let step = env.step(&Array2::zeros((1, 1))).unwrap();
     let efforts = env.sim().robot(cart).get_qf();

@@ -1,12 +1,11 @@
 //! Properties of single environments: held against the laws of physics, shared where nothing differs, kept by name.
 
-use super::worlds::{ALL, all_bits, arm, cfg, cube, get, set, world};
+use super::worlds::{ALL, all_bits, all_properties, all_values, arm, cfg, cube, get, set, values, world};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
 use std::f64::consts::TAU;
-use testkit::bits::bits;
 use testkit::refusal::assert_error;
 use testkit::urdf::{self, Files};
 use testkit::worlds::{gains, passive, text_robot};
@@ -291,31 +290,6 @@ fn drawn_across_drive_types() {
     }
 }
 
-/// Everything at once.
-fn all_properties() -> Randomization {
-    Randomization::new()
-        .with(Property::Mass, "arm/.*|cube|machine/.*", Draw::Scale([0.8, 1.2]))
-        .with(Property::CenterOfMass, "arm/link[1-6]|machine/tip", Draw::Add([-0.01, 0.01]))
-        .with(Property::Inertia, "arm/.*", Draw::Scale([0.9, 1.1]))
-        .with(Property::Friction, "cube|pile.|ground", Draw::Set([0.4, 1.1]))
-        .with(Property::JointDamping, "machine/hinge", Draw::Scale([0.5, 2.0]))
-        .with(Property::Armature, "arm/.*", Draw::Set([0.0, 0.1]))
-        .with(Property::Gravity, "gravity", Draw::Add([-0.2, 0.2]))
-        .with(Property::Stiffness, "arm/JOINT[1-3]", Draw::Scale([0.7, 1.3]))
-        .with(Property::MaxEffort, "arm/JOINT4", Draw::Scale([0.5, 1.0]))
-}
-
-/// Names and values of all properties.
-fn values(sim: &SimulationManager, env: usize) -> Vec<(Property, String, Vec<u64>)> {
-    let properties = sim.properties(EnvId(env)).unwrap();
-    let bits = |property, name| bits(properties.get(property, name).unwrap());
-    let named = |property| properties.names(property).into_iter().map(move |name| (property, name));
-    let all = Property::ALL.into_iter().flat_map(named);
-    let mut all: Vec<_> = all.map(|(property, name)| (property, name.to_string(), bits(property, name))).collect();
-    all.sort();
-    all
-}
-
 #[test]
 fn ranges() {
     let (mut sim, _) = world(cfg(4, 2));
@@ -446,7 +420,7 @@ fn growing_buffers() {
         sim.add_rigid_object(cube(&format!("more{k}"), 0.2, [1.0, 0.2 * f64::from(k), 0.2])).unwrap();
     }
     sim.randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
-    let drawn: Vec<_> = (0..3).map(|env| values(&sim, env)).collect();
+    let drawn = all_values(&sim);
     let own = |sim: &SimulationManager, env| {
         sim.batch().read(env, |env| env.data().model().own_arrays().map(|(name, _)| name).collect::<Vec<_>>())
     };
@@ -456,9 +430,7 @@ fn growing_buffers() {
     sim.update(150);
     assert!(sim.buffer_growths() > growths || TARGET == Target::V4, "the arena of 4.x is large enough");
     sim.reset(None).unwrap();
-    for (env, drawn) in drawn.iter().enumerate() {
-        assert_eq!(values(&sim, env), *drawn);
-    }
+    assert_eq!(all_values(&sim), drawn);
     assert_eq!(own(&sim, 0), arrays);
     // And it is what is stepped with: one step of free fall.
     let before = sim.rigid_object(ids.cube).get_velocity();
@@ -480,7 +452,7 @@ fn later_entities() {
         let machine = sim.mjcf_part(ids.machine);
         (arm.get_qpos(), arm.get_qvel(), sim.rigid_object(ids.cube).get_pose(), machine.get_qpos(), machine.get_qvel())
     };
-    let (before, drawn) = (state(&sim), (0..3).map(|env| values(&sim, env)).collect::<Vec<_>>());
+    let (before, drawn) = (state(&sim), all_values(&sim));
     sim.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
     sim.add_robot(RobotCfg { uid: "second".into(), init_pose: Pose::translation(3.0, 0.0, 0.0), ..arm() }).unwrap();
     assert!(state(&sim) == before, "bit for bit");

@@ -1,6 +1,6 @@
 //! Going on from a snapshot is going on: the same bits, wherever it is restored; and wrong ones are told apart.
 
-use super::worlds::{ALL, all_bits, arm, bits_of, cfg, cube, fewest_contacts, world};
+use super::worlds::{ALL, all_bits, all_properties, all_values, arm, bits_of, cfg, cube, fewest_contacts, world};
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{Cone, Integrator};
@@ -270,37 +270,6 @@ fn drives_and_wrenches() {
     assert!(go(&mut other, its, 60) != end);
 }
 
-/// Everything that an environment can have for itself, gains too.
-fn drawn() -> Randomization {
-    Randomization::new()
-        .with(Property::Mass, "arm/.*|cube", Draw::Scale([0.6, 1.4]))
-        .with(Property::CenterOfMass, "arm/link[1-6]", Draw::Add([-0.01, 0.01]))
-        .with(Property::Friction, "cube|pile.|ground", Draw::Set([0.4, 1.1]))
-        .with(Property::Armature, "arm/.*", Draw::Set([0.0, 0.1]))
-        .with(Property::JointDamping, "arm/.*|machine/hinge", Draw::Set([0.1, 2.0]))
-        .with(Property::DryFriction, "machine/hinge", Draw::Set([0.01, 0.05]))
-        .with(Property::Gravity, "gravity", Draw::Add([-0.2, 0.2]))
-        .with(Property::Stiffness, "arm/JOINT[1-3]", Draw::Scale([0.7, 1.3]))
-        .with(Property::MaxEffort, "arm/JOINT4", Draw::Scale([0.5, 1.0]))
-        .with(Property::Size, "pile.", Draw::Scale([0.8, 1.0]))
-        .with(Property::Color, "cube", Draw::Set([0.1, 0.9]))
-}
-
-fn properties(sim: &SimulationManager) -> Vec<Vec<u64>> {
-    let of_env = |env| {
-        let properties = sim.properties(EnvId(env)).unwrap();
-        let numbers = |property| {
-            let names = properties.names(property);
-            names
-                .into_iter()
-                .flat_map(|name| testkit::bits::bits(properties.get(property, name).unwrap()))
-                .collect::<Vec<u64>>()
-        };
-        Property::ALL.into_iter().flat_map(numbers).collect()
-    };
-    (0..sim.num_envs()).map(of_env).collect()
-}
-
 /// From memory and from a file, into the manager itself and one that was built alike: the same bits with the properties of
 /// then, and the next draws are those of then.
 #[test]
@@ -308,16 +277,16 @@ fn with_properties() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("drawn.kts");
     let (mut sim, ids) = world(cfg(3, 2));
-    sim.randomize(&drawn(), Some(&[EnvId(0), EnvId(2)])).unwrap();
+    sim.randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
     sim.robot_mut(ids.arm).set_damping(&array![[77.0, 78.0, 79.0, 80.0, 81.0, 82.0]], None, Some(&[EnvId(2)])).unwrap();
     sim.update(120);
-    let (snapshot, there, had) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), properties(&sim));
+    let (snapshot, there, had) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), all_values(&sim));
     snapshot.save(&path).unwrap();
     let stiffness = sim.robot(ids.arm).get_stiffness();
     sim.update(80);
     let end = all_bits(&sim);
-    sim.randomize(&drawn(), ALL).unwrap();
-    let next = properties(&sim);
+    sim.randomize(&all_properties(), ALL).unwrap();
+    let next = all_values(&sim);
     assert!(had != next && (0..3).all(|env| had[env] != next[env]));
     // In itself, from memory, after other properties; in another manager, from the file, where something else was drawn.
     let (mut fresh, _) = world(cfg(3, 1));
@@ -325,12 +294,12 @@ fn with_properties() {
     let loaded = Snapshot::load(&path).unwrap();
     for (sim, snapshot) in [(&mut sim, &snapshot), (&mut fresh, &loaded)] {
         sim.restore_with_properties(snapshot, ALL).unwrap();
-        assert!(all_bits(sim) == there && properties(sim) == had, "back, in every bit");
+        assert!(all_bits(sim) == there && all_values(sim) == had, "back, in every bit");
         assert_eq!(sim.property_bytes(EnvId(1)).unwrap(), 0, "what was nominal is shared again");
         sim.update(80);
         assert!(all_bits(sim) == end, "and goes on as before");
-        sim.randomize(&drawn(), ALL).unwrap();
-        assert!(properties(sim) == next, "the next draw is the next one");
+        sim.randomize(&all_properties(), ALL).unwrap();
+        assert!(all_values(sim) == next, "the next draw is the next one");
         // What is drawn is drawn still: a gain stays when a plain state is restored, and one that was set does not.
         sim.restore_with_properties(snapshot, ALL).unwrap();
         assert_eq!(sim.robot(sim.robot_id("arm").unwrap()).get_stiffness(), stiffness);
@@ -338,20 +307,20 @@ fn with_properties() {
     // Control: a plain restore leaves properties alone, and goes elsewhere.
     sim.reset_properties(ALL).unwrap();
     sim.restore(&snapshot, ALL).unwrap();
-    assert!(properties(&sim) != had);
+    assert!(all_values(&sim) != had);
     sim.update(80);
     assert!(all_bits(&sim) != end);
     // Into other environments: each has what the one of the snapshot had.
     sim.restore_with_properties(&sim.snapshot(ALL).unwrap(), ALL).unwrap();
     fresh.restore_with_properties(&loaded, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
-    assert_eq!(properties(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
+    assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
     fresh.update(80);
     assert!(all_bits(&fresh) == [end[2].clone(), end[1].clone(), end[0].clone()]);
     // A rollout ends with the properties it was done with.
     let rollout = fresh.rollout(&Array3::zeros((1, 5, 7)), None, ALL).unwrap();
     fresh.reset_properties(ALL).unwrap();
     fresh.restore_with_properties(&rollout.end, ALL).unwrap();
-    assert_eq!(properties(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
+    assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
 }
 
 /// A scene of the same states in which something has not the property any more: another scene, and nothing changes.

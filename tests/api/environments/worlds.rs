@@ -3,6 +3,7 @@
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
+use testkit::bits::bits;
 pub(crate) use testkit::worlds::cfg;
 
 pub(crate) fn arm() -> RobotCfg {
@@ -94,4 +95,37 @@ pub(crate) fn fewest_contacts(sim: &SimulationManager) -> usize {
     let mut fewest = usize::MAX;
     sim.batch().for_each(|_, env| fewest = fewest.min(env.data().contact().len()));
     fewest
+}
+
+/// A draw of everything that an environment can have for itself.
+pub(crate) fn all_properties() -> Randomization {
+    Randomization::new()
+        .with(Property::Mass, "arm/.*|cube|machine/.*", Draw::Scale([0.8, 1.2]))
+        .with(Property::CenterOfMass, "arm/link[1-6]|machine/tip", Draw::Add([-0.01, 0.01]))
+        .with(Property::Inertia, "arm/.*", Draw::Scale([0.9, 1.1]))
+        .with(Property::Friction, "cube|pile.|ground", Draw::Set([0.4, 1.1]))
+        .with(Property::JointDamping, "arm/.*|machine/hinge", Draw::Set([0.1, 2.0]))
+        .with(Property::DryFriction, "machine/hinge", Draw::Set([0.01, 0.05]))
+        .with(Property::Armature, "arm/.*", Draw::Set([0.0, 0.1]))
+        .with(Property::Gravity, "gravity", Draw::Add([-0.2, 0.2]))
+        .with(Property::Stiffness, "arm/JOINT[1-3]", Draw::Scale([0.7, 1.3]))
+        .with(Property::MaxEffort, "arm/JOINT4", Draw::Scale([0.5, 1.0]))
+        .with(Property::Size, "pile.", Draw::Scale([0.8, 1.0]))
+        .with(Property::Color, "cube", Draw::Set([0.1, 0.9]))
+}
+
+/// Names and bits of all properties of an environment.
+pub(crate) fn values(sim: &SimulationManager, env: usize) -> Vec<(Property, String, Vec<u64>)> {
+    let properties = sim.properties(EnvId(env)).unwrap();
+    let bits = |property, name| bits(properties.get(property, name).unwrap());
+    let named = |property| properties.names(property).into_iter().map(move |name| (property, name));
+    let all = Property::ALL.into_iter().flat_map(named);
+    let mut all: Vec<_> = all.map(|(property, name)| (property, name.to_string(), bits(property, name))).collect();
+    all.sort();
+    all
+}
+
+/// [`values`] of all environments.
+pub(crate) fn all_values(sim: &SimulationManager) -> Vec<Vec<(Property, String, Vec<u64>)>> {
+    (0..sim.num_envs()).map(|env| values(sim, env)).collect()
 }

@@ -5,6 +5,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::{PyramidStairs, RoughTerrain, Slope, TerrainGenerator};
 use kinetoscope::sensors::ray::pattern::Grid;
 use testkit::bits::bits;
+use testkit::worlds::{look_at, object};
 
 const FILE: &str = r#"
 [simulation]
@@ -62,11 +63,7 @@ fn declared() -> SceneCfg {
         friction: Some([0.8, 0.005, 0.0001]),
         ..Default::default()
     };
-    let ball = RigidObjectCfg {
-        shape: ObjectShape::Sphere { radius: 0.1 },
-        init_pose: Pose::translation(0.1, 0.2, 0.8),
-        ..Default::default()
-    };
+    let ball = object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.1, 0.2, 0.8]);
     let scanner = RayCasterCfg {
         parent: Some("ball".into()),
         alignment: RayAlignment::Yaw,
@@ -79,10 +76,7 @@ fn declared() -> SceneCfg {
         width: 64,
         height: 48,
         intrinsics: Intrinsics::Fovy { radians: 0.9 },
-        extrinsics: Extrinsics {
-            placement: Placement::LookAt { eye: [2.0, 0.0, 1.5], target: [0.0; 3], up: [0.0, 0.0, 1.0] },
-            ..Default::default()
-        },
+        extrinsics: look_at([2.0, 0.0, 1.5], [0.0; 3]),
         max_distance: 20.0,
         depth_miss: DepthMiss::Far,
         targets: HitTargets::Everything { exclude_parent: false },
