@@ -67,7 +67,7 @@ fn after_a_write() {
     let at_start = sim.sensor(id).unwrap().values().to_owned();
     let mut plain = roomy(&sim, &[0.0; 3]);
     plain.forward().unwrap();
-    assert_eq!(bits(&at_start.row(0)), bits(plain.sensordata()), "before any step");
+    assert_eq!(bits(at_start.row(0)), bits(plain.sensordata()), "before any step");
     sim.update(40);
     let (mut qpos, qvel) = (sim.mjcf_part(part).get_qpos(), sim.mjcf_part(part).get_qvel());
     qpos[(1, 0)] += 0.3;

@@ -150,8 +150,11 @@ fn arm() -> [String; 2] {
     [mjcf, testkit::urdf::robot("arm", &urdf)]
 }
 
-/// Positions and efforts after each tenth of a second of steps that saturate drives.
-fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<(Array2<f64>, Array2<f64>)>) {
+/// Positions and efforts.
+type Sample = (Array2<f64>, Array2<f64>);
+
+/// [`Sample`]s after each tenth of a second of steps that saturate drives.
+fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<Sample>) {
     let (mut sim, id) = with(2, cfg);
     let targets = array![[0.5, -0.7, 1.0, 0.8, -1.2, 0.1], [-1.0, 0.4, -0.6, 1.5, 0.3, -0.05]];
     sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();

@@ -51,13 +51,13 @@ fn wrenches_and_gravity_compensation() {
     sim.robot_mut(id).set_gravity_compensation(true, None, second).unwrap();
     sim.update(100);
     let off = sim.robot(id).get_qpos() - &start;
-    assert!(largest(&off.row(1)) < 1e-9 && largest(&off.row(0)) > 0.05, "{off}");
+    assert!(largest(off.row(1)) < 1e-9 && largest(off.row(0)) > 0.05, "{off}");
     let hand = sim.robot(id).link_id("hand").unwrap();
     let forces = Array3::from_shape_fn((1, 1, 3), |(_, _, k)| [0.0, 0.0, 5.0][k]);
     let none = Array3::zeros((1, 1, 3));
     sim.robot_mut(id).set_external_wrench(&forces, &none, WrenchFrame::World, Some(&[hand]), second).unwrap();
     sim.update(50);
-    assert!(largest(&(sim.robot(id).get_qpos() - &start).row(1)) > 0.01);
+    assert!(largest((sim.robot(id).get_qpos() - &start).row(1)) > 0.01);
 }
 
 /// Two fingers that close on each other: they pass through each other unless told to collide; a pair of the file holds only
@@ -117,7 +117,7 @@ fn sensors() {
         let sensor = sim.sensor(contact).unwrap();
         let [foot, body] = ["leg/foot", "leg/body"].map(|name| sensor.find_bodies(name).unwrap()[0]);
         for forces in sensor.net_forces_w().axis_iter(Axis(0)) {
-            assert!((forces[(foot, 2)] - 5.0 * 9.81).abs() < 0.1 && largest(&forces.row(body)) == 0.0, "{forces}");
+            assert!((forces[(foot, 2)] - 5.0 * 9.81).abs() < 0.1 && largest(forces.row(body)) == 0.0, "{forces}");
         }
         // An accelerometer at rest measures g upwards.
         let acc = sim.sensor(imu).unwrap().lin_acc_b().to_owned();
@@ -147,9 +147,7 @@ fn cameras() {
         ("free", Extrinsics { placement, ..Default::default() }),
         ("mounted", Extrinsics { parent: Some("leg/imu".into()), ..Default::default() }),
     ]
-    .map(|(name, extrinsics)| {
-        sim.add_sensor(name, CameraCfg { channels: channels.clone(), extrinsics, ..Default::default() }).unwrap()
-    });
+    .map(|(name, extrinsics)| sim.add_sensor(name, CameraCfg { channels, extrinsics, ..Default::default() }).unwrap());
     sim.update(1);
     let id = |link: &str| sim.mask_ids().iter().find(|id| id.link.as_deref() == Some(link)).unwrap().clone();
     let body = id("body");
