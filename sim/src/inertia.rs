@@ -273,7 +273,6 @@ fn sorted_eigen(symmetric: &Matrix3<f64>) -> (Vector3<f64>, UnitQuaternion<f64>)
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use crate::source::Source;
@@ -302,7 +301,7 @@ mod tests {
         r.matrix() * Matrix3::from_diagonal(moments) * r.matrix().transpose()
     }
 
-    /// What MuJoCo does with `diaginertia`: exact comparisons, in double.
+    /// MuJoCo's checks of `diaginertia`: exact comparisons, in double precision.
     fn mujoco_accepts(b: &RigidInertia) -> bool {
         let (i, _) = b.principal();
         b.mass >= 1e-15 && i.min() >= 1e-15 && i[0] + i[1] >= i[2] && i[0] + i[2] >= i[1] && i[1] + i[2] >= i[0]

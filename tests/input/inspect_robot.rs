@@ -13,9 +13,9 @@ use testkit::urdf::{self, Files};
 
 #[allow(dead_code, reason = "main is what cargo runs")]
 #[path = "../../examples/inspect_robot.rs"]
-mod inspect_robot;
+mod example;
 
-/// What a run of the program leaves behind.
+/// Exit code and output of the program.
 struct Run {
     code: u8,
     out: String,
@@ -25,7 +25,7 @@ struct Run {
 fn run(args: &[&str]) -> Run {
     let (mut out, mut err) = (Vec::new(), Vec::new());
     let args = ["inspect_robot"].iter().chain(args).map(OsString::from);
-    let code = inspect_robot::run(args, &mut out, &mut err);
+    let code = example::run(args, &mut out, &mut err);
     Run { code, out: String::from_utf8(out).unwrap(), err: String::from_utf8(err).unwrap() }
 }
 

@@ -1,4 +1,4 @@
-//! Where MuJoCo refuses a model, the message names the place in the user's file that caused the line of the MJCF.
+//! A refusal of a model by MuJoCo names the place in the user's file that caused the line of the MJCF.
 
 use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
 use kinetoscope::prelude::*;

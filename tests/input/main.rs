@@ -1,5 +1,5 @@
-//! What users may give by mistake: every row is refused with a message that helps, or works; nothing is half done and
-//! nothing ends the process.
+//! Input of users, good and bad: it works, or it is refused with a message that helps; nothing is half done, and nothing
+//! ends the process.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accepted;

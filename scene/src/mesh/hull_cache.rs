@@ -280,7 +280,7 @@ mod tests {
         let all = ["KINETOSCOPE_CACHE", "XDG_CACHE_HOME", "HOME"];
         let located = |set: &[&'static str]| {
             let set = set.to_vec();
-            HullCache::located(move |name| set.iter().any(|s| *s == name).then(|| Path::new("/").join(name)))
+            HullCache::located(move |name| set.contains(&name).then(|| Path::new("/").join(name)))
         };
         assert_eq!(located(&all), HullCache::at("/KINETOSCOPE_CACHE"));
         assert_eq!(located(&all[1..]), HullCache::at("/XDG_CACHE_HOME/kinetoscope"));

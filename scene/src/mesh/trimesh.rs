@@ -224,7 +224,8 @@ mod tests {
 
     #[test]
     fn faults() {
-        let rows: [(fn(&mut TriMesh), &str); 5] = [
+        type Change = fn(&mut TriMesh);
+        let rows: [(Change, &str); 5] = [
             (|m| m.triangles[2][1] = 9, "triangle 2 refers to vertex 9, but there are 4"),
             (|m| m.positions[3][0] = f32::NAN, "position 3 is not finite"),
             (|m| m.uvs = Some(vec![]), "0 texture coordinates for 4 positions; expected as many"),

@@ -1,8 +1,6 @@
 //! Judges that share nothing with the algorithms: closed forms, and d'Alembert's principle on finite differences of
 //! link poses.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use super::*;
 use crate::description::{Inertial, Joint, Link, Mimic};
 use crate::source::Source;

@@ -209,7 +209,7 @@ mod tests {
     use super::*;
     use crate::mj;
 
-    /// What [`RawQuats`] keeps is what a forward pass changes, on either line of MuJoCo.
+    /// A forward pass changes no more than [`RawQuats`] keeps, on either line of MuJoCo.
     #[test]
     fn raw_quaternions() {
         const JOINTS: &str = r#"<mujoco><worldbody>

@@ -1,4 +1,4 @@
-//! What models count, what rays hit and what bodies feel, by MuJoCo's own arrays and by closed forms.
+//! Counts of models, hits of rays and forces on bodies, by MuJoCo's own arrays and by closed forms.
 
 use super::{Buffers, Data, Model, compile};
 

@@ -190,7 +190,8 @@ fn two_arms_and_hands() {
 #[test]
 fn usual_parents() {
     let files = Files::default();
-    let rows: [(&[&str], &[(&str, Option<&str>)]); 6] = [
+    type Parent<'a> = (&'a str, Option<&'a str>);
+    let rows: [(&[&str], &[Parent<'_>]); 6] = [
         (
             &["hand", "arm", "head", "torso", "legs", "chassis"],
             &[

@@ -173,7 +173,8 @@ fn mistakes() {
 fn unreadable_files() {
     let files = Files::default();
     files.write("arm.urdf", "<robot/>");
-    let rows: [(&str, Option<&[u8]>, Check, &[&str]); 5] = [
+    type Row<'a> = (&'a str, Option<&'a [u8]>, Check, &'a [&'a str]);
+    let rows: [Row<'_>; 5] = [
         ("nothing.urdf", None, is!(FileMissing), &["nothing.urdf"]),
         (".", None, is!(FileIsFolder), &["arm.urdf"]),
         ("latin1.urdf", Some(b"<robot>\n<link name=\"\xe9\"/></robot>"), is!(Encoding), &["latin1.urdf:2: byte 0xe9"]),

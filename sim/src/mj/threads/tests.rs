@@ -7,7 +7,7 @@ fn me() -> ThreadId {
     std::thread::current().id()
 }
 
-/// What was taken: number, desk, thread.
+/// The work that was done: number, desk, thread.
 type Taken = Vec<(usize, usize, ThreadId)>;
 
 /// Takes numbers up to `count`, slowly; fails at `fail`.
@@ -43,7 +43,7 @@ fn reused_threads() {
     assert_eq!(format!("{threads:?}"), "StayingThreads { started: 2 }");
 }
 
-/// What the caller borrows is written to by others, and is the caller's again afterwards.
+/// Borrowed data are written by other threads, and belong to the caller again afterwards.
 #[test]
 fn borrowed_data() {
     let threads = StayingThreads::default();
