@@ -129,5 +129,5 @@ fn sampler() {
     let id = sim.add_sensor("speed", SpeedCfg("ball", late)).unwrap();
     sim.update(101);
     // The newest capture that is 4 steps old is that of step 96.
-    assert_near(&sim.sensor(id).unwrap().1.values("speed"), &[9.81 * 96.0 * 0.005; 2], 1e-12);
+    assert_near(sim.sensor(id).unwrap().1.values("speed"), &[9.81 * 96.0 * 0.005; 2], 1e-12);
 }

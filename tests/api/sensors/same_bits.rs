@@ -79,9 +79,11 @@ impl Words {
     }
 }
 
+type Reader = Box<dyn Fn(&SimulationManager, &mut Words)>;
+
 /// Sensors, by the name of their kind in scene files, each with its reader.
 #[derive(Default)]
-struct Readers(Vec<(&'static str, Box<dyn Fn(&SimulationManager, &mut Words)>)>);
+struct Readers(Vec<(&'static str, Reader)>);
 
 impl Readers {
     fn add<C>(&mut self, sim: &mut SimulationManager, kind: &'static str, cfg: C, read: fn(&C::Sensor, &mut Words))
@@ -175,8 +177,10 @@ fn add_sensors(sim: &mut SimulationManager, sampling: Sampling) -> Readers {
     readers.add(sim, "camera", camera, |camera, words| {
         words.add(&camera.color().unwrap());
         words.add(&camera.mask().unwrap());
-        [camera.depth(), camera.distance()].map(|depth| words.add(&depth.unwrap()));
-        [camera.normal(), camera.shading_normal(), camera.position()].map(|vectors| words.add(&vectors.unwrap()));
+        [camera.depth(), camera.distance()].into_iter().for_each(|depth| words.add(&depth.unwrap()));
+        for vectors in [camera.normal(), camera.shading_normal(), camera.position()] {
+            words.add(&vectors.unwrap());
+        }
     });
     readers.add(sim, "ray_caster", rays, |rays, words| {
         words.add_sampled(rays);
@@ -184,7 +188,7 @@ fn add_sensors(sim: &mut SimulationManager, sampling: Sampling) -> Readers {
     });
     readers.add(sim, "ray_caster_camera", ray_camera, |camera, words| {
         words.add_sampled(camera);
-        [camera.depth(), camera.distance()].map(|depth| words.add(&depth));
+        [camera.depth(), camera.distance()].into_iter().for_each(|depth| words.add(&depth));
         words.add(&camera.mask());
     });
     readers.add(sim, "stereo_camera", stereo, |stereo, words| {
