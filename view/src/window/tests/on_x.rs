@@ -136,7 +136,9 @@ fn keys() {
 fn paused(display: &Display, mut sim: SimulationManager) -> (Window, Viewer, Running) {
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
     let viewer = sim.viewer(Wants::default());
-    Target::on(&display.connect(), window.number()).press(b" ");
+    // It stays until the key is obeyed: a server drops what a client has sent that is gone.
+    let connection = display.connect();
+    Target::on(&connection, window.number()).press(b" ");
     let run = Running::start(sim);
     wait_for(&viewer, true, None);
     (window, viewer, run)
