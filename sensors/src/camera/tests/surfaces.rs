@@ -35,7 +35,7 @@ fn material_albedo() {
             (Box { half: [0.05, 0.1, 0.1] }.into(), material(4, 0.7), at(1.0, 0.0, 0.0)),
             (Box { half: [0.05, 0.3, 0.3] }.into(), material(5, 0.3), at(1.0, 0.3, 0.2)),
         ]),
-        look([80, 60], 0.8, [3.0, 0.0, 0.0], [0.0; 3]),
+        look([83, 61], 0.8, [3.0, 0.0, 0.0], [0.0; 3]),
     );
     let mut dark = still.with(|still| still.scene = unlit(still.scene.clone()));
     dark.scene.lights = vec![Light { diffuse: [0.0; 3], ..Light::default() }];
