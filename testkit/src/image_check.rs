@@ -54,6 +54,17 @@ impl ImageCheck<'_> {
         );
     }
 
+    /// Counts the pixels that differ by more than the tolerance, and those that have an expected value: for controls.
+    pub fn count(&self, found: &[f32], expected: impl Fn(usize, usize) -> Option<f64>) -> [usize; 2] {
+        let of_pixel = |(k, &found): (usize, &f32)| {
+            let expected = expected(k % self.size[0], k / self.size[0])?;
+            let found = f64::from(found);
+            Some(!(found == expected || (found - expected).abs() <= self.tolerance))
+        };
+        let compared: Vec<bool> = found.iter().enumerate().filter_map(of_pixel).collect();
+        [compared.iter().filter(|wrong| **wrong).count(), compared.len()]
+    }
+
     /// Compares with another image.
     ///
     /// # Panics

@@ -22,31 +22,47 @@ fn tone() -> &'static Tone {
     Tone::of(ToneCurve::Soft)
 }
 
-/// The picture of a number.
+/// The ticket of frame `number`.
 fn ticket(number: u64) -> Ticket {
     let mut ticket = Ticket::first(11, 3, "eye");
     (0..number).for_each(|_| ticket.due());
     ticket
 }
 
-/// What becomes of a grey picture.
-fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<u8> {
+/// These imperfections and no others.
+fn only(set: impl FnOnce(&mut Imperfections)) -> Imperfections {
+    let mut imperfections = Imperfections::default();
+    set(&mut imperfections);
+    imperfections
+}
+
+/// A grey image with imperfections.
+fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
     imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &ticket(picture)));
-    frame.color.unwrap()
+    frame.color.unwrap().as_chunks().0.to_vec()
 }
 
-/// Mean, variance and number of the light of all pixels and colours. The bytes of a picture are steps, which add a twelfth of
+/// The light of all pixels and colours of a grey image with imperfections.
+fn lights(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<f64> {
+    spoilt(imperfections, byte, picture).iter().flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().light(b)).collect()
+}
+
+/// Mean and variance.
+fn moments(numbers: &[f64]) -> [f64; 2] {
+    let n = numbers.len() as f64;
+    let mean = numbers.iter().sum::<f64>() / n;
+    [mean, numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n]
+}
+
+/// Mean, variance and number of the light of all pixels and colours. The bytes of an image are steps, which add a twelfth of
 /// their square to the variance (Sheppard): that is taken off.
 fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
-    let bytes = spoilt(imperfections, byte, u64::from(byte));
-    let lights: Vec<f64> = bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|byte| tone().light(byte)).collect();
-    let n = lights.len() as f64;
-    let mean = lights.iter().sum::<f64>() / n;
-    let variance = lights.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / n;
+    let lights = lights(imperfections, byte, u64::from(byte));
+    let [mean, variance] = moments(&lights);
     let step = 0.5 * (tone().light(byte + 1) - tone().light(byte - 1));
-    [mean, variance - step * step / 12.0, n]
+    [mean, variance - step * step / 12.0, lights.len() as f64]
 }
 
 /// The line through points (mean, variance), each weighted by its own scatter: intercept, slope, and the scatter of both.
@@ -64,50 +80,50 @@ fn line(points: &[[f64; 3]]) -> ([f64; 2], [f64; 2]) {
     ([(xx * y - x * xy) / d, (w * xy - x * y) / d], [(xx / d).sqrt(), (w / d).sqrt()])
 }
 
+/// Shot noise grows with the signal, and read noise does not.
 #[test]
-fn shot_noise_grows_with_the_signal_and_read_noise_does_not() {
+fn photon_transfer_curve() {
     let (electrons, std) = (1000.0, 0.01);
-    let shot_noise = Some(ShotNoise { electrons });
-    let read_noise = Some(ReadNoise { std });
-    let both = Imperfections { shot_noise, read_noise, ..Imperfections::default() };
-    let shot = Imperfections { shot_noise, ..Imperfections::default() };
-    let read = Imperfections { read_noise, ..Imperfections::default() };
+    let (shot, read) = (Some(ShotNoise { electrons }), Some(ReadNoise { std }));
     // Far enough from black that nothing is cut off there: at byte 100, light of 0.127 is more than eight deviations.
     let levels = [100, 130, 160, 190];
-    for (imperfections, slope, intercept) in
-        [(&both, 1.0 / electrons, std * std), (&shot, 1.0 / electrons, 0.0), (&read, 0.0, std * std)]
+    for (shot_noise, read_noise, slope, intercept) in
+        [(shot, read, 1.0 / electrons, std * std), (shot, None, 1.0 / electrons, 0.0), (None, read, 0.0, std * std)]
     {
-        let points = levels.map(|byte| photon_transfer(imperfections, byte));
+        let imperfections = Imperfections { shot_noise, read_noise, ..Imperfections::default() };
+        let points = levels.map(|byte| photon_transfer(&imperfections, byte));
         for (byte, [mean, variance, n]) in levels.into_iter().zip(points) {
             let (light, bound) = (tone().light(byte), 6.0 * (variance / n).sqrt());
             // A byte's middle and the mean of its light differ by an eighth of the change of the step: below 1e-5 here.
             assert!((mean - light).abs() < bound + 1e-5, "{byte}: {mean} is not {light}");
         }
-        let ([found_intercept, found_slope], [of_intercept, of_slope]) = line(&points);
-        assert!((found_slope - slope).abs() < 6.0 * of_slope, "{found_slope} is not {slope} ± {of_slope}");
-        assert!((found_intercept - intercept).abs() < 6.0 * of_intercept, "{found_intercept} ± {of_intercept}");
+        let (found, scatter) = line(&points);
+        for (k, expected) in [intercept, slope].into_iter().enumerate() {
+            assert!((found[k] - expected).abs() < 6.0 * scatter[k], "{found:?}, not {expected} ± {scatter:?}");
+        }
         // The control: either noise would be missed.
-        assert!(6.0 * of_slope < 0.2 / electrons && 6.0 * of_intercept < 0.5 * std * std);
+        assert!(6.0 * scatter[1] < 0.2 / electrons && 6.0 * scatter[0] < 0.5 * std * std);
     }
 }
 
+/// Noise is independent in each frame and colour.
 #[test]
-fn noise_is_of_each_picture_and_colour() {
-    let shot = Imperfections { shot_noise: Some(ShotNoise { electrons: 200.0 }), ..Imperfections::default() };
-    let read = Imperfections { read_noise: Some(ReadNoise { std: 0.02 }), ..Imperfections::default() };
+fn correlations() {
+    let shot = only(|all| all.shot_noise = Some(ShotNoise { electrons: 200.0 }));
+    let read = only(|all| all.read_noise = Some(ReadNoise { std: 0.02 }));
     for imperfections in [shot, read] {
-        let lights = |picture| -> Vec<f64> {
-            let bytes = spoilt(&imperfections, 150, picture);
-            bytes.chunks(4).flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().light(b) - tone().light(150)).collect()
+        let errors = |picture| {
+            let lights = lights(&imperfections, 150, picture);
+            lights.into_iter().map(|light| light - tone().light(150)).collect::<Vec<f64>>()
         };
-        let (a, b) = (lights(1), lights(2));
-        assert_eq!(a, lights(1), "the same picture");
+        let (a, b) = (errors(1), errors(2));
+        assert_eq!(a, errors(1), "the same frame");
         let correlation = |a: &[f64], b: &[f64]| {
             let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
             sum(a, b) / (sum(a, a) * sum(b, b)).sqrt()
         };
         let bound = 6.0 / (a.len() as f64).sqrt();
-        assert!(correlation(&a, &b).abs() < bound, "pictures");
+        assert!(correlation(&a, &b).abs() < bound, "frames");
         assert!(correlation(&a[1..], &a[..a.len() - 1]).abs() < bound, "red, green and blue");
         assert!(correlation(&a, &a) > 0.99, "the control");
     }
@@ -115,54 +131,49 @@ fn noise_is_of_each_picture_and_colour() {
 
 /// Poisson's distribution, every quantile of it: mean and variance are equal.
 #[test]
-fn few_electrons_are_counted_one_by_one() {
+fn few_electrons() {
     for electrons in [0.5, 3.0, 20.0] {
-        let byte = 128;
-        let shot = ShotNoise { electrons: electrons / tone().light(byte) };
-        let (view, n) = (view([SIDE; 2], 150.0), 40_000);
+        let light = tone().light(128);
+        let shot = ShotNoise { electrons: electrons / light };
+        let (view, ticket) = (view([SIDE; 2], 150.0), ticket(1));
         let mut counts = Vec::new();
-        for pixel in 0..n {
-            let mut light = [tone().light(byte); 3];
-            shot.spoil(&mut light, &Place { picture: pinhole(&view, &ticket(1)), pixel });
+        for pixel in 0..40_000 {
+            let mut light = [light; 3];
+            shot.spoil(&mut light, &Place { picture: pinhole(&view, &ticket), pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
-        let n = counts.len() as f64;
-        let mean = counts.iter().sum::<f64>() / n;
-        let variance = counts.iter().map(|count| (count - mean).powi(2)).sum::<f64>() / n;
+        let (n, [mean, variance]) = (counts.len() as f64, moments(&counts));
         // Means scatter by sqrt(N / n); variances by sqrt((2 + 1 / N) / n) of themselves.
         assert!((mean - electrons).abs() < 6.0 * (electrons / n).sqrt(), "{mean}");
         assert!((variance / electrons - 1.0).abs() < 6.0 * ((2.0 + 1.0 / electrons) / n).sqrt(), "{variance}");
     }
 }
 
+/// Light falls with the fourth power of the cosine.
 #[test]
-fn light_falls_with_the_fourth_power_of_the_cosine() {
+fn vignetting() {
+    let of = |strength| spoilt(&only(|all| all.vignetting = Some(Vignetting { strength })), 200, 1);
     for strength in [0.0, 0.5, 1.0] {
-        let vignetting = Some(Vignetting { strength });
-        let bytes = spoilt(&Imperfections { vignetting, ..Imperfections::default() }, 200, 1);
         let mut off = 0;
-        for (pixel, found) in bytes.chunks(4).enumerate() {
+        for (pixel, found) in of(strength).into_iter().enumerate() {
             let (u, v) = ((pixel % SIDE) as f64 + 0.5, (pixel / SIDE) as f64 + 0.5);
             let angle = ((u - 100.0).hypot(v - 100.0) / 150.0).atan();
-            let light = tone().light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4)));
-            let expected = tone().byte(light);
-            assert!(found[..3].iter().all(|byte| byte.abs_diff(expected) <= 1), "{pixel}: {found:?}, {expected}");
-            assert_eq!(found[3], 255);
+            let expected = tone().byte(tone().light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4))));
+            let close = found[..3].iter().all(|byte| byte.abs_diff(expected) <= 1);
+            assert!(close && found[3] == 255, "{pixel}: {found:?}, {expected}");
             off += usize::from(found[0] != expected);
         }
         // Only where the two ways to compute it round to different sides.
         assert!(off < SIDE, "{off}");
     }
     // The control: at a corner, 43 degrees off the axis, 0.28 of the light is left.
-    let vignetting = Some(Vignetting::default());
-    let corner = spoilt(&Imperfections { vignetting, ..Imperfections::default() }, 200, 1)[0];
-    let left = tone().light(corner) / tone().light(200);
+    let left = tone().light(of(Vignetting::default().strength)[0][0]) / tone().light(200);
     assert!((left - 0.28).abs() < 0.01, "{left}");
 }
 
 #[test]
-fn nothing_is_what_it_was() {
+fn zero_imperfections() {
     let light = Imperfections {
         vignetting: Some(Vignetting { strength: 0.0 }),
         exposure: Some(Exposure { stops: 0.0 }),
@@ -170,14 +181,8 @@ fn nothing_is_what_it_was() {
         ..Imperfections::default()
     };
     for byte in 0..=255 {
-        let bytes = spoilt(&light, byte, 1);
-        assert!(bytes.chunks(4).all(|pixel| *pixel == [byte, byte, byte, 255]), "{byte}");
+        assert!(spoilt(&light, byte, 1).iter().all(|pixel| *pixel == [byte, byte, byte, 255]), "{byte}");
     }
-}
-
-/// What becomes of depths, with distances beside them.
-fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
-    spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
 }
 
 /// Depths and distances of reaches: of a lens whose rays go aside these are distances, of others depths.
@@ -197,7 +202,7 @@ fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
     [0, 1].map(|k| pixels.iter().map(|pixel| pixel[k]).collect())
 }
 
-/// As [`spoilt_depths`], with any lens: reaches, from both channels, from each alone, and all of them the same.
+/// Reaches with imperfections, from both channels and from each alone: all of them must be the same.
 fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Picture<'_>) -> Vec<f32> {
     let seen = |(pixel, reach): (usize, &f32)| if picture.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
     let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
@@ -226,18 +231,20 @@ fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Pictur
     found.clone()
 }
 
-/// Both depth and distance of a camera tell the same of holes and noise, and each alone too.
+/// Depths through a pinhole, with imperfections.
+fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
+    spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
+}
+
+/// Holes and noise are the same in depth and distance of a camera, and in each alone.
 #[test]
-fn distances_alone_are_spoilt_alike() {
+fn distances() {
     let (view, n) = (view([60, 40], 50.0), 60 * 40);
     let reaches: Vec<f32> = (0..n).map(|k| if k % 60 < 30 { 2.0 } else { 1.0 }).collect();
     for rays in lenses(&view) {
         let baseline = if rays.is_none() { 0.075 } else { 0.0 };
-        let all = Imperfections {
-            depth_noise: Some(DepthNoise::NGUYEN),
-            holes: Some(Holes { baseline, ..Holes::default() }),
-            ..Imperfections::default()
-        };
+        let holes = Some(Holes { baseline, ..Holes::default() });
+        let all = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), holes, ..Imperfections::default() };
         let ticket = ticket(1);
         let found = spoilt_behind(&all, &reaches, Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
         assert!(rays.is_some() || found.iter().any(|reach| reach.is_infinite()), "there are holes");
@@ -251,7 +258,7 @@ type Law = fn(f64) -> f64;
 
 /// Deviations scatter by sqrt(1 / 2n) of themselves, means by sigma / sqrt(n): six times that.
 #[test]
-fn depth_noise_grows_with_the_square_of_the_depth() {
+fn depth_noise() {
     let (view, n) = (view([SIDE; 2], 150.0), (SIDE * SIDE) as f64);
     let laws: [(DepthNoise, Law); 2] = [
         (DepthNoise::KHOSHELHAM, |z| 2.85e-5 * 100.0 * z * z * 0.5),
@@ -259,34 +266,32 @@ fn depth_noise_grows_with_the_square_of_the_depth() {
     ];
     for (depth_noise, law) in laws {
         for z in [0.5, 1.0, 2.0, 5.0] {
-            let all = Imperfections { depth_noise: Some(depth_noise), ..Imperfections::default() };
             let mut depths = vec![z as f32; SIDE * SIDE];
             depths[7] = f32::INFINITY;
-            let found = spoilt_depths(&all, &depths, &view);
+            let found = spoilt_depths(&only(|all| all.depth_noise = Some(depth_noise)), &depths, &view);
             assert_eq!(found[7], f32::INFINITY, "a miss stays a miss");
             let errors: Vec<f64> = found.iter().filter(|z| z.is_finite()).map(|found| f64::from(*found) - z).collect();
-            let mean = errors.iter().sum::<f64>() / n;
-            let sigma = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
+            let [mean, variance] = moments(&errors);
+            let sigma = variance.sqrt();
             assert!(mean.abs() < 6.0 * sigma / n.sqrt(), "{z} m: {mean}");
             assert!((sigma / law(z) - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{z} m: {sigma}");
         }
     }
     // The control: the deviations at 1 m and 2 m are four times apart, not twice.
     assert_eq!((laws[0].1)(2.0) / (laws[0].1)(1.0), 4.0);
-    let huge = DepthNoise { constant: 1000.0, quadratic: 0.0, offset: 0.0 };
-    let all = Imperfections { depth_noise: Some(huge), ..Imperfections::default() };
-    let found = spoilt_depths(&all, &[50.0; SIDE * SIDE], &view);
+    let huge = only(|all| all.depth_noise = Some(DepthNoise { constant: 1000.0, quadratic: 0.0, offset: 0.0 }));
+    let found = spoilt_depths(&huge, &[50.0; SIDE * SIDE], &view);
     assert!(found.iter().all(|z| (0.01..=100.0).contains(z)), "saturated");
 }
 
 /// A box 1 m away before a wall 2 m away: the shadow is fx b (1/1 - 1/2) pixels wide, on the side that the projector is not on.
 #[test]
-fn the_projector_casts_a_shadow() {
+fn projector_shadow() {
     let view = view([100, 8], 100.0);
     let row: Vec<f32> = (0..100).map(|u| if (20..40).contains(&u) { 1.0 } else { 2.0 }).collect();
     let holes_with = |baseline: f64| {
         let holes = Some(Holes { max_angle: FRAC_PI_2, baseline });
-        spoilt_depths(&Imperfections { holes, ..Imperfections::default() }, &row.repeat(8), &view)
+        spoilt_depths(&only(|all| all.holes = holes), &row.repeat(8), &view)
     };
     for baseline in [0.075, 0.15, -0.075, -0.15, 0.0] {
         let found = holes_with(baseline);
@@ -308,11 +313,11 @@ fn the_projector_casts_a_shadow() {
 
 /// Tilted planes: the angle between ray and normal is known at every pixel, behind any lens.
 #[test]
-fn grazing_surfaces_are_holes() {
+fn grazing_holes() {
     let view = view([80, 60], 60.0);
     let max_angle = 60f64.to_radians();
     let holes = Some(Holes { max_angle, baseline: 0.0 });
-    let all = Imperfections { holes, ..Imperfections::default() };
+    let all = only(|all| all.holes = holes);
     for rays in lenses(&view) {
         let (mut inside, mut outside) = (0, 0);
         for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
@@ -341,7 +346,7 @@ fn grazing_surfaces_are_holes() {
     }
 }
 
-/// No lens, one whose rays go forward, and one whose rays go aside too: of pictures of a view.
+/// No lens, one whose rays go forward, and one whose rays go aside too: of images of a view.
 fn lenses(view: &View) -> [Option<LensRays>; 3] {
     let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
     let rays = |lens: Lens, by: f64| {
@@ -354,9 +359,9 @@ fn lenses(view: &View) -> [Option<LensRays>; 3] {
 
 /// Behind lenses too the deviation of what is measured is the law's: of depths where rays go forward, of distances elsewhere.
 #[test]
-fn depth_is_noisy_behind_lenses() {
+fn lens_depth_noise() {
     let (view, law) = (view([120, 90], 60.0), DepthNoise { constant: 1e-3, quadratic: 2e-3, offset: 0.0 });
-    let all = Imperfections { depth_noise: Some(law), ..Imperfections::default() };
+    let all = only(|all| all.depth_noise = Some(law));
     for rays in lenses(&view) {
         let ticket = ticket(1);
         let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
@@ -374,7 +379,7 @@ fn depth_is_noisy_behind_lenses() {
     }
 }
 
-/// What falls on a white picture, by pixel.
+/// Light on a white image, by pixel.
 fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
     let (view, ticket) = (view(size, 1.0), ticket(1));
     let picture = Picture { rays: Some(rays), ..pinhole(&view, &ticket) };
@@ -389,9 +394,9 @@ fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
 
 /// Fisheyes by their formulas, lenses of zero distortion as a pinhole, and all of them by their mapping from directions to
 /// points, which the falloff does not use: a patch of the sky of solid angle d omega, seen at the angle theta, lights an area of
-/// the picture, and gets there cos theta d omega of the light.
+/// the image, and gets there cos theta d omega of the light.
 #[test]
-fn light_falls_off_as_the_lens_maps_the_sky() {
+fn lens_vignetting() {
     let size = [64, 48];
     let law = |name: &str, t: f64| match name {
         "equidistant" => Some(t.cos().max(0.0) * t.sin() / t),
@@ -424,7 +429,7 @@ fn light_falls_off_as_the_lens_maps_the_sky() {
                 assert!((found - expected).abs() < 1e-6, "{}: {theta}: {found} is not {expected}", lens.name());
                 by_law += 1;
             }
-            // The area of the picture that a unit of solid angle lights there, and on the axis.
+            // The area of the image that a unit of solid angle lights there, and on the axis.
             let area = |ray: nalgebra::Vector3<f64>| {
                 let beside = ray.cross(&nalgebra::Vector3::new(0.3, -0.5, 0.2)).normalize();
                 let slope = |along: nalgebra::Vector3<f64>| {
@@ -444,9 +449,9 @@ fn light_falls_off_as_the_lens_maps_the_sky() {
     assert!(by_law > 5000 && by_mapping > 15_000 && dark > 100, "{by_law} {by_mapping} {dark}");
 }
 
-/// A pixel on the very edge of what the lens sees has nothing beside it, above or below; it is as bright as the law has it.
+/// A pixel on the very edge of the image circle has nothing beside it, above or below; it is as bright as the law has it.
 #[test]
-fn the_last_pixel_of_the_image_circle_is_lit() {
+fn image_circle_edge() {
     let size = [65, 65];
     for max_angle in [0.5, 1.0, 1.5] {
         // The middle of the first pixel of row 32 is 32 pixels from the principal point.
@@ -462,9 +467,9 @@ fn the_last_pixel_of_the_image_circle_is_lit() {
     }
 }
 
-/// The normalised picture of a lens may be as large or as small as its focal length makes it: the light is the same.
+/// The normalised image of a lens may be as large or as small as its focal length makes it: the light is the same.
 #[test]
-fn light_does_not_depend_on_the_unit_of_the_picture() {
+fn focal_length_unit() {
     let size = [64, 48];
     let of = |scale: f64| {
         let pixels = PixelIntrinsics { fx: 20.0 / scale, fy: 20.0 / scale, cx: 32.0, cy: 24.0 };
@@ -483,7 +488,7 @@ fn light_does_not_depend_on_the_unit_of_the_picture() {
 /// Under a sky that is equally bright everywhere, a lens that sees up to the angle theta collects pi sin² theta of light, up to
 /// a right angle, however it spreads it: the sum over all pixels times the area of one.
 #[test]
-fn lenses_collect_the_light_of_the_sky() {
+fn light_of_sky() {
     use crate::camera::lens::{Equisolid, Orthographic, Stereographic};
     use std::f64::consts::PI;
     let (size, f) = ([300, 300], 50.0);
@@ -508,33 +513,31 @@ fn lenses_collect_the_light_of_the_sky() {
 }
 
 #[test]
-fn bad_numbers_are_refused() {
+fn refusals() {
     let color = Channels { color: true, ..Channels::default() };
     let depth = Channels { depth: true, ..Channels::default() };
-    let mut bad = Vec::new();
+    let mut bad = vec![
+        only(|all| all.read_noise = Some(ReadNoise { std: -1.0 })),
+        only(|all| all.read_noise = Some(ReadNoise { std: f64::INFINITY })),
+    ];
     for value in [-0.1, 1.1, f64::NAN] {
-        bad.push(Imperfections { vignetting: Some(Vignetting { strength: value }), ..Imperfections::default() });
-        bad.push(Imperfections { shot_noise: Some(ShotNoise { electrons: value - 1.0 }), ..Default::default() });
-        bad.push(Imperfections { exposure: Some(Exposure { stops: 30.0 * value.signum() }), ..Default::default() });
+        bad.push(only(|all| all.vignetting = Some(Vignetting { strength: value })));
+        bad.push(only(|all| all.shot_noise = Some(ShotNoise { electrons: value - 1.0 })));
+        bad.push(only(|all| all.exposure = Some(Exposure { stops: 30.0 * value.signum() })));
     }
-    bad.push(Imperfections { read_noise: Some(ReadNoise { std: -1.0 }), ..Default::default() });
-    bad.push(Imperfections { read_noise: Some(ReadNoise { std: f64::INFINITY }), ..Default::default() });
     for imperfections in &bad {
         let error = imperfections.check(color).unwrap_err();
         assert!(matches!(error, SensorError::OutOfRange { .. }), "{error}");
     }
-    let holes = |max_angle, baseline| {
-        Imperfections { holes: Some(Holes { max_angle, baseline }), ..Imperfections::default() }.check(depth)
-    };
+    let holes = |max_angle, baseline| only(|all| all.holes = Some(Holes { max_angle, baseline })).check(depth);
     assert!(holes(1.0, 0.1).is_ok() && holes(2.0, 0.1).is_err() && holes(1.0, f64::NAN).is_err());
-    let noise = DepthNoise { quadratic: -1.0, ..DepthNoise::default() };
-    let error = Imperfections { depth_noise: Some(noise), ..Default::default() }.check(depth).unwrap_err().to_string();
+    let noise = only(|all| all.depth_noise = Some(DepthNoise { quadratic: -1.0, ..DepthNoise::default() }));
+    let error = noise.check(depth).unwrap_err().to_string();
     assert_eq!(error, "quadratic of the depth noise is -1; it must be 0 to 1000");
-    // What is not measured cannot be spoilt.
-    let shot = Imperfections { shot_noise: Some(ShotNoise::default()), ..Imperfections::default() };
-    let error = shot.check(depth).unwrap_err().to_string();
-    assert_eq!(error, "the camera does not measure color; it measures depth");
-    let holes = Imperfections { holes: Some(Holes::default()), ..Imperfections::default() };
+    // Channels that are not measured have no imperfections.
+    let shot = only(|all| all.shot_noise = Some(ShotNoise::default()));
+    assert_eq!(shot.check(depth).unwrap_err().to_string(), "the camera does not measure color; it measures depth");
+    let holes = only(|all| all.holes = Some(Holes::default()));
     assert!(holes.check(color).is_err() && holes.check(depth).is_ok());
     assert!(Imperfections::default().check(Channels::default()).is_ok());
 }

@@ -1,169 +1,163 @@
-//! The same picture, bit for bit, with every instruction set and on every thread.
+//! The same image, bit for bit, with every instruction set, on any number of threads, and with any channels.
 
-use super::super::{Channels, Frame, FrameMut, ParallelRasterizer, RasterCfg, Rasterizer, Shot};
-use super::scenes::{Random, figure, random};
+use super::super::{Aperture, Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, Shutter};
+use super::detail;
+use super::harness::{Image, Still, assert_same_bits, look};
+use super::lenses;
+use super::scenes::{EXACT, Random, figure, random};
+use super::shutter::{bar, bar_at};
 use crate::lanes::levels;
 use crate::visibility::View;
-use scene::{Light, LightKind, PoseF32, RenderScene};
+use scene::{Haze, Light, LightKind, PoseF32, RenderScene};
 
-/// A scene with everything that colours are made of.
-fn rich(seed: u64) -> (RenderScene, Vec<PoseF32>, View) {
-    let mut numbers = Random(seed);
-    let (mut scene, poses) = random(&mut numbers, 1.0);
-    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 10.0 };
-    scene.lights.push(Light { kind: spot, position: [2., 1., 3.], direction: [-2., -1., -3.], ..Light::default() });
-    scene.lights.push(Light { kind: LightKind::Point, position: [0., -2., 1.], ..Light::default() });
-    scene.haze = Some(scene::Haze { color: None, start: 2.0, end: 8.0 });
-    let view = View::look_at([101, 67], 0.9, [2.5, -1.5, 1.5], [0., 0., -0.1], [0., 0., 1.]).unwrap();
-    (scene, poses, view)
-}
+const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
+const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
-/// Frames are compared as bits: NaN would equal itself.
-pub(super) fn bits(frame: &Frame) -> Vec<u32> {
-    let bytes = [&frame.color, &frame.albedo].into_iter().flatten().flatten();
-    let mut out: Vec<u32> = bytes.map(|&x| x.into()).collect();
-    out.extend(frame.mask.iter().flatten().map(|&x| x as u32));
-    let floats = [&frame.depth, &frame.distance, &frame.normal, &frame.shading_normal, &frame.position, &frame.flow];
-    out.extend(floats.into_iter().flatten().flatten().map(|x| x.to_bits()));
-    out
-}
-
-#[test]
-fn every_instruction_set_draws_the_same_bits() {
-    let names: Vec<String> = levels().iter().map(|l| format!("{l:?}")).collect();
-    println!("{names:?}");
-    assert!(names.len() >= 2);
-    for seed in 1..4 {
-        let (scene, poses, view) = rich(seed);
-        for samples in [1, 4] {
-            let draw = |level| {
-                let cfg = RasterCfg { samples, ..RasterCfg::default() };
-                let mut frame = Frame::new(view.width, view.height, Channels::ALL);
-                Rasterizer::with_level(cfg, level).render(&scene, &poses, &view, &mut frame).unwrap();
-                bits(&frame)
-            };
-            let all: Vec<_> = levels().into_iter().map(draw).collect();
-            for (other, name) in all.iter().zip(&names) {
-                let different = other.iter().zip(&all[0]).filter(|(a, b)| a != b).count();
-                assert_eq!(different, 0, "{name} differs from scalar, {samples} samples, scene {seed}");
-            }
-        }
-    }
-}
-
-#[test]
-fn every_thread_draws_the_same_bits() {
-    let scenes: Vec<_> = (1..7).map(rich).collect();
-    let draw = |rasterizer: &mut Rasterizer, k: usize| {
-        let (scene, poses, view) = &scenes[k];
-        let mut frame = Frame::new(view.width, view.height, Channels::ALL);
-        rasterizer.render(scene, poses, view, &mut frame).unwrap();
-        bits(&frame)
-    };
-    let alone: Vec<_> = (0..6).map(|k| draw(&mut Rasterizer::default(), k)).collect();
-    for threads in 1..=3 {
-        std::thread::scope(|scope| {
-            for thread in 0..threads {
-                let (draw, alone) = (&draw, &alone);
-                scope.spawn(move || {
-                    let mut rasterizer = Rasterizer::default();
-                    for k in (thread..6).step_by(threads) {
-                        assert!(draw(&mut rasterizer, k) == alone[k], "scene {k}, {threads} threads");
-                    }
-                });
-            }
-        });
-    }
-}
-
-#[test]
-fn bands_and_channels_do_not_change_a_picture() {
-    let (scene, poses) = figure();
-    // Tall enough for several bands with four samples.
-    let view = View::look_at([200, 400], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap();
-    let draw = |channels, samples| {
-        let mut frame = Frame::new(view.width, view.height, channels);
-        let cfg = RasterCfg { samples, ..RasterCfg::default() };
-        Rasterizer::new(cfg).render(&scene, &poses, &view, &mut frame).unwrap();
-        frame
-    };
-    let (all, one) = (draw(Channels::ALL, 4), draw(Channels::ALL, 1));
-    let depth = draw(Channels { depth: true, ..Channels::default() }, 4);
-    assert!(all.depth == one.depth && all.depth == depth.depth, "multisampling is for the colour only");
-    assert!(all.mask == one.mask && all.normal == one.normal);
-    assert!(all.color != one.color);
-    assert!(draw(Channels { color: true, ..Channels::default() }, 4).color == all.color);
-}
-
-/// A scene with everything, and things that are not quite opaque; larger than what is worth a thread.
-fn large(seed: u64, size: [usize; 2]) -> (RenderScene, Vec<PoseF32>, View) {
-    let (scene, poses, view) = rich(seed);
+/// Everything that colours are made of: veils, a mirror, all kinds of lights, haze.
+fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
+    let (scene, poses) = random(&mut Random(seed), 1.0);
     let mut instances = scene.instances().to_vec();
     (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
-    let mut veiled = RenderScene::new(instances).unwrap();
-    (veiled.lights, veiled.haze) = (scene.lights.clone(), scene.haze);
-    let view = View { width: size[0], height: size[1], fx: view.fx * 3.0, fy: view.fy * 3.0, ..view };
-    (veiled, poses, View { cx: 0.5 * size[0] as f32, cy: 0.5 * size[1] as f32, ..view })
+    instances[3].material.reflectance = 0.5;
+    let mut scene = RenderScene::new(instances).unwrap();
+    let kind = LightKind::Spot { cutoff_deg: 40.0, exponent: 10.0 };
+    let spot = Light { kind, position: [2., 1., 3.], direction: [-2., -1., -3.], ..Light::default() };
+    scene.lights.push(Light { radius: 0.1, ..spot });
+    scene.lights.push(Light { kind: LightKind::Point, position: [0., -2., 1.], ..Light::default() });
+    scene.haze = Some(Haze { color: None, start: 2.0, end: 8.0 });
+    let view = look([width, height], 0.9, [2.5, -1.5, 1.5], [0., 0., -0.1]);
+    Still::new((scene, poses), View { fx: zoom * view.fx, fy: zoom * view.fy, ..view })
+}
+
+/// Sizes on both sides of what is worth a thread.
+#[test]
+fn raster() {
+    assert!(levels().len() >= 2, "{:?}", levels());
+    let sizes = [[333, 251], [64, 64], [97, 401], [8, 8], [401, 97], [203, 300], [1, 1], [120, 90], [130, 17]];
+    for samples in [1, 4] {
+        let cfg = RasterCfg { samples, ..RasterCfg::default() };
+        let some = || (1..4).map(|seed| rich(seed, [101, 67], 1.0).with(|still| still.cfg = cfg)).collect();
+        assert_same_bits(&format!("{samples} samples"), &some, &[1], &[3]);
+        let large = |(size, seed)| rich(seed, size, 3.0).with(|still| still.cfg = cfg);
+        let all = || sizes.into_iter().zip(1..).map(large).collect();
+        assert_same_bits(&format!("sizes, {samples} samples"), &all, &[1, 2, 3, 8], &[1, 2, 3, 5, 9]);
+    }
 }
 
 #[test]
-fn the_number_of_threads_does_not_change_pictures() {
-    let sizes = [[333, 251], [64, 64], [97, 401], [8, 8], [401, 97], [203, 300], [1, 1], [120, 90], [130, 17]];
-    let shots: Vec<_> = sizes.into_iter().zip(1..).map(|(size, seed)| large(seed, size)).collect();
-    for samples in [1, 4] {
-        let cfg = RasterCfg { samples, ..RasterCfg::default() };
-        let mut alone = Rasterizer::new(cfg);
-        let expected: Vec<Vec<u32>> = shots
-            .iter()
-            .map(|(scene, poses, view)| {
-                let mut frame = Frame::new(view.width, view.height, Channels::ALL);
-                alone.render(scene, poses, view, &mut frame).unwrap();
-                bits(&frame)
-            })
-            .collect();
-        for threads in [1, 2, 3, 8] {
-            let mut parallel = ParallelRasterizer::new(cfg, threads);
-            for count in [1, 2, 3, 5, 9] {
-                let mut frames: Vec<_> =
-                    shots[..count].iter().map(|(_, _, v)| Frame::new(v.width, v.height, Channels::ALL)).collect();
-                let mut jobs: Vec<_> = shots[..count]
-                    .iter()
-                    .zip(&mut frames)
-                    .map(|((scene, poses, view), frame)| {
-                        (Shot { scene, poses, view, lights: None, lens: None, before: None }, frame.as_mut())
-                    })
-                    .collect();
-                parallel.render(&mut jobs).unwrap();
-                for (k, frame) in frames.iter().enumerate() {
-                    assert!(bits(frame) == expected[k], "{threads} threads, shot {k} of {count}, {samples} samples");
-                }
-            }
+fn rays() {
+    for renderer in &RENDERERS[1..] {
+        let occlusion_rays = if *renderer == Renderer::Hybrid { 4 } else { 0 };
+        let cfg = RasterCfg { occlusion_rays, ..RasterCfg::default() };
+        let by = |(size, seed)| Still { renderer: *renderer, cfg, ..rich(seed, size, 1.0) };
+        let stills = || [[61, 47], [8, 8], [33, 70]].into_iter().zip(1..).map(by).collect();
+        assert_same_bits(&format!("{renderer:?}"), &stills, &[1, 2, 3], &[1, 3]);
+    }
+    // The control: another seed has other noise.
+    let other = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 4 };
+    let still = rich(1, [61, 47], 1.0);
+    assert!(still.by(FEW_PATHS).color() != still.by(other).color());
+}
+
+#[test]
+fn lens_images() {
+    let view = look([64, 48], 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
+    // Farther to the side, and of other intrinsics.
+    let old = look([64, 48], 0.8, [1.5, -1.0, 1.1], [0.1, 0., 0.7]);
+    for (lens, rays) in lenses::bent() {
+        for renderer in &RENDERERS[1..] {
+            let still = || {
+                let before = Some((figure().1, old));
+                vec![Still { renderer: *renderer, lens: Some(rays.clone()), before, ..Still::new(figure(), view) }]
+            };
+            assert!(still()[0].draw().flow().iter().flatten().any(|x| x.is_finite() && *x != 0.0), "things move");
+            assert_same_bits(&format!("{}, {renderer:?}", lens.name()), &still, &[2, 3], &[1]);
         }
     }
 }
 
 #[test]
-fn shots_that_cannot_be_drawn_do_not_stop_the_others() {
-    let (scene, poses, view) = large(1, [333, 251]);
+fn rolling_shutter() {
+    let (scene, view) = bar();
+    let shutter = Shutter { row_time: 0.004, exposure_time: 0.01 };
+    let aperture = Some(Aperture { focal_length: 0.05, f_number: 1.4, focus_distance: 1.5 });
+    let renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: true, seed: 0 };
+    let moved = PoseF32 { translation: [0.01, 0.0, 0.02], ..view.world_from_camera };
+    let (before, opened) = (Some((bar_at(-0.3), view)), Some((bar_at(-0.3), moved, 0.2)));
+    let still = Still { shutter, aperture, renderer, before, opened, ..Still::new((scene, bar_at(0.3)), view) };
+    assert_same_bits("rows", &|| vec![still.clone()], &[1, 2, 3], &[1]);
+}
+
+#[test]
+fn detail_levels() {
+    let still = || detail::veiled().with(|still| still.cfg = detail::ON);
+    assert!(still().draw().bits() != detail::veiled().draw().bits(), "levels are in use");
+    assert_same_bits("levels of detail", &|| vec![still(); 9], &[2, 3], &[1, 9]);
+}
+
+/// Bands, samples and channels that are not asked for change no bit of the other channels.
+#[test]
+fn channels() {
+    // Tall enough for several bands with four samples.
+    let view = look([200, 400], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
+    let still = |channels, samples| {
+        let cfg = RasterCfg { samples, ..RasterCfg::default() };
+        Still { channels, cfg, ..Still::new(figure(), view) }.draw()
+    };
+    let (all, one) = (still(Channels::ALL, 4), still(Channels::ALL, 1));
+    assert!(all.bits_but_color() == one.bits_but_color(), "multisampling is for the colour only");
+    assert!(all.color() != one.color());
+    assert!(still(Channels { depth: true, ..Channels::default() }, 4).depth() == all.depth());
+    assert!(still(Channels { color: true, ..Channels::default() }, 4).color() == all.color());
+
+    let still = Still::new(random(&mut Random(9), 1.0), look([90, 70], 1.0, [2.2, 0.4, 0.9], [0.0; 3]));
+    for renderer in
+        RENDERERS.into_iter().chain([Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed: 0 }])
+    {
+        let of = |channels| Still { channels, ..still.clone() }.by(renderer);
+        let all = of(Channels::ALL);
+        assert_eq!(of(Channels { albedo: true, mask: true, ..Channels::NONE }).albedo(), all.albedo());
+        let without = of(Channels { albedo: false, ..Channels::ALL });
+        let all = all.frame;
+        assert!(without.bits() == Image { frame: Frame { albedo: None, ..all }, width: 90 }.bits());
+    }
+}
+
+/// Path tracing and the hybrid change no channel but the colour.
+#[test]
+fn only_color_differs() {
+    let view = look([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
+    for scene in [figure(), random(&mut Random(5), 1.2)] {
+        let still = Still { cfg: EXACT, ..Still::new(scene, view) };
+        let [raster, traced, hybrid, paths] = RENDERERS.map(|renderer| still.by(renderer));
+        assert!(traced.bits_but_color() == paths.bits_but_color());
+        assert!(raster.bits_but_color() == hybrid.bits_but_color());
+        assert!(traced.color() != paths.color() && raster.color() != hybrid.color());
+        let found = super::traced::compare(&raster, &paths);
+        assert!(found.compared > 97 * 83 / 2 && found.different * 1000 <= found.compared, "{found:?}");
+    }
+}
+
+#[test]
+fn failed_jobs() {
+    let still = rich(1, [333, 251], 3.0).with(|still| still.channels = Channels { mask: true, ..Channels::default() });
     for (threads, count) in [(1, 3), (2, 3), (4, 3), (2, 5), (2, 9)] {
-        let mut frames = vec![Frame::new(333, 251, Channels { mask: true, ..Channels::default() }); count];
-        let mut jobs: Vec<(Shot<'_>, FrameMut<'_>)> = frames
-            .iter_mut()
-            .map(|frame| {
-                (
-                    Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None },
-                    frame.as_mut(),
-                )
-            })
-            .collect();
-        for k in [1, count - 1] {
-            jobs[k].0.poses = &[];
-        }
-        let (index, _) = ParallelRasterizer::new(RasterCfg::default(), threads).render(&mut jobs).unwrap_err();
+        let mut frames = vec![still.frame(); count];
+        let failed = |k| k == 1 || k == count - 1;
+        let shot = |k| Shot { poses: if failed(k) { &[] } else { &still.poses }, ..still.shot() };
+        let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(k, frame)| (shot(k), frame.as_mut())).collect();
+        let (index, _) = ParallelRasterizer::new(still.cfg, threads).render(&mut jobs).unwrap_err();
         assert_eq!(index, 1);
         for (k, frame) in frames.iter().enumerate() {
             let drawn = frame.mask.iter().flatten().any(|&m| m != 0);
-            assert_eq!(drawn, k != 1 && k != count - 1, "shot {k} of {count}, {threads} threads");
+            assert_eq!(drawn, !failed(k), "shot {k} of {count}, {threads} threads");
         }
     }
+}
+
+#[test]
+fn thread_safety() {
+    fn shared<T: Send + Sync>(_: &T) {}
+    shared(&Rasterizer::default());
+    shared(&ParallelRasterizer::new(EXACT, 2));
 }

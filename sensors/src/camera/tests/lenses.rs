@@ -4,6 +4,7 @@ use super::super::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
 use super::super::{CameraError, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics};
+use super::harness::opencv;
 use crate::SensorError;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -28,7 +29,7 @@ pub(super) const WARPED: OpenCv = OpenCv {
 pub(super) const FISHEYE: OpenCvFisheye =
     OpenCvFisheye { k1: 0.03, k2: -0.012, k3: 0.004, k4: -0.0011, max_angle: Some(1.6) };
 
-/// One of each kind, and the pixels of a picture of 64 x 48 that it fills, or more than fills.
+/// One of each kind, and the pixels of an image of 64 x 48 that it fills, or more than fills.
 pub(in crate::camera) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     let f = |f: f64| PixelIntrinsics { fx: f, fy: 1.1 * f, cx: 30.25, cy: 25.5 };
     let panorama = Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap();
@@ -47,13 +48,26 @@ pub(in crate::camera) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     ]
 }
 
+/// Rays of a lens, with those of the samples of colours.
+pub(super) fn rays_of(lens: Lens, pixels: PixelIntrinsics, size: [usize; 2]) -> LensRays {
+    LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 4).unwrap()
+}
+
+/// Those of [`all`] that are no pinhole.
+pub(super) fn bent() -> impl Iterator<Item = (Lens, LensRays)> {
+    all()
+        .into_iter()
+        .filter(|(lens, _)| !lens.is_pinhole())
+        .map(|(lens, pixels)| (lens, rays_of(lens, pixels, [64, 48])))
+}
+
 fn angle_with([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).atan2(z)
 }
 
 /// Every pixel that has a ray is where its ray is seen, to 1e-10 pixel; every other one is outside of the image circle.
 #[test]
-fn pixels_are_where_their_rays_are_seen() {
+fn round_trip() {
     for (lens, pixels) in all() {
         let optics = Optics::new(lens, pixels).unwrap();
         let (mut seen, mut blind) = (0, 0);
@@ -81,7 +95,7 @@ fn pixels_are_where_their_rays_are_seen() {
 }
 
 #[test]
-fn fisheyes_have_the_radii_of_their_closed_forms() {
+fn fisheye_radii() {
     type Law = fn(f64) -> f64;
     let laws: [(Lens, Law, f64); 5] = [
         (Equidistant::default().into(), |t| t, PI),
@@ -112,7 +126,7 @@ fn fisheyes_have_the_radii_of_their_closed_forms() {
     }
     // A control: one law is not another.
     assert!((FRAC_PI_2 - 2.0 * (FRAC_PI_2 / 2.0).sin()).abs() > 0.1);
-    // Isaac's picture of 200 degrees has a circle of 712.4 pixels: 100 degrees / 0.00245.
+    // Isaac's image of 200 degrees has a circle of 712.4 pixels: 100 degrees / 0.00245.
     let isaac = Optics::new(FTheta::default().into(), FTheta::ISAAC.to_pixels(1936, 1216).unwrap()).unwrap();
     assert!((isaac.domain().radius * isaac.pixels().fx - 100f64.to_radians() / 0.00245).abs() < 1e-9);
     assert!(isaac.unproject([970.94244 + 712.3, 600.37482]).is_some());
@@ -120,7 +134,7 @@ fn fisheyes_have_the_radii_of_their_closed_forms() {
 }
 
 #[test]
-fn panoramas_are_longitudes_and_latitudes() {
+fn panorama() {
     let optics = Optics::new(Panorama {}.into(), Panorama::intrinsics(360, 180).to_pixels(360, 180).unwrap()).unwrap();
     for (direction, pixel) in [
         ([0.0, 0.0, 1.0], [180.0, 90.0]),
@@ -136,48 +150,26 @@ fn panoramas_are_longitudes_and_latitudes() {
     }
 }
 
-/// Numbers of OpenCV 5.0 from the Python wheel: `cv2.projectPoints(P, zeros(3), zeros(3), K, d)` and
-/// `cv2.fisheye.projectPoints` of the points below, K and d as here.
 #[test]
-fn distortions_are_opencvs() {
-    let points = [[0.3, -0.2, 1.0], [-0.45, 0.35, 1.2], [0.05, 0.6, 1.0], [-0.4, -0.3, 0.9]];
-    let twelve = [
-        [497.4837129955332, 127.13232872972938],
-        [108.79949131698197, 407.75417504468305],
-        [349.4513360696524, 568.8287823566423],
-        [75.5734567532167, 59.94473025125538],
-    ];
-    let five = [
-        [498.48543838800003, 126.34152404399998],
-        [106.47150043440456, 409.31233506954914],
-        [349.68347583203126, 573.6849638984374],
-        [72.0443700680477, 57.25661842518741],
-    ];
+fn opencv_numbers() {
     let OpenCv { k1, k2, p1, p2, k3, .. } = WARPED;
-    let wide = [[0.3, -0.2, 1.0], [1.5, 0.35, 0.8], [0.05, 2.0, 0.3], [-4.0, -0.3, 0.9]];
-    let fisheye = [
-        [498.2382643012527, 126.47087442376186],
-        [985.6420228345494, 396.5805446286512],
-        [344.2476713096925, 1125.6125339255066],
-        [-521.3306597669921, 180.26864149684056],
-    ];
-    for (lens, points, pixels) in [
-        (Lens::from(WARPED), points, twelve),
-        (OpenCv { k1, k2, p1, p2, k3, ..OpenCv::default() }.into(), points, five),
-        (FISHEYE.into(), wide, fisheye),
-    ] {
+    let five = OpenCv { k1, k2, p1, p2, k3, ..OpenCv::default() };
+    for (lens, name) in [(Lens::from(WARPED), "warped"), (five.into(), "warped five"), (FISHEYE.into(), "fisheye")] {
         let optics = Optics::new(lens, PIXELS).unwrap();
-        for (point, pixel) in points.into_iter().zip(pixels) {
-            let [u, v] = optics.project(point).unwrap();
+        let mut count = 0;
+        for [x, y, z, u, v] in opencv(name) {
+            let [a, b] = optics.project([x, y, z]).unwrap();
             // Both are a few dozen operations on numbers below 1000.
-            assert!((u - pixel[0]).abs() < 1e-10 && (v - pixel[1]).abs() < 1e-10, "{}: {u}, {v}", lens.name());
+            assert!((a - u).abs() < 1e-10 && (b - v).abs() < 1e-10, "{name}: {a}, {b}");
+            count += 1;
         }
+        assert_eq!(count, 4, "{name}");
     }
 }
 
 /// x (1 + k1 x²) has its largest value at x² = -1 / (3 k1), 2/3 of x; theta (1 + k1 theta²) likewise.
 #[test]
-fn distortions_that_fold_back_name_the_radius() {
+fn folds() {
     let pixels = PixelIntrinsics { fx: 100.0, fy: 100.0, cx: 100.0, cy: 100.0 };
     let tangent = 1.0 / 0.6f64.sqrt();
     for (lens, angle, end) in [
@@ -189,7 +181,7 @@ fn distortions_that_fold_back_name_the_radius() {
         let domain = optics.domain();
         assert!(domain.folds && (domain.angle - angle).abs() < 1e-8, "{}: {domain:?}", lens.name());
         assert!((domain.radius - tangent * 2.0 / 3.0).abs() < 1e-12, "{}: {domain:?}", lens.name());
-        // A picture that ends before is good; one that does not is refused, by the radius.
+        // An image that ends before is good; one that does not is refused, by the radius.
         let middle = Optics::new(lens, PixelIntrinsics { cx: 50.0, cy: 50.0, ..pixels }).unwrap();
         assert!(LensRays::new(&middle, [100, 100], 1).is_ok());
         let error = LensRays::new(&optics, [200, 200], 1).unwrap_err();
@@ -214,33 +206,38 @@ fn distortions_that_fold_back_name_the_radius() {
 }
 
 #[test]
-fn bad_numbers_and_names_are_named() {
-    let what = |lens: Lens| match lens.domain() {
-        Err(CameraError::Lens { what, .. }) => what,
-        other => panic!("{other:?}"),
-    };
-    assert_eq!(what(OpenCv { k5: f64::NAN, ..OpenCv::default() }.into()), "k5");
-    assert_eq!(what(OpenCvFisheye { k2: f64::INFINITY, ..OpenCvFisheye::default() }.into()), "k2");
+fn refusals() {
+    let mut rows: Vec<(Lens, &str)> = vec![
+        (OpenCv { k5: f64::NAN, ..OpenCv::default() }.into(), "k5"),
+        (OpenCvFisheye { k2: f64::INFINITY, ..OpenCvFisheye::default() }.into(), "k2"),
+        (Orthographic { max_angle: 1.6 }.into(), "max_angle"),
+        (Stereographic { max_angle: PI }.into(), "max_angle"),
+    ];
     for bad in [0.0, -1.0, 4.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(what(Equidistant { max_angle: bad }.into()), "max_angle");
-        assert_eq!(what(Equisolid { max_angle: bad }.into()), "max_angle");
-        assert_eq!(what(OpenCv { max_angle: Some(bad), ..OpenCv::default() }.into()), "max_angle");
-        assert_eq!(what(FTheta { max_angle: bad, ..FTheta::default() }.into()), "max_angle");
+        let opencv = OpenCv { max_angle: Some(bad), ..OpenCv::default() };
+        let ftheta = FTheta { max_angle: bad, ..FTheta::default() };
+        let all =
+            [Equidistant { max_angle: bad }.into(), Equisolid { max_angle: bad }.into(), opencv.into(), ftheta.into()];
+        rows.extend(all.map(|lens: Lens| (lens, "max_angle")));
     }
-    assert_eq!(what(Orthographic { max_angle: 1.6 }.into()), "max_angle");
-    assert_eq!(what(Stereographic { max_angle: PI }.into()), "max_angle");
-    let theta = |polynomial, focal_length| FTheta { polynomial, focal_length, ..FTheta::default() };
-    assert_eq!(what(theta([0.1, 0.1, 0., 0., 0., 0.], 1.0).into()), "a");
-    assert_eq!(what(theta([0.0, -0.1, 0., 0., 0., 0.], 1.0).into()), "b");
-    assert_eq!(what(theta([0.0, 0.1, 0., 0., f64::NAN, 0.], 1.0).into()), "e");
-    assert_eq!(what(theta([0.0, 0.1, 0., 0., 0., 0.], 0.0).into()), "focal_length");
+    let theta = |polynomial, focal_length| FTheta { polynomial, focal_length, ..FTheta::default() }.into();
+    rows.extend([
+        (theta([0.1, 0.1, 0., 0., 0., 0.], 1.0), "a"),
+        (theta([0.0, -0.1, 0., 0., 0., 0.], 1.0), "b"),
+        (theta([0.0, 0.1, 0., 0., f64::NAN, 0.], 1.0), "e"),
+        (theta([0.0, 0.1, 0., 0., 0., 0.], 0.0), "focal_length"),
+    ]);
+    for (lens, expected) in rows {
+        let error = lens.domain();
+        assert!(matches!(error, Err(CameraError::Lens { what, .. }) if what == expected), "{expected}: {error:?}");
+    }
     let Err(SensorError::UnknownName { what, candidates, .. }) = Lens::from_name("equidistent") else { panic!() };
     assert_eq!((what, candidates[0].as_str()), ("lens", "equidistant"));
     for name in Lens::NAMES {
         assert_eq!(Lens::from_name(name).unwrap().name(), *name);
     }
     assert_eq!(Lens::from_name("plumb_bob").unwrap(), Lens::from(OpenCv::default()));
-    // Nothing but dark: the circle is far beside the picture.
+    // Nothing but dark: the circle is far beside the image.
     let beside = Intrinsics::Pixels { fx: 1.0, fy: 1.0, cx: -50.0, cy: 0.0 }.to_pixels(8, 8).unwrap();
     let optics = Optics::new(Orthographic::default().into(), beside).unwrap();
     assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(CameraError::LensBlind { lens: "orthographic" }));
@@ -248,7 +245,7 @@ fn bad_numbers_and_names_are_named() {
 
 /// As scene files have them: a name, an alias, or a table with numbers; and back.
 #[test]
-fn lenses_stand_in_files() {
+fn files() {
     use super::super::CameraCfg;
     let read = |text: &str| toml::from_str::<CameraCfg>(text).map(|cfg| cfg.lens);
     assert_eq!(read("").unwrap(), Lens::default());

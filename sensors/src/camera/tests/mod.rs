@@ -1,29 +1,23 @@
-//! Pictures held against independent judges.
+//! Images, compared with analytic answers and other renderers.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-mod albedo;
 mod boxes;
 mod calibration;
-mod calibration_files;
-mod calibration_open_cv;
 mod degenerate;
 mod detail;
 mod determinism;
-mod floors_and_lamps;
 mod flow;
 mod golden;
+mod harness;
 mod late;
-mod lens_pictures;
+mod lens_images;
 mod lens_poles;
 pub(super) mod lenses;
-mod metals;
+mod light;
 mod noisy;
-mod pictures;
 mod progress;
-mod rectified;
 mod reference;
 mod robots;
-mod rolling_boxes;
 mod scenes;
 mod sensor;
 mod sensor_mistakes;
@@ -31,5 +25,5 @@ mod sensor_values;
 mod shutter;
 mod stage;
 mod stereo;
+mod surfaces;
 mod traced;
-mod watertight;

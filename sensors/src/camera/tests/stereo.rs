@@ -1,26 +1,34 @@
-//! Pairs of eyes, held against cameras that stand alone and against the geometry of pairs.
+//! Pairs of eyes, against cameras that stand alone, the geometry of pairs, and OpenCV's rectification.
 
+use super::super::lens::{Equisolid, OpenCv, OpenCvFisheye};
 use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraError, Channels, DepthMiss, Extrinsics, Imperfections, Intrinsics, Lens,
-    Placement, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
+    CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, Channels, DepthMiss,
+    DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement, Rectification,
+    Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
+use super::harness::{opencv, pinhole, point};
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
 use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
-use crate::camera::lens::OpenCvFisheye;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use nalgebra::{Point3, UnitQuaternion, Vector3};
-use ndarray::array;
+use nalgebra::{Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use ndarray::{Axis, array};
 use scene::Pose;
 use scene::pose::{from_row, to_row};
 use std::collections::BTreeMap;
 
 const BASELINE: f64 = 0.2;
+/// The same lens as [`LENS`], its principal point farther to the right.
+const SHIFTED: Intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
 
 /// A pair of small cameras, 20 cm apart.
 fn pair() -> StereoCameraCfg {
     StereoCameraCfg { camera: cfg(), left_to_right_pos: [BASELINE, 0.0, 0.0], ..StereoCameraCfg::default() }
+}
+
+fn pair_of(camera: CameraCfg) -> StereoCameraCfg {
+    StereoCameraCfg { camera, ..pair() }
 }
 
 fn of(cfg: &StereoCameraCfg, context: &SensorContext) -> StereoCamera {
@@ -30,34 +38,46 @@ fn of(cfg: &StereoCameraCfg, context: &SensorContext) -> StereoCamera {
     stereo
 }
 
-fn near(a: &Pose, b: &Pose) -> bool {
-    (a.translation.vector - b.translation.vector).norm() < 1e-12 && a.rotation.angle_to(&b.rotation) < 1e-7
+fn both_bits(stereo: &StereoCamera, envs: usize) -> [Vec<u32>; 2] {
+    [stereo.left(), stereo.right()].map(|eye| bits(eye, 0..envs))
+}
+
+/// Distance of two poses \[m\] and the angle between them \[rad\].
+fn apart(a: &Pose, b: &Pose) -> [f64; 2] {
+    let between = a.inverse() * b;
+    [between.translation.vector.norm(), between.rotation.angle()]
+}
+
+/// Asserts that the eyes of an environment stand there.
+#[track_caller]
+fn assert_eyes(stereo: &StereoCamera, env: usize, expected: [Pose; 2]) {
+    for (eye, expected) in [stereo.left(), stereo.right()].into_iter().zip(expected) {
+        let [moved, turned] = apart(&pose_of(eye, env), &expected);
+        assert!(moved < 1e-12 && turned < 1e-7, "{moved} {turned}");
+    }
 }
 
 #[test]
-fn eyes_are_cameras_that_stand_alone() {
+fn single_cameras() {
     let context = context(2);
     let turned = UnitQuaternion::from_euler_angles(0.02, -0.1, 0.05);
     let there = look_at_pose([-1.6, 0.0, 0.9], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]).unwrap();
     let offset = Pose::from_parts([0.2, 0.03, -0.04].into(), turned);
-    let half = Pose::translation(-0.1, -0.015, 0.02);
     let right_lens = Intrinsics::Pixels { fx: 60.0, fy: 50.0, cx: 20.0, cy: 15.0 };
-    for (origin, left) in [(StereoOrigin::Left, there), (StereoOrigin::Middle, there * half)] {
-        let cfg = StereoCameraCfg {
-            intrinsics_right: Some(right_lens),
-            left_to_right_pos: [0.2, 0.03, -0.04],
-            left_to_right_rot: turned,
-            origin,
-            ..pair()
-        };
+    for (origin, left) in
+        [(StereoOrigin::Left, there), (StereoOrigin::Middle, there * Pose::translation(-0.1, -0.015, 0.02))]
+    {
+        let intrinsics_right = Some(right_lens);
+        let (left_to_right_pos, left_to_right_rot) = ([0.2, 0.03, -0.04], turned);
+        let cfg = StereoCameraCfg { intrinsics_right, left_to_right_pos, left_to_right_rot, origin, ..pair() };
         let mut stereo = of(&cfg, &context);
         stereo.update(&state(&[3, 4])).unwrap();
-        let right = left * offset;
-        assert!(near(&pose_of(stereo.left(), 1), &left) && near(&pose_of(stereo.right(), 1), &right), "{origin:?}");
+        assert_eyes(&stereo, 1, [left, left * offset]);
         let origins = stereo.pose_w(CameraConvention::Ros);
-        assert!(near(&from_row(&std::array::from_fn(|k| origins[(1, k)])), &there));
+        let [moved, turned] = apart(&from_row(&std::array::from_fn(|k| origins[(1, k)])), &there);
+        assert!(moved < 1e-12 && turned < 1e-7, "{moved} {turned}");
         // Each eye is the camera that stands where it stands, in all channels, bit for bit.
-        for (eye, pose, intrinsics) in [(stereo.left(), left, LENS), (stereo.right(), right, right_lens)] {
+        for (eye, pose, intrinsics) in [(stereo.left(), left, LENS), (stereo.right(), left * offset, right_lens)] {
             let placement = Placement::Pose { pos: pose.translation.into(), rotation: pose.rotation };
             let extrinsics = Extrinsics { placement, ..Extrinsics::default() };
             let mut alone = built(&CameraCfg { extrinsics, intrinsics, ..super::stage::cfg() }, &context);
@@ -67,28 +87,26 @@ fn eyes_are_cameras_that_stand_alone() {
             assert_eq!(eye.depth().unwrap().dim(), (2, SIZE[1], SIZE[0]));
         }
         // The control: the eyes do not see the same.
-        assert_ne!(bits(stereo.left(), 0..2), bits(stereo.right(), 0..2));
+        let [left, right] = both_bits(&stereo, 2);
+        assert!(left != right);
     }
 }
 
-/// How many pixels of the left eye were judged, and how many of them the right eye does not see where they should be.
-/// `scale` is what disparities are multiplied by: 1, or something else as a control.
+/// Number of judged pixels of the left eye, and of those that the right eye does not see where they should be. Disparities are
+/// multiplied by `scale`: 1, or something else as a control.
 ///
 /// A point P that the left eye sees is projected to the right eye. Rows of a rectified pair are the same, so that P falls
 /// between two pixels of its row, which see Q and R. Both surfaces are convex (a plane, a ball), so that the right eye
 /// sees P exactly where it is on the near side of its surface and both pixels see that surface. Then P, Q and R are on the
 /// curve in which the epipolar plane cuts the surface: a line, or a circle of radius r <= R0. P is between Q and R in the
-/// picture and so on the arc between them, whose distance from the chord L is at most r - sqrt(r² - L²/4) <= L²/(4 r).
+/// image and so on the arc between them, whose distance from the chord L is at most r - sqrt(r² - L²/4) <= L²/(4 r).
 /// Single precision adds some ulps of coordinates below 100 m, of which only those nearer than 10 m are judged: 1e-4.
 fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize) {
     let (left, right) = (stereo.left(), stereo.right());
     let disparity = stereo.disparity().unwrap();
     let (mut judged, mut wrong) = (0, 0);
     for row in 0..steps.len() {
-        let at = |camera: &Camera, v: usize, u: usize| {
-            let p = camera.position().unwrap();
-            Vector3::from_fn(|k, _| f64::from(p[(row, v, u, k)]))
-        };
+        let at = |camera: &Camera, v: usize, u: usize| point(camera, [row, v, u]).coords;
         let (eyes, center) = ([pose_of(left, row), pose_of(right, row)], Vector3::from(ball(row, steps[row])));
         let matrices = right.intrinsic_matrices();
         for (v, u) in (0..SIZE[1]).flat_map(|v| (0..SIZE[0]).map(move |u| (v, u))) {
@@ -121,11 +139,7 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
             }
             judged += 1;
             // The projection itself.
-            let local = eyes[1].inverse() * Point3::from(point);
-            let projected = [
-                matrices[(row, 0, 0)] * local.x / local.z + matrices[(row, 0, 2)],
-                matrices[(row, 1, 1)] * local.y / local.z + matrices[(row, 1, 2)],
-            ];
+            let projected = pinhole(right, row, eyes[1].inverse() * Point3::from(point));
             let missed = (projected[0] - x).abs().max((projected[1] - (v as f64 + 0.5)).abs());
             let [q, r] = columns.map(|column| at(right, v, column));
             let chord = r - q;
@@ -147,94 +161,79 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
     (judged, wrong)
 }
 
+/// The disparity leads to the same point of the same surface.
 #[test]
-fn disparity_leads_to_the_same_point_of_the_same_surface() {
+fn matching_points() {
     let context = context(2);
-    let shifted = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
-    for (renderer, intrinsics_right) in [
-        (Renderer::Raster, None),
-        (Renderer::Raster, Some(shifted)),
-        (Renderer::FastRayTraced, None),
-        (Renderer::FastRayTraced, Some(shifted)),
-    ] {
+    for (renderer, intrinsics_right) in
+        [Renderer::Raster, Renderer::FastRayTraced].into_iter().flat_map(|by| [(by, None), (by, Some(SHIFTED))])
+    {
         let camera = CameraCfg { renderer, ..cfg() };
-        let mut stereo = of(&StereoCameraCfg { camera, intrinsics_right, ..pair() }, &context);
+        let mut stereo = of(&StereoCameraCfg { intrinsics_right, ..pair_of(camera) }, &context);
         for steps in [[0, 0], [3, 4]] {
             stereo.refresh(&[0, 1], &state(&steps)).unwrap();
             let (judged, wrong) = reproject(&stereo, &steps, 1.0);
             assert!(judged > 1000 && wrong == 0, "{wrong} of {judged} pixels");
             let seen = stereo.left().mask().unwrap().iter().filter(|&&id| id == BALL).count();
             assert!(seen > 100, "{seen} pixels of the ball");
-            // Controls: one percent more is seen to be wrong at nearly every pixel.
+            // The control: one percent more is seen to be wrong at nearly every pixel.
             let (judged, wrong) = reproject(&stereo, &steps, 1.01);
             assert!(10 * wrong > 9 * judged, "{wrong} of {judged} pixels");
         }
     }
 }
 
-/// Of what the left eye measures, noise included, which ends at the far plane: hits have one there too.
+/// Disparity is that of the left eye's depth, noise included, which ends at the far plane: hits have one there too.
 #[test]
-fn disparity_is_the_closed_form_and_zero_on_a_miss() {
-    let context = context(2);
+fn disparity_formula() {
     let misses = [DepthMiss::Inf, DepthMiss::Far, DepthMiss::Zero];
     for (depth_miss, std) in misses.into_iter().flat_map(|miss| [(miss, 0.0), (miss, 0.5)]) {
         let noise = [("depth".to_string(), NoiseCfg::white(std))].into();
-        let camera = CameraCfg { depth_miss, noise, far: 4.0, ..cfg() };
-        let stereo = of(&StereoCameraCfg { camera, ..pair() }, &context);
+        let stereo = of(&pair_of(CameraCfg { depth_miss, noise, far: 4.0, ..cfg() }), &context(2));
         let (disparity, depth) = (stereo.disparity().unwrap(), stereo.left().depth().unwrap());
         let (mut misses, mut last) = (0, 0);
         for ((d, z), id) in disparity.iter().zip(depth).zip(stereo.left().mask().unwrap()) {
             let expected = if *id == 0 { 0.0 } else { (40.0 * BASELINE / f64::from(*z)) as f32 };
             misses += usize::from(*id == 0);
             last += usize::from(*id != 0 && *z >= 4f32.next_down());
-            assert_eq!(*d, expected);
-            assert!(*id == 0 || *d > 0.0);
+            assert!(*d == expected && (*id == 0 || *d > 0.0), "{d}, not {expected}");
         }
-        assert!(misses > 100, "{misses}");
-        assert!(std == 0.0 || last > 20, "the control: noise reaches the far plane, {last}");
+        assert!(misses > 100 && (std == 0.0 || last > 20), "the control: noise reaches the far plane, {misses} {last}");
     }
 }
 
 #[test]
-fn it_is_lazy_as_a_camera_and_computes_only_what_is_new() {
-    let context = context(2);
-    let camera = CameraCfg { update_period: 0.02, ..cfg() };
-    let mut stereo = of(&StereoCameraCfg { camera, ..pair() }, &context);
-    assert_eq!(stereo.left().draws() + stereo.right().draws(), 0, "nobody looked");
-    let place = stereo.disparity().unwrap().as_ptr();
+fn lazy_disparity() {
+    let mut stereo = of(&pair_of(CameraCfg { update_period: 0.02, ..cfg() }), &context(2));
+    assert_eq!(stereo.left().draws() + stereo.right().draws(), 0, "nothing is drawn before it is read");
+    let address = stereo.disparity().unwrap().as_ptr();
     assert_eq!((stereo.left().draws(), stereo.right().draws()), (2, 0), "disparity is of the left eye");
     let before = stereo.disparity().unwrap().to_owned();
     let mut due = Vec::new();
     for step in 1..=4 {
         due.push(stereo.due_in(&[step - 1; 2]));
         stereo.update(&state(&[step; 2])).unwrap();
-        if step < 4 {
-            assert_eq!(stereo.disparity().unwrap(), before, "not due yet");
-        }
+        assert!(step == 4 || stereo.disparity().unwrap() == before, "not due yet");
     }
     assert_eq!((due, stereo.left().draws()), (vec![4, 3, 2, 1], 2));
     assert_ne!(stereo.disparity().unwrap(), before);
-    assert_eq!(stereo.disparity().unwrap().as_ptr(), place, "memory stays where it is");
+    assert_eq!(stereo.disparity().unwrap().as_ptr(), address, "memory stays where it is");
     assert_eq!((stereo.left().draws(), stereo.left().frame_counts()), (4, array![1, 1].view()));
-    // A lens that changes changes it, of the same instant.
-    let wide = [Intrinsics::Pixels { fx: 20.0, fy: 26.0, cx: 22.25, cy: 17.5 }];
+    // Other intrinsics change it, of the same instant.
+    let other = [Intrinsics::Pixels { fx: 20.0, fy: 26.0, cx: 22.25, cy: 17.5 }];
     let before = stereo.disparity().unwrap().to_owned();
-    stereo.set_intrinsics(&wide, None, Some(&[1])).unwrap();
+    stereo.set_intrinsics(&other, None, Some(&[1])).unwrap();
     let after = stereo.disparity().unwrap();
-    let env = |map: &ndarray::ArrayView3<'_, f32>, k| map.index_axis(ndarray::Axis(0), k).to_owned();
-    assert_eq!(env(&after, 0), env(&before.view(), 0));
-    assert_ne!(env(&after, 1), env(&before.view(), 1));
+    assert_eq!(after.index_axis(Axis(0), 0), before.index_axis(Axis(0), 0));
+    assert_ne!(after.index_axis(Axis(0), 1), before.index_axis(Axis(0), 1));
 }
 
-/// Both eyes at one place see the same, bit for bit; what is random is not the same in both.
+/// Both eyes at one place see the same, bit for bit; random numbers are not the same in both.
 #[test]
-fn noise_is_not_the_same_in_both_eyes() {
+fn independent_noise() {
     let one_place = |camera: CameraCfg| {
-        let stereo = of(&StereoCameraCfg { camera, left_to_right_pos: [0.0; 3], ..pair() }, &context(1));
-        let all = |eye: &Camera| -> (Vec<f32>, Vec<u8>) {
-            (eye.depth().unwrap().iter().copied().collect(), eye.color().unwrap().iter().copied().collect())
-        };
-        [all(stereo.left()), all(stereo.right())]
+        let stereo = of(&StereoCameraCfg { left_to_right_pos: [0.0; 3], ..pair_of(camera) }, &context(1));
+        [stereo.left(), stereo.right()].map(|eye| (eye.depth().unwrap().to_owned(), eye.color().unwrap().to_owned()))
     };
     let [left, right] = one_place(cfg());
     assert!(left == right, "the control: without noise they are the same");
@@ -245,14 +244,13 @@ fn noise_is_not_the_same_in_both_eyes() {
     assert!(hits > 500 && same < hits / 100, "{same} of {hits}");
     let renderer = Renderer::RayTraced { samples: 2, max_bounces: 2, denoise: false, seed: 3 };
     let [left, right] = one_place(CameraCfg { renderer, ..cfg() });
-    assert_eq!(left.0, right.0, "depth has no noise of paths");
-    assert_ne!(left.1, right.1);
+    assert!(left.0 == right.0 && left.1 != right.1, "depth has no noise of paths, colour has");
 }
 
 /// Root cause: the right eye took over the left one's noise and imperfections whatever it measures, so that no pair could be built
 /// whose right eye measures less.
 #[test]
-fn an_eye_has_the_faults_of_what_it_measures() {
+fn own_imperfections() {
     let context = context(1);
     let [colors, both] = [false, true].map(|depth| Channels { color: true, depth, ..Channels::default() });
     let of_light = Imperfections { read_noise: Some(ReadNoise { std: 0.05 }), ..Imperfections::default() };
@@ -260,67 +258,55 @@ fn an_eye_has_the_faults_of_what_it_measures() {
     let noise = |names: &[&str]| names.iter().map(|name| (name.to_string(), NoiseCfg::white(0.5))).collect();
     let all_noise = noise(&["distance_to_image_plane", "rgb"]);
     let camera = CameraCfg { channels: both, imperfections, noise: all_noise, ..cfg() };
-    let cfg = StereoCameraCfg { camera: camera.clone(), channels_right: Some(colors), ..pair() };
+    let cfg = StereoCameraCfg { channels_right: Some(colors), ..pair_of(camera.clone()) };
     let stereo = of(&cfg, &context);
-    // The judge is a camera that stands alone where the right eye is, under its name, and has what faults of colours there are.
+    // The judge is a camera that stands alone where the right eye is, under its name, with all imperfections of colours.
     let extrinsics = cfg.eyes().unwrap()[1].extrinsics.clone();
     let alone = CameraCfg { channels: colors, imperfections: of_light, noise: noise(&["color"]), extrinsics, ..camera };
     let named = SensorContext { name: "/right".into(), ..context.clone() };
     let color = |cfg: &CameraCfg| built(cfg, &named).color().unwrap().to_owned();
     assert_eq!(stereo.right().color().unwrap(), color(&alone));
     assert!(stereo.left().depth().is_ok() && stereo.right().depth().is_err());
-    // The controls: either fault is seen.
+    // The controls: noise and imperfections are both seen.
     let quiet = CameraCfg { noise: BTreeMap::new(), ..alone.clone() };
     let clean = CameraCfg { imperfections: Imperfections::default(), ..alone };
     assert!(stereo.right().color().unwrap() != color(&quiet) && stereo.right().color().unwrap() != color(&clean));
-    // Faults of its own.
+    // Imperfections of its own.
     let (noise_right, imperfections_right) = (Some(BTreeMap::new()), Some(clean.imperfections.clone()));
     let stereo = of(&StereoCameraCfg { noise_right, imperfections_right, ..cfg }, &context);
     assert_eq!(stereo.right().color().unwrap(), color(&CameraCfg { noise: BTreeMap::new(), ..clean }));
 }
 
-/// Root cause: what was wrong with an eye was said of a camera, whichever of the two it was.
+/// Root cause: errors of an eye named a camera, whichever of the two it was.
 #[test]
-fn what_is_wrong_with_an_eye_says_which() {
+fn errors_of_eyes() {
     let context = context(1);
     let [colors, depths] = [true, false].map(|color| Channels { color, depth: !color, ..Channels::default() });
     let of_depth = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), ..Imperfections::default() };
-    let shadows = Imperfections { holes: Some(Holes::default()), ..Imperfections::default() };
+    let shadows =
+        |baseline| Imperfections { holes: Some(Holes { baseline, ..Holes::default() }), ..Default::default() };
     let camera = CameraCfg { channels: colors, renderer: Renderer::FastRayTraced, ..cfg() };
     let off = "the camera does not measure depth; it measures color";
     let bent = "shadows of a projector (holes with a baseline other than 0): only of a pinhole camera, and this one has the lens";
-    let with_shadows = CameraCfg { channels: depths, imperfections: shadows.clone(), ..camera.clone() };
-    let lens_right = Some(fisheye());
+    let with_depth_noise = CameraCfg { imperfections: of_depth.clone(), ..camera.clone() };
+    let imperfections = shadows(Holes::default().baseline);
+    let with_shadows = CameraCfg { channels: depths, imperfections, ..camera.clone() };
+    let (channels_right, imperfections_right, lens_right) = (Some(depths), Some(of_depth), Some(fisheye()));
+    let left = StereoCameraCfg { channels_right, ..pair_of(with_depth_noise) };
+    let right = StereoCameraCfg { imperfections_right, ..pair_of(camera) };
+    let lens = StereoCameraCfg { lens_right, ..pair_of(with_shadows) };
+    // The left eye has its own imperfections only, whatever the right one measures; those of the right one are not left out.
     for (cfg, expected) in [
-        // The left eye has its own faults only, whatever the right one measures.
-        (
-            StereoCameraCfg {
-                camera: CameraCfg { imperfections: of_depth.clone(), ..camera.clone() },
-                channels_right: Some(depths),
-                ..pair()
-            },
-            format!("the left eye: {off}"),
-        ),
-        // What is asked for is not left out.
-        (
-            StereoCameraCfg { camera: camera.clone(), imperfections_right: Some(of_depth.clone()), ..pair() },
-            format!("the right eye: {off}"),
-        ),
-        (
-            StereoCameraCfg { camera: with_shadows.clone(), lens_right, ..pair() },
-            format!("the right eye: {bent} opencv_fisheye"),
-        ),
+        (&left, format!("the left eye: {off}")),
+        (&right, format!("the right eye: {off}")),
+        (&lens, format!("the right eye: {bent} opencv_fisheye")),
     ] {
         let error = cfg.build(&context).unwrap_err().to_string();
         assert!(error.starts_with(&expected), "{error}");
     }
-    // All of them can be had by what is of the right eye.
-    let (channels_right, imperfections_right) = (Some(depths), Some(of_depth));
-    let cfg = StereoCameraCfg { camera, channels_right, imperfections_right, ..pair() };
-    assert!(of(&cfg, &context).right().depth().is_ok());
-    let imperfections_right =
-        Some(Imperfections { holes: Some(Holes { baseline: 0.0, ..Holes::default() }), ..shadows });
-    let cfg = StereoCameraCfg { camera: with_shadows, lens_right, imperfections_right, ..pair() };
+    // All of them are possible with settings of the right eye.
+    assert!(of(&StereoCameraCfg { channels_right, ..right }, &context).right().depth().is_ok());
+    let cfg = StereoCameraCfg { imperfections_right: Some(shadows(0.0)), ..lens };
     assert!(of(&cfg, &context).right().depth().is_ok());
     // As scene files have them.
     let text = "imperfections_right.holes.baseline = 0.0\nnoise_right.depth.std = 0.01\n[camera]\nchannels = ['depth']";
@@ -331,87 +317,73 @@ fn what_is_wrong_with_an_eye_says_which() {
     assert_eq!(toml::from_str::<StereoCameraCfg>("").unwrap(), StereoCameraCfg::default());
 }
 
+/// Rigs are placed as a whole or not at all.
 #[test]
-fn rigs_are_placed_as_a_whole_or_not_at_all() {
+fn placement() {
     let context = context(2);
-    let parent = Extrinsics { parent: Some("tip".into()), ..Extrinsics::default() };
-    let camera = CameraCfg { extrinsics: parent, ..cfg() };
-    let mut attached = of(&StereoCameraCfg { camera, ..pair() }, &context);
+    let extrinsics = Extrinsics { parent: Some("tip".into()), ..Extrinsics::default() };
+    let mut attached = of(&pair_of(CameraCfg { extrinsics, ..cfg() }), &context);
     attached.refresh(&[0, 1], &state(&[3, 2])).unwrap();
     let half = Pose::translation(-0.5 * BASELINE, 0.0, 0.0);
-    let link = from_row(&to_row(&tip(1, 2)));
-    assert!(near(&pose_of(attached.left(), 1), &(link * half)));
-    assert!(near(&pose_of(attached.right(), 1), &(link * half.inverse())));
+    let eyes = |middle: Pose| [middle * half, middle * half.inverse()];
+    assert_eyes(&attached, 1, eyes(from_row(&to_row(&tip(1, 2)))));
     let there = look_at_pose([-1.2, 0.4, 0.9], [0.1, 0.0, 0.5], [0.0, 0.0, 1.0]).unwrap();
     for convention in [CameraConvention::Ros, CameraConvention::OpenGl, CameraConvention::World] {
         attached.set_world_poses(&convention.of_optical(&there), Some(&[1]), convention).unwrap();
-        let eyes = [pose_of(attached.left(), 1), pose_of(attached.right(), 1)];
-        assert!(near(&eyes[0], &(there * half)) && near(&eyes[1], &(there * half.inverse())), "{convention:?}");
-        let now = attached.pose_w(convention);
-        let expected = to_row(&convention.of_optical(&there));
+        assert_eyes(&attached, 1, eyes(there));
+        let (now, expected) = (attached.pose_w(convention), to_row(&convention.of_optical(&there)));
         assert!(now.row(1).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{now}");
     }
     // They move with the link.
     attached.refresh(&[1], &state(&[3, 9])).unwrap();
-    let moved = tip(1, 9) * tip(1, 2).inverse() * there;
-    assert!(near(&pose_of(attached.right(), 1), &(moved * half.inverse())));
+    assert_eyes(&attached, 1, eyes(tip(1, 9) * tip(1, 2).inverse() * there));
 
     let mut free = of(&pair(), &context);
     free.look_at(&[[-1.2, 0.4, 0.9]], &[[0.1, 0.0, 0.5]], &[[0.0, 0.0, 1.0]], Some(&[0])).unwrap();
-    assert!(
-        near(&pose_of(free.left(), 0), &(there * half)) && near(&pose_of(free.right(), 0), &(there * half.inverse()))
-    );
+    assert_eyes(&free, 0, eyes(there));
     let untouched = free.left().local_pose(CameraConvention::Ros);
-    let lens = Intrinsics::Pixels { fx: 44.0, fy: 44.0, cx: 20.0, cy: 16.0 };
-    let bad = Intrinsics::Pixels { fx: -1.0, fy: 44.0, cx: 20.0, cy: 16.0 };
-    assert!(free.set_intrinsics(&[lens], Some(&[bad]), None).is_err());
-    assert!(free.set_intrinsics(&[lens], Some(&[lens; 3]), None).is_err());
+    let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
+    assert!(free.set_intrinsics(&[lens(44.0)], Some(&[lens(-1.0)]), None).is_err());
+    assert!(free.set_intrinsics(&[lens(44.0)], Some(&[lens(44.0); 3]), None).is_err());
     assert_eq!(free.left().intrinsic_matrices()[(0, 0, 0)], 40.0, "the left eye was not changed either");
     assert!(free.set_local_pose(&there, Some(&[2]), CameraConvention::Ros).is_err());
     assert!(free.look_at(&[[0.0; 3]], &[[0.0; 3]], &[[0.0; 3]], None).is_err());
     assert_eq!(free.left().local_pose(CameraConvention::Ros), untouched);
     free.restore(None).unwrap();
-    assert_eq!(bits(free.right(), 0..2), bits(of(&pair(), &context).right(), 0..2));
+    assert!(both_bits(&free, 2) == both_bits(&of(&pair(), &context), 2));
 }
 
 #[test]
-fn what_has_no_disparity_is_said() {
+fn without_disparity() {
     let context = context(1);
-    let error = |cfg: &StereoCameraCfg| of(cfg, &context).disparity().unwrap_err().to_string();
-    let lens = |fx, fy, cy| Some(Intrinsics::Pixels { fx, fy, cx: 22.25, cy });
+    let lens =
+        |fx, fy, cy| StereoCameraCfg { intrinsics_right: Some(Intrinsics::Pixels { fx, fy, cx: 22.25, cy }), ..pair() };
+    let moved = |left_to_right_pos| StereoCameraCfg { left_to_right_pos, ..pair() };
+    let left_to_right_rot = UnitQuaternion::from_euler_angles(0.0, 0.25, 0.0);
     for (cfg, expected) in [
-        (
-            StereoCameraCfg { intrinsics_right: lens(41.0, 52.0, 17.5), ..pair() },
-            "fx of the right eye is 41, it must be the left eye's, 40",
-        ),
-        (StereoCameraCfg { intrinsics_right: lens(40.0, 51.0, 17.5), ..pair() }, "fy of the right eye is 51"),
-        (StereoCameraCfg { intrinsics_right: lens(40.0, 52.0, 17.0), ..pair() }, "cy of the right eye is 17"),
-        (
-            StereoCameraCfg { left_to_right_rot: UnitQuaternion::from_euler_angles(0.0, 0.25, 0.0), ..pair() },
-            "the angle between the eyes [rad] is 0.25, it must be 0",
-        ),
-        (StereoCameraCfg { left_to_right_pos: [0.1, 0.01, 0.0], ..pair() }, "left_to_right_pos.y [m] is 0.01"),
-        (StereoCameraCfg { left_to_right_pos: [0.1, 0.0, -0.01], ..pair() }, "left_to_right_pos.z [m] is -0.01"),
-        (StereoCameraCfg { left_to_right_pos: [-0.1, 0.0, 0.0], ..pair() }, "left_to_right_pos.x [m] is -0.1"),
-        (
-            StereoCameraCfg { left_to_right_pos: [0.0; 3], ..pair() },
-            "left_to_right_pos.x [m] is 0, it must be positive",
-        ),
+        (lens(41.0, 52.0, 17.5), "fx of the right eye is 41, it must be the left eye's, 40"),
+        (lens(40.0, 51.0, 17.5), "fy of the right eye is 51"),
+        (lens(40.0, 52.0, 17.0), "cy of the right eye is 17"),
+        (StereoCameraCfg { left_to_right_rot, ..pair() }, "the angle between the eyes [rad] is 0.25, it must be 0"),
+        (moved([0.1, 0.01, 0.0]), "left_to_right_pos.y [m] is 0.01"),
+        (moved([0.1, 0.0, -0.01]), "left_to_right_pos.z [m] is -0.01"),
+        (moved([-0.1, 0.0, 0.0]), "left_to_right_pos.x [m] is -0.1"),
+        (moved([0.0; 3]), "left_to_right_pos.x [m] is 0, it must be positive"),
     ] {
-        let said = error(&cfg);
-        assert!(said.contains(expected), "{said}");
+        let stereo = of(&cfg, &context);
+        let error = stereo.disparity().unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
         // Everything else can be read.
-        assert!(of(&cfg, &context).right().depth().is_ok());
+        assert!(stereo.right().depth().is_ok());
     }
     let camera = CameraCfg { channels: Channels { color: true, ..Channels::default() }, ..cfg() };
-    let blind = of(&StereoCameraCfg { camera, channels_right: Some(Channels::ALL), ..pair() }, &context);
+    let blind = of(&StereoCameraCfg { channels_right: Some(Channels::ALL), ..pair_of(camera) }, &context);
     let off = blind.disparity().unwrap_err();
     assert!(matches!(off, SensorError::Camera(CameraError::ChannelOff { channel: "depth", .. })), "{off}");
     assert!(blind.right().depth().is_ok(), "channels are of each eye");
-    let bad = StereoCameraCfg { left_to_right_pos: [f64::NAN, 0.0, 0.0], ..pair() };
-    assert!(matches!(bad.build(&context), Err(SensorError::Camera(CameraError::Pose { .. }))));
-    let bad = StereoCameraCfg { intrinsics_right: lens(0.0, 1.0, 1.0), ..pair() };
-    let error = bad.build(&context).unwrap_err();
+    let nowhere = moved([f64::NAN, 0.0, 0.0]).build(&context);
+    assert!(matches!(nowhere, Err(SensorError::Camera(CameraError::Pose { .. }))));
+    let error = lens(0.0, 1.0, 1.0).build(&context).unwrap_err();
     assert_eq!(error.to_string(), "the right eye: fx of the lens is 0; it must be positive and finite");
     let SensorError::Eye { eye: "right", error } = error else { panic!("{error}") };
     assert!(matches!(*error, SensorError::Camera(CameraError::Lens { .. })), "{error}");
@@ -423,83 +395,376 @@ fn fisheye() -> Lens {
 }
 
 #[test]
-fn eyes_have_lenses_of_their_own() {
+fn own_lenses() {
     let context = context(1);
     let camera = CameraCfg { renderer: Renderer::FastRayTraced, ..cfg() };
-    let plain = StereoCameraCfg { camera: camera.clone(), ..pair() };
+    let plain = pair_of(camera.clone());
     let cfg = StereoCameraCfg { lens_right: Some(fisheye()), ..plain.clone() };
-    let stereo = of(&cfg, &context);
+    let (stereo, without) = (of(&cfg, &context), of(&plain, &context));
     assert_eq!((stereo.left().lens(), stereo.right().lens()), (Lens::default(), fisheye()));
     let alone = built(&CameraCfg { lens: fisheye(), ..cfg.eyes().unwrap()[1].clone() }, &context);
-    assert_eq!(bits(stereo.right(), 0..1), bits(&alone, 0..1));
-    // The control: another picture than without it; the left eye's is the same.
-    let without = of(&plain, &context);
-    assert_ne!(bits(stereo.right(), 0..1), bits(without.right(), 0..1));
-    assert_eq!(bits(stereo.left(), 0..1), bits(without.left(), 0..1));
+    assert!(both_bits(&stereo, 1) == [bits(without.left(), 0..1), bits(&alone, 0..1)]);
+    // The control: another image than without it.
+    assert!(bits(stereo.right(), 0..1) != bits(without.right(), 0..1));
     // Disparity is of two pinholes, whichever eye is none.
     assert!(without.has_disparity() && !stereo.has_disparity());
-    let swapped = CameraCfg { lens: fisheye(), ..camera };
-    let swapped = StereoCameraCfg { camera: swapped, lens_right: Some(Lens::default()), ..pair() };
+    let swapped = pair_of(CameraCfg { lens: fisheye(), ..camera });
+    let swapped = StereoCameraCfg { lens_right: Some(Lens::default()), ..swapped };
     for stereo in [stereo, of(&swapped, &context)] {
         let error = stereo.disparity().unwrap_err();
         assert!(matches!(error, SensorError::Camera(CameraError::PinholeOnly { what: "disparity", .. })), "{error}");
     }
 }
 
-/// Pictures through lenses are of tables of rays: a change that fails leaves those too.
+/// Images through lenses are of tables of rays: a change that fails leaves those too.
 #[test]
-fn changes_that_fail_leave_the_rays_of_lenses() {
-    let context = context(2);
+fn failed_changes() {
     let camera = CameraCfg { renderer: Renderer::FastRayTraced, lens: fisheye(), ..cfg() };
-    let mut stereo = of(&StereoCameraCfg { camera, ..pair() }, &context);
+    let mut stereo = of(&pair_of(camera), &context(2));
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
-    // What was set before is what stays, not what was configured.
+    // The intrinsics that were set before stay, not those of the configuration.
     stereo.set_intrinsics(&[lens(44.0)], None, Some(&[1])).unwrap();
-    let before = [bits(stereo.left(), 0..2), bits(stereo.right(), 0..2)];
-    let bytes = stereo.left().lens_bytes();
+    let (before, bytes) = (both_bits(&stereo, 2), stereo.left().lens_bytes());
     assert!(stereo.set_intrinsics(&[lens(30.0)], Some(&[lens(-1.0)]), None).is_err());
     stereo.set_local_pose(&stereo.local_pose(CameraConvention::Ros), None, CameraConvention::Ros).unwrap();
-    // Not assert_eq: pictures are long.
-    assert!(
-        [bits(stereo.left(), 0..2), bits(stereo.right(), 0..2)] == before,
-        "another picture after a change that failed"
-    );
-    assert_eq!(stereo.left().lens_bytes(), bytes);
-    // The control: one that does not fail is seen, and tables that nobody needs are freed.
+    assert!(both_bits(&stereo, 2) == before && stereo.left().lens_bytes() == bytes);
+    // The control: one that does not fail is seen, and tables that are not needed are freed.
     stereo.set_intrinsics(&[lens(30.0)], None, Some(&[1])).unwrap();
-    assert_ne!(bits(stereo.left(), 0..2), before[0]);
-    assert_eq!(stereo.left().lens_bytes(), bytes);
+    assert!(bits(stereo.left(), 0..2) != before[0] && stereo.left().lens_bytes() == bytes);
 }
 
 /// By the definition of P in ROS's `sensor_msgs/CameraInfo`: (u, v, w) = P (X, Y, Z, 1) of a point in the frame of the left eye,
 /// against where the right eye sees it from where it stands.
 #[test]
-fn calibrations_of_a_pair_project_points_of_the_left_eye() {
-    let context = context(2);
-    let shifted = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
-    let stereo = of(&StereoCameraCfg { intrinsics_right: Some(shifted), ..pair() }, &context);
+fn projection_matrices() {
+    let stereo = of(&StereoCameraCfg { intrinsics_right: Some(SHIFTED), ..pair() }, &context(2));
     let [left, right] = stereo.camera_info("head", 1).unwrap();
     assert_eq!((left.name.as_str(), right.name.as_str()), ("head/left", "head/right"));
     assert_eq!(left.projection_matrix.column(3).amax(), 0.0);
     assert_eq!(right.projection_matrix[(0, 3)], -40.0 * BASELINE);
-    let eyes = [pose_of(stereo.left(), 1), pose_of(stereo.right(), 1)];
-    let (lefts, rights) = (stereo.left().intrinsic_matrices(), stereo.right().intrinsic_matrices());
-    for point in [Point3::new(0.3, -0.2, 1.5), Point3::new(-0.7, 0.4, 4.0), Point3::new(0.0, 0.0, 0.5)] {
-        for (info, pose, k) in [(&left, eyes[0], &lefts), (&right, eyes[1], &rights)] {
-            let local = pose.inverse() * (eyes[0] * point);
-            let seen = [0, 1].map(|i| k[(1, i, i)] * local[i] / local.z + k[(1, i, 2)]);
-            let p = info.projection_matrix * point.to_homogeneous();
-            // ROS counts from the centre of the first pixel.
-            let p = [p.x / p.z + 0.5, p.y / p.z + 0.5];
-            // Some ulps of 100 pixels, and of poses.
-            assert!((p[0] - seen[0]).abs() < 1e-10 && (p[1] - seen[1]).abs() < 1e-10, "{p:?} {seen:?}");
+    let alone = stereo.right().camera_info("head", 1).unwrap();
+    for point in [[0.3, -0.2, 1.5], [-0.7, 0.4, 4.0], [0.0, 0.0, 0.5]].map(Point3::from) {
+        for (info, eye) in [(&left, stereo.left()), (&right, stereo.right())] {
+            let seen = pinhole(eye, 1, pose_of(eye, 1).inverse() * (pose_of(stereo.left(), 1) * point));
+            let p = projected(&info.projection_matrix, point.coords);
+            // ROS counts from the centre of the first pixel. Some ulps of 100 pixels, and of poses.
+            assert!((0..2).all(|axis| (p[axis] + 0.5 - seen[axis]).abs() < 1e-10), "{p:?} {seen:?}");
         }
         // The control: without the fourth column it is 40 * 0.2 / z pixels off, at least 2.
-        let alone = stereo.right().camera_info("head", 1).unwrap();
-        let apart = (alone.projection_matrix - right.projection_matrix) * point.to_homogeneous() / point.z;
-        assert!(apart.x >= 1.999);
+        let off = (alone.projection_matrix - right.projection_matrix) * point.to_homogeneous() / point.z;
+        assert!(off.x >= 1.999);
     }
-    let again = crate::camera::CameraInfo::parse(&right.to_yaml(), "right.yaml").unwrap();
-    assert_eq!(again, right);
+    assert_eq!(CameraInfo::parse(&right.to_yaml(), "right.yaml").unwrap(), right);
     assert!(stereo.camera_info("head", 2).is_err());
+}
+
+/// A pair by OpenCV: rotation and translation that bring points of the left eye to the right one, and the results of
+/// `stereoRectify`.
+struct Known {
+    r: [f64; 9],
+    t: [f64; 3],
+    r1: [f64; 9],
+    r2: [f64; 9],
+    /// fx, cx, cy of both P, and P\[0\]\[3\] of the right one.
+    p: [f64; 4],
+    /// Pixels of `projectPoints` for three points of the left eye's frame in the raw images of both.
+    seen: [[f64; 6]; 2],
+}
+
+const K: [[f64; 4]; 2] = [[610.2, 611.0, 324.1, 238.7], [598.4, 600.3, 317.6, 243.2]];
+const D: [[f64; 5]; 2] = [[-0.31, 0.11, 0.0004, -0.0002, 0.01], [-0.28, 0.09, -0.0003, 0.0005, -0.005]];
+const POINTS: [[f64; 3]; 3] = [[0.3, -0.2, 1.5], [-0.4, 0.25, 2.0], [0.1, 0.05, 0.8]];
+
+impl Known {
+    fn all() -> impl Iterator<Item = Self> {
+        opencv::<46>("stereo_rectify").map(|n| {
+            let nine = |from: usize| std::array::from_fn(|k| n[from + k]);
+            let seen = [34, 40].map(|from| std::array::from_fn(|k| n[from + k]));
+            Self {
+                r: nine(0),
+                t: [n[9], n[10], n[11]],
+                r1: nine(12),
+                r2: nine(21),
+                p: [n[30], n[31], n[32], n[33]],
+                seen,
+            }
+        })
+    }
+
+    /// Its calibrations.
+    fn infos(&self) -> [CameraInfo; 2] {
+        let [f, cx, cy, tx] = self.p;
+        let info = |k: usize, r: &[f64; 9], tx: f64| CameraInfo {
+            name: ["left", "right"][k].into(),
+            width: 640,
+            height: 480,
+            camera_matrix: Matrix3::new(K[k][0], 0.0, K[k][2], 0.0, K[k][1], K[k][3], 0.0, 0.0, 1.0),
+            distortion_model: DistortionModel::PlumbBob,
+            distortion_coefficients: D[k].to_vec(),
+            rectification_matrix: Matrix3::from_row_slice(r),
+            projection_matrix: Matrix3x4::new(f, 0.0, cx, tx, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0),
+        };
+        [info(0, &self.r1, 0.0), info(1, &self.r2, tx)]
+    }
+
+    /// The right eye in the frame of the left one: X_right = R X_left + T the other way round.
+    fn left_from_right(&self) -> Pose {
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&self.r)));
+        Pose::from_parts(Translation3::from(self.t), rotation).inverse()
+    }
+}
+
+fn rig_of(cfg: &StereoCameraCfg) -> Pose {
+    Pose::from_parts(Translation3::from(cfg.left_to_right_pos), cfg.left_to_right_rot)
+}
+
+fn pixels(intrinsics: Intrinsics) -> PixelIntrinsics {
+    intrinsics.to_pixels(640, 480).unwrap()
+}
+
+/// From K, D, R and P to the eyes: they stand as in OpenCV's input, and see points where OpenCV projects them to.
+#[test]
+fn opencv_pairs() {
+    assert_eq!(Known::all().count(), 2);
+    for known in Known::all() {
+        let [left, right] = known.infos();
+        let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();
+        let expected = known.left_from_right();
+        // Numbers of 16 digits, and OpenCV's own rounding: R's products are of some ulps, and its baseline is the norm of T.
+        let [moved, turned] = apart(&rig_of(&cfg), &expected);
+        assert!(moved < 1e-14 && turned < 1e-14, "{moved} {turned}");
+        assert_eq!((cfg.origin, cfg.camera.renderer), (StereoOrigin::Left, Renderer::FastRayTraced));
+        assert_eq!((cfg.camera.width, cfg.camera.height), (640, 480));
+        let lens_right = cfg.lens_right.unwrap();
+        let eyes = [(cfg.camera.intrinsics, cfg.camera.lens), (cfg.intrinsics_right.unwrap(), lens_right)];
+        let [left, right] = eyes.map(|(intrinsics, lens)| Optics::new(lens, pixels(intrinsics)).unwrap());
+        for (k, point) in POINTS.into_iter().enumerate() {
+            let beside = rig_of(&cfg).inverse() * Point3::from(point);
+            for (optics, at, seen) in [(&left, point, known.seen[0]), (&right, beside.into(), known.seen[1])] {
+                let found = optics.project(at).unwrap();
+                let off = [0, 1].map(|axis| found[axis] - CameraInfo::FIRST_CENTRE - seen[2 * k + axis]);
+                assert!(off.iter().all(|off| off.abs() < 1e-10), "{point:?}: {off:?} pixels");
+            }
+        }
+        // The control: a millimetre and a milliradian are seen.
+        let moved =
+            expected * Pose::from_parts(Translation3::new(1e-3, 0.0, 0.0), UnitQuaternion::new(Vector3::x() * 1e-3));
+        assert!(apart(&rig_of(&cfg), &moved).iter().all(|off| *off > 5e-4));
+        // R of ours are OpenCV's, and so is the baseline; f and the principal points are chosen otherwise, as documented.
+        let [left, right] = K.map(|[fx, fy, cx, cy]| PixelIntrinsics { fx, fy, cx, cy });
+        let found = Rectification::of(&known.left_from_right(), [left, right]).unwrap();
+        for (rotation, expected) in found.rotations.iter().zip([&known.r1, &known.r2]) {
+            let off = (rotation - Matrix3::from_row_slice(expected)).amax();
+            // OpenCV has the last angle by an arc cosine, which is some ulps over that angle: 0.03 rad or more here.
+            assert!(off < 1e-14, "{off}");
+        }
+        let baseline = |p: f64, f: f64| -p / f;
+        let p = &found.projections[1];
+        assert!((baseline(p[(0, 3)], p[(0, 0)]) - baseline(known.p[3], known.p[0])).abs() < 1e-15);
+        assert_eq!((p[(0, 0)], p[(1, 1)]), (600.3, 600.3), "the smaller fy");
+    }
+}
+
+/// A point of a rectified image \[pixels\].
+fn projected(p: &Matrix3x4<f64>, point: Vector3<f64>) -> [f64; 2] {
+    let at = p * point.push(1.0);
+    [at.x / at.z, at.y / at.z]
+}
+
+fn of_two(cfg: &StereoCameraCfg) -> StereoCamera {
+    of(cfg, &context(2))
+}
+
+/// Pairs of eyes that are not parallel, stand askew, or have other lenses.
+fn pairs() -> Vec<StereoCameraCfg> {
+    let other = |fx, fy, cx, cy| Some(Intrinsics::Pixels { fx, fy, cx, cy });
+    let turned = UnitQuaternion::from_euler_angles;
+    let barrel = OpenCv { k1: -0.1, k2: 0.01, p1: 1e-3, p2: -2e-3, ..OpenCv::default() };
+    let fish = OpenCvFisheye { k1: 0.02, k2: -0.003, ..OpenCvFisheye::default() };
+    let pair = |pos, rot, intrinsics_right, lens: Lens, lens_right| StereoCameraCfg {
+        camera: CameraCfg { lens, renderer: Renderer::FastRayTraced, ..cfg() },
+        left_to_right_pos: pos,
+        left_to_right_rot: rot,
+        intrinsics_right,
+        lens_right,
+        origin: StereoOrigin::Left,
+        ..StereoCameraCfg::default()
+    };
+    vec![
+        pair([0.1, 0.0, 0.0], turned(0.0, -0.2, 0.0), None, Lens::default(), None),
+        pair(
+            [0.12, 0.01, -0.02],
+            turned(0.03, -0.1, 0.05),
+            other(44.0, 50.0, 20.0, 15.0),
+            barrel.into(),
+            Some(fish.into()),
+        ),
+        pair([0.3, -0.2, 0.1], turned(-0.2, 0.3, 0.4), other(41.0, 52.0, 23.0, 18.5), fish.into(), Some(barrel.into())),
+        // Parallel, with another focal length.
+        pair([0.06, 0.0, 0.0], UnitQuaternion::identity(), other(40.5, 52.0, 22.25, 17.5), Lens::default(), None),
+        // Above each other, almost: images lie on their side.
+        pair([0.01, 0.2, 0.0], turned(0.05, 0.0, 0.0), None, barrel.into(), None),
+    ]
+}
+
+/// By the definitions of R and P, with the eyes where they stand: a point is in the same row of both rectified images, and f b / z
+/// farther left in the right one; and the way there by raw pixels, whose distortion is undone, is the same.
+#[test]
+fn rectified_rows() {
+    for cfg in pairs() {
+        let stereo = of_two(&cfg);
+        let eyes = [stereo.left(), stereo.right()];
+        let infos = stereo.camera_info("head", 1).unwrap();
+        let ros = CameraInfo::FIRST_CENTRE;
+        let f = infos[0].projection_matrix[(0, 0)];
+        let baseline = Vector3::from(cfg.left_to_right_pos).norm();
+        let (mut by_raw, mut skew, mut middle) = (0, 0.0f64, [0.0; 2]);
+        for point in [[0.1, 0.0, 1.0], [-0.2, 0.1, 0.8], [0.05, -0.1, 3.0], [0.6, 0.4, 2.0], [-1.0, -0.5, 6.0]] {
+            let world = pose_of(eyes[0], 1) * Point3::from(point);
+            // Of each eye: where it is in its rectified frame.
+            let rectified =
+                [0, 1].map(|k| infos[k].rectification_matrix * (pose_of(eyes[k], 1).inverse() * world).coords);
+            let z = rectified[0].z;
+            assert!(z > 0.1 && (rectified[1] - rectified[0] + Vector3::x() * baseline).norm() < 1e-13);
+            // P of both is of points of the left eye.
+            let [left, right] = [0, 1].map(|k| projected(&infos[k].projection_matrix, rectified[0]));
+            let [shift, drop] = [left[0] - right[0] - f * baseline / z, left[1] - right[1]];
+            assert!(shift.abs() < 1e-10 && drop.abs() < 1e-10, "{shift} {drop}");
+            for (k, expected) in [left, right].into_iter().enumerate() {
+                let optics = eyes[k].optics(1).unwrap();
+                let raw = optics.project((pose_of(eyes[k], 1).inverse() * world).coords.into());
+                let Some(ray) = raw.and_then(|raw| optics.unproject(raw)) else { continue };
+                let mut own = infos[k].projection_matrix;
+                // What lies in the fourth column is in the eye's own place already.
+                own.set_column(3, &Vector3::zeros());
+                let found = projected(&own, infos[k].rectification_matrix * Vector3::from(ray));
+                let off = [found[0] - expected[0], found[1] - expected[1]];
+                // Distortions are undone to 1e-12 of the normalised image or so.
+                assert!(off.iter().all(|off| off.abs() < 1e-8), "{off:?}");
+                by_raw += 1;
+                // The control: raw rows are not the same.
+                skew = skew.max((raw.unwrap()[1] - ros - expected[1]).abs());
+            }
+        }
+        assert!(by_raw >= 8, "{by_raw}");
+        let straight = cfg.left_to_right_rot == UnitQuaternion::identity();
+        assert!(straight || skew > 0.5, "{skew}");
+        // Common principal points, so that what is far away has no disparity.
+        let [left, right] = [0, 1].map(|k| infos[k].projection_matrix.fixed_columns::<3>(0).into_owned());
+        assert_eq!(left, right);
+        // What raw images have at their principal points is there on the mean of both.
+        for (k, info) in infos.iter().enumerate() {
+            let ahead = projected(&info.projection_matrix, info.rectification_matrix * Vector3::z() * 1e9);
+            let own = [info.camera_matrix[(0, 2)], info.camera_matrix[(1, 2)]];
+            (0..2).for_each(|axis| middle[axis] += ahead[axis] - own[axis]);
+            assert!((info.rectification_matrix.determinant() - 1.0).abs() < 1e-14, "{k}");
+        }
+        assert!(middle.iter().all(|sum| sum.abs() < 1e-6), "{middle:?}");
+        assert_eq!(infos.each_ref().map(|info| info.name.as_str()), ["head/left", "head/right"]);
+    }
+}
+
+/// The pair of the calibrations of a pair is that pair, through the text of files too.
+#[test]
+fn calibration_round_trip() {
+    for cfg in pairs() {
+        let infos = of_two(&cfg).camera_info("head", 0).unwrap();
+        let read = infos.each_ref().map(|info| CameraInfo::parse(&info.to_yaml(), &info.name).unwrap());
+        assert_eq!(read, infos);
+        let again = StereoCameraCfg::of_infos(&read[0], &read[1]).unwrap();
+        let [moved, turned] = apart(&rig_of(&again), &rig_of(&cfg));
+        // Some ulps of numbers below 1.
+        assert!(moved < 1e-14 && turned < 1e-14, "{moved} {turned}");
+        let close = |a: Intrinsics, b: Intrinsics| {
+            let [a, b] = [a, b].map(pixels);
+            // Half a pixel there and back.
+            let off = [a.fx - b.fx, a.fy - b.fy, a.cx - b.cx, a.cy - b.cy];
+            off.iter().all(|off| off.abs() < 1e-14)
+        };
+        assert!(close(again.camera.intrinsics, cfg.camera.intrinsics));
+        assert!(close(again.intrinsics_right.unwrap(), cfg.intrinsics_right.unwrap_or(cfg.camera.intrinsics)));
+        let same = |a: Lens, b: Lens| a == b || a.is_pinhole() && b.is_pinhole();
+        assert!(same(again.camera.lens, cfg.camera.lens));
+        assert!(same(again.lens_right.unwrap(), cfg.lens_right.unwrap_or(cfg.camera.lens)));
+        // It can be built, and has the same calibrations.
+        let own = CameraCfg { channels: cfg.camera.channels, ..again.camera.clone() };
+        let said = of_two(&StereoCameraCfg { camera: own, ..again }).camera_info("head", 0).unwrap();
+        for (said, info) in said.iter().zip(&infos) {
+            assert!((said.rectification_matrix - info.rectification_matrix).amax() < 1e-14);
+            assert!((said.projection_matrix - info.projection_matrix).amax() < 1e-11);
+        }
+    }
+}
+
+#[test]
+fn not_rectifiable() {
+    for (left_to_right_pos, angle, expected) in [
+        (
+            [-0.1, 0.0, 0.0],
+            0.0,
+            "how far the right eye is to the right of the left one [m] is -0.1, it must be positive",
+        ),
+        ([0.0; 3], 0.0, "of the left one [m] is 0, it must be positive"),
+        ([0.01, 0.0, 0.2], 0.0, "the angle by which the left eye turns to be rectified [rad] is 1.52"),
+        ([0.3, 0.0, 0.0], 3.0, "it must be at most 1.396 (80 degrees)"),
+    ] {
+        let left_to_right_rot = UnitQuaternion::from_euler_angles(0.0, angle, 0.0);
+        let stereo =
+            of_two(&StereoCameraCfg { camera: cfg(), left_to_right_pos, left_to_right_rot, ..Default::default() });
+        let error = stereo.camera_info("head", 0).unwrap_err();
+        assert!(matches!(error, SensorError::Camera(CameraError::NotRectifiable { .. })), "{error}");
+        let said = error.to_string();
+        assert!(
+            said.starts_with("the pictures of these eyes cannot be rectified: ") && said.contains(expected),
+            "{said}"
+        );
+        // Only errors of the disparity mention it.
+        assert!(!said.contains("disparity") && stereo.disparity().unwrap_err().to_string().contains("disparity"));
+    }
+    // Lenses that ROS has no model for are refused as of a camera alone, whatever the eyes' places.
+    let camera = CameraCfg { lens: Equisolid::default().into(), renderer: Renderer::FastRayTraced, ..cfg() };
+    let stereo = of_two(&StereoCameraCfg { camera, ..pairs()[2].clone() });
+    let error = stereo.camera_info("head", 0).unwrap_err();
+    assert!(matches!(error, SensorError::Calibration(CalibrationError::Lens { lens: "equisolid", .. })), "{error}");
+    // How they are rectified is known all the same.
+    assert!(stereo.rectification(1).is_ok() && stereo.rectification(2).is_err());
+}
+
+#[test]
+fn refused_pairs() {
+    type Change = fn(&mut CameraInfo, &mut CameraInfo);
+    let changes: [(Change, &str); 11] = [
+        (|_, r| r.width = 320, "the size of the right picture is 320 x 480; it must be the left one's, 640 x 480"),
+        (|_, r| r.projection_matrix[(0, 3)] = 0.0, "P[0][3] of the right eye is 0; it must be negative"),
+        (|l, r| std::mem::swap(l, r), "P[0][3] of the right eye is 0; it must be negative"),
+        (|_, r| r.projection_matrix[(0, 3)] = 72.8, "P[0][3] of the right eye is 72.8"),
+        (|_, r| r.projection_matrix[(0, 3)] = f64::NAN, "P[0][3] of the right eye is NaN"),
+        (|l, _| l.projection_matrix[(0, 3)] = -1.0, "P[0][3] of the left eye is -1; it must be 0"),
+        (|_, r| r.projection_matrix[(1, 3)] = 5.0, "P[1][3] of the right eye is 5; it must be 0"),
+        (|_, r| r.projection_matrix[(0, 0)] = 0.0, "P[0][0] of the right eye is 0; it must be a focal length"),
+        (
+            |_, r| r.projection_matrix[(1, 1)] = 605.7,
+            "P[1][1] of the right eye is 605.7; it must be the left eye's, 605.65",
+        ),
+        (|_, r| r.projection_matrix[(1, 2)] += 1.0, "P[1][2] of the right eye is 241.98"),
+        (|l, _| l.rectification_matrix *= 1.1, "R of the left eye is no rotation: its determinant is 1.3310"),
+    ];
+    for (change, expected) in changes {
+        let [mut left, mut right] = Known::all().next().unwrap().infos();
+        change(&mut left, &mut right);
+        let error = StereoCameraCfg::of_infos(&left, &right).unwrap_err();
+        assert!(matches!(error, CameraError::NotAPair { .. }), "{error}");
+        let said = error.to_string();
+        assert!(
+            said.starts_with("these are no calibrations of a left and a right eye: ") && said.contains(expected),
+            "{said}"
+        );
+    }
+    // Files of few digits are read: R is the rotation that is nearest.
+    let [left, mut right] = Known::all().next().unwrap().infos();
+    right.rectification_matrix.iter_mut().for_each(|x| *x = (*x * 1e4).round() / 1e4);
+    let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();
+    let [moved, turned] = apart(&rig_of(&cfg), &Known::all().next().unwrap().left_from_right());
+    assert!(moved < 1e-14 && turned > 1e-6 && turned < 1e-4, "{moved} {turned}");
 }

@@ -1,0 +1,314 @@
+//! A scene, drawn by a renderer, and its image pixel by pixel, to compare with an analytic answer or another renderer.
+
+use super::super::{
+    Aperture, Before, Camera, Channels, Frame, LensRays, Opened, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
+    Shot, Shutter, Take,
+};
+use crate::lanes::{Level, levels};
+use crate::visibility::{RenderError, View};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use scene::{Hemisphere, Instance, Material, Pose, PoseF32, RenderScene, Shape};
+use testkit::image_check::ImageCheck;
+
+/// Everything that an image depends on.
+#[derive(Clone, Debug)]
+pub(super) struct Still {
+    pub(super) scene: RenderScene,
+    pub(super) poses: Vec<PoseF32>,
+    pub(super) view: View,
+    pub(super) channels: Channels,
+    pub(super) cfg: RasterCfg,
+    pub(super) renderer: Renderer,
+    pub(super) stops: f64,
+    pub(super) lens: Option<LensRays>,
+    /// Poses and view of the frame before, for flow.
+    pub(super) before: Option<(Vec<PoseF32>, View)>,
+    pub(super) aperture: Option<Aperture>,
+    pub(super) shutter: Shutter,
+    /// Poses of things and camera when the shutter opened, and how long before \[s\].
+    pub(super) opened: Option<(Vec<PoseF32>, PoseF32, f64)>,
+}
+
+impl Still {
+    /// All channels by the rasterizer with default settings.
+    pub(super) fn new((scene, poses): (RenderScene, Vec<PoseF32>), view: View) -> Self {
+        Self {
+            scene,
+            poses,
+            view,
+            channels: Channels::ALL,
+            cfg: RasterCfg::default(),
+            renderer: Renderer::Raster,
+            stops: 0.0,
+            lens: None,
+            before: None,
+            aperture: None,
+            shutter: Shutter::default(),
+            opened: None,
+        }
+    }
+
+    pub(super) fn shot(&self) -> Shot<'_> {
+        let before = self.before.as_ref().map(|(poses, view)| Before { poses, view });
+        let Self { scene, poses, view, .. } = self;
+        Shot { scene, poses, view, lights: None, lens: self.lens.as_ref(), before }
+    }
+
+    pub(super) fn take(&self) -> Take<'_> {
+        let opened = self.opened.as_ref();
+        let opened =
+            opened.map(|(poses, camera, before)| Opened { poses, world_from_camera: *camera, before: *before });
+        Take { noise: 0, opened }
+    }
+
+    pub(super) fn frame(&self) -> Frame {
+        Frame::new(self.view.width, self.view.height, self.channels)
+    }
+
+    /// The image with an instruction set.
+    pub(super) fn draw_on(&self, level: Level) -> Result<Image, RenderError> {
+        let mut rasterizer = Rasterizer::with_level(self.cfg, level);
+        (rasterizer.renderer, rasterizer.stops) = (self.renderer, self.stops);
+        (rasterizer.aperture, rasterizer.shutter) = (self.aperture, self.shutter);
+        let mut frame = self.frame();
+        rasterizer.render_take(&self.shot(), &self.take(), &mut frame.as_mut())?;
+        Ok(Image { frame, width: self.view.width })
+    }
+
+    pub(super) fn try_draw(&self) -> Result<Image, RenderError> {
+        self.draw_on(Level::best())
+    }
+
+    #[track_caller]
+    pub(super) fn draw(&self) -> Image {
+        self.try_draw().unwrap()
+    }
+
+    /// The image by another renderer.
+    #[track_caller]
+    pub(super) fn by(&self, renderer: Renderer) -> Image {
+        self.with(|still| still.renderer = renderer).draw()
+    }
+
+    /// The image from another view.
+    #[track_caller]
+    pub(super) fn from(&self, view: View) -> Image {
+        self.with(|still| still.view = view).draw()
+    }
+
+    pub(super) fn with(&self, change: impl FnOnce(&mut Self)) -> Self {
+        let mut still = self.clone();
+        change(&mut still);
+        still
+    }
+}
+
+/// Asserts that stills have the same bits with every instruction set, and in batches of these sizes for these numbers of
+/// threads. Scenes are made anew for each batch, so that threads meet while assets of meshes are built.
+pub(super) fn assert_same_bits(what: &str, make: &dyn Fn() -> Vec<Still>, threads: &[usize], batches: &[usize]) {
+    let stills = make();
+    let expected: Vec<Vec<u32>> = stills.iter().map(|still| still.draw().bits()).collect();
+    for level in levels() {
+        for (k, still) in stills.iter().enumerate() {
+            assert!(still.draw_on(level).unwrap().bits() == expected[k], "{what}: still {k} by {level:?}");
+        }
+    }
+    for (&threads, &count) in threads.iter().flat_map(|threads| batches.iter().map(move |count| (threads, count))) {
+        let stills = &make()[..count];
+        let Still { cfg, renderer, aperture, shutter, .. } = stills[0];
+        let mut parallel = ParallelRasterizer::new(cfg, threads);
+        parallel.set_renderer(renderer);
+        parallel.set_light(aperture, shutter);
+        let mut frames: Vec<Frame> = stills.iter().map(Still::frame).collect();
+        let mut jobs: Vec<_> = stills.iter().map(Still::shot).zip(frames.iter_mut().map(Frame::as_mut)).collect();
+        parallel.render_takes(&mut jobs, &stills.iter().map(Still::take).collect::<Vec<_>>()).unwrap();
+        for (k, frame) in frames.into_iter().enumerate() {
+            let image = Image { width: stills[k].view.width, frame };
+            assert!(image.bits() == expected[k], "{what}: still {k} of {count}, {threads} threads");
+        }
+    }
+}
+
+/// An image; channels by pixel, row by row.
+#[derive(Clone, Debug)]
+pub(super) struct Image {
+    pub(super) frame: Frame,
+    pub(super) width: usize,
+}
+
+impl Image {
+    pub(super) fn mask(&self) -> &[i32] {
+        self.frame.mask.as_ref().unwrap()
+    }
+
+    pub(super) fn depth(&self) -> &[f32] {
+        self.frame.depth.as_ref().unwrap()
+    }
+
+    pub(super) fn distance(&self) -> &[f32] {
+        self.frame.distance.as_ref().unwrap()
+    }
+
+    pub(super) fn color(&self) -> &[[u8; 4]] {
+        self.frame.color.as_ref().unwrap().as_chunks().0
+    }
+
+    pub(super) fn albedo(&self) -> &[[u8; 4]] {
+        self.frame.albedo.as_ref().unwrap().as_chunks().0
+    }
+
+    pub(super) fn normal(&self) -> &[[f32; 3]] {
+        self.frame.normal.as_ref().unwrap().as_chunks().0
+    }
+
+    pub(super) fn shading_normal(&self) -> &[[f32; 3]] {
+        self.frame.shading_normal.as_ref().unwrap().as_chunks().0
+    }
+
+    pub(super) fn position(&self) -> &[[f32; 3]] {
+        self.frame.position.as_ref().unwrap().as_chunks().0
+    }
+
+    pub(super) fn flow(&self) -> &[[f32; 2]] {
+        self.frame.flow.as_ref().unwrap().as_chunks().0
+    }
+
+    /// Red, green or blue \[bytes\].
+    pub(super) fn channel(&self, c: usize) -> Vec<f32> {
+        self.color().iter().map(|color| f32::from(color[c])).collect()
+    }
+
+    fn check<'a>(&self, name: &'a str, tolerance: f64) -> ImageCheck<'a> {
+        ImageCheck { name, size: [self.width, self.color().len() / self.width], tolerance, outliers: 0.0 }
+    }
+
+    /// Asserts that all colours of a pixel are the byte of a formula, where it has one.
+    #[track_caller]
+    pub(super) fn assert_gray(&self, name: &str, tolerance: f64, expected: impl Fn(usize) -> Option<f64>) {
+        let check = self.check(name, tolerance);
+        (0..3).for_each(|c| check.assert_matches(&self.channel(c), |x, y| expected(y * self.width + x)));
+    }
+
+    /// How many pixels are not the byte of a formula, and for how many it has one.
+    pub(super) fn count_gray(&self, tolerance: f64, expected: impl Fn(usize) -> Option<f64>) -> [usize; 2] {
+        self.check("", tolerance).count(&self.channel(0), |x, y| expected(y * self.width + x))
+    }
+
+    /// All channels as bits: NaN would equal itself.
+    pub(super) fn bits(&self) -> Vec<u32> {
+        let Frame { color, albedo, mask, depth, distance, normal, shading_normal, position, flow, .. } = &self.frame;
+        let mut out: Vec<u32> = [color, albedo].into_iter().flatten().flatten().map(|&x| x.into()).collect();
+        out.extend(mask.iter().flatten().map(|&x| x as u32));
+        let floats = [depth, distance, normal, shading_normal, position, flow];
+        out.extend(floats.into_iter().flatten().flatten().map(|x| x.to_bits()));
+        out
+    }
+
+    /// [`Self::bits`] without the colour.
+    pub(super) fn bits_but_color(&self) -> Vec<u32> {
+        Self { frame: Frame { color: None, ..self.frame.clone() }, width: self.width }.bits()
+    }
+
+    /// Pixels that have eight neighbours.
+    pub(super) fn inner(&self) -> impl Iterator<Item = usize> + use<> {
+        let (width, height) = (self.width, self.mask().len() / self.width);
+        (1..height - 1).flat_map(move |y| (1..width - 1).map(move |x| y * width + x))
+    }
+
+    /// An inner pixel and its eight neighbours.
+    pub(super) fn around(&self, k: usize) -> impl Iterator<Item = usize> + Clone + use<> {
+        let width = self.width;
+        (0..9).map(move |n| k + (n / 3) * width + n % 3 - width - 1)
+    }
+
+    /// True if an inner pixel and its neighbours show the same thing.
+    pub(super) fn alone(&self, k: usize) -> bool {
+        self.around(k).all(|n| self.mask()[n] == self.mask()[k])
+    }
+
+    /// True if an inner pixel is off silhouettes: all around is the same thing, to a tenth as deep.
+    pub(super) fn whole(&self, k: usize) -> bool {
+        let depth = self.depth();
+        let near = |n: usize| depth[n] == depth[k] || (depth[n] - depth[k]).abs() <= 0.1 * depth[k].abs();
+        self.alone(k) && self.around(k).all(near)
+    }
+}
+
+/// How many pixels differ by more than some bytes in any colour.
+pub(super) fn far_apart(a: &Image, b: &Image, bytes: u8) -> usize {
+    let differ = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|c| a[c].abs_diff(b[c]) > bytes);
+    a.color().iter().zip(b.color()).filter(differ).count()
+}
+
+/// A camera at `eye` that looks at `target`, z up.
+#[track_caller]
+pub(super) fn look(size: [usize; 2], fovy: f32, eye: [f32; 3], target: [f32; 3]) -> View {
+    View::look_at(size, fovy, eye, target, [0.0, 0.0, 1.0]).unwrap()
+}
+
+pub(super) fn at(x: f32, y: f32, z: f32) -> PoseF32 {
+    PoseF32::from_translation([x, y, z])
+}
+
+/// Things with mask ids from 1 on.
+pub(super) fn things(
+    all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>,
+) -> (RenderScene, Vec<PoseF32>) {
+    let thing =
+        |((shape, material, pose), id): ((_, Material, PoseF32), i32)| (Instance::new(shape, material, id), pose);
+    let (instances, poses) = all.into_iter().zip(1..).map(thing).unzip();
+    (RenderScene::new(instances).unwrap(), poses)
+}
+
+/// A scene without lights and ambient light; the sky stays.
+pub(super) fn unlit(mut scene: RenderScene) -> RenderScene {
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+    scene
+}
+
+/// A material without highlights.
+pub(super) fn matt([r, g, b]: [f32; 3]) -> Material {
+    Material { specular: 0.0, ..Material::from_rgba([r, g, b, 1.0]) }
+}
+
+/// The byte of this light: the transfer function of the sRGB standard.
+pub(super) fn srgb(light: f64) -> f64 {
+    255.0 * if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The light of an sRGB number from 0 to 1.
+pub(super) fn linear(x: f32) -> f64 {
+    let x = f64::from(x);
+    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// A pose in double precision.
+pub(super) fn wide(pose: &PoseF32) -> Pose {
+    let r = pose.rotation.map(|row| row.map(f64::from));
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| r[i][j]));
+    let translation = Vector3::from(pose.translation.map(f64::from));
+    Pose::from_parts(translation.into(), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+/// Numbers of OpenCV: the rows of this name in `tests/data/opencv.txt`.
+pub(super) fn opencv<const N: usize>(name: &str) -> impl Iterator<Item = [f64; N]> {
+    let row = move |line: &str| {
+        let numbers = line.strip_prefix(name)?.strip_prefix(": ")?;
+        Some(numbers.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
+    };
+    include_str!("../../../tests/data/opencv.txt").lines().filter_map(row)
+}
+
+/// The pixel of a point in the frame of a camera without a lens.
+pub(super) fn pinhole(camera: &Camera, row: usize, p: Point3<f64>) -> [f64; 2] {
+    let k = camera.intrinsic_matrices();
+    [0, 1].map(|axis| k[(row, axis, axis)] * p[axis] / p.z + k[(row, axis, 2)])
+}
+
+/// The point that a pixel of a camera shows.
+pub(super) fn point(camera: &Camera, [row, v, u]: [usize; 3]) -> Point3<f64> {
+    let position = camera.position().unwrap();
+    Point3::from([0, 1, 2].map(|axis| f64::from(position[(row, v, u, axis)])))
+}

@@ -1,0 +1,291 @@
+//! Shadows, ambient occlusion, metals, own light and tone curves, against closed forms.
+
+use super::super::imperfection::Exposure;
+use super::super::{CameraCfg, Imperfections, RasterCfg, Renderer, ToneCurve};
+use super::harness::{Image, Still, at, linear, look, matt, srgb, things, unlit};
+use super::scenes::EXACT;
+use nalgebra::Vector3;
+use scene::shape::{Box, Plane, Sphere};
+use scene::{Headlight, Hemisphere, Light, LightKind, Material, PoseF32, RenderScene, Shape, Sky};
+
+/// sRGB number of the gray that floors have here.
+const GRAY: f32 = 0.7;
+
+/// A gray floor, and a gray box of these half sizes, by the hybrid.
+fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visibility::View) -> Still {
+    let gray = matt([GRAY; 3]);
+    let (mut scene, poses) =
+        things([(Shape::from(Plane::INFINITE), gray.clone(), PoseF32::IDENTITY), (Box { half }.into(), gray, place)]);
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [ambient; 3], ground: [ambient; 3] };
+    Still { cfg: EXACT, renderer: Renderer::Hybrid, ..Still::new((scene, poses), view) }
+}
+
+/// The byte of a gray floor in this light; below where the tone curve bends.
+fn byte(light: f32) -> f64 {
+    srgb(linear(GRAY) * f64::from(light))
+}
+
+/// A quarter for the polynomial, a half for rounding.
+const ROUNDING: f64 = 0.8;
+
+/// A box over a floor, its shadow by rays: where its edge is, and how bright the floor is on both sides.
+#[test]
+fn hybrid_shadows() {
+    // From -2 to 0 along x, 0.9 to 1.1 high.
+    let view = look([201, 201], 0.9, [2.2, -0.3, 0.8], [1.0, 0., 0.]);
+    let mut still = floor_and_box([1.0, 2.0, 0.1], at(-1.0, 0.0, 1.0), 0.1, view);
+    let light = Light { diffuse: [0.7; 3], attenuation: [1., 0., 0.], ..Light::default() };
+    let slanted = Light { direction: [1., 0., -1.], ..light };
+    let near = Light { kind: LightKind::Point, position: [-1.0, 0.0, 2.3], ..light };
+    // Past the box's upper edge, 1.1 high: 1.1 m on at 45 degrees; from 1.2 m above and 1 m behind it, 1.1 / 1.2 m on.
+    for (light, edge) in [(slanted, 1.1f32), (near, 1.1 / 1.2)] {
+        still.scene.lights = vec![light];
+        let cosine = |p: [f32; 3]| match light.kind {
+            LightKind::Directional => 0.5f32.sqrt(),
+            _ => 2.3 / ((p[0] + 1.0).powi(2) + p[1].powi(2) + 2.3 * 2.3).sqrt(),
+        };
+        let of = |image: &Image, k: usize, lit: &dyn Fn(f32) -> bool| {
+            let p = image.position()[k];
+            // A pixel is up to 0.02 m long on the floor; the box's sides do not end here.
+            let inside = (p[0] - edge).abs() >= 0.03 && p[1].abs() <= 1.5 && (0.0..3.0).contains(&p[0]);
+            let shadow = byte(if p[0] > edge { 0.1 + 0.7 * cosine(p) } else { 0.1 });
+            (image.mask()[k] == 1 && inside && lit(p[0])).then_some(shadow)
+        };
+        let image = still.draw();
+        image.assert_gray("hybrid shadows", ROUNDING, |k| of(&image, k, &|_| true));
+        let sides: [&dyn Fn(f32) -> bool; 2] = [&|x| x <= edge, &|x| x > edge];
+        let sizes = sides.map(|side| image.count_gray(ROUNDING, |k| of(&image, k, side))[1]);
+        assert!(sizes.iter().all(|&n| n > 2000), "{sizes:?}");
+        // The control: without shadows all that is dark is wrong, and nothing else.
+        let bright = still.with(|still| still.cfg.shadows = false).draw();
+        assert_eq!(bright.count_gray(ROUNDING, |k| of(&bright, k, &|_| true))[0], sizes[0]);
+    }
+}
+
+/// A point light exactly on a ceiling, which is not between it and the floor: the floor below is lit everywhere, by the cosine.
+///
+/// Root cause once: rays went as far as the light, so that the last bit decided whether the ceiling was before it.
+#[test]
+fn ceiling_light() {
+    let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
+    let mut still = floor_and_box([3.0, 3.0, 0.5], at(0.0, 0.0, 2.5), 0.0, view);
+    let mut wrong = |height: f32| {
+        let kind = LightKind::Point;
+        let light = Light { kind, position: [0.1, 0.0, height], diffuse: [0.7; 3], ..Light::default() };
+        still.scene.lights = vec![Light { attenuation: [1., 0., 0.], ..light }];
+        let image = still.draw();
+        image.count_gray(ROUNDING, |k| {
+            let p = image.position()[k];
+            let cosine = 2.0 / ((p[0] - 0.1).powi(2) + p[1].powi(2) + 4.0).sqrt();
+            (image.mask()[k] == 1 && p[0].abs() < 1.0 && p[1].abs() < 1.0).then(|| byte(0.7 * cosine))
+        })
+    };
+    let [off, all] = wrong(2.0);
+    assert!(off == 0 && all > 2000, "{off} of {all}");
+    // The control: a millimetre inside of it the light reaches nothing.
+    assert_eq!(wrong(2.001), [all; 2]);
+}
+
+/// Ambient occlusion at the foot of a long wall of height h: of the light that is everywhere, the wall takes
+/// `(1 - d / sqrt(d² + h²)) / 2` at the distance d. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
+#[test]
+fn ambient_occlusion() {
+    // From x = 0 on, 1 m high.
+    let view = look([48, 16], 0.4, [-1.0, -3.0, 2.5], [-0.8, 0.0, 0.0]);
+    let mut still = floor_and_box([0.5, 300.0, 0.5], at(0.5, 0.0, 0.5), 0.6, view);
+    still.scene.lights.clear();
+    still.scene.ambient.ground = [0.2; 3];
+    let of = |occlusion_rays| still.with(|still| still.cfg.occlusion_rays = occlusion_rays).draw();
+    let (with, without) = (of(1024), of(0));
+    // Colours of pixels at edges are means.
+    let x = |k: usize| Some(with.position()[k][0]).filter(|x| with.mask()[k] == 1 && *x < -0.02);
+    let shade = |x: f32| byte(0.6 * (1.0 - 0.5 * (1.0 - -x / (x * x + 1.0).sqrt())));
+    // The net finds the share to 1/256 or so, and byte(x) rises by 250 at most here.
+    with.assert_gray("ambient occlusion", 1.5, |k| x(k).map(shade));
+    let all: Vec<(usize, f32)> = (0..48 * 16).filter_map(|k| Some((k, x(k)?))).collect();
+    assert!(all.len() > 300 && all.iter().any(|(_, x)| *x > -0.1), "{} pixels", all.len());
+    // The control: without rays the floor is as bright as in the open, at the foot of the wall by 35.
+    for (k, x) in all {
+        let off = f64::from(without.color()[k][0]) - shade(x);
+        assert!((x < -0.1 || off > 30.0) && off > -1.5, "at {x} m: {off}");
+    }
+}
+
+/// Distance of a point from the way of the light to another.
+fn beside(point: [f32; 3], from: [f32; 3], to: [f32; 3]) -> f32 {
+    let (way, at) = (Vector3::from(to) - Vector3::from(from), Vector3::from(point) - Vector3::from(from));
+    (at - way * (at.dot(&way) / way.norm_squared()).clamp(0.0, 1.0)).norm()
+}
+
+/// Shadow maps are cut to things that cast shadows. A point of the ground is dark where the way to the light goes through a
+/// ball, and lit elsewhere: balls in the middle of the cone, half outside of it, close to the light, far apart.
+#[test]
+fn shadow_maps() {
+    const RADIUS: f32 = 0.3;
+    let (position, spot) = ([0.0, 0.0, 3.0], LightKind::Spot { cutoff_deg: 40.0, exponent: 0.0 });
+    let cases: [&[[f32; 3]]; 6] = [
+        &[[0.0, 0.0, 0.5]],
+        &[[1.9, 0.0, 0.5]],
+        &[[-0.9, -1.6, 0.6]],
+        &[[0.1, 0.0, 2.5]],
+        &[[-1.5, 1.0, 0.35], [1.4, -1.1, 0.5], [0.0, 0.3, 1.4]],
+        // None at all in the cone.
+        &[[6.0, 0.0, 0.5]],
+    ];
+    for (case, kind) in (0..cases.len()).flat_map(|case| [(case, spot), (case, LightKind::Directional)]) {
+        let gray = Material::default;
+        let ball = |[x, y, z]: &[f32; 3]| (Shape::from(Sphere { radius: RADIUS }), gray(), at(*x, *y, *z));
+        let ground = (Shape::from(Plane::INFINITE), gray(), PoseF32::IDENTITY);
+        let (mut scene, poses) = things([ground].into_iter().chain(cases[case].iter().map(ball)));
+        let direction = if kind == spot { [0.0, 0.0, -1.0] } else { [0.3, 0.2, -1.0] };
+        scene.lights = vec![Light { kind, position, direction, ..Light::default() }];
+        scene.headlight.active = false;
+        let view = look([320, 240], 1.1, [3.5, -2.5, 4.0], [0.; 3]);
+        let still = Still { cfg: RasterCfg { samples: 1, ..RasterCfg::default() }, ..Still::new((scene, poses), view) };
+        let (image, bright) = (still.draw(), still.with(|still| still.cfg.shadows = false).draw());
+        let (mut dark, mut lit) = (0, 0);
+        for (k, &p) in image.position().iter().enumerate().filter(|(k, _)| image.mask()[*k] == 1) {
+            // Inside of the cone and of the map, whose light the balls could take.
+            if p[0].hypot(p[1]) > 3.0 * 38f32.to_radians().tan() {
+                continue;
+            }
+            let from = if kind == spot { position } else { [0, 1, 2].map(|k| p[k] - 8.0 * direction[k]) };
+            let near = cases[case].iter().map(|ball| beside(*ball, from, p)).fold(f32::INFINITY, f32::min);
+            let [with, without] = [&image, &bright].map(|image| i32::from(image.color()[k][0]));
+            // The edge of a shadow is two texels of 1 to 2 cm wide on each side, and points are moved off the ground by
+            // two more; close to the light a ball is larger on the map than on the ground.
+            if near < RADIUS - 0.08 {
+                assert!(with + 20 < without, "case {case}, {kind:?}: {with} of {without} at {p:?}");
+                dark += 1;
+            } else if near > RADIUS + 0.08 {
+                assert!((with - without).abs() <= 1, "case {case}, {kind:?}: {with} of {without} at {p:?}");
+                lit += 1;
+            }
+        }
+        assert!(lit > 50 && (dark > 20 || case == 5), "case {case}, {kind:?}: {dark} dark, {lit} lit");
+    }
+}
+
+const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: false, seed: 1 };
+const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
+
+/// The colour in the middle of an image of a plane, from straight above.
+fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
+    let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
+    let mut scene = unlit(scene);
+    (scene.headlight, scene.sky) = (headlight, Sky::uniform(sky));
+    let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    let still = Still { stops: by.1, ..Still::new((scene, poses), view) };
+    still.with(|still| still.cfg.tone = tone).by(by.0).color()[16 * 33 + 16]
+}
+
+/// A white plane that glows in the dark.
+fn glowing(emission: f32, tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
+    middle(Material { emission, ..matt([1.0; 3]) }, DARK, [0.0; 3], tone, by)
+}
+
+/// A step of a byte for rounding, and one for the approximation of the power in the transfer function.
+fn close(seen: [u8; 4], light: [f64; 3]) -> bool {
+    (0..3).all(|k| (f64::from(seen[k]) - srgb(light[k].min(1.0))).abs() <= 1.5)
+}
+
+/// Seen along its normal a surface mirrors the sky behind the camera, and the headlight in full: a metal in its own colour, and
+/// with its own light, whatever `specular` says. Root cause once: highlights of metals were those of other materials, none
+/// where `specular` was 0, and their own light was lost.
+#[test]
+fn metals() {
+    let (base, above) = ([0.7, 0.5, 0.3], [0.4, 0.5, 0.6]);
+    let headlight = Headlight { ambient: [0.0; 3], diffuse: [0.3, 0.2, 0.1], specular: [0.2, 0.3, 0.4], active: true };
+    for (metallic, specular, emission) in
+        [1.0, 0.4].into_iter().flat_map(|m| [(m, 0.0, 0.0), (m, 0.5, 0.0), (m, 0.0, 0.3), (m, 1.0, 0.3)])
+    {
+        let material = Material { metallic, specular, emission, ..matt(base) };
+        let expected = [0, 1, 2].map(|k| {
+            let [color, sky, own, metal] =
+                [linear(base[k]), linear(above[k]), f64::from(emission), f64::from(metallic)];
+            let (shine, scattered) = (f64::from(headlight.specular[k]), f64::from(headlight.diffuse[k]));
+            let plain = color * (scattered + own) + f64::from(specular) * shine;
+            metal * color * (sky + shine + own) + (1.0 - metal) * plain
+        });
+        let seen = middle(material, headlight, above, ToneCurve::Clip, (Renderer::Raster, 0.0));
+        assert!(close(seen, expected), "metallic {metallic}, specular {specular}, {emission}: {seen:?}, {expected:?}");
+    }
+}
+
+/// A plane that glows in the dark: its light is its colour times its emission, by the rasterizer and by paths, through every curve.
+#[test]
+fn tone_curves() {
+    for (renderer, emission) in
+        [Renderer::Raster, PATHS].into_iter().flat_map(|r| [0.05_f32, 0.5, 0.9, 1.7].map(|e| (r, e)))
+    {
+        let x = f64::from(emission);
+        let shown = ToneCurve::ALL.map(|tone| {
+            let curve = match tone {
+                ToneCurve::Soft if x > 0.7 => 0.7 + 0.3 * (x - 0.7) / (x - 0.7 + 0.3),
+                ToneCurve::Soft => x,
+                ToneCurve::Clip => x.min(1.0),
+                ToneCurve::Filmic => (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0),
+            };
+            let seen = glowing(emission, tone, (renderer, 0.0));
+            assert!(close(seen, [curve; 3]), "{renderer:?}, {tone:?} of {x}: {seen:?}, not {curve}");
+            seen[0]
+        });
+        // The control: above the knee no two curves are alike.
+        assert!(emission != 0.9 || (0..3).all(|k| shown[k].abs_diff(shown[(k + 1) % 3]) > 3), "{shown:?}");
+    }
+}
+
+/// A stop is twice the light before the curve, in both renderers: also of light that is far brighter than white, where finished
+/// bytes are all the same.
+#[test]
+fn stops() {
+    for renderer in [Renderer::Raster, PATHS] {
+        let of = |emission, stops| glowing(emission, ToneCurve::Clip, (renderer, stops));
+        for (emission, stops) in [(0.2_f32, 1.0), (0.2, -1.0), (0.2, 0.5), (3.0, -2.0), (3.9, -2.0), (1e4, -20.0)] {
+            let light = (f64::from(emission) * f64::exp2(stops)).min(1.0);
+            let seen = of(emission, stops);
+            assert!(close(seen, [light; 3]), "{renderer:?}: {emission} at {stops} stops is {seen:?}, not {light}");
+        }
+        // The control: at 0 stops both highlights are white, and at -2 they are told apart.
+        assert_eq!([of(3.0, 0.0), of(3.9, 0.0)], [[255; 4]; 2]);
+        assert!(of(3.9, -2.0)[0] > of(3.0, -2.0)[0] + 20);
+    }
+    let still = Still::new((RenderScene::empty(), vec![]), look([4, 4], 0.5, [0.0, 0.1, 2.0], [0.0; 3]));
+    for stops in [f64::NAN, 21.0, f64::NEG_INFINITY] {
+        let error = Still { stops, ..still.clone() }.try_draw().unwrap_err().to_string();
+        assert!(error.contains("stops; it must be -20 to 20"), "{error}");
+    }
+}
+
+/// A camera's exposure is that of its renderer: the sky, 0.8 on the screen, is taken twice as long and half as long.
+#[test]
+fn camera_exposure() {
+    let context = super::stage::context(1);
+    let sky = |stops: Option<f64>| {
+        let imperfections = Imperfections { exposure: stops.map(|stops| Exposure { stops }), ..Default::default() };
+        let raster = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::default() };
+        let camera = super::stage::built(&CameraCfg { imperfections, raster, ..super::stage::cfg() }, &context);
+        camera.color().unwrap().iter().copied().collect::<Vec<u8>>()
+    };
+    let plain = sky(None);
+    assert_eq!(sky(Some(0.0)), plain);
+    for stops in [-1.0, 1.0] {
+        let mut changed = 0;
+        for (k, (found, before)) in sky(Some(stops)).into_iter().zip(&plain).enumerate() {
+            if k % 4 == 3 {
+                assert_eq!(found, 255);
+                continue;
+            }
+            // A byte of the plain image stands for light that is half a byte more or less; white may be brighter. 1.5 as in `close`.
+            let [low, high] = [-0.5, 0.5].map(|half| {
+                let byte = (f64::from(*before) + half).clamp(0.0, 255.0);
+                srgb((linear((byte / 255.0) as f32) * f64::exp2(stops)).min(1.0))
+            });
+            let high = if *before == 255 { 255.0 } else { high };
+            assert!((low - 1.5..=high + 1.5).contains(&f64::from(found)), "{before} becomes {found} at {stops}");
+            changed += usize::from(found.abs_diff(*before) > 8);
+        }
+        assert!(changed > plain.len() * 3 / 16, "{changed} of {}", plain.len());
+    }
+}
