@@ -1,5 +1,4 @@
 //! Pictures held against independent judges.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod albedo;
 mod boxes;
@@ -26,8 +25,6 @@ mod robots;
 mod rolling_boxes;
 mod scenes;
 mod sensor;
-mod sensor_mistakes;
-mod sensor_values;
 mod shutter;
 mod stage;
 mod stereo;

@@ -20,9 +20,9 @@ fn distance(mesh: &Mesh, ray: &Ray, limit: f64) -> Option<f64> {
     mesh.touch(ray, limit, &mut Stack::default()).map(|t| t.t)
 }
 
-/// On every ray, to the bit: the tree leaves out nothing that the same test would hit.
+/// Equals brute force on every ray, to the bit.
 #[test]
-fn a_tree_is_brute_force_on_every_ray() {
+fn brute_force() {
     for (seed, count, at) in [(1, 1, 0.0), (2, 7, 0.0), (3, 300, 0.0), (4, 2000, 0.0), (5, 500, 1000.0), (6, 500, -3e4)]
     {
         let mut dice = Dice(seed);
@@ -43,21 +43,20 @@ fn a_tree_is_brute_force_on_every_ray() {
                 worst = worst.max((t - u).abs());
             }
         }
-        println!("{count} triangles at {at}: {hits} hits, {worst:.1e} m from the textbook formula");
         assert!(hits > 0 || count < 8);
         // Coordinates of 3e4 m have 7e-12 m between doubles, slivers magnify that.
         assert!(worst < 1e-7 * (1.0 + at.abs() / 10.0), "{worst:e}");
     }
 }
 
-/// The control: a tree that lost a triangle is found out.
+/// The control: a tree without one of its triangles is found out.
 #[test]
-fn a_lost_triangle_is_found_out() {
+fn lost_triangle() {
     let mut dice = Dice(7);
     let triangles = soup(&mut dice, 50, [0.0; 3]);
     let mesh = tree(&triangles[1..]);
-    let lost = triangles[0].map(|p| p.map(f64::from));
-    let middle = [0, 1, 2].map(|k| (lost[0][k] + lost[1][k] + lost[2][k]) / 3.0);
+    let [a, b, c] = triangles[0].map(|p| p.map(f64::from));
+    let middle = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
     let n = normal(&triangles[0]).unwrap();
     let ray = Ray { origin: crate::ray::vector::along(middle, 1e-4, n), direction: n.map(|x| -x) };
     assert!(nearest_watertight(&ray, &triangles).is_some_and(|t| (t - 1e-4).abs() < 1e-6));
@@ -65,9 +64,8 @@ fn a_lost_triangle_is_found_out() {
 }
 
 #[test]
-fn a_limit_is_a_limit_and_counts_itself() {
-    let square: [Triangle; 2] =
-        [[[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.]], [[-1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]]];
+fn limits() {
+    let square = [[[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.]], [[-1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]]];
     let mesh = tree(&square);
     let ray = Ray { origin: [0.25, 0.25, 20.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&mesh, &ray, 20.0), Some(20.0), "on the edge between the two");
@@ -77,7 +75,7 @@ fn a_limit_is_a_limit_and_counts_itself() {
 }
 
 #[test]
-fn odd_meshes_are_fine() {
+fn degenerate() {
     let nothing = tree(&[]);
     let ray = Ray { origin: [0.0, 0.0, 1.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&nothing, &ray, 10.0), None);
@@ -100,9 +98,9 @@ fn odd_meshes_are_fine() {
     assert_eq!(distance(&tree(&nested), &ray, 100.0), nearest_watertight(&ray, &nested));
 }
 
-/// Whatever the builder has built before, and with every instruction set; also where sizes leave the range.
+/// The same boxes give the same tree, after other builds and with every instruction set; also where sizes leave the range.
 #[test]
-fn the_same_boxes_give_the_same_tree() {
+fn same_tree() {
     let boxes = |count, scale: f32| -> Vec<_> {
         soup(&mut Dice(9), count, [0.0; 3])
             .iter()
@@ -129,7 +127,7 @@ fn the_same_boxes_give_the_same_tree() {
 
 /// A mesh of a shape is hit where the shape is, up to the flatness of its triangles.
 #[test]
-fn a_tessellated_ball_is_nearly_a_ball() {
+fn tessellated_ball() {
     let ball = Shape::from(scene::shape::Sphere { radius: 0.5 }).tessellate(256);
     let mesh = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&ball, RenderMesh::CREASE))));
     // The sagitta of 1/256 of a turn.
