@@ -168,7 +168,7 @@ impl Sensor for Counted {
 /// A plane below balls that move with the steps.
 fn balls(num_envs: usize, count: usize) -> (SensorContext, Vec<SceneState>) {
     let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
-    let ball = |k| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k as i32).of_body(k);
+    let ball = |k: usize| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k as i32).of_body(k as u32);
     instances.extend((0..count).map(ball));
     let scene = Some(Arc::new(RenderScene::new(instances).unwrap()));
     let bodies: Vec<String> = (0..count).map(|k| format!("ball{k}")).collect();

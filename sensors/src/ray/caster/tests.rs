@@ -5,7 +5,7 @@ use crate::ray::pattern::{Custom, Grid, Lidar};
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::{NoiseCfg, SensorError};
-use ndarray::{Array2, Array3, Axis, array};
+use ndarray::{Array2, Array3, Axis};
 use scene::pose::{from_xyz_rpy, to_row};
 use scene::shape::{Box, Plane, Sphere};
 use scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
@@ -190,16 +190,14 @@ fn misses() {
     let caster = built_in(&cfg, &context(2, 1), &state(&[0, 0]));
     let mut misses = 0;
     for ((env, k), hit) in caster.hit_mask().indexed_iter() {
-        let point = caster.hits().index_axis(Axis(0), env).index_axis_move(Axis(0), k).to_owned();
-        let normal = caster.normals().index_axis(Axis(0), env).index_axis_move(Axis(0), k).to_owned();
-        assert!(point.iter().chain(&normal).all(|x| !x.is_nan()));
+        let [point, normal] = [caster.hits(), caster.normals()].map(|v| [0, 1, 2].map(|axis| v[(env, k, axis)]));
+        let distance = caster.distances()[(env, k)];
         assert_eq!(*hit, caster.hit_ids()[(env, k)] != 0);
-        if !hit {
-            misses += 1;
-            assert!(caster.distances()[(env, k)] == f64::INFINITY && point.iter().all(|x| *x == f64::INFINITY));
-            assert_eq!(normal, array![0.0, 0.0, 0.0]);
+        misses += usize::from(!hit);
+        if *hit {
+            assert!(distance <= 3.0 && point.iter().chain(&normal).all(|x| !x.is_nan()));
         } else {
-            assert!(caster.distances()[(env, k)] <= 3.0);
+            assert_eq!((distance, point, normal), (f64::INFINITY, [f64::INFINITY; 3], [0.0; 3]));
         }
     }
     assert!(misses > 10 && misses < 110, "{misses}");

@@ -1,6 +1,5 @@
 //! Rays held against closed forms and against brute force.
 
-mod brute_force;
 mod columns;
 mod packets;
 mod shapes;

@@ -1,6 +1,6 @@
 //! Packets find what single rays find, to the bit, on every instruction set.
 
-use super::brute_force::soup;
+use super::trees::soup;
 use super::{Dice, bits};
 use crate::lanes::{at_level, levels};
 use crate::ray::bvh::{Beam, Stack, Walked};
@@ -15,11 +15,11 @@ use scene::{Instance, Material, PoseF64, RenderScene, Shape};
 use std::sync::Arc;
 
 /// Casts every packet of the rays together, at every level, and each ray alone; counts hits.
-struct Compare<'a> {
-    rays: &'a [Ray],
-    max_distance: f64,
-    what: &'a str,
-    hits: &'a mut usize,
+pub(super) struct Compare<'a> {
+    pub(super) rays: &'a [Ray],
+    pub(super) max_distance: f64,
+    pub(super) what: &'a str,
+    pub(super) hits: &'a mut usize,
 }
 
 impl ForShape for Compare<'_> {

@@ -1,7 +1,7 @@
 //! Walking over a grid finds what brute force over the triangles of the same field finds.
 
 use super::Dice;
-use super::brute_force::nearest;
+use super::trees::nearest;
 use crate::ray::Ray;
 use crate::ray::bvh::Stack;
 use crate::ray::shape::height_field::Field;
