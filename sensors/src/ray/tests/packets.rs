@@ -209,7 +209,7 @@ fn shapes(dice: &mut Dice) -> Vec<Shape> {
     ]
 }
 
-fn targets(shapes: &[Shape], count: usize, fixed: impl Fn(usize) -> bool) -> Arc<RayTargets> {
+pub(super) fn targets(shapes: &[Shape], count: usize, fixed: impl Fn(usize) -> bool) -> Arc<RayTargets> {
     let instance = |k: usize| {
         let instance = Instance::new(shapes[k % shapes.len()].clone(), Material::default(), k as i32 + 1);
         if fixed(k) { instance.fixed() } else { instance }
