@@ -86,8 +86,9 @@ mod tests {
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    /// Everything is done once, by no more threads than items.
     #[test]
-    fn everything_is_done_once_and_by_no_more_threads_than_things() {
+    fn share() {
         let crew = Crew::default();
         for (workers, things) in [(1, 5), (3, 0), (3, 1), (3, 100), (8, 3)] {
             let mut workers = vec![Vec::new(); workers];
@@ -103,19 +104,16 @@ mod tests {
         }
     }
 
+    /// Every thread has its own index, and panics reach the caller.
     #[test]
-    fn threads_have_desks_of_their_own() {
+    fn run() {
         let desks: [AtomicUsize; 4] = Default::default();
         Crew::default().run(4, |desk| {
             desks[desk].fetch_add(1, Ordering::Relaxed);
         });
         assert_eq!(desks.map(AtomicUsize::into_inner), [1; 4]);
-    }
-
-    #[test]
-    fn panics_reach_the_caller() {
         for fails in 0..3 {
-            let run = || Crew::default().run(3, |desk| assert!(desk != fails, "told to fail"));
+            let run = || Crew::default().run(3, |desk| assert!(desk != fails, "on purpose"));
             assert!(catch_unwind(AssertUnwindSafe(run)).is_err(), "desk {fails}");
         }
     }

@@ -90,50 +90,33 @@ impl<T: Copy + Default> History<T> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use ndarray::array;
 
+    /// Newest first, the oldest falls out; a reset clears one environment; memory stays where it is.
     #[test]
-    fn rows_are_newest_first_and_the_oldest_falls_out() {
+    fn rows() {
         let mut h = History::new(2, 3, 2);
-        for k in 1..=4 {
-            h.push(0, &[f64::from(k), -f64::from(k)]);
-        }
+        let memory = h.view().as_ptr();
+        (1..=4).for_each(|k| h.push(0, &[f64::from(k), -f64::from(k)]));
         h.push(1, &[9.0, 9.0]);
         assert_eq!(h.env(0), array![[4.0, -4.0], [3.0, -3.0], [2.0, -2.0]]);
         assert_eq!(h.env(1), array![[9.0, 9.0]]);
         assert_eq!(h.view().dim(), (2, 3, 2));
         assert_eq!(h.view().index_axis(Axis(0), 1).split_at(Axis(0), 1).1, array![[0.0, 0.0], [0.0, 0.0]]);
-        assert_eq!(h.row(0, 2).unwrap(), array![2.0, -2.0]);
-        assert_eq!(h.row(1, 1), None);
+        assert_eq!((h.row(0, 2).unwrap(), h.row(1, 1)), (array![2.0, -2.0].view(), None));
         assert_eq!((h.filled(0), h.filled(1), h.length()), (3, 1, 3));
-    }
-
-    #[test]
-    fn reset_forgets_one_environment() {
-        let mut h = History::new(2, 2, 1);
-        h.push(0, &[1]);
-        h.push(1, &[2]);
         h.reset(0);
-        assert_eq!(h.filled(0), 0);
-        assert_eq!(h.view(), array![[[0], [0]], [[2], [0]]]);
-    }
-
-    #[test]
-    fn memory_stays_where_it_is() {
-        let mut h = History::new(1, 4, 3);
-        let place = h.view().as_ptr();
-        for k in 0..1000 {
-            h.push(0, &[k, k, k]);
-        }
+        assert_eq!((h.filled(0), h.filled(1)), (0, 1));
+        assert!(h.view().index_axis(Axis(0), 0).iter().all(|x| *x == 0.0) && h.env(1) == array![[9.0, 9.0]]);
+        (0..1000).for_each(|k| h.push(0, &[f64::from(k); 2]));
         h.reset(0);
-        assert_eq!(h.view().as_ptr(), place);
+        assert_eq!(h.view().as_ptr(), memory);
     }
 
     #[test]
-    fn a_history_of_nothing_is_fine() {
+    fn empty() {
         let mut h = History::new(2, 0, 3);
         h.push(1, &[1.0, 2.0, 3.0]);
         assert_eq!((h.filled(1), h.env(1).dim()), (0, (0, 3)));

@@ -61,7 +61,7 @@ mod tests {
 
     /// The known answers of the authors' own library, Random123.
     #[test]
-    fn known_answers_come_out() {
+    fn known_answers() {
         let zero = Philox([0, 0]).bits([0; 4]);
         assert_eq!(zero, [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         let ones = Philox([u32::MAX; 2]).bits([u32::MAX; 4]);
@@ -74,15 +74,15 @@ mod tests {
     /// sqrt(1 / 180 / n), fourth moments of normal ones by sqrt(96 / n), correlations by 1 / sqrt(n): six times that fails
     /// once in 5e8 seeds, and the seeds here are fixed.
     #[test]
-    fn moments_are_those_of_the_distributions() {
+    fn moments() {
         let dice = Philox::keyed(3, 1, "camera");
         let n = 200_000.0;
         let normals: Vec<f64> = (0..50_000).flat_map(|k| dice.normals([k, 0, 7, 1])).collect();
         let moment = |numbers: &[f64], power: i32| numbers.iter().map(|x| x.powi(power)).sum::<f64>() / n;
         let root = f64::sqrt(n);
-        assert!(moment(&normals, 1).abs() < 6.0 / root);
-        assert!((moment(&normals, 2) - 1.0).abs() < 6.0 * 2f64.sqrt() / root);
-        assert!((moment(&normals, 4) - 3.0).abs() < 6.0 * 96f64.sqrt() / root);
+        for (power, expected, variance) in [(1, 0.0, 1f64), (2, 1.0, 2.0), (4, 3.0, 96.0)] {
+            assert!((moment(&normals, power) - expected).abs() < 6.0 * variance.sqrt() / root, "moment {power}");
+        }
         let uniforms: Vec<f64> = (0..50_000).flat_map(|k| dice.uniforms([0, k, 7, 1])).collect();
         assert!((moment(&uniforms, 1) - 0.5).abs() < 6.0 * (1.0 / 12.0_f64).sqrt() / root);
         let second: f64 = uniforms.iter().map(|x| (x - 0.5).powi(2)).sum::<f64>() / n;
@@ -91,14 +91,11 @@ mod tests {
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;
         let near = product(&normals, &normals[1..]);
         assert!(near.abs() < 6.0 / root, "{near}");
-        for other in [[0, 1, 7, 1], [0, 0, 8, 1], [0, 0, 7, 2], [1, 0, 7, 1]] {
-            let others: Vec<f64> =
-                (0..50_000).flat_map(|k| dice.normals([other[0] + k, other[1], other[2], other[3]])).collect();
-            assert!(product(&normals, &others).abs() < 6.0 / root, "{other:?}");
-        }
-        for key in [Philox::keyed(4, 1, "camera"), Philox::keyed(3, 2, "camera"), Philox::keyed(3, 1, "camerb")] {
-            let others: Vec<f64> = (0..50_000).flat_map(|k| key.normals([k, 0, 7, 1])).collect();
-            assert!(product(&normals, &others).abs() < 6.0 / root, "{key:?}");
+        let [a, b, c] = [Philox::keyed(4, 1, "camera"), Philox::keyed(3, 2, "camera"), Philox::keyed(3, 1, "camerb")];
+        let places = [[0, 1, 7, 1], [0, 0, 8, 1], [0, 0, 7, 2], [1, 0, 7, 1]].map(|place| (&dice, place));
+        for (key, [x, y, z, w]) in places.into_iter().chain([&a, &b, &c].map(|key| (key, [0, 0, 7, 1]))) {
+            let others: Vec<f64> = (0..50_000).flat_map(|k| key.normals([x + k, y, z, w])).collect();
+            assert!(product(&normals, &others).abs() < 6.0 / root, "{key:?} {:?}", [x, y, z, w]);
         }
         assert!((product(&normals, &normals) - 1.0).abs() < 0.05, "the control: with itself");
     }

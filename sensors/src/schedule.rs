@@ -139,41 +139,40 @@ impl Phases {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
-    fn steps(update_period: f64, dt: f64) -> u64 {
-        Schedule::new(update_period, dt, false).unwrap().period_steps()
+    fn schedule(update_period: f64, dt: f64) -> Schedule {
+        Schedule::new(update_period, dt, false).unwrap()
     }
 
     #[test]
-    fn periods_are_whole_steps() {
-        assert_eq!(steps(0.0, 0.005), 1);
-        assert_eq!(steps(0.005, 0.005), 1);
-        assert_eq!(steps(0.02, 0.005), 4);
-        assert_eq!(steps(0.1, 0.005), 20);
-        assert_eq!(steps(0.3, 0.1), 3);
-        assert_eq!(steps(1.0 / 30.0, 1.0 / 240.0), 8);
-        assert_eq!(steps(3600.0, 1e-4), 36_000_000);
+    fn periods() {
+        for (period, dt, steps) in [
+            (0.0, 0.005, 1),
+            (0.005, 0.005, 1),
+            (0.02, 0.005, 4),
+            (0.1, 0.005, 20),
+            (0.3, 0.1, 3),
+            (1.0 / 30.0, 1.0 / 240.0, 8),
+            (3600.0, 1e-4, 36_000_000),
+        ] {
+            assert_eq!(schedule(period, dt).period_steps(), steps);
+        }
         for n in 1..10_000u32 {
             for dt in [0.001, 0.002, 0.005, 0.01, 1.0 / 60.0, 1.0 / 240.0, 0.0025] {
-                assert_eq!(steps(f64::from(n) * dt, dt), u64::from(n));
+                assert_eq!(schedule(f64::from(n) * dt, dt).period_steps(), u64::from(n));
             }
         }
-    }
-
-    #[test]
-    fn other_periods_are_an_error_unless_rounded() {
         let error = Schedule::new(0.033, 0.005, false).unwrap_err();
         assert!(matches!(error, SensorError::PeriodNotMultiple { nearest, .. } if nearest == 0.035), "{error}");
         assert!(error.to_string().contains("round_period"), "{error}");
-        assert_eq!(Schedule::new(0.033, 0.005, true).unwrap().period_steps(), 7);
         assert!(Schedule::new(0.001, 0.005, false).is_err(), "shorter than a step");
-        assert_eq!(Schedule::new(0.001, 0.005, true).unwrap().period_steps(), 1);
         assert!(Schedule::new(1e6 + 0.005, 0.01, false).is_err(), "half a step too long");
+        let rounded = |period| Schedule::new(period, 0.005, true);
+        assert_eq!([0.033, 0.001].map(|period| rounded(period).unwrap().period_steps()), [7, 1]);
         for bad in [-0.1, f64::NAN, f64::INFINITY, 1e300] {
-            assert!(matches!(Schedule::new(bad, 0.005, true), Err(SensorError::InvalidPeriod { .. })));
+            assert!(matches!(rounded(bad), Err(SensorError::InvalidPeriod { .. })));
         }
         for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
             assert!(matches!(Schedule::new(0.1, bad, true), Err(SensorError::InvalidTimeStep { .. })));
@@ -182,48 +181,37 @@ mod tests {
 
     /// Counting seconds in f32, as others do, turns intervals of 20 steps into 21 after 3200 steps.
     #[test]
-    fn intervals_stay_exact_over_a_million_steps() {
-        let mut phases = Schedule::new(0.1, 0.005, false).unwrap().phases(1);
-        let due: Vec<u64> = (1..=1_000_000).filter(|&step| phases.is_due(0, step)).collect();
-        assert!(due.iter().copied().eq((1..=50_000).map(|k| 20 * k)));
+    fn million_steps() {
+        let mut phases = schedule(0.1, 0.005).phases(1);
+        let due = (1..=1_000_000u64).filter(|&step| phases.is_due(0, step));
+        assert!(due.eq((1..=50_000).map(|k| 20 * k)));
     }
 
+    /// Measurements that were not read are counted, and steps that cannot be due may be left out.
     #[test]
-    fn measurements_that_nobody_asked_for_are_counted() {
-        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(1);
+    fn skipped_steps() {
+        let mut phases = schedule(0.02, 0.005).phases(1);
         phases.reset(0, 3);
         assert_eq!([3, 7, 7, 19, 20, 23].map(|step| phases.fallen_due(0, step)), [0, 1, 0, 3, 0, 1]);
-    }
-
-    #[test]
-    fn steps_that_cannot_be_due_may_be_left_out() {
-        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(2);
+        let mut phases = schedule(0.02, 0.005).phases(2);
         phases.reset(1, 3);
-        let (mut step, mut due) = (0, Vec::new());
+        let (mut step, mut due) = (0, [Vec::new(), Vec::new()]);
         while step < 20 {
             step += phases.due_in([step, step.max(3)]);
             // Environment 1 came late: it is asked from its own step 3 on.
-            due.extend([0, 1].into_iter().filter(|&env| phases.is_due(env, step)).map(|env| (env, step)));
+            [0, 1].into_iter().filter(|&env| phases.is_due(env, step)).for_each(|env| due[env].push(step));
         }
-        let expected: Vec<(usize, u64)> = (1..=20)
-            .flat_map(|k| [(0, k), (1, k)])
-            .filter(|&(env, k)| if env == 0 { k % 4 == 0 } else { k > 3 && k % 4 == 3 })
-            .collect();
-        assert_eq!(due, expected);
-    }
-
-    /// One that stands a step before its turn would otherwise make every block one step long, for ever.
-    #[test]
-    fn an_environment_that_stands_still_hurries_nobody() {
-        let phases = Schedule::new(0.1, 0.005, false).unwrap().phases(2);
+        assert_eq!(due, [vec![4, 8, 12, 16, 20], vec![7, 11, 15, 19]]);
+        // An environment that stands still a step before its turn would otherwise make every block one step long.
+        let phases = schedule(0.1, 0.005).phases(2);
         assert_eq!(phases.due_in([19, 5]), 1, "running, it is due in a step");
         assert_eq!(phases.due_in([Phases::STANDS, 5]), 15);
         assert_eq!(phases.due_in([Phases::STANDS; 2]), 20, "nothing is due where nothing runs");
     }
 
     #[test]
-    fn each_environment_counts_from_its_own_reset() {
-        let mut phases = Schedule::new(0.02, 0.005, false).unwrap().phases(2);
+    fn resets() {
+        let mut phases = schedule(0.02, 0.005).phases(2);
         assert!(!phases.is_due(0, 0) && !phases.is_due(1, 0), "nothing at the start");
         let mut due = [Vec::new(), Vec::new()];
         for tick in 1..=12u64 {
@@ -246,8 +234,8 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "without a reset")]
-    fn going_back_without_a_reset_is_a_bug() {
-        let mut phases = Schedule::new(0.0, 0.005, false).unwrap().phases(1);
+    fn going_back() {
+        let mut phases = schedule(0.0, 0.005).phases(1);
         phases.is_due(0, 5);
         phases.is_due(0, 4);
     }

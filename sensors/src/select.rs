@@ -93,19 +93,16 @@ fn bare(name: &str) -> &str {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
     #[test]
-    fn full_and_bare_names_match_as_a_whole() {
+    fn names() {
         let names = ["a/LF_FOOT", "a/RF_FOOT", "b/LF_FOOT", "cube", "a/x/y"].map(String::from);
         let found = |patterns: &[&str]| select(patterns, &names, "body").unwrap();
-        assert_eq!(found(&[".F_FOOT"]), [0, 1, 2]);
-        assert_eq!(found(&["b/.*", "a/RF_FOOT"]), [2, 1]);
-        assert_eq!(found(&["cube", "x/y"]), [3, 4]);
+        assert_eq!([found(&[".F_FOOT"]), found(&[])], [vec![0, 1, 2], vec![]]);
+        assert_eq!([found(&["b/.*", "a/RF_FOOT"]), found(&["cube", "x/y"])], [[2, 1], [3, 4]]);
         assert_eq!(found(&["{ENV}/b/.*", "{ENV_REGEX_NS}/RF_FOOT"]), [2, 1]);
-        assert_eq!(found(&[]), [0_usize; 0]);
         let wrong = |patterns: &[&str]| select(patterns, &names, "body").unwrap_err().to_string();
         assert!(wrong(&["F_FOOT"]).starts_with("there is no body \"F_FOOT\"; known are \"LF_FOOT\""));
         assert!(wrong(&["cube", "c.*"]).contains("matched by both"));

@@ -212,5 +212,4 @@ impl SensorSlot {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests;

@@ -32,7 +32,7 @@ mod tests {
     use crate::{ImuCfg, JointStateCfg, JointWrenchCfg, SamplingCfg, SensorCfg, SensorContext};
 
     #[test]
-    fn a_summary_tells_rate_history_and_what_is_measured() {
+    fn summaries() {
         let context = SensorContext {
             num_envs: 3,
             dt: 0.005,

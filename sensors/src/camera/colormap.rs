@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn depth_goes_from_blue_to_red() {
+    fn depth() {
         let range = [1.0, 3.0];
         let [near, quarter, middle, far] = [1.0, 1.4, 2.0, 3.0].map(|d| depth_color(d, range));
         assert!(quarter[2] > 200 && far[0] > far[2] && middle[1] > 200, "{quarter:?} {middle:?} {far:?}");
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbouring_ids_are_told_apart() {
+    fn ids() {
         assert_eq!(mask_color(0), [0, 0, 0]);
         for id in 1..200 {
             for other in id + 1..id + 6 {
@@ -75,9 +75,8 @@ mod tests {
     }
 
     #[test]
-    fn normals_are_spread_over_the_bytes() {
-        assert_eq!(normal_color([0.0, 0.0, 1.0]), [128, 128, 255]);
-        assert_eq!(normal_color([-1.0, 0.0, 0.0]), [0, 128, 128]);
-        assert_eq!(normal_color([0.0; 3]), [0, 0, 0]);
+    fn normals() {
+        let colors = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0; 3]].map(normal_color);
+        assert_eq!(colors, [[128, 128, 255], [0, 128, 128], [0, 0, 0]]);
     }
 }

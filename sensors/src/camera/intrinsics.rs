@@ -191,12 +191,11 @@ fn finite(what: &'static str, value: f64) -> Result<f64, CameraError> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_form_gives_the_same_lens() {
+    fn forms() {
         let film = |vertical_aperture, vertical_offset| Intrinsics::Aperture {
             focal_length: 24.0,
             horizontal_aperture: 20.0,
@@ -227,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_numbers_are_named() {
+    fn mistakes() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let lens = Intrinsics::Pixels { fx: bad, fy: 1.0, cx: 0.0, cy: 0.0 };
             assert!(matches!(lens.to_pixels(4, 4), Err(CameraError::Lens { what: "fx", .. })));

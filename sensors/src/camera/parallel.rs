@@ -268,7 +268,6 @@ fn bands<'a>(
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
     use crate::camera::{Channels, Frame};
@@ -276,9 +275,9 @@ mod tests {
     use scene::shape::Sphere;
     use scene::{Instance, Material, PoseF32, RenderScene};
 
-    /// A small picture of many paths takes seconds, one of few is drawn before a thread has woken.
+    /// A small image of many paths takes seconds, one of few is drawn before a thread has woken.
     #[test]
-    fn many_paths_and_bounces_are_worth_threads() {
+    fn worth_of_paths() {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
         let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
         let mut frame = Frame::new(32, 32, Channels::ALL);

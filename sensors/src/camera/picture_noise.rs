@@ -121,10 +121,10 @@ mod tests {
     use super::*;
     use crate::camera::{Frame, Lens, Renderer};
 
-    /// Root cause: depths were kept between near and far, which behind lenses that see backward are along the ray: whatever is
-    /// beside the camera was `near` away.
+    /// Root cause: depths were clamped to near and far, which of lenses that see backward are along the ray: objects beside the
+    /// camera came out `near` away.
     #[test]
-    fn depths_beside_and_behind_the_camera_stay_there() {
+    fn wide_lens_depths() {
         let disturbed = |lens: &str| {
             let cfg = CameraCfg {
                 lens: Lens::from_name(lens).expect("a lens"),

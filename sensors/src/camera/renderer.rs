@@ -221,14 +221,13 @@ impl<'de> Deserialize<'de> for Renderer {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::super::CameraCfg;
     use super::Renderer;
 
-    /// As scene files have them: a name, or a table with numbers; and back.
+    /// As in scene files: a name, or a table with numbers; and back.
     #[test]
-    fn renderers_stand_in_files() {
+    fn serde() {
         let read = |text: &str| toml::from_str::<CameraCfg>(text).map(|cfg| cfg.renderer);
         let some = Renderer::RayTraced { samples: 256, max_bounces: 4, denoise: true, seed: 7 };
         let all = Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed: 9 };

@@ -142,7 +142,7 @@ mod tests {
     /// The law of a random walk: places at times s and t have the covariance min(s, t). The mean of the product of two normal
     /// numbers scatters by sqrt((s t + min²) / n): six times that.
     #[test]
-    fn walks_are_random_walks() {
+    fn covariance() {
         let times = [1, 2, 3, 5, 8, 100, 777];
         let n = 20_000;
         let places = |age: u32| -> Vec<f64> {
@@ -163,9 +163,9 @@ mod tests {
         assert!(last.iter().all(|x| x.abs() < 7.0 * 65536.0 && *x != 0.0), "{last:?}");
     }
 
-    /// A look-up is the sum of what it looked up before and one more step, whose variance is 1.
+    /// A value is the one before plus a step of variance 1.
     #[test]
-    fn steps_of_walks_are_independent() {
+    fn independent_steps() {
         let n = 40_000.0;
         let step = |age: u32| -> Vec<f64> {
             (0..10_000)

@@ -116,17 +116,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn phases_are_counted_to_one_step() {
+    fn phases() {
         let mut times = AirTimes::new(1, 1, 0.5, 1.0);
         let force = |f: f64| move |net: &mut [f64]| net[2] += f;
         times.reset(0, 0, force(0.0));
-        let mut row = [0.0; 6];
-        let mut told = Vec::new();
+        let (mut row, mut reads) = ([0.0; 6], Vec::new());
         for (k, f) in [0.0, 0.9, 1.0, 5.0, 5.0, 0.0, 2.0, 0.0, 0.0].into_iter().enumerate() {
             times.look(0, k as u64 + 1, force(f));
             times.read(0, &mut row);
             times.told(0);
-            told.push(row);
+            reads.push(row);
         }
         // Air, contact, last air, last contact, first contact, first air; exactly 1 N is not above the threshold.
         let expected = [
@@ -140,27 +139,23 @@ mod tests {
             [0.5, 0.0, 0.5, 0.5, 0.0, 1.0],
             [1.0, 0.0, 0.5, 0.5, 0.0, 0.0],
         ];
-        assert_eq!(told, expected);
+        assert_eq!(reads, expected);
     }
 
+    /// The next measurement reports a touch between two; a touch at the reset is no first contact.
     #[test]
-    fn a_touch_between_two_measurements_is_told_by_the_next() {
-        let mut times = AirTimes::new(1, 1, 0.5, 1.0);
+    fn first_contact() {
         let mut row = [0.0; 6];
-        for (k, f) in [0.0, 9.0, 0.0, 0.0].into_iter().enumerate() {
-            times.look(0, k as u64 + 1, |net| net[0] += f);
+        let mut times = AirTimes::new(1, 1, 0.5, 1.0);
+        for (step, f) in [(1, 0.0), (2, 9.0), (3, 0.0), (4, 0.0)] {
+            times.look(0, step, |net| net[0] += f);
         }
         times.read(0, &mut row);
         assert_eq!(row, [1.0, 0.0, 0.5, 0.5, 1.0, 1.0]);
-    }
-
-    #[test]
-    fn what_touches_at_the_reset_has_no_first_contact() {
         let mut times = AirTimes::new(2, 1, 0.5, 1.0);
         times.reset(1, 0, |net| net[1] = -3.0);
         times.look(1, 1, |net| net[1] = -3.0);
         times.look(1, 1, |net| net[1] = 0.0);
-        let mut row = [0.0; 6];
         times.read(1, &mut row);
         assert_eq!(row, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
         times.read(0, &mut row);

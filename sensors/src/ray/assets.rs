@@ -62,7 +62,7 @@ mod tests {
     use scene::shape::Sphere;
 
     #[test]
-    fn an_asset_is_built_once_and_given_back() {
+    fn shared_assets() {
         let ball = scene::Shape::from(Sphere { radius: 1.0 }).tessellate(8);
         let [a, b] = [0, 1].map(|_| Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE)));
         let assets = RayAssets::default();
@@ -71,7 +71,7 @@ mod tests {
         assert!(Arc::ptr_eq(&first, &tree(&a)) && !Arc::ptr_eq(&first, &tree(&b)));
         let gone = Arc::downgrade(&first);
         drop(first);
-        assert!(gone.upgrade().is_none(), "nobody uses it");
+        assert!(gone.upgrade().is_none(), "not in use");
         assert_eq!(Arc::strong_count(&tree(&a)), 1);
     }
 }

@@ -135,7 +135,6 @@ impl ShadowRays<'_> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
     use crate::lanes::{Level, at_level};
@@ -144,15 +143,12 @@ mod tests {
     use scene::shape::{Box, Plane, Sphere};
     use scene::{Instance, Material, PoseF32, RenderScene, Shape};
 
-    /// The parts from above and below that are blocked at a point of a floor that looks to `normal`.
-    fn blocked(things: Vec<(Shape, PoseF32)>, at: [f32; 3], normal: [f32; 3]) -> [f64; 2] {
-        blocked_of(things, at, (normal, normal))
-    }
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
-    /// The same, where light sees another normal than the surface has.
-    fn blocked_of(things: Vec<(Shape, PoseF32)>, at: [f32; 3], normals: ([f32; 3], [f32; 3])) -> [f64; 2] {
+    /// The blocked parts from above and below at a point above a floor, with its geometric and its smooth normal.
+    fn blocked(objects: Vec<(Shape, PoseF32)>, at: [f32; 3], normals: [[f32; 3]; 2]) -> [f64; 2] {
         let floor = (Plane::INFINITE.into(), PoseF32::IDENTITY);
-        let (shapes, poses): (Vec<Shape>, Vec<PoseF32>) = std::iter::once(floor).chain(things).unzip();
+        let (shapes, poses): (Vec<Shape>, Vec<PoseF32>) = std::iter::once(floor).chain(objects).unzip();
         let instances = shapes.into_iter().map(|shape| Instance::new(shape, Material::default(), 1)).collect();
         let scene = RenderScene::new(instances).unwrap();
         let mut tracer = Tracer::default();
@@ -162,7 +158,7 @@ mod tests {
         let stack = RefCell::new(&mut stack);
         let rays = ShadowRays { tracer: &tracer, stack: &stack, shadows: true, occlusion_rays: 1 << 12 };
         at_level!(Level::best(), s => {
-            let [at, normal, smooth] = [at, normals.0, normals.1].map(|v| V3::splat(s, v));
+            let [at, normal, smooth] = [at, normals[0], normals[1]].map(|v| V3::splat(s, v));
             let lanes = splat(s, 0.0f32).simd_gt(splat(s, -1.0));
             let parts = rays.blocked(s, (at, normal, smooth, splat(s, 1.0)), lanes);
             parts.map(|part| f64::from(part.array()[3]))
@@ -176,7 +172,7 @@ mod tests {
     /// Beside a wall of height h that goes on and on, at the distance d: (1 - d / sqrt(d² + h²)) / 2, which is a half in its
     /// corner. Source: Howell, A catalog of radiation heat transfer configuration factors, B-1 (infinitely long).
     #[test]
-    fn a_wall_takes_its_form_factor_of_the_sky() {
+    fn wall() {
         let wall = |height: f32| {
             let half = [0.5, 5000.0, height];
             (Box { half }.into(), PoseF32::from_translation([-0.5, 0.0, 0.0]))
@@ -184,33 +180,33 @@ mod tests {
         for (height, distance) in [(1.0f32, 1.0f32), (2.0, 0.5), (1.0, 4.0), (3000.0, 0.01)] {
             let (d, h) = (f64::from(distance), f64::from(height));
             let expected = 0.5 * (1.0 - d / d.hypot(h));
-            let [above, below] = blocked(vec![wall(height)], [distance, 0.0, 0.0], [0.0, 0.0, 1.0]);
+            let [above, below] = blocked(vec![wall(height)], [distance, 0.0, 0.0], [UP; 2]);
             assert!((above - expected).abs() < NOISE && below == 0.0, "{height} {distance}: {above}, not {expected}");
         }
-        let [corner, _] = blocked(vec![wall(3000.0)], [0.001, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let [corner, _] = blocked(vec![wall(3000.0)], [0.001, 0.0, 0.0], [UP; 2]);
         assert!((corner - 0.5).abs() < NOISE);
         // Nothing in the way: nothing is blocked, exactly. A control: the wall takes something everywhere above.
-        assert_eq!(blocked(vec![], [0.3, 0.2, 0.0], [0.0, 0.0, 1.0]), [0.0; 2]);
+        assert_eq!(blocked(vec![], [0.3, 0.2, 0.0], [UP; 2]), [0.0; 2]);
     }
 
     /// Below a ball: (r / d)²; on a wall half of the light is from below, and the floor takes it.
     #[test]
-    fn balls_and_floors_take_theirs() {
+    fn ball_and_floor() {
         let ball = (Sphere { radius: 0.5 }.into(), PoseF32::from_translation([0.0, 0.0, 1.25]));
-        let [above, below] = blocked(vec![ball], [0.0; 3], [0.0, 0.0, 1.0]);
+        let [above, below] = blocked(vec![ball], [0.0; 3], [UP; 2]);
         assert!((above - 0.16).abs() < NOISE && below == 0.0, "{above}");
-        let [above, below] = blocked(vec![], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        let [above, below] = blocked(vec![], UP, [[1.0, 0.0, 0.0]; 2]);
         assert!((below - 0.5).abs() < NOISE && above == 0.0, "{below}");
     }
 
     /// A facet of something round, whose smooth normal leans over by half a right angle: alone it is not shaded at all, by
     /// itself neither. In a closed box nothing passes, whatever the normals.
     #[test]
-    fn facets_do_not_shade_what_is_round() {
-        let (up, leaning) = ([0.0, 0.0, 1.0], [0.5f32.sqrt(), 0.0, 0.5f32.sqrt()]);
-        assert_eq!(blocked_of(vec![], [0.3, 0.2, 0.0], (up, leaning)), [0.0; 2]);
+    fn facets() {
+        let normals = [UP, [0.5f32.sqrt(), 0.0, 0.5f32.sqrt()]];
+        assert_eq!(blocked(vec![], [0.3, 0.2, 0.0], normals), [0.0; 2]);
         let room = vec![(Sphere { radius: 2.0 }.into(), PoseF32::IDENTITY)];
-        let [above, below] = blocked_of(room, [0.3, 0.2, 0.0], (up, leaning));
+        let [above, below] = blocked(room, [0.3, 0.2, 0.0], normals);
         assert!((above + below - 1.0).abs() < 1e-6, "{above} {below}");
         // Light from below the horizon is that part of it that a plane of this tilt sees: (1 - cos) / 2.
         assert!((below - 0.5 * (1.0 - 0.5f64.sqrt())).abs() < NOISE, "{below}");

@@ -1,5 +1,4 @@
 //! Latency, lost samples and noise: exact where they are exact, with bounds where they are not.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use super::*;
 use ndarray::array;
@@ -10,9 +9,13 @@ fn context(num_envs: usize) -> SensorContext {
     SensorContext { num_envs, dt: DT, name: "encoder".into(), seed: 42, ..SensorContext::default() }
 }
 
-fn sampler(num_envs: usize, cfg: &SamplingCfg) -> Sampler {
+fn try_built(context: &SensorContext, cfg: &SamplingCfg) -> Result<Sampler, SensorError> {
     let channels = [Channel::new("a", 1), Channel::new("b", 2), Channel::exact("n", 1)];
-    Sampler::new("encoder", Requires::NONE, &context(num_envs), cfg, &channels).unwrap()
+    Sampler::new("encoder", Requires::NONE, context, cfg, &channels)
+}
+
+fn sampler(num_envs: usize, cfg: &SamplingCfg) -> Sampler {
+    try_built(&context(num_envs), cfg).unwrap()
 }
 
 fn state(steps: &[u64]) -> SceneState {
@@ -24,13 +27,8 @@ fn state(steps: &[u64]) -> SceneState {
     }
 }
 
-/// Values that tell the step.
-fn tell(state: &SceneState) -> impl Fn(usize, &mut [f64]) + '_ {
-    |env, row| row.fill(state.step[env] as f64)
-}
-
-/// Values that are always zero: what is read is noise.
-fn nothing(_env: usize, _row: &mut [f64]) {}
+/// Measures zeros, so that all that is read is noise.
+fn zeros(_env: usize, _row: &mut [f64]) {}
 
 impl Sampled for Sampler {
     fn sampler(&self) -> &Sampler {
@@ -38,75 +36,85 @@ impl Sampled for Sampler {
     }
 }
 
+/// Measures the step.
 fn step(sampler: &mut Sampler, steps: &[u64]) {
-    let state = state(steps);
-    sampler.update(&state, tell(&state)).unwrap();
+    sampler.update(&state(steps), |env, row| row.fill(steps[env] as f64)).unwrap();
 }
 
+fn reset(sampler: &mut Sampler, envs: &[usize], steps: &[u64]) {
+    sampler.reset(envs, &state(steps), |env, row| row.fill(steps[env] as f64)).unwrap();
+}
+
+/// A measurement can be read exactly `latency_steps` after its capture.
 #[test]
-fn a_late_measurement_is_read_exactly_latency_steps_after_its_capture() {
+fn latency() {
     for (period, latency) in [(1, 1), (1, 7), (4, 1), (4, 3), (4, 4), (4, 5), (4, 9), (3, 100)] {
         let cfg = SamplingCfg { latency_steps: latency, history_length: 3, ..SamplingCfg::every(period as f64 * DT) };
         let mut sampler = sampler(1, &cfg);
-        let start = state(&[0]);
-        sampler.reset(&[0], &start, tell(&start)).unwrap();
+        reset(&mut sampler, &[0], &[0]);
         for now in 1..=150 {
             step(&mut sampler, &[now]);
             // The newest capture that is old enough.
             let arrived = now.saturating_sub(latency.into()) / period;
             let captured = (arrived * period) as f64;
             assert_eq!(sampler.sample_counts()[0], arrived, "period {period}, latency {latency}, step {now}");
-            assert_eq!(sampler.values("b"), array![[captured, captured]]);
-            assert_eq!(sampler.stamps()[0], captured, "the stamp is that of the capture");
+            assert_eq!((sampler.values("b"), sampler.stamps()[0]), (array![[captured, captured]].view(), captured));
             assert_eq!(sampler.history_filled(0), arrived.min(3) as usize);
             for age in 0..sampler.history_filled(0) {
                 let expected = captured - (age as u64 * period) as f64;
-                assert_eq!(
-                    (sampler.history("a")[(0, age, 0)], sampler.stamp_history()[(0, age)]),
-                    (expected, expected)
-                );
-                assert_eq!(sampler.force_stamp_history()[(0, age)], expected - 0.5);
+                let stamps = (sampler.stamp_history()[(0, age)], sampler.force_stamp_history()[(0, age)]);
+                assert_eq!((sampler.history("a")[(0, age, 0)], stamps), (expected, (expected, expected - 0.5)));
             }
         }
     }
 }
 
-/// What was on its way when somebody wrote to the state arrives one after the other, and is not what is shown.
+/// Measurements that were pending at a write arrive one after the other, into the history and `arrived`; those from before
+/// the write do not replace the written value.
 #[test]
-fn what_arrives_after_a_refresh_can_be_read_and_is_not_shown() {
+fn refresh() {
+    let read = |s: &Sampler| (s.arrived("b")[(0, 1)], s.arrived_stamps()[0], s.values("b")[(0, 1)], s.stamps()[0]);
     let mut sampler = sampler(1, &SamplingCfg { latency_steps: 4, ..SamplingCfg::default() });
-    let start = state(&[0]);
-    sampler.reset(&[0], &start, tell(&start)).unwrap();
-    let read =
-        |sampler: &Sampler| (sampler.arrived("b")[(0, 1)], sampler.arrived_stamps()[0], sampler.values("b")[(0, 1)]);
+    reset(&mut sampler, &[0], &[0]);
     for now in 1..=15 {
         step(&mut sampler, &[now]);
         if now == 6 {
-            let state = state(&[6]);
-            sampler.refresh(&[0], &state, |_, row| row.fill(100.0)).unwrap();
+            sampler.refresh(&[0], &state(&[6]), |_, row| row.fill(100.0)).unwrap();
         }
         let captured = now.saturating_sub(4) as f64;
-        let shown = if (6..=10).contains(&now) { 100.0 } else { captured };
-        assert_eq!(read(&sampler), (captured, captured, shown), "step {now}");
+        let (shown, stamp) = if (6..=10).contains(&now) { (100.0, 6.0) } else { (captured, captured) };
+        assert_eq!(read(&sampler), (captured, captured, shown, stamp), "step {now}");
         assert_eq!(sampler.arrived_force_stamps()[0], captured - 0.5);
     }
-    // Without a latency there is nothing on its way: both are the same.
+    // Without a latency nothing is pending: both are the same.
     let mut sampler = self::sampler(1, &SamplingCfg::default());
     step(&mut sampler, &[3]);
-    assert_eq!(read(&sampler), (3.0, 3.0, 3.0));
+    assert_eq!(read(&sampler), (3.0, 3.0, 3.0, 3.0));
+    // With a period and a history.
+    let cfg = SamplingCfg { latency_steps: 4, history_length: 9, ..SamplingCfg::every(2.0 * DT) };
+    let mut sampler = self::sampler(1, &cfg);
+    for now in 1..=12 {
+        step(&mut sampler, &[now]);
+        match now {
+            6 => sampler.refresh(&[0], &state(&[6]), |_, row| row.fill(-1.0)).unwrap(),
+            7..12 => assert_eq!((sampler.values("a")[(0, 0)], sampler.stamps()[0]), (-1.0, 6.0), "step {now}"),
+            12 => assert_eq!(sampler.values("a")[(0, 0)], 8.0),
+            _ => {}
+        }
+        if now == 11 {
+            assert_eq!(sampler.history("a").iter().take(4).copied().collect::<Vec<_>>(), [6.0, 4.0, 2.0, 0.0]);
+        }
+    }
 }
 
-/// An owner who only updates when something is due sees the same at every step.
+/// An owner that updates only when something is due sees the same at every step.
 #[test]
-fn captures_and_arrivals_are_due() {
+fn due() {
     let cfg = SamplingCfg { latency_steps: 5, ..SamplingCfg::every(4.0 * DT) };
     let (mut lazy, mut eager) = (sampler(2, &cfg), sampler(2, &cfg));
-    let start = state(&[0, 2]);
-    for sampler in [&mut lazy, &mut eager] {
-        sampler.reset(&[0, 1], &start, tell(&start)).unwrap();
-    }
-    let mut updates = 0;
-    let mut next = lazy.due_in(&[0, 2]);
+    reset(&mut lazy, &[0, 1], &[0, 2]);
+    reset(&mut eager, &[0, 1], &[0, 2]);
+    let (mut updates, mut next) = (0, lazy.due_in(&[0, 2]));
     for now in 1..=100 {
         step(&mut eager, &[now, now + 2]);
         if now == next {
@@ -121,49 +129,27 @@ fn captures_and_arrivals_are_due() {
     assert_eq!(updates, 25 + 23);
 }
 
+/// A reset drops pending measurements.
 #[test]
-fn a_reset_forgets_what_is_on_its_way() {
+fn resets() {
     let cfg = SamplingCfg { latency_steps: 6, ..SamplingCfg::every(2.0 * DT) };
     let mut sampler = sampler(2, &cfg);
-    for now in 1..=9 {
-        step(&mut sampler, &[now, now]);
-    }
+    (1..=9).for_each(|now| step(&mut sampler, &[now, now]));
     assert_eq!(sampler.sample_counts(), array![1, 1]);
-    let fresh = state(&[9, 0]);
-    sampler.reset(&[1], &fresh, tell(&fresh)).unwrap();
+    reset(&mut sampler, &[1], &[9, 0]);
     for k in 1..=7 {
         step(&mut sampler, &[9 + k, k]);
         assert_eq!((sampler.values("a")[(1, 0)], sampler.sample_counts()[1]), (0.0, 0));
     }
     step(&mut sampler, &[17, 8]);
-    assert_eq!((sampler.values("a")[(1, 0)], sampler.sample_counts()[1]), (2.0, 1));
-    assert_eq!((sampler.values("a")[(0, 0)], sampler.sample_counts()[0]), (10.0, 5));
+    assert_eq!((sampler.values("a"), sampler.sample_counts()), (array![[10.0], [2.0]].view(), array![5, 1].view()));
 }
 
+/// A lost measurement never arrives. The share lost of n scatters by sqrt(p (1 - p) / n): six times that.
 #[test]
-fn what_was_captured_before_a_refresh_does_not_replace_it() {
-    let cfg = SamplingCfg { latency_steps: 4, history_length: 9, ..SamplingCfg::every(2.0 * DT) };
-    let mut sampler = sampler(1, &cfg);
-    for now in 1..=6 {
-        step(&mut sampler, &[now]);
-    }
-    let written = state(&[6]);
-    sampler.refresh(&[0], &written, |_, row| row.fill(-1.0)).unwrap();
-    for now in 7..=11 {
-        step(&mut sampler, &[now]);
-        assert_eq!((sampler.values("a")[(0, 0)], sampler.stamps()[0]), (-1.0, 6.0), "step {now}");
-    }
-    assert_eq!(sampler.history("a").iter().take(4).copied().collect::<Vec<_>>(), [6.0, 4.0, 2.0, 0.0]);
-    step(&mut sampler, &[12]);
-    assert_eq!(sampler.values("a")[(0, 0)], 8.0);
-}
-
-#[test]
-fn a_lost_measurement_never_arrives() {
-    let cfg = SamplingCfg { dropout: 0.3, history_length: 2, ..SamplingCfg::default() };
-    let mut sampler = sampler(1, &cfg);
-    let (mut before, mut lost) = (0.0, 0);
-    let n = 20_000;
+fn dropout() {
+    let mut sampler = sampler(1, &SamplingCfg { dropout: 0.3, history_length: 2, ..SamplingCfg::default() });
+    let (mut before, mut lost, n) = (0.0, 0, 20_000);
     for now in 1..=n {
         step(&mut sampler, &[now]);
         let value = sampler.values("a")[(0, 0)];
@@ -173,11 +159,8 @@ fn a_lost_measurement_never_arrives() {
         assert_eq!(sampler.history("a")[(0, 0, 0)], value);
         before = value;
     }
-    // The share lost of n scatters by sqrt(p (1 - p) / n).
-    let bound = 6.0 * (0.3 * 0.7 / n as f64).sqrt();
-    assert!((lost as f64 / n as f64 - 0.3).abs() < bound, "{lost}");
-    let all = SamplingCfg { dropout: 1.0, ..SamplingCfg::default() };
-    let mut sampler = super::tests::sampler(1, &all);
+    assert!((lost as f64 / n as f64 - 0.3).abs() < 6.0 * (0.3 * 0.7 / n as f64).sqrt(), "{lost}");
+    let mut sampler = self::sampler(1, &SamplingCfg { dropout: 1.0, ..SamplingCfg::default() });
     (1..100).for_each(|now| step(&mut sampler, &[now]));
     assert_eq!((sampler.sample_counts()[0], sampler.values("a")[(0, 0)]), (0, 0.0));
 }
@@ -186,28 +169,23 @@ fn with_noise(channel: &str, noise: NoiseCfg) -> SamplingCfg {
     SamplingCfg { noise: [(channel.to_string(), noise)].into(), ..SamplingCfg::default() }
 }
 
-/// Mean and standard deviation.
-fn moments(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
-}
-
 /// The mean of n numbers scatters by std / sqrt(n), their standard deviation by std / sqrt(2 n); six times that.
 #[track_caller]
 fn assert_normal(values: &[f64], std: f64) {
-    let (mean, found) = moments(values);
     let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let found = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
     assert!(mean.abs() < 6.0 * std / n.sqrt(), "mean {mean} of {n} numbers with std {std}");
     assert!((found - std).abs() < 6.0 * std / (2.0 * n).sqrt(), "std {found} instead of {std}");
 }
 
+/// White noise has its mean and deviation, touches its channel only, and is independent of the other environment.
 #[test]
-fn white_noise_has_its_mean_and_deviation_and_touches_its_channel_only() {
+fn white_noise() {
     let mut sampler = sampler(2, &with_noise("b", NoiseCfg::white(0.2)));
     let mut values = [Vec::new(), Vec::new()];
     for now in 1..=20_000 {
-        sampler.update(&state(&[now, now]), nothing).unwrap();
+        sampler.update(&state(&[now, now]), zeros).unwrap();
         for (env, values) in values.iter_mut().enumerate() {
             values.push(sampler.values("b")[(env, 0)]);
             assert_ne!(values.last(), Some(&sampler.values("b")[(env, 1)]), "each number for itself");
@@ -223,33 +201,30 @@ fn white_noise_has_its_mean_and_deviation_and_touches_its_channel_only() {
 /// After t seconds the walk of `bias_walk` per sqrt(s) has the standard deviation `bias_walk * sqrt(t)`, whatever the
 /// period; at a reset the bias is drawn again.
 #[test]
-fn biases_are_drawn_at_resets_and_wander_with_the_square_root_of_time() {
+fn biases() {
     let n = 4000;
+    let all: Vec<usize> = (0..n).collect();
+    let values = |sampler: &Sampler| sampler.values("a").column(0).to_vec();
     for period in [1, 5] {
         let noise = NoiseCfg { bias_std: 0.5, bias_walk: 0.3, ..NoiseCfg::default() };
         let cfg = SamplingCfg { update_period: period as f64 * DT, ..with_noise("a", noise) };
         let mut sampler = sampler(n, &cfg);
-        let all: Vec<usize> = (0..n).collect();
-        sampler.reset(&all, &state(&vec![0; n]), nothing).unwrap();
-        let at_reset = sampler.values("a").column(0).to_vec();
+        sampler.reset(&all, &state(&vec![0; n]), zeros).unwrap();
+        let at_reset = values(&sampler);
         assert_normal(&at_reset, 0.5);
-        sampler.refresh(&all, &state(&vec![0; n]), nothing).unwrap();
-        assert_eq!(sampler.values("a").column(0).to_vec(), at_reset, "a refresh lets no time pass");
-        let steps = 200;
-        for now in 1..=steps {
-            sampler.update(&state(&vec![now; n]), nothing).unwrap();
-        }
-        let walked: Vec<f64> = sampler.values("a").iter().zip(&at_reset).map(|(now, then)| now - then).collect();
-        assert_normal(&walked, 0.3 * (steps as f64 * DT).sqrt());
-        sampler.reset(&all, &state(&vec![0; n]), nothing).unwrap();
-        let again = sampler.values("a").column(0).to_vec();
-        assert_normal(&again, 0.5);
-        assert_ne!(again, at_reset);
+        sampler.refresh(&all, &state(&vec![0; n]), zeros).unwrap();
+        assert_eq!(values(&sampler), at_reset, "a refresh lets no time pass");
+        (1..=200).for_each(|now| sampler.update(&state(&vec![now; n]), zeros).unwrap());
+        let walked: Vec<f64> = values(&sampler).iter().zip(&at_reset).map(|(now, then)| now - then).collect();
+        assert_normal(&walked, 0.3 * (200.0 * DT).sqrt());
+        sampler.reset(&all, &state(&vec![0; n]), zeros).unwrap();
+        assert_normal(&values(&sampler), 0.5);
+        assert_ne!(values(&sampler), at_reset);
     }
 }
 
 #[test]
-fn values_are_rounded_to_the_resolution() {
+fn resolution() {
     let noise = NoiseCfg { resolution: 0.25, ..NoiseCfg::default() };
     let mut sampler = sampler(1, &with_noise("a", noise));
     for (k, (value, expected)) in [(0.1, 0.0), (0.13, 0.25), (-1.4, -1.5), (7.0, 7.0)].into_iter().enumerate() {
@@ -258,63 +233,52 @@ fn values_are_rounded_to_the_resolution() {
     }
 }
 
-/// Environment 5 of a simulation and environment 2 of a shard that begins at 3 are the same.
+/// Noise depends on seed, environment and name only: environment 5 of a simulation and environment 2 of a shard that begins
+/// at 3 are the same.
 #[test]
-fn noise_depends_on_seed_environment_and_name_only() {
+fn first_env() {
     let noise = NoiseCfg { std: 0.1, bias_std: 1.0, bias_walk: 0.1, resolution: 0.0 };
     let cfg = SamplingCfg { dropout: 0.2, ..with_noise("a", noise) };
-    let run = |context: SensorContext, env: usize| {
-        let channels = [Channel::new("a", 1)];
+    let run = |context: SensorContext, env: usize| -> Vec<u64> {
         let n = context.num_envs;
-        let mut sampler = Sampler::new("encoder", Requires::NONE, &context, &cfg, &channels).unwrap();
-        sampler.reset(&(0..n).collect::<Vec<_>>(), &state(&vec![0; n]), nothing).unwrap();
-        let mut values = Vec::new();
-        for now in 1..=50 {
-            sampler.update(&state(&vec![now; n]), nothing).unwrap();
-            values.push(sampler.values("a")[(env, 0)].to_bits());
-        }
-        values
+        let mut sampler = try_built(&context, &cfg).unwrap();
+        sampler.reset(&(0..n).collect::<Vec<_>>(), &state(&vec![0; n]), zeros).unwrap();
+        let mut read = |now| {
+            sampler.update(&state(&vec![now; n]), zeros).unwrap();
+            sampler.values("a")[(env, 0)].to_bits()
+        };
+        (1..=50).map(&mut read).collect()
     };
     let reference = run(context(8), 5);
     assert_eq!(run(context(6), 5), reference);
     assert_eq!(run(SensorContext { first_env: 3, ..context(4) }, 2), reference);
-    for other in [
-        run(context(8), 4),
-        run(SensorContext { seed: 43, ..context(8) }, 5),
-        run(SensorContext { name: "other".into(), ..context(8) }, 5),
-    ] {
-        assert_ne!(other, reference);
-    }
+    assert_ne!(run(context(8), 4), reference);
+    assert_ne!(run(SensorContext { seed: 43, ..context(8) }, 5), reference);
+    assert_ne!(run(SensorContext { name: "other".into(), ..context(8) }, 5), reference);
 }
 
 #[test]
-fn mistakes_are_typed_errors() {
-    let wrong = |cfg: SamplingCfg| {
-        let channels = [Channel::new("forces", 3), Channel::exact("count", 1)];
-        Sampler::new("encoder", Requires::NONE, &context(2), &cfg, &channels).unwrap_err()
-    };
-    let text = wrong(with_noise("force", NoiseCfg::white(1.0))).to_string();
-    assert_eq!(text, "there is no channel that can have noise \"force\"; known are \"forces\"");
-    assert!(matches!(wrong(with_noise("count", NoiseCfg::white(1.0))), SensorError::UnknownName { .. }));
+fn mistakes() {
+    let wrong = |cfg: SamplingCfg| try_built(&context(2), &cfg).unwrap_err();
+    let text = wrong(with_noise("c", NoiseCfg::white(1.0))).to_string();
+    assert_eq!(text, "there is no channel that can have noise \"c\"; known are \"a\", \"b\"");
+    assert!(matches!(wrong(with_noise("n", NoiseCfg::white(1.0))), SensorError::UnknownName { .. }));
+    let default = NoiseCfg::default;
     for bad in [-1.0, f64::NAN, f64::INFINITY, 1e101] {
         for noise in [
             NoiseCfg::white(bad),
-            NoiseCfg { bias_std: bad, ..NoiseCfg::default() },
-            NoiseCfg { bias_walk: bad, ..NoiseCfg::default() },
-            NoiseCfg { resolution: bad, ..NoiseCfg::default() },
+            NoiseCfg { bias_std: bad, ..default() },
+            NoiseCfg { bias_walk: bad, ..default() },
+            NoiseCfg { resolution: bad, ..default() },
         ] {
-            assert!(matches!(wrong(with_noise("forces", noise)), SensorError::OutOfRange { .. }));
+            assert!(matches!(wrong(with_noise("a", noise)), SensorError::OutOfRange { .. }));
         }
     }
     for dropout in [-0.1, 1.1, f64::NAN] {
         assert!(matches!(wrong(SamplingCfg { dropout, ..SamplingCfg::default() }), SensorError::OutOfRange { .. }));
     }
-    for cfg in [
-        SamplingCfg { history_length: usize::MAX, ..SamplingCfg::default() },
-        SamplingCfg { latency_steps: u32::MAX, ..SamplingCfg::default() },
-    ] {
-        assert!(matches!(wrong(cfg), SensorError::TooLarge { .. }));
-    }
-    let period = SamplingCfg::every(0.007);
-    assert!(matches!(wrong(period), SensorError::PeriodNotMultiple { .. }));
+    let history = SamplingCfg { history_length: usize::MAX, ..SamplingCfg::default() };
+    let latency = SamplingCfg { latency_steps: u32::MAX, ..SamplingCfg::default() };
+    assert!([history, latency].map(wrong).iter().all(|error| matches!(error, SensorError::TooLarge { .. })));
+    assert!(matches!(wrong(SamplingCfg::every(0.007)), SensorError::PeriodNotMultiple { .. }));
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{SensorCfg, SensorContext};
-use crate::{JointState, JointStateCfg, Requires};
+use crate::{JointState, JointStateCfg};
 use ndarray::Array2;
 use scene::Random;
 use std::any::Any;
@@ -9,13 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const ENVS: usize = 3;
+const NOT_WRITTEN: [u64; ENVS] = [0; ENVS];
 
-fn context() -> SensorContext {
-    let joints = ["arm/a", "arm/b"].map(String::from);
-    SensorContext { num_envs: ENVS, dt: 0.005, joints: joints.into(), ..SensorContext::default() }
-}
-
-/// Environments at these steps; every number says environment, step and how often somebody wrote to it.
+/// Environments at these steps; every number tells environment, step and the number of writes to it.
 fn state(steps: [u64; ENVS], written: [u64; ENVS]) -> SceneState {
     let number =
         |env: usize, joint| (1000 * env + joint) as f64 + 0.001 * steps[env] as f64 + 1e6 * written[env] as f64;
@@ -30,27 +26,24 @@ fn state(steps: [u64; ENVS], written: [u64; ENVS]) -> SceneState {
     }
 }
 
-fn slot(cfg: &JointStateCfg) -> SensorSlot {
-    let context = context();
-    let sensor = Box::new(cfg.build(&context).unwrap());
-    SensorSlot::new(sensor, cfg.requires(), cfg.lazy(context.dt), ENVS)
-}
-
 fn joints(lazy: bool, sampling: SamplingCfg) -> SensorSlot {
-    slot(&JointStateCfg { joints: None, sampling: SamplingCfg { lazy, ..sampling } })
+    let joints = ["arm/a", "arm/b"].map(String::from).into();
+    let context = SensorContext { num_envs: ENVS, dt: 0.005, joints, ..SensorContext::default() };
+    let cfg = JointStateCfg { joints: None, sampling: SamplingCfg { lazy, ..sampling } };
+    SensorSlot::new(Box::new(cfg.build(&context).unwrap()), cfg.requires(), cfg.lazy(context.dt), ENVS)
 }
 
-/// All that a sensor of joints says.
-fn said(slot: &SensorSlot) -> (Vec<u64>, Vec<f64>, Vec<f64>) {
+/// Counts, stamps and positions.
+fn measured(slot: &SensorSlot) -> (Vec<u64>, Vec<f64>, Vec<f64>) {
     let any: &dyn Any = slot.sensor().unwrap();
     let sensor = any.downcast_ref::<JointState>().unwrap();
     (sensor.sample_counts().to_vec(), sensor.stamps().to_vec(), sensor.positions().iter().copied().collect())
 }
 
-/// Steps, resets and writes of single environments, in any order, and somebody who reads now and then: never does a lazy
-/// sensor say anything else than an eager one.
+/// Steps, resets, writes of single environments and reads in any order: a lazy sensor equals an eager one. Sensors whose
+/// values depend on earlier measurements are never lazy.
 #[test]
-fn lazy_sensors_say_what_eager_ones_say() {
+fn lazy_and_eager() {
     for (seed, period) in [(1, 0.0), (2, 0.01), (3, 0.02), (4, 0.035)] {
         let mut random = Random::keyed(seed, 0, "slots");
         let mut slots = [false, true].map(|lazy| joints(lazy, SamplingCfg::every(period)));
@@ -71,9 +64,9 @@ fn lazy_sensors_say_what_eager_ones_say() {
                 }
                 x if x < 0.25 => {
                     reads += 1;
-                    assert_eq!(said(&slots[0]), said(&slots[1]));
+                    assert_eq!(measured(&slots[0]), measured(&slots[1]));
                 }
-                // An environment that is put aside stands still.
+                // Sometimes an environment stands still.
                 x => {
                     let stands = if x < 0.4 { env } else { ENVS };
                     (0..ENVS).filter(|&env| env != stands).for_each(|env| steps[env] += 1);
@@ -85,35 +78,31 @@ fn lazy_sensors_say_what_eager_ones_say() {
         }
         assert!(reads > 200);
     }
-}
-
-#[test]
-fn what_depends_on_measurements_before_is_never_lazy() {
     let noise = [("positions".to_string(), crate::NoiseCfg::white(0.1))].into();
-    for sampling in [
-        SamplingCfg { history_length: 1, ..SamplingCfg::default() },
-        SamplingCfg { latency_steps: 1, ..SamplingCfg::default() },
-        SamplingCfg { dropout: 0.1, ..SamplingCfg::default() },
-        SamplingCfg { noise, ..SamplingCfg::default() },
+    for (lazy, sampling) in [
+        (false, SamplingCfg { history_length: 1, ..SamplingCfg::default() }),
+        (false, SamplingCfg { latency_steps: 1, ..SamplingCfg::default() }),
+        (false, SamplingCfg { dropout: 0.1, ..SamplingCfg::default() }),
+        (false, SamplingCfg { noise, ..SamplingCfg::default() }),
+        (true, SamplingCfg::every(0.02)),
     ] {
-        assert!(!joints(true, sampling.clone()).is_lazy(), "{sampling:?}");
+        assert_eq!(joints(true, sampling.clone()).is_lazy(), lazy, "{sampling:?}");
     }
-    assert!(joints(true, SamplingCfg::every(0.02)).is_lazy(), "the control");
 }
 
-/// A user's own sensor: counts how often it measures.
+/// A user's own sensor: counts its measurements.
 #[derive(Debug, Default)]
 struct Counting {
-    measured: Arc<AtomicUsize>,
+    count: Arc<AtomicUsize>,
     fails: bool,
     panics: bool,
 }
 
 impl Sensor for Counting {
     fn update(&mut self, _: &SceneState) -> Result<(), SensorError> {
-        self.measured.fetch_add(1, Ordering::Relaxed);
-        assert!(!self.panics, "told to");
-        if self.fails { Err(SensorError::Pattern("told to".into())) } else { Ok(()) }
+        self.count.fetch_add(1, Ordering::Relaxed);
+        assert!(!self.panics, "on purpose");
+        if self.fails { Err(SensorError::Pattern("on purpose".into())) } else { Ok(()) }
     }
 
     fn reset(&mut self, _: &[usize], _: &SceneState) -> Result<(), SensorError> {
@@ -125,75 +114,69 @@ impl Sensor for Counting {
     }
 }
 
-fn counting(sensor: Counting) -> SensorSlot {
+fn counting(fails: bool, panics: bool) -> (SensorSlot, Arc<AtomicUsize>) {
+    let count = Arc::new(AtomicUsize::new(0));
+    let sensor = Counting { count: Arc::clone(&count), fails, panics };
     let schedule = Schedule::new(0.01, 0.005, false).unwrap();
     let mut slot = SensorSlot::new(Box::new(sensor), Requires::JOINT_STATE, Some(schedule), ENVS);
-    slot.reset(&[0, 1, 2], &state([0; ENVS], [0; ENVS]));
-    slot
+    slot.reset(&[0, 1, 2], &state([0; ENVS], NOT_WRITTEN));
+    (slot, count)
 }
 
 #[test]
-fn nobody_reads_nothing_is_measured() {
-    let measured = Arc::new(AtomicUsize::new(0));
-    let mut slot = counting(Counting { measured: Arc::clone(&measured), ..Counting::default() });
-    let count = || measured.load(Ordering::Relaxed);
-    for step in 1..=9 {
-        slot.update(&state([step; ENVS], [0; ENVS]));
-    }
+fn measurements_on_demand() {
+    let (mut slot, count) = counting(false, false);
+    let count = || count.load(Ordering::Relaxed);
+    (1..=9).for_each(|step| slot.update(&state([step; ENVS], NOT_WRITTEN)));
     assert_eq!(count(), 0);
     assert!(slot.sensor().is_ok() && slot.sensor().is_ok() && slot.sensor_mut().is_ok());
     assert_eq!(count(), 1, "once, however often it is read");
-    slot.update(&state([10; ENVS], [0; ENVS]));
-    slot.reset(&[0, 1, 2], &state([0; ENVS], [0; ENVS]));
-    assert_eq!(count(), 1, "what a reset makes past is not measured");
-    slot.update(&state([2; ENVS], [0; ENVS]));
+    slot.update(&state([10; ENVS], NOT_WRITTEN));
+    slot.reset(&[0, 1, 2], &state([0; ENVS], NOT_WRITTEN));
+    assert_eq!(count(), 1, "a reset drops what was due");
+    slot.update(&state([2; ENVS], NOT_WRITTEN));
     slot.refresh(&[1], &state([2; ENVS], [0, 1, 0]));
     assert_eq!(count(), 2, "a refresh comes after what was due before");
     slot.update(&state([3; ENVS], [0, 1, 0]));
     assert!(slot.sensor().is_ok());
     assert_eq!(count(), 2, "nothing was due");
-}
-
-/// Several threads may read at once; one of them measures.
-#[test]
-fn readers_share_one_measurement() {
+    // Several threads may read at once; one of them measures.
     for _ in 0..50 {
-        let measured = Arc::new(AtomicUsize::new(0));
-        let mut slot = counting(Counting { measured: Arc::clone(&measured), ..Counting::default() });
-        slot.update(&state([2; ENVS], [0; ENVS]));
+        let (mut slot, count) = counting(false, false);
+        slot.update(&state([2; ENVS], NOT_WRITTEN));
         std::thread::scope(|scope| {
-            for _ in 0..3 {
-                scope.spawn(|| assert!(slot.sensor().is_ok()));
-            }
+            (0..3).for_each(|_| drop(scope.spawn(|| assert!(slot.sensor().is_ok()))));
         });
-        assert_eq!(measured.load(Ordering::Relaxed), 1);
+        assert_eq!(count.load(Ordering::Relaxed), 1);
     }
 }
 
+/// Errors of a lazy sensor are returned when it is read; those of the state are those of an eager sensor.
 #[test]
-fn a_lazy_sensor_says_what_is_wrong_when_it_is_read() {
-    let mut slot = counting(Counting { fails: true, ..Counting::default() });
-    slot.update(&state([2; ENVS], [0; ENVS]));
-    assert!(!slot.has_failed(), "nobody knows yet");
-    assert_eq!(slot.sensor().unwrap_err().to_string(), "told to");
+fn errors() {
+    let (mut slot, _) = counting(true, false);
+    slot.update(&state([2; ENVS], NOT_WRITTEN));
+    assert!(!slot.has_failed(), "not known yet");
+    assert_eq!(slot.sensor().unwrap_err().to_string(), "on purpose");
     assert!(slot.has_failed());
-    // A state of another scene is said to be that, as an eager sensor says it.
-    let mut slot = joints(true, SamplingCfg::default());
-    slot.reset(&[0, 1, 2], &state([0; ENVS], [0; ENVS]));
+    let reset = || {
+        let mut slot = joints(true, SamplingCfg::default());
+        slot.reset(&[0, 1, 2], &state([0; ENVS], NOT_WRITTEN));
+        slot
+    };
+    let mut slot = reset();
     slot.update(&SceneState::new(ENVS));
     assert!(matches!(slot.sensor(), Err(SensorError::MissingFields { .. })));
-    let mut slot = joints(true, SamplingCfg::default());
-    slot.reset(&[0, 1, 2], &state([0; ENVS], [0; ENVS]));
+    let mut slot = reset();
     slot.update(&SceneState::new(2));
     assert!(slot.has_failed());
-    // Nor does a panic take others with it.
-    let mut slot = counting(Counting { panics: true, ..Counting::default() });
-    slot.update(&state([2; ENVS], [0; ENVS]));
-    let read = std::panic::AssertUnwindSafe(|| slot.sensor().is_ok());
-    let cause = std::panic::catch_unwind(read).unwrap_err();
-    assert_eq!(cause.downcast_ref::<&str>(), Some(&"told to"));
-    assert!(slot.has_failed(), "known at once");
-    slot.update(&state([4; ENVS], [0; ENVS]));
-    assert!(slot.has_failed(), "and for good");
+    // A panic is known at once, and for good.
+    let (mut slot, _) = counting(false, true);
+    slot.update(&state([2; ENVS], NOT_WRITTEN));
+    let cause = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| slot.sensor().is_ok())).unwrap_err();
+    assert_eq!(cause.downcast_ref::<&str>(), Some(&"on purpose"));
+    assert!(slot.has_failed());
+    slot.update(&state([4; ENVS], NOT_WRITTEN));
+    assert!(slot.has_failed());
     assert_eq!(slot.sensor().unwrap_err(), &SensorError::BrokenOff);
 }

@@ -1,5 +1,6 @@
 //! After the first steps, stepping and measuring allocates nothing on the calling thread.
 
+use crate::{allocations, assert_settles};
 use sensors::camera::{CameraCfg, Extrinsics, Placement};
 use sensors::ray::pattern::Grid;
 use sensors::{
@@ -27,22 +28,23 @@ fn world(threads: usize) -> SimulationManager {
     sim
 }
 
-fn allocations(sim: &mut SimulationManager) -> u64 {
+/// Allocations of ten steps, after thirty.
+fn of_steps(sim: &mut SimulationManager) -> u64 {
     sim.update(30);
-    allocation_counter::measure(|| (0..10).for_each(|_| sim.update(1))).count_total
+    allocations(|| (0..10).for_each(|_| sim.update(1)))
 }
 
 #[test]
-fn updates_allocate_nothing() {
+fn steps() {
     for threads in [1, 3] {
         let mut sim = world(threads);
-        assert_eq!(allocations(&mut sim), 0, "{threads} threads, no sensors");
+        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, no sensors");
         let contact =
             ContactSensorCfg { filters: vec!["ground".into()], track_air_time: true, ..ContactSensorCfg::of("box") };
         sim.add_sensor("contact", contact).unwrap();
         let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
-        assert_eq!(allocations(&mut sim), 0, "{threads} threads, sensors of numbers");
+        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
         // 10201 rays in each environment, and a camera of 3072: enough for all threads.
         let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
         let offset = scene::Pose::translation(0.0, 0.0, 2.0);
@@ -50,7 +52,7 @@ fn updates_allocate_nothing() {
         assert!(scanner.requires().contains(Requires::INSTANCES));
         sim.add_sensor("scanner", scanner).unwrap();
         sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
-        assert_eq!(allocations(&mut sim), 0, "{threads} threads, rays");
+        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, rays");
         // MuJoCo's own sensors and what joints exert, of a part and of a robot; a camera captures what there is to see.
         sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
         let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
@@ -72,18 +74,15 @@ fn updates_allocate_nothing() {
         let late = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
         sim.add_sensor("late", late).unwrap();
         let camera = sim.add_sensor("camera", camera).unwrap();
-        assert_eq!(allocations(&mut sim), 0, "{threads} threads, every kind of sensor");
+        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, every kind of sensor");
         let captured = sim.sensor(camera).unwrap();
         assert_eq!((captured.frame_counts()[0], captured.draws()), (40, 0), "it saw all of it, and drew nothing yet");
     }
-    let control = allocation_counter::measure(|| drop(vec![0u8; 100])).count_total;
-    assert_eq!(control, 1, "the control: the counter counts");
 }
 
-/// Pictures that are drawn at every step, each environment by one thread or all threads together on one. What a thread
-/// needs is chance: there are at most 400 updates until twenty in a row allocate nothing.
+/// Images drawn at every step, each environment by one thread or all threads together on one.
 #[test]
-fn pictures_allocate_nothing() {
+fn images() {
     for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
         let mut sim = world(threads);
         let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
@@ -94,15 +93,7 @@ fn pictures_allocate_nothing() {
         let all = sim.add_sensor("all", CameraCfg { extrinsics: extrinsics(1.0), ..base.clone() }).unwrap();
         let some = CameraCfg { extrinsics: extrinsics(-0.5), env_ids: Some(vec![2, 0, 3]), ..base };
         let some = sim.add_sensor("some", some).unwrap();
-        let mut in_a_row = 0;
-        for _ in 0..400 {
-            let allocations = allocation_counter::measure(|| sim.update(1)).count_total;
-            in_a_row = if allocations == 0 { in_a_row + 1 } else { 0 };
-            if in_a_row == 20 {
-                break;
-            }
-        }
-        assert_eq!(in_a_row, 20, "{threads} threads, {width} x {height}");
+        assert_settles(&format!("{threads} threads, {width} x {height}"), || allocations(|| sim.update(1)));
         let (all, some) = (sim.sensor(all).unwrap(), sim.sensor(some).unwrap());
         // Also at the reset with which they begin.
         let pictures = 1 + all.frame_counts()[0];
@@ -110,25 +101,21 @@ fn pictures_allocate_nothing() {
     }
 }
 
-/// Actuator models compute and remember without allocating.
 #[test]
-fn actuator_models_allocate_nothing() {
-    let files = tempfile::tempdir().unwrap();
-    let path = files.path().join("robot.urdf");
-    let (mut urdf, mut actuators) = (String::from("<robot name=\"r\"><link name=\"base\"/>"), Vec::new());
+fn actuator_models() {
+    let (mut urdf, mut actuators) = (String::from("<link name=\"base\"/>"), Vec::new());
     for (i, model) in sim::ActuatorModel::examples().into_iter().enumerate() {
-        urdf += &format!(
-            "<link name=\"l{i}\"><inertial><mass value=\"1\"/><inertia ixx=\".1\" ixy=\"0\" ixz=\"0\" iyy=\".1\" iyz=\"0\" \
-             izz=\".1\"/></inertial></link><joint name=\"j{i}\" type=\"continuous\"><parent link=\"base\"/>\
-             <child link=\"l{i}\"/><axis xyz=\"0 1 0\"/></joint>"
-        );
+        let (link, joint) = (format!("l{i}"), format!("j{i}"));
+        urdf += &testkit::urdf::link(&link, 1.0, 0.1, [0.0; 3], "");
+        urdf += &testkit::urdf::joint(&joint, "continuous", ["base", &link], [0.0; 3], "0 1 0", "");
         let model = match model {
             sim::ActuatorModel::DelayedPd(_) => sim::DelayedPd { delay: 3, max_delay: 0 }.into(),
             other => other,
         };
-        actuators.push((format!("j{i}"), model));
+        actuators.push((joint, model));
     }
-    std::fs::write(&path, urdf + "</robot>").unwrap();
+    let files = testkit::urdf::Files::default();
+    let path = files.write("robot.urdf", testkit::urdf::robot("r", &urdf));
     let drive = sim::DriveCfg {
         actuators,
         stiffness: 10.0.into(),
@@ -139,5 +126,5 @@ fn actuator_models_allocate_nothing() {
     };
     let mut sim = world(1);
     sim.add_robot(sim::RobotCfg { urdf: sim::UrdfCfg::single(&path), drive, ..Default::default() }).unwrap();
-    assert_eq!(allocations(&mut sim), 0);
+    assert_eq!(of_steps(&mut sim), 0);
 }

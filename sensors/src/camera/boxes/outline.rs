@@ -232,13 +232,12 @@ fn horizon(view: &View, seen: &Seen, far: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
     use scene::Material;
     use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
 
-    /// A picture so wide that nothing here reaches its edges, but for what is to.
+    /// An image so wide that only the infinite plane reaches its edges.
     fn view() -> View {
         View {
             width: 8640,
@@ -265,7 +264,7 @@ mod tests {
     /// The rays to a ball fill a cone of half the angle asin(r / d) about the direction of its centre, in the plane of y = 0
     /// too: so u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
     #[test]
-    fn the_silhouette_of_a_ball_is_that_of_its_cone() {
+    fn balls() {
         for (at, radius) in [([0.3, -0.2, 2.0], 0.25), ([-3.0, 1.0, 1.5], 0.4), ([0.0, 0.0, 0.6], 0.45)] {
             let found = of(Sphere { radius: radius as f32 }, &pose([0.4, 0.3, -1.0], at)).unwrap();
             let radius = f64::from(radius as f32);
@@ -283,7 +282,7 @@ mod tests {
     /// Points of fine triangles are on the surface, so they are inside of the outline; the outermost is near its edge: a
     /// circle's polygon is inside by R (1 - cos(pi / n)), times f / z and the slant of what is seen.
     #[test]
-    fn outlines_hold_every_point_and_no_more() {
+    fn shapes() {
         let shapes: Vec<Shape> = vec![
             Ellipsoid { radii: [0.3, 0.1, 0.2] }.into(),
             Capsule { radius: 0.1, half_length: 0.3 }.into(),
@@ -333,61 +332,57 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_seen_has_no_outline() {
-        let ball = Sphere { radius: 0.2 };
-        assert_eq!(of(ball, &pose([0.0; 3], [0.0, 0.0, -0.5])), None, "behind");
-        assert_eq!(of(ball, &pose([0.0; 3], [0.0, 0.0, 20.3])), None, "too far");
-        assert!(of(ball, &pose([0.0; 3], [0.0, 0.0, 20.1])).is_some());
+    fn unseen() {
+        let ball = |z| of(Sphere { radius: 0.2 }, &pose([0.0; 3], [0.0, 0.0, z]));
+        assert_eq!([ball(-0.5), ball(20.3)], [None; 2], "behind, and too far");
+        assert!(ball(20.1).is_some());
         assert_eq!(of(Plane { half: [1.0, 1.0] }, &pose([0.0; 3], [0.0, 0.0, 2.0])), None, "from behind");
     }
 
     /// A camera 1 m above the ground that looks ahead sees it up to its far plane, 20 m away: v = cy + fy / 20, and to the
-    /// edges of the picture to the sides and below.
+    /// edges of the image to the sides and below.
     #[test]
-    fn endless_planes_end_at_the_far_plane() {
+    fn infinite_plane() {
         // z of the plane is up, which is -y of the camera.
         let ground = PoseF32 { rotation: [[1., 0., 0.], [0., 0., -1.], [0., 1., 0.]], translation: [0.0, 1.0, 0.0] };
         let [u, v] = of(Plane::INFINITE, &ground).unwrap();
         assert!((v[0] - (4250.25 + 520.0 / 20.0)).abs() < 1e-3, "{v:?}");
-        assert_eq!((v[1], u), (8480.0, [0.0, 8640.0]), "to the edges of the picture");
+        assert_eq!((v[1], u), (8480.0, [0.0, 8640.0]), "to the edges of the image");
     }
 
-    fn narrow() -> View {
-        View { width: 640, height: 480, fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, ..view() }
+    fn in_narrow(near: f32, shape: impl Into<Shape>, pose: &PoseF32) -> Option<[[f64; 2]; 2]> {
+        let view = View { width: 640, height: 480, fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, near, ..view() };
+        outline(&view, &Instance::new(shape, Material::default(), 1), pose)
     }
 
-    /// A strip askew, 1 m before the camera, between the lines u + v = s ± 500 w sqrt(2): what is in the picture of it is a
-    /// triangle (or a strip) at its upper left corner, however long it is.
+    /// A strip askew, 1 m before the camera, between the lines u + v = s ± 500 w sqrt(2): the visible part is a triangle at
+    /// the upper left corner, however long the strip is. Beside the corner its ends are left and above, and their rectangle
+    /// would be the whole image.
     #[test]
-    fn a_strip_across_a_corner_ends_where_it_leaves_the_picture() {
+    fn strip() {
         let half_width = 0.01f32;
         let wide = 500.0 * f64::from(half_width) * 2f64.sqrt();
         let strip = |s: f64| {
             // Along (1, -1), through the middle of the line u + v = s; its z looks at the camera.
-            let middle = [0.5 * s, 0.5 * s];
             let h = std::f32::consts::FRAC_1_SQRT_2;
-            let at = [((middle[0] - 320.0) / 500.0) as f32, ((middle[1] - 240.0) / 500.0) as f32, 1.0];
+            let at = [((0.5 * s - 320.0) / 500.0) as f32, ((0.5 * s - 240.0) / 500.0) as f32, 1.0];
             let pose = PoseF32 { rotation: [[h, -h, 0.0], [-h, -h, 0.0], [0.0, 0.0, -1.0]], translation: at };
-            outline(&narrow(), &Instance::new(Plane { half: [5.0, half_width] }, Material::default(), 1), &pose)
+            in_narrow(0.1, Plane { half: [5.0, half_width] }, &pose)
         };
-        let [u, v] = strip(30.0).unwrap();
-        for found in [u, v] {
-            // Single precision of the pose: 1e-7 of 1 m and of 5 m at a slant, 500 pixels.
-            assert!(found[0] == 0.0 && (found[1] - 30.0 - wide).abs() < 1e-3, "{u:?} {v:?}");
-        }
-        // Beside the corner: the ends of the strip are left and above, their rectangle is the whole picture.
+        // Single precision of the pose: 1e-7 of 1 m and of 5 m at a slant, 500 pixels.
+        let found = strip(30.0).unwrap();
+        assert!(found.iter().all(|[a, b]| *a == 0.0 && (b - 30.0 - wide).abs() < 1e-3), "{found:?}");
         assert_eq!(strip(-30.0), None);
     }
 
-    /// A rod that passes the eye on its right, from behind: 0.1 m aside and 0.02 m thick, 1 m of it ahead. Its near end is
-    /// seen at x / z = 0.09, the last of it that is in the picture at its right edge; at the near plane, 5 mm away, x / z is 22.
+    /// A rod that passes the camera on its right, from behind: 0.1 m aside and 0.02 m thick, 1 m of it ahead. Its near end is
+    /// seen at x / z = 0.09; it leaves the image where 500 * 0.09 / z = 320, and is 500 * 0.01 / z high there. At the near
+    /// plane, 5 mm away, x / z is 22.
     #[test]
-    fn what_passes_the_eye_has_the_height_it_has_in_the_picture() {
-        let view = View { near: 0.005, ..narrow() };
-        let rod = Instance::new(Box { half: [0.01, 0.01, 1.0] }, Material::default(), 1);
-        let [u, v] = outline(&view, &rod, &PoseF32::from_translation([0.1, 0.0, 0.0])).unwrap();
+    fn rod() {
+        let rod = Box { half: [0.01, 0.01, 1.0] };
+        let [u, v] = in_narrow(0.005, rod, &PoseF32::from_translation([0.1, 0.0, 0.0])).unwrap();
         assert!((u[0] - (320.0 + 500.0 * 0.09)).abs() < 1e-3 && u[1] == 640.0, "{u:?}");
-        // It leaves where 500 * 0.09 / z = 320; there it is 500 * 0.01 / z high.
         let half = 320.0 / 9.0;
         assert!((v[0] - (240.0 - half)).abs() < 1e-2 && (v[1] - (240.0 + half)).abs() < 1e-2, "{v:?}");
     }

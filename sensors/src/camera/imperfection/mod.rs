@@ -240,5 +240,4 @@ fn within(field: &'static str, value: f64, range: [f64; 2], expected: &'static s
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests;

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_comes_back() {
+    fn round_trip() {
         for curve in ToneCurve::ALL {
             let tone = Tone::of(curve);
             for byte in 0..=255 {
@@ -79,7 +79,7 @@ mod tests {
     /// Against the closed form of the curve: sRGB's own inverse, and above 0.7 that of y = 0.7 + 0.3 k / (k + 0.3). The
     /// renderers' polynomial is within 0.2 of 255 of the standard, and the middle of a byte is found to far less.
     #[test]
-    fn bytes_are_the_light_of_the_curve() {
+    fn curve() {
         let tone = Tone::of(ToneCurve::Soft);
         let screen = |light: f64| {
             let k = light - 0.7;

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn roots_are_found_in_order() {
+    fn roots() {
         // (x - 1)(x - 2)(x - 3), times (x - 5)^2, whose sign stays.
         let cubic = [-6.0, 11.0, -6.0, 1.0];
         let found = sign_changes(&cubic, 0.0, 10.0);

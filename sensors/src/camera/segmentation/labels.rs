@@ -218,7 +218,6 @@ fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), number
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
 
@@ -238,81 +237,68 @@ mod tests {
         ]
     }
 
-    fn classes(cfg: &SegmentationCfg) -> Vec<(i32, String, Vec<i32>)> {
-        let all = Segmentation::new(things(), cfg).unwrap();
-        let of = |s: &Segment| (s.id, s.name.clone(), s.mask_ids.clone());
-        all.segments(SegmentLevel::Semantic).iter().map(of).collect()
+    /// Ids, names and mask ids of the classes.
+    fn classes(labels: &[(&str, &str)]) -> String {
+        let all = Segmentation::new(things(), &SegmentationCfg::labeled(labels)).unwrap();
+        let of = |s: &Segment| format!("{} {} {:?}", s.id, s.name, s.mask_ids);
+        all.segments(SegmentLevel::Semantic).iter().map(of).collect::<Vec<_>>().join(", ")
     }
 
     #[test]
-    fn segments_of_every_level() {
+    fn levels() {
         let all = Segmentation::new(things(), &SegmentationCfg::default()).unwrap();
-        let names = |level| -> Vec<(i32, &str)> {
-            all.segments(level).iter().map(|segment| (segment.id, segment.name.as_str())).collect()
-        };
-        let expected = [(1, "ground"), (2, "arm"), (5, "table"), (6, "shelf"), (7, "cube")];
-        assert_eq!(names(SegmentLevel::Instance), expected);
-        assert_eq!(
-            names(SegmentLevel::Link)[..4],
-            [(1, "ground"), (2, "arm/base"), (3, "arm/finger_l"), (4, "arm/finger_r")]
-        );
-        assert_eq!(names(SegmentLevel::Semantic), [(1, "ground"), (2, "robot"), (3, "object"), (4, "toy")]);
-        let of = |level| [0, 1, 2, 4, 6, 7, 8, -5].map(|id| all.segment_of(level, id));
-        assert_eq!(of(SegmentLevel::Instance), [0, 1, 2, 2, 6, 7, -1, -1]);
-        assert_eq!(of(SegmentLevel::Link), [0, 1, 2, 4, 6, 7, -1, -1]);
-        assert_eq!(of(SegmentLevel::Semantic), [0, 1, 2, 2, 3, 4, -1, -1]);
-        // What is added later changes no id.
         let more = things().into_iter().chain([thing(8, "lamp", None, "light")]);
         let more = Segmentation::new(more, &SegmentationCfg::default()).unwrap();
-        for level in [SegmentLevel::Instance, SegmentLevel::Link, SegmentLevel::Semantic] {
-            assert_eq!(more.segments(level)[..all.segments(level).len()], *all.segments(level), "{level:?}");
+        for (level, names, segments) in [
+            (SegmentLevel::Instance, "1 ground, 2 arm, 5 table, 6 shelf, 7 cube", [0, 1, 2, 2, 6, 7, -1, -1]),
+            (SegmentLevel::Link, "1 ground, 2 arm/base, 3 arm/finger_l, 4 arm/finger_r", [0, 1, 2, 4, 6, 7, -1, -1]),
+            (SegmentLevel::Semantic, "1 ground, 2 robot, 3 object, 4 toy", [0, 1, 2, 2, 3, 4, -1, -1]),
+        ] {
+            let of = |segment: &Segment| format!("{} {}", segment.id, segment.name);
+            let found: Vec<String> = all.segments(level).iter().map(of).collect();
+            assert_eq!(found[..names.split(", ").count()].join(", "), names);
+            assert_eq!([0, 1, 2, 4, 6, 7, 8, -5].map(|id| all.segment_of(level, id)), segments);
+            assert!(level == SegmentLevel::Link || found.len() == names.split(", ").count());
+            // An object that is added later changes no id.
+            assert_eq!(more.segments(level)[..found.len()], *all.segments(level), "{level:?}");
         }
     }
 
     #[test]
-    fn labels_give_classes_by_pattern() {
-        let own = |id, name: &str, ids: &[i32]| (id, name.to_string(), ids.to_vec());
-        let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture"), ("finger.*", "hand")]);
-        let expected = [
-            own(1, "ground", &[1]),
-            own(2, "robot", &[2]),
-            own(3, "hand", &[3, 4]),
-            own(4, "furniture", &[5, 6]),
-            own(5, "toy", &[7]),
-        ];
-        assert_eq!(classes(&cfg), expected);
+    fn patterns() {
+        let found = classes(&[("table|shelf", "furniture"), ("finger.*", "hand")]);
+        assert_eq!(found, "1 ground [1], 2 robot [2], 3 hand [3, 4], 4 furniture [5, 6], 5 toy [7]");
         // An object is all its links; a link may be named in full; classes may be those of others.
-        let cfg = SegmentationCfg::labeled(&[("arm|cube", "toy"), ("ground", "object")]);
-        assert_eq!(classes(&cfg), [own(1, "object", &[1, 5, 6]), own(2, "toy", &[2, 3, 4, 7])]);
-        let cfg = SegmentationCfg::labeled(&[("arm/finger_l", "left")]);
-        assert_eq!(classes(&cfg)[2], own(3, "left", &[3]));
+        assert_eq!(classes(&[("arm|cube", "toy"), ("ground", "object")]), "1 object [1, 5, 6], 2 toy [2, 3, 4, 7]");
+        assert!(classes(&[("arm/finger_l", "left")]).contains(", 3 left [3],"));
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn mistakes() {
         let error = |labels: &[(&str, &str)]| {
             Segmentation::new(things(), &SegmentationCfg::labeled(labels)).unwrap_err().to_string()
         };
-        let said = error(&[("tabel", "furniture")]);
-        assert!(said.starts_with("there is no object or link \"tabel\"; known are \"table\""), "{said}");
+        let unknown = error(&[("tabel", "furniture")]);
+        assert!(unknown.starts_with("there is no object or link \"tabel\"; known are \"table\""), "{unknown}");
         assert!(error(&[("fingerl", "hand")]).contains("known are \"finger_l\""));
-        let said = error(&[("arm", "robot"), ("finger_.", "hand")]);
-        assert!(said.contains("\"arm/finger_l\" is matched by both \"arm\" and \"finger_.\""), "{said}");
+        let both = error(&[("arm", "robot"), ("finger_.", "hand")]);
+        assert!(both.contains("\"arm/finger_l\" is matched by both \"arm\" and \"finger_.\""), "{both}");
         assert!(error(&[("(", "x")]).contains("not a regular expression"));
         assert!(error(&[("(?!a)b", "x")]).contains("look-around"));
-        let cfg = SegmentationCfg::default();
-        let of = |things: Vec<Thing>| Segmentation::new(things, &cfg).unwrap_err().to_string();
-        assert_eq!(of(vec![thing(0, "a", None, "b")]), "mask id 0 means that nothing was hit");
-        let said = of(vec![thing(-1, "a", None, "b")]);
-        assert_eq!(said, "mask id -1 is negative; ids count from 1, and -1 is what is not known");
-        assert_eq!(of(vec![thing(4, "a", None, "")]), "mask id 4 has a class without a name");
-        let nameless = Segmentation::new(things(), &SegmentationCfg::labeled(&[("table", "")])).unwrap_err();
-        assert_eq!(nameless.to_string(), "mask id 5 has a class without a name");
-        assert_eq!(of(vec![thing(3, "a", None, "b"), thing(3, "c", None, "b")]), "mask id 3 is given twice");
+        assert_eq!(error(&[("table", "")]), "mask id 5 has a class without a name");
+        let twice = vec![thing(3, "a", None, "b"), thing(3, "c", None, "b")];
+        for (things, text) in [
+            (vec![thing(0, "a", None, "b")], "mask id 0 means that nothing was hit"),
+            (vec![thing(-1, "a", None, "b")], "mask id -1 is negative; ids count from 1, and -1 is what is not known"),
+            (vec![thing(4, "a", None, "")], "mask id 4 has a class without a name"),
+            (twice, "mask id 3 is given twice"),
+        ] {
+            assert_eq!(Segmentation::new(things, &SegmentationCfg::default()).unwrap_err().to_string(), text);
+        }
     }
 
     #[test]
-    fn things_of_one_name_stay_apart() {
+    fn equal_names() {
         let twins = [
             thing(1, "arm", None, "world"),
             thing(2, "arm", Some("base"), "robot"),

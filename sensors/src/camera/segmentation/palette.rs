@@ -25,7 +25,7 @@ mod tests {
     use std::collections::HashSet;
 
     #[test]
-    fn colours_are_distinct_and_those_of_few_things_far_apart() {
+    fn distinct() {
         let all: HashSet<[u8; 4]> = (0..1 << 24).step_by(7).chain(0..4096).map(segment_color).collect();
         assert_eq!(all.len(), (0..1 << 24).step_by(7).chain(0..4096).collect::<HashSet<i32>>().len());
         // The first seven are the corners of a cube with sides of 128.

@@ -78,7 +78,6 @@ fn paint(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) 
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::super::{SegmentationCfg, Thing};
     use super::*;
@@ -101,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_the_table_pixel_by_pixel() {
+    fn images() {
         let segmentation = segmentation();
         let mask = array![[[0, 1, 1, 3], [2, 2, 4, 9]], [[4, 4, 0, 1], [3, 0, 9, 2]]];
         let levels = [

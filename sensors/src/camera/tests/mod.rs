@@ -1,5 +1,4 @@
 //! Images, compared with analytic answers and other renderers.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod boxes;
 mod calibration;
@@ -20,8 +19,6 @@ mod reference;
 mod robots;
 mod scenes;
 mod sensor;
-mod sensor_mistakes;
-mod sensor_values;
 mod shutter;
 mod stage;
 mod stereo;

@@ -31,7 +31,7 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64
 }
 
-/// Errors of all pixels at 20 steps, one after the other.
+/// Errors of all pixels at 20 steps.
 fn errors(cfg: &CameraCfg, context: &SensorContext, row: usize) -> Vec<f64> {
     let mut camera = built(cfg, context);
     let mut all = Vec::new();
@@ -43,46 +43,38 @@ fn errors(cfg: &CameraCfg, context: &SensorContext, row: usize) -> Vec<f64> {
 }
 
 #[test]
-fn white_noise_is_normal_and_independent() {
-    let mut context = context(2);
+fn white() {
     let std = 0.05;
     let cfg = down(&[("depth", NoiseCfg::white(std))]);
-    let first = errors(&cfg, &context, 0);
+    let first = errors(&cfg, &context(2), 0);
     let n = first.len() as f64;
     let bound = 6.0 / n.sqrt();
-    assert!(mean(&first).abs() < bound * std, "{}", mean(&first));
-    let variance = product(&first, &first);
-    assert!((variance / (std * std) - 1.0).abs() < bound * 2f64.sqrt(), "{variance}");
-    let fourth = first.iter().map(|x| (x / std).powi(4)).sum::<f64>() / n;
-    assert!((fourth - 3.0).abs() < bound * 96f64.sqrt(), "{fourth}");
-    // Of neighbours, of rows, of pictures, of environments, of sensors, of seeds.
     let alike = |a: &[f64], b: &[f64]| product(a, b) / (std * std);
+    let fourth = first.iter().map(|x| (x / std).powi(4)).sum::<f64>() / n;
+    assert!(mean(&first).abs() < bound * std, "{}", mean(&first));
+    assert!((alike(&first, &first) - 1.0).abs() < bound * 2f64.sqrt(), "variance");
+    assert!((fourth - 3.0).abs() < bound * 96f64.sqrt(), "{fourth}");
+    // Of neighbours, of rows, of images, of environments, of sensors, of seeds.
     for apart in [1, SIZE[0], PIXELS as usize] {
         assert!(alike(&first, &first[apart..]).abs() < bound * 1.1, "{apart} numbers apart");
     }
-    assert!(alike(&first, &errors(&cfg, &context, 1)).abs() < bound, "environments");
-    assert_eq!(first, errors(&cfg, &context, 0), "the same again");
-    context.name = "other".into();
-    assert!(alike(&first, &errors(&cfg, &context, 0)).abs() < bound, "sensors");
-    context.name = "".into();
-    context.seed = 1;
-    assert!(alike(&first, &errors(&cfg, &context, 0)).abs() < bound, "seeds");
-    assert!(alike(&first, &first) > 0.9, "the control");
+    assert_eq!(first, errors(&cfg, &context(2), 0), "the same again");
+    for (what, context, row) in [
+        ("environments", context(2), 1),
+        ("sensors", SensorContext { name: "other".into(), ..context(2) }, 0),
+        ("seeds", SensorContext { seed: 1, ..context(2) }, 0),
+    ] {
+        assert!(alike(&first, &errors(&cfg, &context, row)).abs() < bound, "{what}");
+    }
 }
 
-/// An environment has its noise whichever process it is in.
+/// An environment has its noise and its imperfections whichever process it is in.
 #[test]
-fn environments_of_other_processes_have_the_same_noise() {
-    let whole = context(4);
+fn first_env() {
     let cfg = down(&[("depth", NoiseCfg::white(0.1))]);
     let part = SensorContext { first_env: 2, ..context(2) };
-    assert_eq!(errors(&cfg, &whole, 3), errors(&cfg, &part, 1));
-    assert_ne!(errors(&cfg, &whole, 1), errors(&cfg, &part, 1), "the control");
-}
-
-/// So have the imperfections: environment 7 alone looks as it does among eight.
-#[test]
-fn environments_of_other_processes_have_the_same_imperfections() {
+    assert_eq!(errors(&cfg, &context(4), 3), errors(&cfg, &part, 1));
+    assert_ne!(errors(&cfg, &context(4), 1), errors(&cfg, &part, 1), "the control");
     let imperfections = Imperfections {
         shot_noise: Some(ShotNoise { electrons: 500.0 }),
         read_noise: Some(ReadNoise { std: 0.01 }),
@@ -90,10 +82,10 @@ fn environments_of_other_processes_have_the_same_imperfections() {
         ..Imperfections::default()
     };
     let cfg = CameraCfg { imperfections, ..down(&[]) };
-    // What the camera does not see, lamps and the ball, depends on the environment.
+    // The lights depend on the environment.
     let at = |envs: usize, step: u64| {
         let mut state = state(&vec![step; envs]);
-        state.visible.as_mut().unwrap().lights.iter_mut().for_each(|lamp| lamp.direction = [0.0, 0.3, -1.0]);
+        state.visible.as_mut().unwrap().lights.iter_mut().for_each(|light| light.direction = [0.0, 0.3, -1.0]);
         state
     };
     let seen = |context: &SensorContext, row: usize| {
@@ -105,16 +97,13 @@ fn environments_of_other_processes_have_the_same_imperfections() {
     };
     let whole = context(8);
     let alone = |first_env| seen(&SensorContext { first_env, ..context(1) }, 0);
-    // Not assert_eq: pictures are long.
-    assert!(alone(7) == seen(&whole, 7));
-    // The controls: another environment and another picture look otherwise.
-    assert!(alone(6) != seen(&whole, 7) && alone(6) == seen(&whole, 6));
+    assert!(alone(7) == seen(&whole, 7) && alone(6) == seen(&whole, 6));
     let [first, second] = alone(7);
-    assert!(first != second);
+    assert!(alone(6) != seen(&whole, 7) && first != second, "the controls: another environment, another image");
 }
 
 #[test]
-fn biases_stay_until_the_reset_and_walk() {
+fn biases() {
     let context = context(1);
     let bias_std = 0.03;
     let mut camera = built(&down(&[("depth", NoiseCfg { bias_std, ..NoiseCfg::default() })]), &context);
@@ -127,7 +116,7 @@ fn biases_stay_until_the_reset_and_walk() {
     camera.reset(&[0], &state(&[0])).unwrap();
     let second = depths(&camera, 0);
     assert!((product(&first, &second) / bias_std.powi(2)).abs() < 6.0 / PIXELS.sqrt());
-    // A walk of 0.2 m per root second is sqrt(t) times that after t seconds; pictures are 4 steps apart.
+    // A walk of 0.2 m per root second is sqrt(t) times that after t seconds; images are 4 steps apart.
     let walk = NoiseCfg { bias_walk: 0.2, ..NoiseCfg::default() };
     let cfg = CameraCfg { update_period: 4.0 * DT, ..down(&[("depth", walk)]) };
     let mut camera = built(&cfg, &context);
@@ -150,7 +139,7 @@ fn biases_stay_until_the_reset_and_walk() {
 }
 
 #[test]
-fn depths_are_whole_steps_within_what_is_seen() {
+fn resolution() {
     let context = context(1);
     let resolution = 0.125;
     let cfg = down(&[("depth", NoiseCfg { std: 1.0, resolution, ..NoiseCfg::default() })]);
@@ -164,10 +153,10 @@ fn depths_are_whole_steps_within_what_is_seen() {
     assert!(ends.iter().all(|count| *count > 50), "the control: noise reaches both ends, {ends:?}");
 }
 
-/// Root cause: noise saturates at the far plane, whose depth is what [`DepthMiss::Far`] says where nothing was hit: half of what
-/// was hit there was taken for a miss.
+/// Noise makes no miss of a hit. Root cause: noise saturates at the far plane, whose depth is also the value of
+/// [`DepthMiss::Far`], so that half of the hits there became misses.
 #[test]
-fn noise_makes_no_miss_of_a_hit() {
+fn saturated_hits() {
     let context = context(1);
     let depth_noise = Some(DepthNoise { constant: 0.1, quadratic: 0.0, offset: 0.0 });
     let spoilt = Imperfections { depth_noise, ..Imperfections::default() };
@@ -179,7 +168,6 @@ fn noise_makes_no_miss_of_a_hit() {
         (equidistant, vec![], spoilt),
     ] {
         let renderer = Renderer::FastRayTraced;
-        // Straight down; along the ray what is aside is too far away.
         let far = if lens.is_pinhole() { 2.01 } else { 2.2 };
         let cfg = CameraCfg { lens, renderer, imperfections, far, ..down(&noise) };
         let hits = |camera: &Camera| camera.mask().unwrap().iter().filter(|id| **id != 0).count();
@@ -209,7 +197,7 @@ fn noise_makes_no_miss_of_a_hit() {
 
 /// Channels have noise of their own, misses stay misses, and what has no noise is the truth.
 #[test]
-fn misses_and_other_channels_stay() {
+fn channels() {
     let context = context(2);
     let noise: [(String, NoiseCfg); 2] =
         [("depth", 0.05), ("distance_to_camera", 0.02)].map(|(name, std)| (name.into(), NoiseCfg::white(std)));
@@ -221,11 +209,10 @@ fn misses_and_other_channels_stay() {
             (noisy.depth().unwrap()[at], perfect.depth().unwrap()[at]),
             (noisy.distance().unwrap()[at], perfect.distance().unwrap()[at]),
         ];
-        for ((found, true_), errors) in pairs.into_iter().zip(&mut errors) {
-            if *id == 0 {
-                assert_eq!(found, f32::INFINITY);
-            } else {
-                errors.push(f64::from(found - true_));
+        for ((found, exact), errors) in pairs.into_iter().zip(&mut errors) {
+            match *id {
+                0 => assert_eq!(found, f32::INFINITY),
+                _ => errors.push(f64::from(found - exact)),
             }
         }
     }
@@ -236,15 +223,13 @@ fn misses_and_other_channels_stay() {
     }
     assert!((product(&errors[0], &errors[1]) / (0.05 * 0.02)).abs() < 6.0 / n.sqrt(), "channels");
     assert!(mask.iter().any(|id| *id == BALL) && mask.iter().any(|id| *id == GROUND));
-    assert_eq!(noisy.mask().unwrap(), mask);
-    assert_eq!(noisy.color().unwrap(), perfect.color().unwrap());
-    assert_eq!(noisy.normal().unwrap(), perfect.normal().unwrap());
-    assert_eq!(noisy.position().unwrap(), perfect.position().unwrap());
+    assert_eq!((noisy.mask().unwrap(), noisy.color().unwrap()), (mask, perfect.color().unwrap()));
+    assert_eq!((noisy.normal(), noisy.position()), (perfect.normal(), perfect.position()));
 }
 
 /// Bytes are rounded, which adds a twelfth to the variance.
 #[test]
-fn colours_have_noise_in_steps_of_their_bytes() {
+fn colors() {
     let context = context(1);
     let std = 4.0;
     let cfg = down(&[("rgb", NoiseCfg::white(std))]);
@@ -259,8 +244,7 @@ fn colours_have_noise_in_steps_of_their_bytes() {
             if at.3 == 3 {
                 assert_eq!(found, 255, "opacity has none");
             } else {
-                // So that nothing is cut off.
-                assert!((35..=220).contains(byte), "{byte}");
+                assert!((35..=220).contains(byte), "{byte}: nothing saturates");
                 errors[at.3].push(f64::from(found) - f64::from(*byte));
             }
         }
@@ -276,16 +260,13 @@ fn colours_have_noise_in_steps_of_their_bytes() {
     let coarse = NoiseCfg { resolution: 16.0, ..NoiseCfg::white(20.0) };
     let camera = built(&down(&[("color", coarse)]), &context);
     let bytes = camera.color().unwrap();
-    let whole = |byte: &u8| byte.is_multiple_of(16) || *byte == 255;
-    assert!(bytes.iter().all(whole), "whole steps, or the end");
+    assert!(bytes.iter().all(|byte| byte.is_multiple_of(16) || *byte == 255), "whole steps, or the end");
 }
 
-/// Whether there is noise or not, the perfect camera's bits come out where there is none to add.
+/// Noise of zero leaves the bits of the perfect camera.
 #[test]
-fn noise_of_nothing_is_nothing() {
-    let context = context(1);
-    let nothing =
-        [("depth", 0.0), ("distance", 0.0), ("color", 0.0)].map(|(name, std)| (name.to_string(), NoiseCfg::white(std)));
-    let camera = built(&CameraCfg { noise: nothing.into(), ..cfg() }, &context);
-    assert_eq!(super::stage::bits(&camera, [0]), super::stage::bits(&built(&cfg(), &context), [0]));
+fn zero() {
+    let nothing = ["depth", "distance", "color"].map(|name| (name.to_string(), NoiseCfg::white(0.0)));
+    let camera = built(&CameraCfg { noise: nothing.into(), ..cfg() }, &context(1));
+    assert_eq!(bits(&camera, [0]), bits(&built(&cfg(), &context(1)), [0]));
 }

@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_are_neighbours_and_every_ray_is_there_once() {
+    fn neighbours() {
         let lidar = Lidar { channels: 16, horizontal_resolution_deg: 2.0, ..Lidar::default() };
         for pattern in [RayPattern::from(Grid::default()), lidar.into()] {
             let rays = pattern.rays().expect("a good pattern");
@@ -68,7 +68,6 @@ mod tests {
             assert!(sorted.into_iter().eq(0..rays.len() as u32));
             let own: Vec<u32> = (0..rays.len() as u32).collect();
             let (before, after) = (spread(&rays, &own), spread(&rays, &order));
-            println!("{}: {before} {after}", pattern.name());
             assert!(after < 0.8 * before, "{}: {after} of {before}", pattern.name());
             assert_eq!(order, neighbours_together(&rays), "the same every time");
         }

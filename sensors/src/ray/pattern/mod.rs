@@ -118,5 +118,4 @@ fn finite(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayEr
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests;

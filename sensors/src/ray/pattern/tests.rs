@@ -7,21 +7,18 @@ fn rays(pattern: impl Into<RayPattern>) -> Vec<Ray> {
     pattern.into().rays().unwrap()
 }
 
+/// The height scanner has 187 rays, x fastest. Grids whose size is no multiple of the resolution begin at the edge or are
+/// centered: a length of 1 at 0.3 has the points -0.5, -0.2, 0.1, 0.4.
 #[test]
-fn the_height_scanner_has_187_rays_x_fastest() {
+fn grids() {
     let all = rays(Grid::default());
     assert_eq!((all.len(), Grid::default().shape()), (187, [17, 11]));
-    let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-12);
-    assert!(near(all[0].origin, [-0.8, -0.5, 0.0]) && near(all[1].origin, [-0.7, -0.5, 0.0]));
-    assert!(near(all[17].origin, [-0.8, -0.4, 0.0]) && near(all[186].origin, [0.8, 0.5, 0.0]));
+    let near = |ray: Ray, b: [f64; 3]| (0..3).all(|k| (ray.origin[k] - b[k]).abs() < 1e-12);
+    assert!(near(all[0], [-0.8, -0.5, 0.0]) && near(all[1], [-0.7, -0.5, 0.0]));
+    assert!(near(all[17], [-0.8, -0.4, 0.0]) && near(all[186], [0.8, 0.5, 0.0]));
     assert!(all.iter().all(|r| r.direction == [0.0, 0.0, -1.0]));
     let other = rays(Grid { order: GridOrder::Yx, ..Grid::default() });
-    assert!(near(other[1].origin, [-0.8, -0.4, 0.0]) && near(other[11].origin, [-0.7, -0.5, 0.0]));
-}
-
-/// A length of 1 at 0.3 has the points -0.5, -0.2, 0.1, 0.4.
-#[test]
-fn grids_that_do_not_fit_begin_at_the_edge_or_are_centered() {
+    assert!(near(other[1], [-0.8, -0.4, 0.0]) && near(other[11], [-0.7, -0.5, 0.0]));
     let grid = Grid { resolution: 0.3, size: [1.0, 0.0], direction: [0.0, 0.0, -2.0], ..Grid::default() };
     let x = |grid: Grid| rays(grid).iter().map(|r| (r.origin[0] * 100.0).round()).collect::<Vec<_>>();
     assert_eq!(x(grid), [-50.0, -20.0, 10.0, 40.0]);
@@ -29,8 +26,9 @@ fn grids_that_do_not_fit_begin_at_the_edge_or_are_centered() {
     assert_eq!(rays(grid)[0].direction, [0.0, 0.0, -1.0], "of length 1");
 }
 
+/// A full turn leaves out its end.
 #[test]
-fn lidars_leave_out_the_end_of_a_full_turn() {
+fn lidars() {
     let lidar = |horizontal_fov_deg, horizontal_resolution_deg| Lidar {
         channels: 3,
         vertical_fov_deg: [-10.0, 20.0],
@@ -52,8 +50,9 @@ fn lidars_leave_out_the_end_of_a_full_turn() {
     assert_eq!(rays(Lidar::default()).len(), 16 * 900);
 }
 
+/// 1152 rays, beams fastest.
 #[test]
-fn the_bpearl_has_1152_rays_beams_fastest() {
+fn bpearl() {
     let all = rays(Bpearl::default());
     assert_eq!(all.len(), 1152);
     // The first azimuth is -180 degrees; the last beam is nearly level.
@@ -63,8 +62,9 @@ fn the_bpearl_has_1152_rays_beams_fastest() {
     assert!(all.iter().all(|r| r.direction[2] > 0.0), "the upper half");
 }
 
+/// Rays through the centres of pixels.
 #[test]
-fn pinholes_look_through_the_centres_of_pixels() {
+fn pinholes() {
     let intrinsics = Intrinsics::Pixels { fx: 2.0, fy: 4.0, cx: 1.0, cy: 1.0 };
     let all = rays(Pinhole { width: 2, height: 2, intrinsics });
     let expected = [[0.25, 0.125], [-0.25, 0.125], [0.25, -0.125], [-0.25, -0.125]];
@@ -75,15 +75,15 @@ fn pinholes_look_through_the_centres_of_pixels() {
 }
 
 #[test]
-fn mistakes_are_named() {
+fn mistakes() {
     let error = |pattern: RayPattern| pattern.rays().unwrap_err().to_string();
     for resolution in [0.0, -0.1, f64::NAN, f64::INFINITY] {
         let text = error(Grid { resolution, ..Grid::default() }.into());
         assert!(text.contains("resolution") && text.contains("positive"), "{text}");
-        let text = error(Lidar { horizontal_resolution_deg: resolution, ..Lidar::default() }.into());
-        assert!(text.contains("positive"), "{text}");
-        let text = error(Bpearl { horizontal_resolution_deg: resolution, ..Bpearl::default() }.into());
-        assert!(text.contains("positive"), "{text}");
+        assert!(error(Lidar { horizontal_resolution_deg: resolution, ..Lidar::default() }.into()).contains("positive"));
+        assert!(
+            error(Bpearl { horizontal_resolution_deg: resolution, ..Bpearl::default() }.into()).contains("positive")
+        );
     }
     assert!(error(Grid { resolution: 1e-9, ..Grid::default() }.into()).contains("between 1 and 16777216"));
     assert!(error(Grid { size: [-1.0, 1.0], ..Grid::default() }.into()).contains("size along x"));

@@ -1,25 +1,26 @@
 //! Steep rays in packets, which look into columns, find what single rays find in the tree, to the bit.
 
-use super::Dice;
-use super::brute_force::soup;
+use super::packets::{Compare, targets};
+use super::trees::soup;
+use super::{Dice, bits};
 use crate::lanes::{Scalar, at_level, levels};
 use crate::ray::bvh::Stack;
 use crate::ray::packet::{Packet, WIDTH};
 use crate::ray::pattern::Grid;
 use crate::ray::shape::mesh::columns::{Columns, are_steep};
 use crate::ray::shape::mesh::{Mesh, MeshTree};
-use crate::ray::shape::{RayShape, Touch, Touches};
+use crate::ray::shape::{ForShape, RayShape, Touches};
 use crate::ray::triangle::{Shear, ShearPacket, Triangle};
 use crate::ray::vector::{along, cross, dot, scale, sub, to_f64, unit};
-use crate::ray::{Ray, RayAssets, RayHit, RayPattern, RayTargets, RayWorld};
+use crate::ray::{Ray, RayHit, RayPattern, RayWorld};
 use scene::mesh::TriMesh;
-use scene::{Instance, Material, PoseF64, RenderMesh, RenderScene, pose};
+use scene::{PoseF64, RenderMesh, Shape, pose};
 use std::sync::Arc;
 
 /// The axes of columns along z.
 const ABOVE: [usize; 3] = [0, 1, 2];
 
-/// What was compared.
+/// Numbers of compared rays and packets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Count {
     hits: usize,
@@ -30,38 +31,28 @@ struct Count {
     wrong: usize,
 }
 
-fn bits(touch: &Option<Touch>) -> Option<(u64, [u64; 3])> {
-    touch.as_ref().map(|touch| (touch.t.to_bits(), touch.normal.map(f64::to_bits)))
-}
-
-/// Casts packets with some columns, or as they are cast otherwise, at every level, and each ray alone.
+/// Casts packets as they are and by some columns, at every level, and each ray alone.
 fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_distance: f64) -> Count {
     let mesh = Mesh::of_tree(Arc::clone(tree));
-    let (mut count, mut stack) = (Count::default(), Stack::default());
+    let mut count = Count { packets: rays.len().div_ceil(WIDTH), ..Count::default() };
+    Compare { rays, max_distance, what: "steep", hits: &mut count.hits }.run(&mesh);
+    let Some(columns) = columns else { return count };
     for rays in rays.chunks(WIDTH) {
         let packet = Packet::of(rays, max_distance);
-        let alone: Touches = std::array::from_fn(|k| {
-            let ray = rays.get(k).filter(|ray| ray.is_finite())?;
-            mesh.touch(ray, max_distance, &mut stack)
-        });
-        count.hits += alone.iter().flatten().count();
-        count.packets += 1;
         for (index, level) in levels().into_iter().enumerate() {
             let mut touches: Touches = [None; WIDTH];
             let by_columns = at_level!(level, s => match ShearPacket::new(s, &packet) {
-                Some(shear) if are_steep(s, &shear) && columns.is_some_and(|c| c.axes() == shear.axes()) => {
-                    columns.is_some_and(|columns| columns.touch_packet(s, tree, &packet, &shear, &mut touches))
+                Some(shear) if are_steep(s, &shear) && columns.axes() == shear.axes() => {
+                    columns.touch_packet(s, tree, &packet, &shear, &mut touches)
                 }
                 _ => false,
             });
-            count.columns += usize::from(by_columns && index == 0);
-            let same = |touches: &Touches| (0..WIDTH).filter(|&k| bits(&alone[k]) != bits(&touches[k])).count();
             if by_columns {
-                count.wrong += same(&touches);
+                count.columns += usize::from(index == 0);
+                let alone = |ray: &Ray| mesh.touch(ray, max_distance, &mut Stack::default());
+                let alone = |k: usize| rays.get(k).filter(|ray| ray.is_finite()).and_then(alone);
+                count.wrong += (0..WIDTH).filter(|&k| bits(&alone(k)) != bits(&touches[k])).count();
             }
-            let mut touches: Touches = [None; WIDTH];
-            at_level!(level, s => mesh.touch_packet(s, &packet, &mut stack, &mut touches));
-            assert_eq!(same(&touches), 0, "{level:?}, {rays:?}");
         }
     }
     count
@@ -128,7 +119,7 @@ fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
 }
 
 #[test]
-fn steep_rays_are_rays_one_by_one() {
+fn steep_rays() {
     let mut dice = Dice(51);
     let ground = sheet(&mut dice, 25, 0.0);
     // Twice the same triangles: of all ties the first one counts.
@@ -161,18 +152,17 @@ fn steep_rays_are_rays_one_by_one() {
             (all.hits, all.packets, all.columns) =
                 (all.hits + count.hits, all.packets + count.packets, all.columns + count.columns);
         }
-        println!("{what}: {all:?}");
         // In a soup, much is above each other; its packets go on in the tree.
         let least = if what.starts_with("soup") { 0 } else { all.packets / 3 };
         assert!(all.hits > 1000 && all.columns >= least, "{what}: {all:?}");
     }
 }
 
-/// Rays to corners of a sheet that is as good as flat (its normals tell which triangle was hit), each of which is where columns meet, from where the difference to a corner is rounded and
-/// that to the sheet is not: from a bit less than -8192 m along x, so that the difference is more than that. What rays are
-/// wider by is needed. The control: without, some are lost.
+/// Rays to corners of a nearly flat sheet (its normals tell which triangle was hit), where columns meet, from a bit less than
+/// -8192 m along x: there the difference to a corner is rounded and that to the sheet is not. The slack of rays is needed.
+/// The control: without it, some are lost.
 #[test]
-fn rays_between_columns_are_not_lost() {
+fn slack() {
     let mut dice = Dice(52);
     let flat = sheet(&mut dice, 33, 0.0);
     let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
@@ -193,23 +183,22 @@ fn rays_between_columns_are_not_lost() {
     assert_eq!((count.wrong, count.columns), (0, count.packets));
     assert!(count.hits > 9000, "{count:?}");
     let without = compare(&tree, Some(&columns.without_slack()), &rays, f64::INFINITY);
-    println!("{count:?}, without {without:?}");
     assert!(without.wrong > 10, "{without:?}");
 }
 
-/// From so far away that where rays are at the mesh is rounding, columns would hit what the boxes of the tree hide: these rays
-/// are left to the tree. The control: from closer, columns are looked at.
+/// From very far away, the place of a ray at the mesh is rounding, and columns would hit triangles that the boxes of the tree
+/// hide: these rays are left to the tree. The control: from closer, columns are used.
 #[test]
-fn rays_from_very_far_are_left_to_the_tree() {
+fn far_rays() {
     let mut dice = Dice(57);
     let tree = Arc::new(MeshTree::of_triangles(&sheet(&mut dice, 25, 0.0)));
     let mut count = |sizes: f64| {
-        let mut ray = |_| {
+        // The sheet is 3 m wide.
+        let ray = |_| {
             let direction = unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), -1.0]).unwrap();
-            // The sheet is 3 m wide.
             Ray { origin: along(dice.point(1.6), -3.0 * sizes, direction), direction }
         };
-        let rays: Vec<Ray> = (0..16_000).map(&mut ray).collect();
+        let rays: Vec<Ray> = (0..16_000).map(ray).collect();
         compare(&tree, tree.columns(ABOVE), &rays, f64::INFINITY)
     };
     for sizes in [1e10, 1e11, 1e12] {
@@ -223,24 +212,27 @@ fn rays_from_very_far_are_left_to_the_tree() {
 
 /// Columns are for meshes that are spread out, of triangles of about the same size.
 #[test]
-fn some_meshes_have_no_columns() {
+fn meshes_without_columns() {
     let mut dice = Dice(53);
     let ground = sheet(&mut dice, 25, 0.0);
-    let columns = |triangles: &[Triangle]| MeshTree::of_triangles(triangles).columns(ABOVE).is_some();
-    assert!(columns(&ground));
-    assert!(!columns(&ground[..100]), "few");
-    assert!(!columns(&[]), "none");
     let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
-    assert!(!columns(&wall), "a wall has no extent along x");
     let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
-    let mixed: Vec<Triangle> =
-        ground.iter().enumerate().map(|(k, t)| if k.is_multiple_of(40) { all } else { *t }).collect();
-    assert!(!columns(&mixed), "of very different sizes");
+    let mix = |(k, t): (usize, &Triangle)| if k.is_multiple_of(40) { all } else { *t };
+    let mixed: Vec<Triangle> = ground.iter().enumerate().map(mix).collect();
+    for (what, triangles, expected) in [
+        ("ground", &ground[..], true),
+        ("few", &ground[..100], false),
+        ("none", &[], false),
+        ("a wall, without extent along x", &wall, false),
+        ("of very different sizes", &mixed, false),
+    ] {
+        assert_eq!(MeshTree::of_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
+    }
 }
 
-/// Where too much is in the columns of a packet, it takes the tree.
+/// A packet whose columns hold too many triangles takes the tree.
 #[test]
-fn crowds_are_left_to_the_tree() {
+fn crowded_columns() {
     let mut dice = Dice(54);
     let mut triangles = sheet(&mut dice, 33, 0.0);
     triangles.extend(soup(&mut dice, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
@@ -255,10 +247,10 @@ fn crowds_are_left_to_the_tree() {
     assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 1, wrong: 0 }, "the control: beside it");
 }
 
-/// Rays in the planes of triangles, which they pass by at least as far as these are long: none is inside, however edges are
+/// Rays in the planes of triangles pass them at a distance of at least their length: none is inside, however edges are
 /// rounded. The control: by the signs of edges alone, as the source of the test has it, some are.
 #[test]
-fn triangles_seen_edge_on_are_not_hit_from_afar() {
+fn edge_on() {
     let mut dice = Dice(55);
     let (mut rays, mut by_signs) = (0, 0);
     for _ in 0..200_000 {
@@ -281,7 +273,6 @@ fn triangles_seen_edge_on_are_not_hit_from_afar() {
         assert!(together.is_none_or(|(_, inside)| inside.to_bitmask() == 0), "{ray:?} {triangle:?}");
         by_signs += usize::from(inside_by_signs(&ray, &triangle));
     }
-    println!("{by_signs} of {rays} by the signs of edges");
     assert!(rays > 190_000 && by_signs > 10, "{by_signs} of {rays}");
 }
 
@@ -298,26 +289,18 @@ fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
     !mixed && edges.iter().sum::<f64>() != 0.0
 }
 
-/// Height scanners over and beside meshes that stand still and that move: scans of the whole world, and every ray alone.
+/// Height scanners over and beside fixed and moving meshes: scans of the whole world, and every ray alone.
 #[test]
-fn scans_of_a_world_are_rays_alone() {
+fn scans() {
     let mut dice = Dice(56);
     let mesh = |triangles: &[Triangle]| {
         let positions = triangles.iter().flatten().copied().collect();
-        let corners = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        let mesh = TriMesh { positions, triangles: corners, ..TriMesh::default() };
-        scene::Shape::from(scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+        let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let mesh = TriMesh { positions, triangles, ..TriMesh::default() };
+        Shape::from(scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
     };
-    let ground = mesh(&sheet(&mut dice, 40, 0.0));
-    let heap = mesh(&soup(&mut dice, 400, [0.0; 3]));
-    let instances = vec![
-        Instance::new(ground.clone(), Material::default(), 1).fixed(),
-        Instance::new(ground, Material::default(), 2).fixed(),
-        Instance::new(heap.clone(), Material::default(), 3),
-        Instance::new(heap, Material::default(), 4),
-    ];
-    let scene = RenderScene::new(instances).unwrap();
-    let targets = Arc::new(RayTargets::new(&scene, 0..4, &RayAssets::default()));
+    let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
+    let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);
     let pattern = RayPattern::from(Grid::default()).rays().unwrap();
     let (mut hits, mut seen) = (0, [0; 4]);
     for round in 0..12 {
@@ -329,20 +312,21 @@ fn scans_of_a_world_are_rays_alone() {
         let yaw = dice.number(-3.0, 3.0);
         let at = pose::from_xyz_rpy([dice.number(-2.0, 2.0), dice.number(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
         let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.mapped_by(&PoseF64::from(&at))).collect();
-        assert_eq!(rays.len(), 187);
         rays[round * 7].origin[1] = f64::NAN;
         for level in levels() {
             let mut world = RayWorld::with_level(&targets, level);
             world.place(&poses);
             let mut together = vec![RayHit::MISS; rays.len()];
             world.cast(&rays, 8.0, &mut together);
-            let mut alone = together.clone();
-            for (ray, hit) in rays.iter().zip(&mut alone) {
-                world.cast(std::slice::from_ref(ray), 8.0, std::slice::from_mut(hit));
+            for (ray, hit) in rays.iter().zip(&together) {
+                let mut alone = *hit;
+                world.cast(std::slice::from_ref(ray), 8.0, std::slice::from_mut(&mut alone));
+                assert_eq!(
+                    (alone, alone.distance.to_bits()),
+                    (*hit, hit.distance.to_bits()),
+                    "round {round}, {level:?}"
+                );
             }
-            assert_eq!(together, alone, "round {round}, {level:?}");
-            let bits = |hits: &[RayHit]| -> Vec<u64> { hits.iter().map(|hit| hit.distance.to_bits()).collect() };
-            assert_eq!(bits(&together), bits(&alone), "round {round}, {level:?}");
             for hit in together.iter().filter(|hit| hit.is_hit()) {
                 (hits, seen[hit.instance as usize]) = (hits + 1, seen[hit.instance as usize] + 1);
             }

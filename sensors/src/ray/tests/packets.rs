@@ -1,7 +1,7 @@
 //! Packets find what single rays find, to the bit, on every instruction set.
 
-use super::Dice;
-use super::brute_force::soup;
+use super::trees::soup;
+use super::{Dice, bits};
 use crate::lanes::{at_level, levels};
 use crate::ray::bvh::{Beam, Stack, Walked};
 use crate::ray::packet::{Packet, WIDTH};
@@ -15,15 +15,11 @@ use scene::{Instance, Material, PoseF64, RenderScene, Shape};
 use std::sync::Arc;
 
 /// Casts every packet of the rays together, at every level, and each ray alone; counts hits.
-struct Compare<'a> {
-    rays: &'a [Ray],
-    max_distance: f64,
-    what: &'a str,
-    hits: &'a mut usize,
-}
-
-fn bits(touch: &Option<Touch>) -> Option<(u64, [u64; 3])> {
-    touch.as_ref().map(|touch| (touch.t.to_bits(), touch.normal.map(f64::to_bits)))
+pub(super) struct Compare<'a> {
+    pub(super) rays: &'a [Ray],
+    pub(super) max_distance: f64,
+    pub(super) what: &'a str,
+    pub(super) hits: &'a mut usize,
 }
 
 impl ForShape for Compare<'_> {
@@ -100,7 +96,7 @@ fn sheet(field: &HeightField) -> Vec<Triangle> {
 }
 
 #[test]
-fn triangles_in_packets_are_triangles_one_by_one() {
+fn triangles() {
     let mut dice = Dice(31);
     let sheet = sheet(&terrain(33, &mut dice));
     // Twice the same triangles: of all ties the first one counts.
@@ -121,13 +117,12 @@ fn triangles_in_packets_are_triangles_one_by_one() {
             Compare { rays: &rays, max_distance, what, hits: &mut hits }.run(&mesh);
         }
     }
-    println!("{hits} hits");
     assert!(hits > 3000, "{hits}");
 }
 
 /// A limit that is a distance to the bit counts, the one before it does not, in packets as alone.
 #[test]
-fn limits_are_the_same_in_packets() {
+fn limits() {
     let mut dice = Dice(32);
     let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(&sheet(&terrain(17, &mut dice)))));
     let (mut hits, mut lost) = (0, 0);
@@ -143,7 +138,7 @@ fn limits_are_the_same_in_packets() {
 }
 
 #[test]
-fn terrain_in_packets_is_terrain_one_by_one() {
+fn height_fields() {
     let mut dice = Dice(33);
     let mut hits = 0;
     for side in [2, 3, 17, 40] {
@@ -168,21 +163,16 @@ fn terrain_in_packets_is_terrain_one_by_one() {
             solid.with(Compare { rays: &rays, max_distance, what: &what, hits: &mut hits });
         }
     }
-    println!("{hits} hits");
     assert!(hits > 5000, "{hits}");
 }
 
-/// Neighbours of a height scanner walk through the tree together: otherwise all the tests above compare a thing with itself.
+/// The control of the tests above: neighbours of a height scanner walk through the tree together.
 #[test]
-fn a_scan_walks_together() {
+fn beams() {
     let mut dice = Dice(34);
     let tree = MeshTree::of_triangles(&sheet(&terrain(65, &mut dice)));
-    let rays: Vec<Ray> = (0..WIDTH)
-        .map(|k| Ray {
-            origin: [0.03 + 0.125 * (k % 4) as f64, 0.125 * (k / 4) as f64, 20.0],
-            direction: [0.0, 0.0, -1.0],
-        })
-        .collect();
+    let origin = |k: usize| [0.03 + 0.125 * (k % 4) as f64, 0.125 * (k / 4) as f64, 20.0];
+    let rays: Vec<Ray> = (0..WIDTH).map(|k| Ray { origin: origin(k), direction: [0.0, 0.0, -1.0] }).collect();
     let packet = Packet::of(&rays, f64::INFINITY);
     for level in levels() {
         at_level!(level, s => {
@@ -204,12 +194,10 @@ fn a_scan_walks_together() {
     }
 }
 
-/// The whole world against each shape and each ray alone: the nearest, and of two as near the first instance.
-#[test]
-fn the_world_is_every_ray_against_every_shape() {
-    let mut dice = Dice(35);
-    let field = terrain(17, &mut dice);
-    let shapes: Vec<Shape> = vec![
+/// One shape of each kind.
+fn shapes(dice: &mut Dice) -> Vec<Shape> {
+    let field = terrain(17, dice);
+    vec![
         Plane { half: [0.4, 0.0] }.into(),
         Sphere { radius: 0.2 }.into(),
         Capsule { radius: 0.1, half_length: 0.2 }.into(),
@@ -218,7 +206,30 @@ fn the_world_is_every_ray_against_every_shape() {
         Box { half: [0.125, 0.25, 0.375] }.into(),
         scene::shape::Mesh { mesh: Arc::clone(field.mesh()) }.into(),
         field.into(),
-    ];
+    ]
+}
+
+pub(super) fn targets(shapes: &[Shape], count: usize, fixed: impl Fn(usize) -> bool) -> Arc<RayTargets> {
+    let instance = |k: usize| {
+        let instance = Instance::new(shapes[k % shapes.len()].clone(), Material::default(), k as i32 + 1);
+        if fixed(k) { instance.fixed() } else { instance }
+    };
+    let scene = RenderScene::new((0..count).map(instance).collect()).unwrap();
+    Arc::new(RayTargets::new(&scene, 0..count, &RayAssets::default()))
+}
+
+fn cast(world: &mut RayWorld, poses: &[PoseF64], rays: &[Ray]) -> Vec<RayHit> {
+    world.place(poses);
+    let mut hits = vec![RayHit::MISS; rays.len()];
+    world.cast(rays, 50.0, &mut hits);
+    hits
+}
+
+/// The whole world against each shape and each ray alone: the nearest, and of two as near the first instance.
+#[test]
+fn world() {
+    let mut dice = Dice(35);
+    let shapes = shapes(&mut dice);
     let count = 5 * shapes.len();
     let poses: Vec<PoseF64> = (0..count)
         .map(|k| match k / shapes.len() {
@@ -244,23 +255,22 @@ fn the_world_is_every_ray_against_every_shape() {
         })
         .collect();
     let hits = expected.iter().flatten().count();
-    assert!(hits > 300, "{hits}");
+    assert!(hits > 300 && hits < rays.len(), "{hits}");
+    let mut first: Option<Vec<RayHit>> = None;
     for fixed in 0..3 {
-        let instance = |k: usize| {
-            let instance = Instance::new(shapes[k % shapes.len()].clone(), Material::default(), k as i32 + 1);
-            if fixed == 2 || fixed == 1 && k.is_multiple_of(2) { instance.fixed() } else { instance }
-        };
-        let scene = RenderScene::new((0..count).map(instance).collect()).unwrap();
-        let targets = Arc::new(RayTargets::new(&scene, 0..count, &RayAssets::default()));
+        let targets = targets(&shapes, count, |k| fixed == 2 || fixed == 1 && k.is_multiple_of(2));
         for level in levels() {
             let mut world = RayWorld::with_level(&targets, level);
-            world.place(&poses);
-            let mut hits = vec![RayHit::MISS; rays.len()];
-            world.cast(&rays, 50.0, &mut hits);
+            let hits = cast(&mut world, &poses, &rays);
             for (k, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
                 let got = hit.is_hit().then(|| (hit.distance.to_bits(), hit.instance));
                 assert_eq!(got, *expected, "ray {k} {:?}, {level:?}, {fixed}", rays[k]);
+                let towards = (0..3).map(|axis| hit.normal[axis] * rays[k].direction[axis]).sum::<f64>();
+                assert!(!hit.is_hit() || hit.mask_id == hit.instance as i32 + 1 && towards <= 1e-12, "{hit:?}");
             }
+            let of = |h: &RayHit| (h.distance.to_bits(), h.normal.map(f64::to_bits), h.instance);
+            let same = first.get_or_insert_with(|| hits.clone()).iter().map(of).eq(hits.iter().map(of));
+            assert!(same, "{level:?}, {fixed}: other bits");
             // Packets of other rays, and rays alone.
             for size in [1, 3, 13] {
                 let mut parts = vec![RayHit::MISS; rays.len()];
@@ -271,4 +281,34 @@ fn the_world_is_every_ray_against_every_shape() {
             }
         }
     }
+}
+
+/// Fixed instances are placed again where they moved; poses and rays that are not finite hit nothing.
+#[test]
+fn placing() {
+    let mut dice = Dice(23);
+    let shapes = shapes(&mut dice);
+    let fixed = targets(&shapes, 16, |_| true);
+    assert_eq!((fixed.len(), fixed.fixed_count()), (16, 16));
+    let mut poses = || -> Vec<PoseF64> {
+        (0..16).map(|_| PoseF64::from(&scene::pose::from_xyz_rpy(dice.point(2.0), dice.point(3.0)))).collect()
+    };
+    let (a, b) = (poses(), poses());
+    let rays: Vec<Ray> = (0..200).map(|_| dice.ray(5.0, 2.0)).collect();
+    let fresh = |poses| cast(&mut RayWorld::new(&fixed), poses, &rays);
+    let mut world = RayWorld::new(&fixed);
+    assert!([&a, &b, &a].into_iter().all(|poses| cast(&mut world, poses, &rays) == fresh(poses)));
+    assert_ne!(fresh(&a), fresh(&b), "the control");
+
+    let mixed = targets(&shapes, 16, |k| k.is_multiple_of(2));
+    let hits = |poses: &[PoseF64], rays: &[Ray]| cast(&mut RayWorld::new(&mixed), poses, rays);
+    let mut poses = vec![PoseF64::IDENTITY; 16];
+    let down = Ray { origin: [0.05, 0.0, 3.0], direction: [0.0, 0.0, -1.0] };
+    assert!(hits(&poses, &[down])[0].is_hit());
+    for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let rays = [Ray { origin: [0.0, x, 3.0], ..down }, Ray { direction: [x, 0.0, -1.0], ..down }];
+        assert_eq!(hits(&poses, &rays), [RayHit::MISS; 2]);
+    }
+    poses.iter_mut().for_each(|pose| pose.translation[1] = f64::NAN);
+    assert_eq!(hits(&poses, &[down]), [RayHit::MISS]);
 }

@@ -278,7 +278,6 @@ pub(in crate::resolve) fn cosine(at: [f64; 2]) -> V3 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::super::sobol::Sequence;
     use super::*;
@@ -287,12 +286,21 @@ mod tests {
         Lobe::new(&Material { specular, shininess, ..Material::default() }, [albedo; 3], true)
     }
 
+    /// The mean of a function over 2^`log` chosen directions.
+    fn mean(lobe: &Lobe, o: V3, (pixel, seed): ([usize; 2], u32), log: u32, f: impl Fn(&Scattered) -> f64) -> f64 {
+        let one = |k| {
+            let sample = Sequence::new(pixel, seed).sample(k);
+            lobe.choose(o, sample.pair(0)[0], sample.pair(1)).map_or(0.0, |next| f(&next))
+        };
+        (0..1 << log).map(one).sum::<f64>() / f64::from(1 << log)
+    }
+
     fn toward(cos: f64) -> V3 {
         [(1.0 - cos * cos).sqrt(), 0.0, cos]
     }
 
     #[test]
-    fn turns_are_those_of_the_library() {
+    fn turns() {
         for k in 0..=1000 {
             let part = f64::from(k) / 1000.0;
             let angle = part * 2.0 * PI;
@@ -305,7 +313,7 @@ mod tests {
     /// comes in. The grid's error is that of the midpoint rule, which is largest for sharp highlights: at 1000 x 1000 cells
     /// an order below what is asked. Chosen ones: 2^14 points of a net.
     #[test]
-    fn chosen_directions_and_all_directions_give_the_same_and_no_more_than_comes_in() {
+    fn energy() {
         for (specular, shininess, albedo) in
             [(1.0, 1.0, 0.0), (0.5, 0.5, 0.5), (1.0, 0.05, 1.0), (0.0, 0.5, 1.0), (1.0, 0.0, 1.0), (0.02, 1.0, 0.9)]
         {
@@ -320,14 +328,7 @@ mod tests {
                     let Scatter { below, layer } = lobe.scatter(o, [r * c, r * s, z]);
                     all += (below[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
                 }
-                let count = 1 << 14;
-                let chosen: f64 = (0..count)
-                    .map(|k| {
-                        let sample = Sequence::new([1, 2], 3).sample(k);
-                        lobe.choose(o, sample.pair(0)[0], sample.pair(1)).map_or(0.0, |s| s.weight[0])
-                    })
-                    .sum::<f64>()
-                    / f64::from(count);
+                let chosen = mean(&lobe, o, ([1, 2], 3), 14, |next| next.weight[0]);
                 let what = format!("specular {specular}, shininess {shininess}, albedo {albedo}, cosine {cos}");
                 assert!((all - chosen).abs() < 0.005 * all.max(0.1), "{what}: {all}, chosen {chosen}");
                 assert!(all <= 1.0 + 1e-6, "{what}: {all}");
@@ -337,13 +338,7 @@ mod tests {
                 // A control: without the layer taking from what is below, more would go out than comes in.
                 if albedo == 1.0 && specular == 1.0 {
                     let layer = Lobe { body: [0.0; 3], ..lobe };
-                    let above: f64 = (0..count)
-                        .map(|k| {
-                            let sample = Sequence::new([1, 2], 3).sample(k);
-                            layer.choose(o, sample.pair(0)[0], sample.pair(1)).map_or(0.0, |s| s.weight[0])
-                        })
-                        .sum::<f64>()
-                        / f64::from(count);
+                    let above = mean(&layer, o, ([1, 2], 3), 14, |next| next.weight[0]);
                     assert!(1.0 + above > 1.02, "{what}: {above}");
                 }
             }
@@ -352,19 +347,12 @@ mod tests {
 
     /// Of light along the normal a smooth metal mirrors its colour, and nothing else; half a metal as the mean of both says.
     #[test]
-    fn metals_mirror_their_colour() {
+    fn metals() {
         let gold = [1.0, 0.77, 0.34];
         let returned = |metallic: f32| {
             let material = Material { metallic, specular: 0.5, roughness: Some(0.2), ..Material::default() };
             let lobe = Lobe::new(&material, gold, true);
-            let count = 1 << 14;
-            let mut sum = [0.0; 3];
-            for k in 0..count {
-                let sample = Sequence::new([4, 2], 1).sample(k);
-                let Some(next) = lobe.choose([0.0, 0.0, 1.0], sample.pair(0)[0], sample.pair(1)) else { continue };
-                sum = [0, 1, 2].map(|c| sum[c] + next.weight[c] / f64::from(count));
-            }
-            sum
+            [0, 1, 2].map(|c| mean(&lobe, [0.0, 0.0, 1.0], ([4, 2], 1), 14, |next| next.weight[c]))
         };
         let metal = returned(1.0);
         for c in 0..3 {
@@ -381,7 +369,7 @@ mod tests {
     /// plane gives, ((n² - 1)/(n² + 1))²; and from inside beyond the critical angle, sin = 1/n, everything. What goes through
     /// obeys Snell's law.
     #[test]
-    fn glass_mirrors_and_bends_by_fresnel_and_snell() {
+    fn glass() {
         let n = 1.5f64;
         let glass = Material { transmission: 1.0, refractive_index: 1.5, ..Material::default() };
         let [outside, inside] = [true, false].map(|front| Lobe::new(&glass, [0.8; 3], front));
@@ -418,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn scattering_is_the_same_both_ways() {
+    fn reciprocity() {
         let lobe = lobe(0.7, 0.2, 0.6);
         for (a, b) in [(0.9, 0.2), (0.5, 0.6), (1.0, 0.05)] {
             let (o, i) = (toward(a), [0.0, (1.0f64 - b * b).sqrt(), b]);
@@ -430,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn along_the_surface_nothing_is_scattered() {
+    fn grazing() {
         for (specular, reflectance) in [(1.0, 0.0), (0.0, 0.0), (0.5, 0.5)] {
             let lobe = Lobe::new(&Material { specular, reflectance, ..Material::default() }, [0.5; 3], true);
             for chance in [0.0, 0.3, 0.6, 0.99] {
@@ -445,18 +433,12 @@ mod tests {
     /// Against chosen directions, with the layer alone and with all: to some percent, as it leaves out what facets hide of each
     /// other.
     #[test]
-    fn the_mirrored_part_is_about_known() {
+    fn gloss() {
         for (specular, shininess, albedo) in [(0.0, 0.5, 0.7), (0.5, 0.5, 0.5), (1.0, 0.2, 0.0), (1.0, 0.2, 1.0)] {
             let whole = lobe(specular, shininess, albedo);
             for cos in [1.0, 0.6] {
                 let o = toward(cos);
-                let chosen = |lobe: &Lobe| {
-                    let weight = |k| {
-                        let sample = Sequence::new([3, 1], 5).sample(k);
-                        lobe.choose(o, sample.pair(0)[0], sample.pair(1)).map_or(0.0, |next| next.weight[1])
-                    };
-                    (0..1 << 12).map(weight).sum::<f64>()
-                };
+                let chosen = |lobe: &Lobe| mean(lobe, o, ([3, 1], 5), 12, |next| next.weight[1]);
                 let expected = chosen(&Lobe { body: [0.0; 3], ..whole }) / chosen(&whole);
                 let found = whole.gloss(o);
                 assert!((found - expected).abs() < 0.03, "specular {specular}, {cos}: {found}, not {expected}");
@@ -465,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn mirrors_take_their_part() {
+    fn mirrors() {
         let lobe = Lobe::new(&Material { reflectance: 0.4, specular: 0.0, ..Material::default() }, [0.5; 3], true);
         let o = toward(0.6);
         assert!(lobe.choose(o, 0.39, [0.5; 2]).unwrap().mirrored && !lobe.choose(o, 0.41, [0.5; 2]).unwrap().mirrored);

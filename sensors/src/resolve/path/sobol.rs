@@ -80,7 +80,7 @@ mod tests {
 
     /// The textbook's sum: every bit of the index adds a direction number, of which each is the one before times 1 + x.
     #[test]
-    fn the_second_dimension_is_sobols() {
+    fn second_dimension() {
         for k in 0..100_000u32 {
             let index = if k < 1000 { k } else { mix(k) };
             let (mut rest, mut sum, mut direction) = (index, 0, 1u32 << 31);
@@ -94,7 +94,7 @@ mod tests {
 
     /// A net: one sample in every box of the same area, however it is cut in halves.
     #[test]
-    fn the_first_samples_fill_every_box_once() {
+    fn net() {
         for (pixel, dimension) in [([0, 0], 0), ([3, 7], 1), ([639, 479], 12)] {
             for k in [1u32, 4, 8] {
                 let count = 1usize << k;
@@ -122,13 +122,12 @@ mod tests {
 
     /// Means over pixels are those of even numbers: sums of n numbers in 0..1 have a standard deviation of sqrt(n / 12).
     #[test]
-    fn pixels_dimensions_and_seeds_do_not_depend_on_each_other() {
+    fn independence() {
         let n = 4096usize;
         let five = 5.0 / (12.0 * n as f64).sqrt();
         let pick = |k: usize, dimension, seed| Sequence::new([k % 64, k / 64], seed).sample(0).pair(dimension);
         let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
-        assert!((mean(&|k| pick(k, 3, 0)[0]) - 0.5).abs() < five);
-        assert!((mean(&|k| pick(k, 3, 0)[1]) - 0.5).abs() < five);
+        assert!((0..2).all(|axis| (mean(&|k| pick(k, 3, 0)[axis]) - 0.5).abs() < five));
         // Products of two that do not depend on each other: mean 1/4, variance 7/144.
         let five = 5.0 * (7.0 / 144.0 / n as f64).sqrt();
         for (a, b) in [((3, 0), (4, 0)), ((3, 0), (3, 1))] {

@@ -73,15 +73,14 @@ fn linear(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
     use crate::lanes::{at_level, levels, splat};
     use scene::TextureKind;
 
-    /// Within 0.0005 of the standard, and what the rasterizer makes of the same byte to single precision.
+    /// Within 0.0005 of the standard, and equal to the rasterizer to single precision.
     #[test]
-    fn texels_are_as_bright_as_the_standard_and_the_rasterizer_say() {
+    fn brightness() {
         for byte in 0..=255u8 {
             let texture = Texture::new(TextureKind::TwoD, 1, 1, 3, &[byte; 3]).unwrap();
             let [light, ..] = at(&texture, [0.3, 0.7], 0.0);

@@ -46,12 +46,8 @@ mod tests {
     use super::*;
     use crate::visibility::View;
 
-    fn projection(view: &View) -> Projection {
-        Projection::from(view)
-    }
-
     #[test]
-    fn no_displacement_within_the_tolerance_moves_a_pixel_by_more_than_half() {
+    fn half_a_pixel() {
         let bounds = [[-0.1, -0.2, -0.3], [0.3, 0.2, 0.1]];
         let view = View {
             width: 320,
@@ -64,7 +60,7 @@ mod tests {
             far: 100.0,
             world_from_camera: PoseF32::IDENTITY,
         };
-        let projection = projection(&view);
+        let projection = Projection::from(&view);
         let mut closest = 0.0f64;
         for distance in [0.4, 0.45, 0.5, 0.6] {
             let pose = PoseF32::from_translation([0.0, 0.0, distance]);
@@ -91,9 +87,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_wholly_in_front_is_drawn_as_it_is() {
-        let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]);
-        let projection = projection(&view.expect("a good view"));
+    fn partly_behind() {
+        let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]).expect("a good view");
+        let projection = Projection::from(&view);
         let bounds = [[-0.1; 3], [0.1; 3]];
         let at = |z: f32| tolerance(&projection, &PoseF32::from_translation([0., 0., z]), bounds);
         assert!(at(0.0) == 0.0 && at(-1.0) == 0.0 && at(0.11) == 0.0 && at(f32::NAN) == 0.0);

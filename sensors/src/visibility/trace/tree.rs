@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_visit_meets_what_looking_at_every_box_meets() {
+    fn brute_force() {
         let mut state = 9u64;
         let mut number = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

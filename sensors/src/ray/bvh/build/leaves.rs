@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::lanes::{Scalar, at_level, levels};
 
-    /// What leaves cost: the tests of those that are met.
+    /// Cost of leaves: the tests of those that are met.
     fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
         let mut first = 0;
         let mut sum = 0.0;
@@ -107,7 +107,7 @@ mod tests {
 
     /// Every way to cut is looked at.
     #[test]
-    fn no_other_leaves_cost_less() {
+    fn least_cost() {
         let mut state = 1u32;
         let mut dice = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_beyond_the_range_have_short_leaves() {
+    fn huge_boxes() {
         let huge = [[-3e38f32; 3], [3e38; 3]];
         let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
         for level in levels() {

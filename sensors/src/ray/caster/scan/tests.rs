@@ -1,10 +1,8 @@
-//! Scans on several threads: the same bits, and no allocation on any of them.
+//! Scans on several threads, of some environments, and of environments with scenes of their own.
 
 use super::*;
-use crate::crew::{ScopedThreads, Threads};
 use scene::shape::{Plane, Sphere};
 use scene::{Instance, Material, RenderScene};
-use std::sync::{Barrier, Mutex, PoisonError};
 
 const ENVS: usize = 6;
 /// Not a whole number of parts.
@@ -17,7 +15,7 @@ fn balls(radius: f32) -> RenderScene {
     RenderScene::new(instances).expect("a good scene")
 }
 
-/// Fans of rays into a plane and twenty balls, on `threads` threads.
+/// Fans of rays into a plane and twenty balls.
 fn scan(threads: usize) -> Scan<Vec<Ray>> {
     scan_of(&balls(0.3), threads)
 }
@@ -58,18 +56,16 @@ fn bits(scan: &Scan<Vec<Ray>>) -> Vec<u64> {
 }
 
 #[test]
-fn threads_change_no_bit() {
+fn threads() {
     let all: Vec<usize> = (0..ENVS).collect();
     let cast = |threads| {
         let mut scan = scan(threads);
-        let mut told = Vec::new();
-        for step in 0..3 {
+        [0, 1, 2].map(|step| {
             let poses = poses(step);
             all.iter().for_each(|&env| scan.settle(env, &poses, &OwnScene::default()));
             scan.cast(&all, &poses, view);
-            told.push(bits(&scan));
-        }
-        told
+            bits(&scan)
+        })
     };
     let one = cast(1);
     assert_eq!(one[0].len(), ENVS * RAYS * 6);
@@ -80,7 +76,7 @@ fn threads_change_no_bit() {
 }
 
 #[test]
-fn only_what_was_cast_is_shown_and_clones_are_apart() {
+fn some_environments() {
     let mut scan = scan(2);
     let poses = poses(0);
     (0..ENVS).for_each(|env| scan.settle(env, &poses, &OwnScene::default()));
@@ -96,68 +92,15 @@ fn only_what_was_cast_is_shown_and_clones_are_apart() {
     assert_eq!((bits(&scan), count(&other, 4), count(&other, 2)), (before, 0, RAYS));
 }
 
-/// Threads that count what is allocated at their desks.
-#[derive(Debug, Default)]
-struct Counting {
-    /// Allocations and visits, of desk 0 and of all others.
-    seen: Mutex<[(u64, usize); 2]>,
-}
-
-impl Threads for Counting {
-    fn run(&self, desks: usize, work: &(dyn Fn(usize) + Sync)) {
-        // Together: whoever came first would do it all.
-        let turn = Barrier::new(desks);
-        ScopedThreads.run(desks, &|desk| {
-            turn.wait();
-            let allocations = allocation_counter::measure(|| work(desk)).count_total;
-            let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-            let seen = &mut seen[desk.min(1)];
-            *seen = (seen.0 + allocations, seen.1 + 1);
-        });
-    }
-}
-
-/// 6 environments of 3172 rays are worth four threads. Neither the calling thread nor the others allocate.
+/// An environment with a scene of its own is hit as in a scan of that scene; the others stay.
 #[test]
-fn casting_allocates_nothing_on_any_thread() {
-    let counting = Arc::new(Counting::default());
-    let mut scan = scan(4);
-    scan.crew = Crew::new(Arc::<Counting>::clone(&counting));
-    let all: Vec<usize> = (0..ENVS).collect();
-    let states: Vec<_> = (0..4).map(poses).collect();
-    all.iter().for_each(|&env| scan.settle(env, &states[0], &OwnScene::default()));
-    // Everybody's first time: every desk finds out how much scratch memory it needs.
-    let crew = std::mem::take(&mut scan.crew);
-    for _ in 0..4 {
-        scan.desks.rotate_left(1);
-        let mut rest = scan.desks.split_off(1);
-        scan.cast(&all, &states[0], view);
-        scan.desks.append(&mut rest);
-    }
-    scan.crew = crew;
-    for _ in 0..10 {
-        states.iter().for_each(|poses| scan.cast(&all, poses, view));
-    }
-    let seen = *counting.seen.lock().unwrap_or_else(PoisonError::into_inner);
-    assert_eq!(seen, [(0, 40), (0, 120)], "allocations and visits of the calling thread and of the others");
-    let control = allocation_counter::measure(|| drop(std::hint::black_box(vec![0u8; 100]))).count_total;
-    assert_eq!(control, 1, "the control: the counter counts");
-}
-
-/// An environment that looks otherwise is hit as one of a scan of that scene is, and the others as ever.
-#[test]
-fn environments_may_have_scenes_of_their_own() {
+fn own_scenes() {
     let all: Vec<usize> = (0..ENVS).collect();
     let poses = poses(0);
-    let of_env = |scan: &Scan<Vec<Ray>>, env: usize| {
-        let mut hits = Vec::new();
-        scan.each_hit(env, |k, hit| hits.push((k, hit.distance.to_bits(), hit.instance)));
-        hits
-    };
     let cast = |scan: &mut Scan<Vec<Ray>>, own: &[OwnScene]| {
         all.iter().for_each(|&env| scan.settle(env, &poses, &own[env]));
         scan.cast(&all, &poses, view);
-        all.iter().map(|&env| of_env(scan, env)).collect::<Vec<_>>()
+        bits(scan).chunks(6 * RAYS).map(<[u64]>::to_vec).collect::<Vec<_>>()
     };
     let nothing = vec![OwnScene::default(); ENVS];
     let (small, large) = (cast(&mut scan(2), &nothing), cast(&mut scan_of(&balls(0.45), 2), &nothing));

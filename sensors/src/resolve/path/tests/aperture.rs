@@ -2,8 +2,7 @@
 
 use super::super::eye::Pupil;
 use super::*;
-use crate::camera::{Aperture, LensRays};
-use crate::camera::{Intrinsics, Lens, Optics};
+use crate::camera::{Aperture, Intrinsics, Lens, LensRays, Optics};
 
 const SIZE: usize = 28;
 /// \[pixels\].
@@ -24,8 +23,8 @@ fn lamp_at(depth: f32, half: f32) -> (RenderScene, [PoseF32; 1]) {
     (scene, [PoseF32 { rotation, translation: [depth, 0., 0.] }])
 }
 
-/// What all pixels show.
-fn picture(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, samples: u32) -> Vec<f64> {
+/// The light of all pixels.
+fn image(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, samples: u32) -> Vec<f64> {
     let studio = Studio::new(scene, poses, &ahead());
     let mut paths = studio.paths(samples, 0, 1);
     paths.eye.pupil = aperture.and_then(Pupil::of);
@@ -34,19 +33,18 @@ fn picture(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, 
 }
 
 /// Sum, means and variances along both axes.
-fn moments(picture: &[f64]) -> (f64, [f64; 2], [f64; 2]) {
+fn moments(image: &[f64]) -> (f64, [f64; 2], [f64; 2]) {
     let place = |k: usize| [(k % SIZE) as f64 + 0.5, (k / SIZE) as f64 + 0.5];
-    let sum: f64 = picture.iter().sum();
-    let mean = [0, 1].map(|a| picture.iter().enumerate().map(|(k, x)| x * place(k)[a]).sum::<f64>() / sum);
-    let var =
-        [0, 1].map(|a| picture.iter().enumerate().map(|(k, x)| x * (place(k)[a] - mean[a]).powi(2)).sum::<f64>() / sum);
-    (sum, mean, var)
+    let sum: f64 = image.iter().sum();
+    let mean = [0, 1].map(|a| image.iter().enumerate().map(|(k, x)| x * place(k)[a]).sum::<f64>() / sum);
+    let square = |a: usize| image.iter().enumerate().map(|(k, x)| x * (place(k)[a] - mean[a]).powi(2)).sum::<f64>();
+    (sum, mean, [0, 1].map(|a| square(a) / sum))
 }
 
 /// Out of focus, a point becomes a disc of diameter c = f A |1 / S1 - 1 / S2|, and a square the sum of such discs: its variance
 /// along an axis is c² / 16 more than its own, side² / 12, and that of a pixel, 1 / 12.
 #[test]
-fn what_is_out_of_focus_is_blurred_by_its_circle_of_confusion() {
+fn circle_of_confusion() {
     let half = 0.01f32;
     for (focus, depth, f_number) in
         [(1.5f32, 3.0f32, 0.5), (3.0, 1.5, 0.5), (2.0, 1.6, 0.25), (f32::INFINITY, 2.0, 1.0)]
@@ -55,7 +53,7 @@ fn what_is_out_of_focus_is_blurred_by_its_circle_of_confusion() {
         let c = f64::from(F) * (0.05 / f_number) * (1.0 / f64::from(focus) - 1.0 / f64::from(depth)).abs();
         assert!((aperture.circle_of_confusion(depth.into(), F.into()) - c).abs() < 1e-9 && (8.0..20.0).contains(&c));
         let (scene, poses) = lamp_at(depth, half);
-        let blurred = picture(&scene, &poses, Some(&aperture), 2048);
+        let blurred = image(&scene, &poses, Some(&aperture), 2048);
         let (sum, mean, var) = moments(&blurred);
         let side = 2.0 * f64::from(half) * f64::from(F) / f64::from(depth);
         let light = 2.0 * albedo(0.5);
@@ -82,25 +80,25 @@ fn what_is_out_of_focus_is_blurred_by_its_circle_of_confusion() {
 }
 
 #[test]
-fn what_is_in_focus_stays_as_it_is() {
+fn in_focus() {
     let (scene, poses) = lamp_at(2.0, 0.0333);
-    let sharp = picture(&scene, &poses, None, 64);
+    let sharp = image(&scene, &poses, None, 64);
     let aperture = |f_number| Aperture { focal_length: 0.05, f_number, focus_distance: 2.0 };
-    let wide = picture(&scene, &poses, Some(&aperture(0.25)), 64);
+    let wide = image(&scene, &poses, Some(&aperture(0.25)), 64);
     // The same samples meet it, but for rounding at its edges.
     let different = sharp.iter().zip(&wide).filter(|(a, b)| (*a - *b).abs() > 1e-9).count();
     assert!(different <= 2, "{different} pixels");
     assert!(sharp.iter().sum::<f64>() > 10.0);
     // An opening without a size is none, to the bit.
-    assert_eq!(picture(&scene, &poses, Some(&aperture(f64::INFINITY)), 64), sharp);
+    assert_eq!(image(&scene, &poses, Some(&aperture(f64::INFINITY)), 64), sharp);
     // A control: elsewhere it is blurred.
     let (scene, poses) = lamp_at(1.8, 0.03);
-    assert_ne!(picture(&scene, &poses, Some(&aperture(0.25)), 64), picture(&scene, &poses, None, 64));
+    assert_ne!(image(&scene, &poses, Some(&aperture(0.25)), 64), image(&scene, &poses, None, 64));
 }
 
-/// Behind a fisheye the opening faces each ray: what is sharp is a ball, in the middle and far aside.
+/// The aperture of a fisheye faces each ray: a ball is in focus, in the middle and far aside.
 #[test]
-fn fisheyes_are_sharp_on_a_ball() {
+fn fisheye() {
     let pixels = Intrinsics::Pixels { fx: 10.0, fy: 10.0, cx: 14.0, cy: 14.0 }.to_pixels(SIZE, SIZE).unwrap();
     let optics = Optics::new(Lens::from_name("equidistant").unwrap(), pixels).unwrap();
     let rays = LensRays::new(&optics, [SIZE; 2], 1).unwrap();

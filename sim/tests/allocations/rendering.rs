@@ -1,0 +1,165 @@
+//! After the first frame, drawing allocates nothing, and keeps little.
+
+use crate::{Counting, allocations, assert_settles};
+use scene::mesh::TriMesh;
+use scene::shape::{Capsule, Mesh, Plane, Sphere};
+use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
+use sensors::Crew;
+use sensors::camera::lens::Equidistant;
+use sensors::camera::{
+    Aperture, Before, Channels, Frame, LensRays, Opened, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
+    Shot, Shutter, Take,
+};
+use sensors::visibility::View;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Capsules, a mesh and a plane under two lights.
+fn scene() -> (RenderScene, Vec<PoseF32>) {
+    let ball: TriMesh = Shape::from(Sphere { radius: 0.3 }).tessellate(96);
+    let mesh = Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE));
+    let instance = |shape: Shape, id| Instance::new(shape, Material::default(), id);
+    let mut instances = vec![instance(Plane::INFINITE.into(), 1), instance(Mesh { mesh }.into(), 2)];
+    let mut poses = vec![PoseF32::from_translation([0., 0., -0.5]), PoseF32::IDENTITY];
+    for k in 0..12 {
+        instances.push(instance(Capsule { radius: 0.05, half_length: 0.2 }.into(), 3 + k));
+        poses.push(PoseF32::from_translation([0.2 * k as f32 - 1.1, 0.3, 0.1]));
+    }
+    let mut scene = RenderScene::new(instances).unwrap();
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 4.0 };
+    scene.lights.push(Light { kind: spot, position: [1., 1., 3.], direction: [-1., -1., -3.], ..Light::default() });
+    (scene, poses)
+}
+
+const FOUR: Channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::NONE };
+
+fn view(size: [usize; 2]) -> View {
+    View::look_at(size, 0.9, [2.2, -1.4, 1.2], [0., 0., 0.], [0., 0., 1.]).unwrap()
+}
+
+fn paths(max_bounces: u32) -> Renderer {
+    Renderer::RayTraced { samples: 2, max_bounces, denoise: true, seed: 0 }
+}
+
+/// The first call may allocate, the next three must not.
+#[track_caller]
+fn assert_steady(what: &str, mut draw: impl FnMut()) {
+    draw();
+    assert_eq!(allocations(|| (0..3).for_each(|_| draw())), 0, "{what}");
+}
+
+/// Scratch memory is three images at most.
+#[test]
+fn raster() {
+    let (scene, poses) = scene();
+    for size in [[64, 64], [200, 120], [640, 480]] {
+        for (samples, shadows) in [(1, false), (4, false), (1, true), (4, true)] {
+            let what = format!("{size:?}, {samples} samples, shadows {shadows}");
+            let (view, mut frame) = (view(size), Frame::new(size[0], size[1], FOUR));
+            let mut rasterizer = Rasterizer::new(RasterCfg { samples, shadows, ..RasterCfg::default() });
+            assert_steady(&what, || rasterizer.render(&scene, &poses, &view, &mut frame).unwrap());
+            let (scratch, image) = (rasterizer.scratch_bytes(), 24 * size[0] * size[1]);
+            assert!(scratch <= 3 * image, "{what}: {scratch} > 3 x {image}");
+        }
+    }
+}
+
+/// Rays and paths, every channel of moving objects, and the rays of a lens.
+#[test]
+fn renderers() {
+    let (scene, poses) = scene();
+    let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
+    let (small, wide) = (view([96, 64]), view([320, 240]));
+    let pixels = sensors::camera::PixelIntrinsics { fx: 90.0, fy: 90.0, cx: 160.0, cy: 120.0 };
+    let optics = Optics::new(Equidistant { max_angle: 1.9 }.into(), pixels).unwrap();
+    let rays = LensRays::new(&optics, [320, 240], 4).unwrap();
+    // A cone of less than 80 bytes for each block of 64 pixels, and five samples of 12 bytes.
+    assert!(rays.bytes() < 320 * 240 * (60 + 2), "{}", rays.bytes());
+    let still = Shot { scene: &scene, poses: &poses, view: &small, lights: None, lens: None, before: None };
+    let moving = Shot { before: Some(Before { poses: &moved, view: &small }), ..still };
+    let lens = Shot { view: &wide, lens: Some(&rays), ..still };
+    for (what, shot, channels, renderer) in [
+        ("still", still, FOUR, Renderer::Hybrid),
+        ("still", still, FOUR, Renderer::FastRayTraced),
+        ("still", still, FOUR, paths(2)),
+        ("albedo and flow", moving, Channels::ALL, Renderer::Raster),
+        ("albedo and flow", moving, Channels::ALL, Renderer::FastRayTraced),
+        ("lens", lens, FOUR, Renderer::FastRayTraced),
+        ("lens", lens, FOUR, paths(1)),
+    ] {
+        let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
+        let mut rasterizer = Rasterizer::default();
+        rasterizer.renderer = renderer;
+        assert_steady(&format!("{what}, {renderer:?}"), || {
+            rasterizer.render_shot(&shot, &mut frame.as_mut()).unwrap();
+        });
+    }
+}
+
+/// Emissive objects, a lens with an aperture and a rolling shutter.
+#[test]
+fn rolling_shutter() {
+    let (scene, poses) = scene();
+    let mut instances = scene.instances().to_vec();
+    instances.iter_mut().for_each(|instance| instance.material.emission = 0.5);
+    let (scene, view) = (RenderScene::new(instances).unwrap(), view([64, 48]));
+    let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
+    let opened = Opened { poses: &moved, world_from_camera: view.world_from_camera, before: 0.1 };
+    let take = Take { noise: 1, opened: Some(opened) };
+    let mut frame = Frame::new(view.width, view.height, FOUR);
+    let mut rasterizer = Rasterizer::default();
+    rasterizer.renderer = paths(2);
+    rasterizer.aperture = Some(Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 });
+    rasterizer.shutter = Shutter { row_time: 1e-3, exposure_time: 0.01 };
+    let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+    assert_steady("paths", || rasterizer.render_take(&shot, &take, &mut frame.as_mut()).unwrap());
+}
+
+/// Objects come into the light and into the image, come near and go apart, without one more allocation.
+#[test]
+fn moving_objects() {
+    let ball = || Instance::new(Sphere { radius: 0.3 }, Material::default(), 2);
+    let instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1), ball(), ball()];
+    let mut scene = RenderScene::new(instances).unwrap();
+    let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 1.0 };
+    scene.lights = vec![Light { kind: spot, ..Light::default() }];
+    let far = [50.0, 0.0, 0.3];
+    let moments = [
+        [far, far],
+        [[0.0, 0.0, 0.4], far],
+        [[-1.8, 0.0, 0.4], [1.8, 0.0, 0.4]],
+        [[-1.2, -1.2, 0.4], [1.2, 1.2, 0.4]],
+        [[0.0, 0.0, 2.6], [0.0, 0.0, 0.4]],
+    ];
+    let moments = moments.map(|[a, b]| [PoseF32::IDENTITY, PoseF32::from_translation(a), PoseF32::from_translation(b)]);
+    for size in [[320, 240], [640, 480]] {
+        let view = View::look_at(size, 0.9, [0.1, 0.0, 5.0], [0.; 3], [0., 0., 1.]).unwrap();
+        let (mut frame, mut rasterizer) = (Frame::new(size[0], size[1], FOUR), Rasterizer::default());
+        rasterizer.render(&scene, &moments[0], &view, &mut frame).unwrap();
+        for (k, poses) in moments.iter().enumerate() {
+            let draw = || rasterizer.render(&scene, poses, &view, &mut frame).unwrap();
+            assert_eq!(allocations(draw), 0, "{size:?}, moment {k}");
+        }
+    }
+}
+
+/// Few large images and many small ones, on three threads.
+#[test]
+fn batches() {
+    let (scene, poses) = scene();
+    for (size, frames) in [([320, 240], 1), ([160, 120], 3), ([160, 120], 37)] {
+        let view = view(size);
+        let counting = Arc::new(Counting::default());
+        let crew = Crew::new(Arc::<Counting>::clone(&counting));
+        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(crew);
+        let mut images = vec![Frame::new(view.width, view.height, FOUR); frames];
+        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+        let mut jobs: Vec<_> = images.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
+        let mut draw = || {
+            rasterizer.render(&mut jobs).unwrap();
+            counting.allocations.swap(0, Ordering::Relaxed)
+        };
+        assert!(draw() > 0, "the control: the first batch finds no memory yet");
+        assert_settles(&format!("{size:?}, {frames} frames"), draw);
+    }
+}
