@@ -139,7 +139,7 @@ fn anymal_by_pycollada() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn stl_by_trimesh() {
+fn vendor_stl_by_trimesh() {
     let files = files("stl");
     for ((name, triangles, vertices), lo, hi) in STL {
         let mesh = load_of(&files, name);

@@ -54,7 +54,7 @@ fn numbers_of_the_tutorial() {
 /// The same angles put every foot of the bundled and of the vendor's robot at the same place.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn feet_of_the_vendors_robot() {
+fn feet_of_anymal() {
     let mut sim = sim(SimulationManagerCfg::legged());
     let ids = [bundled(), vendor()].map(|robot| sim.add_robot(robot).unwrap());
     for k in 0..20 {
@@ -129,7 +129,7 @@ fn standing() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn standing_of_the_vendors_robot() {
+fn standing_of_anymal() {
     check("vendor", vendor());
 }
 

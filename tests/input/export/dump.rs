@@ -174,7 +174,7 @@ fn alike_names_of_meshes() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn several_robots() {
+fn vendor_robots_together() {
     let other = vendor_arm_and_hand();
     let (mut sim, _) = simulation(bundled());
     for (i, robot) in [other.clone(), RobotCfg { uid: "third".into(), ..other }].into_iter().enumerate() {

@@ -32,7 +32,7 @@ fn mesh_scales(robot: &RobotDescription) -> Vec<f64> {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn sr5() {
+fn vendor_sr5() {
     let Assembly { description: robot, diagnostics } = load(SR5);
     assert_eq!((robot.name.as_str(), count(&robot, JointKind::Revolute)), ("xMateSR5", 6));
     assert!((robot.total_mass() - 13.622).abs() < 1e-12, "{}", robot.total_mass());
@@ -50,7 +50,7 @@ fn sr5() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn inspire_hand() {
+fn vendor_inspire_hand() {
     let Assembly { description: robot, diagnostics } = load(HAND);
     assert_eq!(count(&robot, JointKind::Revolute), 12);
     assert_eq!(robot.joints.iter().filter(|j| j.mimic.is_some()).count(), 6);
@@ -75,7 +75,7 @@ fn anymal() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn arm_with_hand() {
+fn vendor_arm_with_hand() {
     let components = vec![ComponentCfg::new("arm", robot(SR5)), ComponentCfg::new("hand", robot(HAND))];
     let robot = assemble(&UrdfCfg { components, ..Default::default() }).unwrap().description;
     let connector = robot.joint(robot.joint_id("arm_TO_hand_CONNECTOR").unwrap());
@@ -99,7 +99,7 @@ fn looks(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn written_and_read() {
+fn vendor_written_and_read() {
     for name in [SR5, HAND, ANYMAL] {
         let Assembly { description: robot, diagnostics } = load(name);
         let files = testkit::urdf::Files::default();
@@ -116,7 +116,7 @@ fn written_and_read() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn numbers_of_urdf_rs() {
+fn vendor_numbers_of_urdf_rs() {
     for name in [SR5, HAND, ANYMAL] {
         let path = robot(name);
         let ours = parse_file(&path).unwrap().robot;
@@ -135,7 +135,7 @@ fn numbers_of_urdf_rs() {
 /// Every URDF of every vendor: a robot that steps with finite numbers, or a typed error that names the file.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn every_vendors_file() {
+fn every_real_robot() {
     let mut folders = vec![robots_dir()];
     let (mut files, mut worked) = (Vec::new(), 0);
     while let Some(folder) = folders.pop() {

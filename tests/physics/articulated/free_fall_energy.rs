@@ -154,7 +154,7 @@ fn holds() {
 /// The formula on ANYbotics' own ANYmal C, where its description is there.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn holds_for_the_vendors_robot() {
+fn holds_for_anymal() {
     let path = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
     let fall = |cfg| fallen(path.clone(), cfg, 2.0, 0.0, [0.0; 3]);
     let (euler, exact) = (fall(earth()), fall(rk4(earth())));

@@ -158,7 +158,7 @@ fn dense_meshes() {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn meshes_of_sr5() {
+fn vendor_sr5_meshes() {
     for (size, fovy) in [([64, 64], 0.7), ([160, 120], 0.7), ([160, 120], 0.25)] {
         let wide = sr5_view(1, size);
         let zoom = (0.35f32).tan() / (0.5f32 * fovy).tan();

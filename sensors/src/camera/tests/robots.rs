@@ -50,7 +50,7 @@ pub(super) fn sr5_view(copies: usize, size: [usize; 2]) -> View {
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn links_of_sr5() {
+fn vendor_sr5_links() {
     for copies in [1, 3] {
         let image = Still::new(sr5(copies), sr5_view(copies, [640, 480])).draw();
         assert!((1..=7 * copies as i32).all(|id| image.mask().contains(&id)), "every link of {copies} is seen");
