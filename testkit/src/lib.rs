@@ -11,8 +11,8 @@
 //! | [`svg`] | plots in SVG, read back |
 //! | [`urdf`] | URDF snippets |
 //! | [`wait`] | waiting for what another thread or process does |
-//! | [`x_server`] (feature `x_server`) | an X server without a screen |
-//! | [`worlds`] (feature `worlds`) | simulations, robots, objects and cameras |
+//! | `x_server` (feature `x_server`) | an X server without a screen |
+//! | `worlds` (feature `worlds`) | simulations, robots, objects and cameras |
 //!
 //! Without its features nothing here depends on another crate of the workspace, so that unit tests of every crate
 //! can use it.
