@@ -49,7 +49,7 @@ fn build_stub(dir: &Path, version: i32) {
 fn another_version() {
     let headers = kinetoscope::sim::mj::version_string();
     // Written as 2.x and 3.x write it, and as 4.x does.
-    for (version, name) in [(210, "2.1.0"), (3_005_001, "3.5.1"), (4_000_001, "4.0.1")] {
+    for (version, name) in [(210, "2.1.0"), (3_005_001, "3.5.1"), (4_001_000, "4.1.0")] {
         let dir = tempfile::tempdir().unwrap();
         build_stub(dir.path(), version);
         let variables = [("LD_LIBRARY_PATH", dir.path().to_str().unwrap())];
