@@ -147,8 +147,8 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &[i32]) -> Agreement {
     Agreement { seen, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
 }
 
-fn check(name: &str, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
-    let files = Files::default();
+/// `files` has what the model refers to.
+fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
     let file = files.write("judged.xml", with_camera(mjcf, eye, target));
     let theirs = theirs(&file, files.folder());
     let (images, mask_of) = ours(&file, eye, target);
@@ -172,7 +172,7 @@ fn check(name: &str, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn humanoid() {
     let mjcf = std::fs::read_to_string(sample_model("humanoid/humanoid.xml")).unwrap();
-    check("humanoid", &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
+    check("humanoid", &Files::default(), &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
 }
 
 /// The vendor's arm with its real meshes, as it is exported.
@@ -184,5 +184,5 @@ fn arm() {
     let files = Files::default();
     sim.dump(files.folder()).unwrap();
     let mjcf = std::fs::read_to_string(files.folder().join("robot.mjcf4.xml")).unwrap();
-    check("vendor SR5", &mjcf, [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
+    check("vendor SR5", &files, &mjcf, [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
 }
