@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct MutateArgs {
-    /// Only mutations whose name contains this
+    /// Only mutations whose name contains this, or whose tests are in the binary of this name
     filter: Option<String>,
 }
 
@@ -33,7 +33,8 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     let folder = repo.target.join("mutate");
     let tree = folder.join("tree");
     copy(&repo.root, &tree)?;
-    let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| mutation.name.contains(filter));
+    let is_chosen = |filter: &String, mutation: &Mutation| mutation.name.contains(filter) || mutation.tests.0 == filter;
+    let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| is_chosen(filter, mutation));
     let chosen: Vec<&Mutation> = MUTATIONS.iter().filter(chosen).collect();
     let (mut findings, mut table, mut rows) = (Vec::new(), String::new(), Vec::new());
     let test = |binary: &str, words: &[&str]| {
