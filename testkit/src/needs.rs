@@ -24,7 +24,7 @@ fn robot_folders() -> impl Iterator<Item = PathBuf> {
 /// A folder with URDF files of real robots.
 ///
 /// # Panics
-/// If there is none.
+/// If no folder exists.
 #[must_use]
 pub fn robots_dir() -> PathBuf {
     robot_folders()
@@ -93,7 +93,7 @@ pub fn read_json(python: &Path, script: &Path, file: &Path) -> serde_json::Value
 /// The browser.
 ///
 /// # Panics
-/// If there is none on the search path.
+/// If the search path has no browser.
 #[must_use]
 pub fn chromium() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();

@@ -98,7 +98,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];
 
-/// What a stage took.
+/// Wall and CPU time of a stage.
 #[derive(Debug)]
 struct Took {
     stage: &'static str,

@@ -14,7 +14,7 @@ const PACKAGE: &str = "example-robot-data==6.0.0";
 /// The robots inside of the package.
 const INSIDE: &str = "cmeel.prefix/share/example-robot-data/robots";
 
-/// Where the robots come from.
+/// Source of the robots.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Robots {
     /// All of those that tests name.
@@ -26,7 +26,7 @@ pub(crate) enum Robots {
 /// Finds real robots, or downloads them once into the target folder.
 ///
 /// # Errors
-/// If there are none and they cannot be downloaded.
+/// If no robots are found and the download fails.
 pub(crate) fn obtain(repo: &Repo) -> Outcome<Robots> {
     if std::env::var_os(VARIABLE).is_some() || repo.root.join(BESIDE).is_dir() {
         return Ok(Robots::Complete);

@@ -330,7 +330,7 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
 /// Set where a person is asked before packages are installed.
 static ASK: AtomicBool = AtomicBool::new(false);
 
-/// From now on, a person at a terminal is asked before packages are installed; on a build machine nobody is asked.
+/// From now on, a person at a terminal is asked before packages are installed; a build machine is not asked.
 pub(crate) fn ask_before_installing() {
     ASK.store(true, Ordering::Relaxed);
 }

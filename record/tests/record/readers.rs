@@ -92,7 +92,7 @@ fn the_mcap_package_reads_every_message() {
     assert_eq!(said(&python, "read_mcap.py", &path), expected);
 }
 
-/// What was left by a recording without an end is made whole, with its index, and holds the same.
+/// Recovery of an unfinished recording gives a whole file, with its index and the same messages.
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn the_mcap_package_reads_what_was_recovered() {

@@ -169,7 +169,7 @@ fn scenario_200_managers() {
     let first = (0..20).fold((0, 0), |_, _| use_one());
     assert_eq!(first.1, before + 3, "three workers and the caller");
     let one = first.0.saturating_sub(empty);
-    // What the allocator keeps varies: the least of ten measurements is compared.
+    // The memory that the allocator keeps varies: the least of ten measurements is compared.
     let least = || {
         let used = (0..10).map(|_| {
             (0..10).for_each(|_| _ = use_one());

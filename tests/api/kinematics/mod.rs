@@ -62,7 +62,7 @@ fn wide(range: [f64; 2]) -> String {
     limit(range, 9.0, 9.0)
 }
 
-/// Uniformly random positions within the limits (within a turn where there are none); mimic joints where they belong.
+/// Uniformly random positions within the limits (within a turn for joints without limits); mimic joints where they belong.
 fn random_qpos(sim: &SimulationManager, robot: RobotId, rows: usize, seed: u64) -> Array2<f64> {
     let robot = sim.robot(robot);
     let limits = robot.qpos_limits();

@@ -54,7 +54,7 @@ fn control_parts() {
     assert_eq!(of.description().links.len() - named.len(), 2 + 2 + 1);
 }
 
-/// Robots of one file are told apart by their uid.
+/// Robots of one file differ by their uid.
 #[test]
 fn one_file_twice() {
     let (mut sim, left) = with(1, robot("left", ODD));

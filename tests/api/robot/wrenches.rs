@@ -177,7 +177,7 @@ fn changes_of_the_world() {
     sim.update(10);
     let v = sim.robot(id).get_root_velocity();
     assert_near(v.row(1), &[0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT, "after the reset");
-    // What is fixed to the outer ball is one body with it.
+    // Parts that are fixed to the outer ball form one body with it.
     sim.robot_mut(id).set_gravity_compensation(true, Some(&[grip]), Some(&[EnvId(0)])).unwrap();
     let on = sim.robot(id).get_gravity_compensation();
     assert_eq!([on.row(0), on.row(1)], [array![true, true, true].view(), array![false, true, false].view()]);

@@ -45,7 +45,7 @@ fn newtons_second_law() {
         before = after;
     }
     assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
-    // What is left of the motion after two seconds is far below a thousandth of gravity.
+    // The remaining motion after two seconds is far below a thousandth of gravity.
     assert_near(sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], 1e-3 * mass * G);
 }
 
@@ -178,7 +178,7 @@ fn action_and_reaction() {
         assert!(rocking < 0.05 * weight * sin, "{rocking} of {weight}");
         assert_near(&[friction[(a, below, 0)]], &[-weight * sin], rocking + 1e-11);
         let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).get_pose(), 0, 0);
-        // What lies on a contact presses it with up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
+        // The load on a contact is up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
         assert!((at.z + 0.1).abs() < 2.5 * OVERLAP && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
         let net = sensor.friction_forces_w();
         let all = vector(&friction, a, 3) + vector(&friction, a, 4);

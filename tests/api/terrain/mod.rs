@@ -201,7 +201,7 @@ fn ball_at_rest() {
             assert!((distance - RADIUS).abs() < 2e-3, "{distance} at ({x}, {y})");
         }
         for (k, weight) in [0.0, 0.0, 0.5 * 9.81].into_iter().enumerate() {
-            // What is left of the motion, below 1e-3 m/s, is braked at some 0.01 s: below 0.05 N.
+            // The remaining motion, below 1e-3 m/s, is braked at some 0.01 s: below 0.05 N.
             let total = sensor.total_forces_w()[(env, 0, k)];
             assert!((total - weight).abs() < 0.05, "axis {k}: {total}");
             let (normal, of_world) = (sensor.net_forces_w()[(env, 0, k)], sensor.force_matrix_w()[(env, 0, 0, k)]);

@@ -55,7 +55,7 @@ fn due_instant_and_reset() {
     assert!(is_of(middle(&sim, id)[1], 0));
     sim.update(7);
     assert!(is_of(middle(&sim, id)[1], 5), "{:?} {}", middle(&sim, id), gap(5));
-    assert!(!is_of(gap(7), 5), "the control: seven steps are told from five");
+    assert!(!is_of(gap(7), 5), "the control: seven steps differ from five");
     let camera = sim.sensor(id).unwrap();
     assert!((camera.stamps()[0] - 0.05).abs() < 1e-12 && camera.frame_counts()[0] == 1);
     let draws = camera.draws();

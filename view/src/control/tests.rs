@@ -143,7 +143,7 @@ fn target_and_reset() {
     assert!(sim.robot(robot).get_qpos()[(1, 0)].abs() < 1e-9);
 }
 
-/// Refusals are told, and nothing panics; each is told until something else is done, and counted.
+/// Refusals are reported and counted; each is shown until the next action.
 #[test]
 fn refusals() {
     let Sample { mut sim, robot, .. } = sample(1);

@@ -232,7 +232,7 @@ fn panel() {
     let (mut seen, mut colors) = (BTreeSet::new(), BTreeSet::new());
     // Below the titles.
     for (v, u) in (15..48usize).flat_map(|v| (0..64usize).map(move |u| (v, u))) {
-        // Where several things, or lit and shaded parts, are in a pixel, its color is a mixture of four samples.
+        // The color of a pixel with several objects, or with lit and shaded parts, is the mean of four samples.
         let rgb = |v: usize, u: usize| [0, 1, 2].map(|k| color[(1, v, u, k)]);
         let around = [(v - 1, u), (v + 1, u), (v, u.saturating_sub(1)), (v, (u + 1).min(63)), (v, u)];
         let flat = around.iter().all(|&(near, beside)| {

@@ -350,7 +350,7 @@ fn sliders() {
         assert!((value - expected).abs() < 1e-9, "{what}: {value}");
     }
     shows.app.handle(Input::ButtonRelease(1, MIDDLE));
-    // In a window with too few rows for a slider there is none to be moved.
+    // A window with too few rows for a slider has no slider to move.
     for (height, is_there) in [(47, false), (48, true), (360, true)] {
         shows.app.handle(Input::Resize([SIZE[0], height]));
         let canvas = shows.drawn();
@@ -523,7 +523,7 @@ fn record_button() {
     let on_button = [SIZE[0] as f64 - 96.0, 11.0];
     // The whole mark, of 9 by 9 pixels.
     let red = |canvas: &Canvas| (0..9).all(|k| canvas.pixel(SIZE[0] - 96 + k, 11 + k) == Some([235, 60, 50]));
-    // Without a button there is none in the image, and the key is refused by the simulation.
+    // Without a recorder the image has no button, and the simulation refuses the key.
     let bare = shows.drawn();
     assert!(shows.click(on_button).is_empty() && !red(&bare));
     assert_eq!(shows.type_in("r"), [Command::Record(true)]);

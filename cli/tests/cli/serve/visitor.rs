@@ -138,7 +138,7 @@ pub(crate) fn status(address: SocketAddr, path: &str, headers: &[&str]) -> u16 {
     status_of(&say(address, format!("GET {path} HTTP/1.1\r\n{headers}\r\n").as_bytes()))
 }
 
-/// The status of an answer; 0 if there is none.
+/// The status of an answer; 0 without an answer.
 pub(crate) fn status_of(answer: &str) -> u16 {
     answer.strip_prefix("HTTP/1.1 ").and_then(|rest| rest.get(..3)).and_then(|code| code.parse().ok()).unwrap_or(0)
 }

@@ -88,7 +88,7 @@ fn channels() {
             let (world, range) = (pose.rotation * ray, [cfg.near, cfg.far]);
             let met = meets(eye, world, range);
             let id_of = |met: Option<(f64, i32, Vector3<f64>)>| met.map_or(0, |m| m.1);
-            // Where a ray a ten-thousandth beside, or a range as much longer, sees something else, single precision may.
+            // Single precision may differ if a ray a ten-thousandth beside, or a range as much longer, hits something else.
             let mut others = (0..8).map(|n| {
                 let beside = Vector3::from([n & 1, n >> 1 & 1, n >> 2 & 1].map(|b| f64::from(b) - 0.5)) * 2e-4;
                 let by = 1.0 + f64::from(n & 1) * 2e-4 - 1e-4;
@@ -339,7 +339,7 @@ fn own_intrinsics() {
     assert!(rows(&camera) == before && camera.lens_bytes() == bytes);
 }
 
-/// Points need distances where depth says nothing, and misses are none however they are written.
+/// Points need distances if depth has no value. Misses give no point, in every notation of a miss.
 #[test]
 fn point_clouds() {
     let cfg = cfg_of(Panorama {}, Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap());

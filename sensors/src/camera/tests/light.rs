@@ -247,7 +247,7 @@ fn stops() {
             let seen = of(emission, stops);
             assert!(close(seen, [light; 3]), "{renderer:?}: {emission} at {stops} stops is {seen:?}, not {light}");
         }
-        // The control: at 0 stops both highlights are white, and at -2 they are told apart.
+        // The control: at 0 stops both highlights are white, and at -2 they differ.
         assert_eq!([of(3.0, 0.0), of(3.9, 0.0)], [[255; 4]; 2]);
         assert!(of(3.9, -2.0)[0] > of(3.0, -2.0)[0] + 20);
     }

@@ -636,7 +636,7 @@ fn rectified_rows() {
                 let raw = optics.project((pose_of(eyes[k], 1).inverse() * world).coords.into());
                 let Some(ray) = raw.and_then(|raw| optics.unproject(raw)) else { continue };
                 let mut own = infos[k].projection_matrix;
-                // What lies in the fourth column is in the eye's own place already.
+                // The position of the eye already contains the fourth column.
                 own.set_column(3, &Vector3::zeros());
                 let found = projected(&own, infos[k].rectification_matrix * Vector3::from(ray));
                 let off = [found[0] - expected[0], found[1] - expected[1]];
@@ -653,7 +653,7 @@ fn rectified_rows() {
         // Common principal points, so that what is far away has no disparity.
         let [left, right] = [0, 1].map(|k| infos[k].projection_matrix.fixed_columns::<3>(0).into_owned());
         assert_eq!(left, right);
-        // What raw images have at their principal points is there on the mean of both.
+        // Both rectified principal points are the mean of the raw ones.
         for (k, info) in infos.iter().enumerate() {
             let ahead = projected(&info.projection_matrix, info.rectification_matrix * Vector3::z() * 1e9);
             let own = [info.camera_matrix[(0, 2)], info.camera_matrix[(1, 2)]];

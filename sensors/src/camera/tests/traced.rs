@@ -241,7 +241,7 @@ fn smoothed_exposure() {
     // Powers of two change no digit; the tiles' colours are the same.
     assert_eq!(far_apart(&plain, &dim, 1), 0);
     let blinding = of(1e30, 1.0, 0.0);
-    // Where the light is mirrored or seen all is white, and nothing is black that the dome lights.
+    // Pixels of the light and of its mirror image are white; the dome leaves no pixel black.
     let dark = |image: &Image| image.color().iter().filter(|color| color[..3] == [0; 3]).count();
     assert!(dark(&blinding) <= dark(&plain), "{} pixels, not {}", dark(&blinding), dark(&plain));
 }

@@ -67,8 +67,8 @@ fn watertight_and_textbook() {
             let ours = Shear::new(&ray).distance(triangle).filter(|t| *t >= 0.0);
             // Within 1e-9 of an edge, or nearly edge-on, rounding may decide differently.
             let [wide, narrow] = [1e-9, -1e-9].map(|slack| moeller_trumbore(&ray, triangle, slack));
-            assert!(ours.is_none() || wide.is_some(), "a hit that is none");
-            assert!(ours.is_some() || narrow.is_none(), "a miss that is none");
+            assert!(ours.is_none() || wide.is_some(), "a false hit");
+            assert!(ours.is_some() || narrow.is_none(), "a false miss");
             if let (Some(t), Some(u)) = (ours, narrow) {
                 (hits, worst) = (hits + 1, worst.max((t - u).abs()));
             }
