@@ -55,6 +55,26 @@ pub fn sample_model(path: &str) -> PathBuf {
     found
 }
 
+/// All files below `folder` with this extension, in any case, sorted by path.
+///
+/// # Panics
+/// If a folder cannot be read.
+#[must_use]
+pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let (mut folders, mut files) = (vec![folder.to_path_buf()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end.eq_ignore_ascii_case(extension)) {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
 fn python(variable: &str) -> PathBuf {
     std::env::var_os(variable)
         .map(PathBuf::from)

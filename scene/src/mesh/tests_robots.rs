@@ -2,6 +2,7 @@
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
 use std::path::PathBuf;
+use testkit::needs::{files_below, robots_dir};
 
 use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};
@@ -30,20 +31,7 @@ pub(super) fn faces_up([a, b, c]: [[f32; 3]; 3]) -> bool {
 
 /// All files below the robots with an extension, sorted.
 pub(super) fn files(extension: &str) -> Vec<PathBuf> {
-    let mut folders = vec![testkit::needs::robots_dir()];
-    let mut found = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension)) {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
+    files_below(&robots_dir(), extension)
 }
 
 /// The first of `files` with this name.

@@ -3,27 +3,13 @@
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj::compile_file;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-fn models_below(dir: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            models_below(&path, found);
-        } else if path.extension().is_some_and(|e| e == "xml") {
-            found.push(path);
-        }
-    }
-}
+use testkit::needs::{files_below, sample_model};
 
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn compile_and_step() {
-    let dir = testkit::needs::sample_model("");
-    let mut files = Vec::new();
-    models_below(&dir, &mut files);
-    files.sort();
+    let files = files_below(&sample_model(""), "xml");
     assert!(files.len() > 10, "{files:?}");
     let (mut stepped, mut refused) = (0, Vec::new());
     for file in &files {

@@ -3,18 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sim::mj::{TARGET, Target, words};
-use std::path::{Path, PathBuf};
-
-fn models_below(dir: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            models_below(&path, found);
-        } else if path.extension().is_some_and(|e| e == "xml") {
-            found.push(path);
-        }
-    }
-}
+use std::path::Path;
+use testkit::needs::{files_below, sample_model};
 
 /// The file with the options of [`empty`] behind its own, by MuJoCo alone.
 fn plainly(file: &Path) -> Model {
@@ -76,10 +66,8 @@ const SAMPLES: [(&str, &str); 18] = [
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn every_sample() {
-    let dir = testkit::needs::sample_model("");
-    let mut files = Vec::new();
-    models_below(&dir, &mut files);
-    files.sort();
+    let dir = sample_model("");
+    let files = files_below(&dir, "xml");
     let (mut parts, mut refused) = (Vec::new(), Vec::new());
     for file in &files {
         let name = file.strip_prefix(&dir).unwrap().display().to_string();

@@ -4,7 +4,7 @@ use super::view;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
 use kinetoscope::sim::mj;
-use std::path::{Path, PathBuf};
+use testkit::needs::{files_below, sample_model};
 use testkit::urdf::Files;
 
 /// Draws a still from the place of MuJoCo's viewers, and returns the share of pixels that see something.
@@ -20,22 +20,10 @@ fn seen(still: &Still) -> f64 {
     mask.iter().filter(|&&m| m != 0).count() as f64 / mask.len() as f64
 }
 
-fn xml_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if path.is_dir() {
-            files.extend(xml_files(&path));
-        } else if path.extension().is_some_and(|e| e == "xml") {
-            files.push(path);
-        }
-    }
-    files
-}
-
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn sample_models() {
-    let files = xml_files(&testkit::needs::sample_model(""));
+    let files = files_below(&sample_model(""), "xml");
     let mut drawn = 0;
     for path in &files {
         if std::fs::read_to_string(path).unwrap().contains("<mujocoinclude") {

@@ -6,7 +6,7 @@ use kinetoscope::sim::description::{Geometry, JointKind, Material};
 use kinetoscope::sim::diagnostic::count_by_name;
 use kinetoscope::sim::urdf::{Assembly, assemble, parse_file, write_urdf};
 use kinetoscope::sim::{DiagnosticKind, RobotDescription};
-use testkit::needs::{robot, robots_dir};
+use testkit::needs::{files_below, robot, robots_dir};
 use testkit::worlds::{cfg, sim, urdf_robot};
 
 const SR5: &str = "rokae_description/urdf/SR5.urdf";
@@ -136,14 +136,7 @@ fn vendor_numbers_of_urdf_rs() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn every_real_robot() {
-    let mut folders = vec![robots_dir()];
-    let (mut files, mut worked) = (Vec::new(), 0);
-    while let Some(folder) = folders.pop() {
-        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        let (inner, other): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
-        folders.extend(inner);
-        files.extend(other.into_iter().filter(|path| path.extension().is_some_and(|end| end == "urdf")));
-    }
+    let (files, mut worked) = (files_below(&robots_dir(), "urdf"), 0);
     for file in &files {
         let name = file.file_name().unwrap().to_string_lossy();
         if let Err(error) = assemble(&UrdfCfg::single(file)) {
