@@ -1,8 +1,8 @@
 //! `cargo xtask mutate`: breaks the code in one place, runs the tests that should notice, and so for every mutation of the
-//! list (`mutations.rs`). All are done in a copy of the tree below the target folder. A run of the whole list writes
+//! lists (`mutations/`). All are done in a copy of the tree below the target folder. A run of the whole list writes
 //! `docs/mutations.md`.
 
-use crate::mutations::{MUTATIONS, Mutation};
+use crate::mutations::{self, Mutation};
 use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
@@ -35,7 +35,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     copy(&repo.root, &tree)?;
     let is_chosen = |filter: &String, mutation: &Mutation| mutation.name.contains(filter) || mutation.tests.0 == filter;
     let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| is_chosen(filter, mutation));
-    let chosen: Vec<&Mutation> = MUTATIONS.iter().filter(chosen).collect();
+    let chosen: Vec<&Mutation> = mutations::all().filter(chosen).collect();
     let (mut findings, mut table, mut rows) = (Vec::new(), String::new(), Vec::new());
     let test = |binary: &str, words: &[&str]| {
         let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
@@ -111,20 +111,21 @@ fn row(mutation: &Mutation, caught_by: &[String]) -> String {
 /// Every mutation still finds its place: the search text stands in the file exactly once. And the page is of this list.
 pub(crate) fn check(root: &Path) -> Outcome {
     let mut findings = Vec::new();
-    for Mutation { name, file, search, replacement, .. } in MUTATIONS {
+    for Mutation { name, file, search, replacement, .. } in mutations::all() {
         let times = read(&root.join(file))?.matches(search).count();
         if times != 1 || search == replacement {
             findings.push(format!("{name}: its text stands {times} times in {file}, not once: {search:?}"));
         }
     }
-    no_findings("mutations that do not fit the code (xtask/src/mutations.rs)", &findings)?;
+    no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)?;
     let page = read(&root.join(PAGE))?;
     let wanted = |mutation: &Mutation| format!("| {} | [{}]", mutation.name, mutation.file);
     let mut findings: Vec<String> =
-        MUTATIONS.iter().filter(|mutation| !page.contains(&wanted(mutation))).map(|m| m.name.to_string()).collect();
+        mutations::all().filter(|mutation| !page.contains(&wanted(mutation))).map(|m| m.name.to_string()).collect();
     let rows = page.lines().filter(|line| line.starts_with("| ")).count() - 1;
-    if findings.is_empty() && rows != MUTATIONS.len() {
-        findings.push(format!("{rows} rows for {} mutations", MUTATIONS.len()));
+    let count = mutations::all().count();
+    if findings.is_empty() && rows != count {
+        findings.push(format!("{rows} rows for {count} mutations"));
     }
     no_findings("docs/mutations.md is of another list: cargo xtask mutate", &findings)
 }
@@ -206,11 +207,12 @@ mod tests {
 
     #[test]
     fn there_are_enough_and_each_fits() {
-        assert!(MUTATIONS.len() >= 25);
+        let all: Vec<&Mutation> = mutations::all().collect();
+        assert!(all.len() >= 80);
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         check(&root).expect("every text stands once");
-        for (k, mutation) in MUTATIONS.iter().enumerate() {
-            assert!(MUTATIONS[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
+        for (k, mutation) in all.iter().enumerate() {
+            assert!(all[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
             assert!(!mutation.tests.1.is_empty(), "{}", mutation.name);
         }
     }
@@ -235,8 +237,8 @@ mod tests {
 
     #[test]
     fn each_binary_is_tried_once_with_all_its_words() {
-        let all = binaries(&MUTATIONS.iter().collect::<Vec<_>>());
-        for mutation in MUTATIONS {
+        let all = binaries(&mutations::all().collect::<Vec<_>>());
+        for mutation in mutations::all() {
             let (binary, words) = mutation.tests;
             assert!(words.iter().all(|word| all[binary].contains(word)), "{}", mutation.name);
         }

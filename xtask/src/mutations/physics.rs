@@ -1,18 +1,6 @@
-//! The ways in which `cargo xtask mutate` breaks the code, and the tests that have to notice.
+//! Mistakes in the equations of motion, drives and contacts, which the laws of physics have to notice.
 
-/// One change of one place.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Mutation {
-    /// What is wrong then, in a few words.
-    pub(crate) name: &'static str,
-    pub(crate) file: &'static str,
-    /// Stands in the file exactly once.
-    pub(crate) search: &'static str,
-    pub(crate) replacement: &'static str,
-    /// The tests that are run: a test of the root package (`api`), of another package (`kinetoscope-record/record`) or the unit
-    /// tests of a package (`kinetoscope-scene`); and words in the names of the tests.
-    pub(crate) tests: (&'static str, &'static [&'static str]),
-}
+use super::Mutation;
 
 const fn physics(
     name: &'static str,
@@ -23,8 +11,7 @@ const fn physics(
     Mutation { name, file, search, replacement, tests: ("physics", laws) }
 }
 
-/// All of them.
-pub(crate) const MUTATIONS: &[Mutation] = &[
+pub(super) const PHYSICS: &[Mutation] = &[
     physics(
         "inertia turned the wrong way",
         "sim/src/inertia.rs",

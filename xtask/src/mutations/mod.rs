@@ -1,0 +1,30 @@
+//! The ways in which `cargo xtask mutate` breaks the code, by subject, and the tests that have to notice.
+
+mod physics;
+mod recording;
+mod renderer;
+mod robots;
+mod sensors;
+mod views;
+
+/// One change of one place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mutation {
+    /// What is wrong then, in a few words.
+    pub(crate) name: &'static str,
+    pub(crate) file: &'static str,
+    /// Stands in the file exactly once.
+    pub(crate) search: &'static str,
+    pub(crate) replacement: &'static str,
+    /// The tests that are run: a test of the root package (`api`), of another package (`kinetoscope-record/record`) or the unit
+    /// tests of a package (`kinetoscope-scene`); and words in the names of the tests.
+    pub(crate) tests: (&'static str, &'static [&'static str]),
+}
+
+const LISTS: [&[Mutation]; 6] =
+    [physics::PHYSICS, robots::ROBOTS, sensors::SENSORS, renderer::RENDERER, recording::RECORDING, views::VIEWS];
+
+/// All of them.
+pub(crate) fn all() -> impl Iterator<Item = &'static Mutation> {
+    LISTS.into_iter().flatten()
+}

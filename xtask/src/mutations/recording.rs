@@ -1,0 +1,66 @@
+//! Mistakes in recordings, in their files, and in what is read of them.
+
+use super::Mutation;
+
+const fn unit(
+    name: &'static str,
+    file: &'static str,
+    [search, replacement]: [&'static str; 2],
+    tests: &'static [&'static str],
+) -> Mutation {
+    Mutation { name, file, search, replacement, tests: ("kinetoscope-record", tests) }
+}
+
+pub(super) const RECORDING: &[Mutation] = &[
+    unit(
+        "shape of an array of one axis a number",
+        "record/src/npy.rs",
+        ["if shape.len() == 1 {", "if shape.len() == 2 {"],
+        &["npy::tests::"],
+    ),
+    unit(
+        "sizes before and after packing exchanged",
+        "record/src/zip.rs",
+        ["(before, 8), (*size, 8), (*offset, 8)", "(*size, 8), (before, 8), (*offset, 8)"],
+        &["zip::tests::"],
+    ),
+    unit(
+        "time that an environment is set to ignored",
+        "record/src/clock.rs",
+        ["self.offsets[env] = now - times[env];", "self.offsets[env] = now;"],
+        &["clock::tests::"],
+    ),
+    unit(
+        "count forgotten where deviations are joined",
+        "record/src/lerobot/statistics.rs",
+        ["apart * apart * self.count * other.count / count", "apart * apart * other.count / count"],
+        &["lerobot::statistics::tests::"],
+    ),
+    unit(
+        "actions of the row before repeated",
+        "record/src/replay.rs",
+        ["self.act(sim, row)?;", "self.act(sim, row.saturating_sub(1))?;"],
+        &["replay::tests::"],
+    ),
+    unit(
+        "numbers of messages aligned from the header on",
+        "record/src/ros/cdr.rs",
+        ["(self.0.len() - HEADER.len()).next_multiple_of(size) + HEADER.len()", "self.0.len().next_multiple_of(size)"],
+        &["ros::cdr::tests::"],
+    ),
+    unit(
+        "red and blue of a video exchanged",
+        "record/src/animation/h264.rs",
+        [
+            "fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {",
+            "fn chroma([blue, green, red]: [i32; 3]) -> [u8; 2] {",
+        ],
+        &["animation::h264::tests::"],
+    ),
+    unit(
+        "what a damaged recording left behind removed",
+        "record/src/recover.rs",
+        ["if recovered.damage.is_none() {", "if recovered.messages > 0 {"],
+        &["recorder::tests::"],
+    ),
+];
