@@ -65,5 +65,8 @@ mod tests {
         clock.restarted(&[0], &[2.5, 0.0], 10);
         assert_eq!(clock.stamp(0, 2.75), 2.75);
         assert_eq!((clock.step(10), clock.now(10)), (2, 2.5));
+        // Put to 7 s when 3 s are recorded: what is 0.25 s later is at 3.25 s.
+        clock.restarted(&[0], &[7.0, 0.5], 12);
+        assert_eq!(clock.stamp(0, 7.25), 3.25);
     }
 }

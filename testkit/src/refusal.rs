@@ -1,56 +1,65 @@
-//! Tables of mistakes: each row is an action that must be refused with a message that helps, and that must change nothing.
+//! Tables of mistakes: each row must be refused with an error that helps, and must change nothing.
 
 use std::fmt::{Debug, Display};
 
-/// One mistake.
-pub struct Refusal<S> {
-    /// The mistake, in a few words.
-    pub what: &'static str,
-    /// Makes it, and returns the message of the error.
-    pub act: fn(&mut S) -> Result<(), String>,
-    /// Parts that the message must contain: names, values, limits, candidates.
-    pub message: &'static [&'static str],
+/// What is wrong with the answer to a mistake: it was accepted, or its error is another.
+fn finding<T, E: Debug + Display>(result: Result<T, E>, variant: &str, parts: &[&str]) -> Option<String> {
+    let Err(error) = result else { return Some(format!("accepted, expected {variant} {parts:?}")) };
+    let (shown, text) = (format!("{error:?}"), error.to_string());
+    let missing: Vec<&&str> = parts.iter().filter(|part| !text.contains(**part)).collect();
+    let is_right = shown.starts_with(variant) && missing.is_empty();
+    (!is_right).then(|| format!("{shown} does not begin with {variant:?}, or {text:?} lacks {missing:?}"))
 }
 
-impl<S> Debug for Refusal<S> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Refusal").field("what", &self.what).field("message", &self.message).finish_non_exhaustive()
-    }
+#[track_caller]
+fn assert_none(findings: &[String]) {
+    assert!(findings.is_empty(), "{} wrong rows:\n  {}", findings.len(), findings.join("\n  "));
 }
 
-/// Turns any result into that of a row.
-///
-/// # Errors
-/// The message of the error.
-pub fn message<T, E: Display>(result: Result<T, E>) -> Result<(), String> {
-    result.map(drop).map_err(|error| error.to_string())
-}
-
-/// Makes every mistake of the table and collects what is wrong: accepted mistakes, messages without their parts, and
-/// changes of what `fingerprint` returns.
+/// Asserts that every row `(what, result, variant, parts)` is an error that `Debug` shows with `variant` at its beginning, and
+/// whose message contains each of `parts`. Rows may be lazy: the mistakes are made in their order.
 ///
 /// # Panics
-/// If anything is wrong; the message lists all of it.
+/// If any row is not; the message lists all of them.
 #[track_caller]
-pub fn assert_refused<S, F: PartialEq>(state: &mut S, rows: &[Refusal<S>], fingerprint: impl Fn(&S) -> F) {
-    let before = fingerprint(state);
-    let mut findings = Vec::new();
-    for Refusal { what, act, message } in rows {
-        match act(state) {
-            Ok(()) => findings.push(format!("{what}: accepted")),
-            Err(error) => {
-                let missing: Vec<&&str> = message.iter().filter(|part| !error.contains(**part)).collect();
-                if !missing.is_empty() {
-                    findings.push(format!("{what}: {error:?} does not contain {missing:?}"));
-                }
-            }
-        }
-        if fingerprint(state) != before {
+pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: AsRef<[&'a str]>>(
+    rows: impl IntoIterator<Item = (W, Result<T, E>, V, P)>,
+) {
+    let rows = rows.into_iter().filter_map(|(what, result, variant, parts)| {
+        Some(format!("{what}: {}", finding(result, variant.as_ref(), parts.as_ref())?))
+    });
+    assert_none(&rows.collect::<Vec<_>>());
+}
+
+/// As [`assert_refused`] for rows `(what, mistake, variant, parts)`: `make` makes each mistake, and what `fingerprint` returns
+/// must stay the same.
+///
+/// # Panics
+/// If any row is not refused so, or changes something; the message lists all of them.
+#[track_caller]
+pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
+    state: &mut S,
+    fingerprint: impl Fn(&S) -> F,
+    rows: impl IntoIterator<Item = (W, M, V, P)>,
+    make: impl Fn(&mut S, M) -> Result<T, E>,
+) where
+    F: PartialEq,
+    W: Display,
+    E: Debug + Display,
+    V: AsRef<str>,
+    P: AsRef<[&'a str]>,
+{
+    let (mut before, mut findings) = (fingerprint(state), Vec::new());
+    for (what, mistake, variant, parts) in rows {
+        let wrong = finding(make(state, mistake), variant.as_ref(), parts.as_ref());
+        findings.extend(wrong.map(|wrong| format!("{what}: {wrong}")));
+        let after = fingerprint(state);
+        if after != before {
             findings.push(format!("{what}: something changed"));
-            break;
+            before = after;
         }
     }
-    assert!(findings.is_empty(), "{} of {} rows:\n  {}", findings.len(), rows.len(), findings.join("\n  "));
+    assert_none(&findings);
 }
 
 /// Asserts that a result is an error whose variant and fields, as `Debug` shows them, contain `kind`, and whose message

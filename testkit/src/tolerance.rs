@@ -24,17 +24,37 @@ impl Tolerance {
         Self { absolute: 0.0, relative: limit, derivation }
     }
 
+    /// A limit on the error relative to an expected value larger than one, and on the absolute error of a smaller one.
+    #[must_use]
+    pub const fn mixed(limit: f64, derivation: &'static str) -> Self {
+        Self { absolute: limit, relative: limit, derivation }
+    }
+
     /// The rounding error of `operations` operations in double precision on numbers of the expected size, or of size one.
     #[must_use]
     pub const fn rounding(operations: f64) -> Self {
-        let limit = operations * f64::EPSILON;
-        Self { absolute: limit, relative: limit, derivation: "rounding in double precision" }
+        Self::mixed(operations * f64::EPSILON, "rounding in double precision")
+    }
+
+    /// Largest absolute error of a value.
+    #[must_use]
+    pub const fn limit(&self, expected: f64) -> f64 {
+        self.absolute.max(self.relative * expected.abs())
     }
 
     /// True if `found` is within the limit of `expected`; equal values are, infinities included, and NaN is not.
     #[must_use]
     pub fn holds(&self, found: f64, expected: f64) -> bool {
-        found == expected || (found - expected).abs() <= self.absolute.max(self.relative * expected.abs())
+        found == expected || (found - expected).abs() <= self.limit(expected)
+    }
+}
+
+/// The limits times a factor, for example a weight: the derivation is that of one unit.
+impl std::ops::Mul<f64> for Tolerance {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self { absolute: self.absolute * factor, relative: self.relative * factor, ..self }
     }
 }
 
@@ -60,4 +80,30 @@ pub fn assert_close<'a>(
             (found - expected).abs()
         );
     }
+}
+
+/// As [`assert_close`], with the limit of the largest expected element for every element.
+///
+/// # Panics
+/// As [`assert_close`].
+#[track_caller]
+pub fn assert_vector<'a>(
+    what: &str,
+    found: impl IntoIterator<Item = &'a f64>,
+    expected: impl IntoIterator<Item = &'a f64>,
+    tolerance: Tolerance,
+) {
+    let expected: Vec<f64> = expected.into_iter().copied().collect();
+    let largest = expected.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    let limit = Tolerance::absolute(tolerance.limit(largest), tolerance.derivation);
+    assert_close(what, found, &expected, limit);
+}
+
+/// Asserts that a number is within the tolerance.
+///
+/// # Panics
+/// As [`assert_close`].
+#[track_caller]
+pub fn assert_number(what: &str, found: f64, expected: f64, tolerance: Tolerance) {
+    assert_close(what, [&found], [&expected], tolerance);
 }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
+use testkit::tolerance::{Tolerance, assert_close};
 use testkit::urdf::{self, Files};
 
 #[allow(dead_code, reason = "main is what cargo runs")]
@@ -74,6 +75,10 @@ const M: f64 = 2.0;
 const L: f64 = 0.5;
 const I: f64 = 0.1;
 const Q: f64 = 0.7;
+/// Of numbers of size 1; ten times as much for torques of 10 N m.
+const ROUNDING: Tolerance = Tolerance::absolute(1e-15, "rounding of a handful of operations on numbers of size 1");
+const MUJOCO: Tolerance =
+    Tolerance::absolute(1e-12, "the same sums in MuJoCo's order, a thousand times their rounding");
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
@@ -81,10 +86,6 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 fn names(value: &Value) -> Vec<&str> {
     value.as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect()
-}
-
-fn close(a: &[f64], b: &[f64], tolerance: f64) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance)
 }
 
 /// `file:line: kind` of every warning, the file without its folder.
@@ -112,14 +113,19 @@ fn pendulum() {
     let file = folder.pendulum(&["<link name=\"tool\"/>", &weld]);
     let (code, json) = report(&[&file, "--qpos", &format!("swing={Q}")]);
     assert_eq!(code, 0, "{:?}", warnings(&json));
-    assert!(close(&numbers(&json["mass_matrix"][0]), &[I + M * L * L], 1e-15));
-    assert!(close(&numbers(&json["gravity_torque"]), &[-M * 9.81 * L * Q.cos()], 1e-14));
-    assert!(close(&numbers(&json["com"]), &[L * Q.cos(), 0.0, -L * Q.sin()], 1e-15));
+    assert_close("mass matrix", &numbers(&json["mass_matrix"][0]), &[I + M * L * L], ROUNDING);
+    assert_close("gravity torque", &numbers(&json["gravity_torque"]), &[-M * 9.81 * L * Q.cos()], ROUNDING * 10.0);
+    assert_close("centre of mass", &numbers(&json["com"]), &[L * Q.cos(), 0.0, -L * Q.sin()], ROUNDING);
     let tool = &json["links"][2];
     assert_eq!((tool["name"].as_str(), tool["parent"].as_str()), (Some("tool"), Some("arm")));
     assert_eq!((&tool["mass"], &tool["com"], &tool["inertia"]), (&Value::from(0.0), &Value::Null, &Value::Null));
     let half = Q / 2.0;
-    assert!(close(&numbers(&tool["pose"]), &[Q.cos(), 0.0, -Q.sin(), half.cos(), 0.0, half.sin(), 0.0], 1e-15));
+    assert_close(
+        "pose of the tool",
+        &numbers(&tool["pose"]),
+        &[Q.cos(), 0.0, -Q.sin(), half.cos(), 0.0, half.sin(), 0.0],
+        ROUNDING,
+    );
     assert_eq!(numbers(&json["links"][1]["inertia"][2]), [0.0, 0.0, I]);
     assert_eq!(json["links"][0]["parent"], Value::Null);
     let (_, still) = report(&[&file]);
@@ -134,8 +140,8 @@ fn library() {
     let cfg = InspectCfg { urdf, qpos: vec![("swing".into(), Q)], ..Default::default() };
     let report = inspect(&cfg).unwrap();
     assert_eq!((report.total_mass, report.joint_names.as_slice()), (M, &["swing".to_string()][..]));
-    assert!(close(&report.mass_matrix[0], &[I + M * L * L], 1e-15));
-    assert!(close(&report.gravity_torque, &[-M * 9.81 * L * Q.cos()], 1e-14));
+    assert_close("mass matrix", &report.mass_matrix[0], &[I + M * L * L], ROUNDING);
+    assert_close("gravity torque", &report.gravity_torque, &[-M * 9.81 * L * Q.cos()], ROUNDING * 10.0);
     let kinds: Vec<(&str, Option<u32>)> = report.warnings.iter().map(|w| (w.kind, w.line)).collect();
     assert_eq!(kinds, [("element-ignored", Some(5))]);
     let (with, without) = (report.to_string(), report.without_warnings().to_string());
@@ -401,8 +407,8 @@ fn floating_base() {
     let rows: Vec<Vec<f64>> = json["mass_matrix"].as_array().unwrap().iter().map(numbers).collect();
     assert!(rows.len() == columns.len() && rows.iter().all(|r| r.len() == columns.len()));
     let (mass, torque) = (json["total_mass"].as_f64().unwrap(), numbers(&json["gravity_torque"]));
-    assert!(close(&[rows[0][0], rows[1][1], rows[2][2]], &[mass; 3], 1e-15));
-    assert!(close(&torque[..3], &[0.0, 0.0, 9.81 * mass], 1e-14));
+    assert_close("translation of the mass matrix", &[rows[0][0], rows[1][1], rows[2][2]], &[mass; 3], ROUNDING);
+    assert_close("weight", &torque[..3], &[0.0, 0.0, 9.81 * mass], ROUNDING * 10.0);
 }
 
 #[test]
@@ -439,22 +445,22 @@ fn mjcf_file() {
     assert_eq!(code, 1, "the equality that is no mimic is said");
     assert_eq!(names(&json["joint_names"]), ["turn", "swing", "line", "curve"]);
     let qpos = [0.4, 30f64.to_radians(), 0.1 + 2.0 * 0.4, 0.1 + 3.0 * 0.16];
-    assert!(close(&numbers(&json["qpos"]), &qpos, 1e-12), "{}", json["qpos"]);
+    assert_close("positions", &numbers(&json["qpos"]), &qpos, MUJOCO);
     assert!(json["files"][0].as_str().unwrap().ends_with("robot.xml"));
     let mut data = Data::new(&compile(MJCF, &[]).unwrap().into_model()).unwrap();
     data.qpos_mut().copy_from_slice(&qpos);
     data.forward().unwrap();
     let matrix = data.mass_matrix().unwrap();
     for (row, theirs) in json["mass_matrix"].as_array().unwrap().iter().zip(matrix.chunks(4)) {
-        assert!(close(&numbers(row), theirs, 1e-12), "{row} {theirs:?}");
+        assert_close("row of the mass matrix", &numbers(row), theirs, MUJOCO);
     }
-    assert!(close(&numbers(&json["gravity_torque"]), data.qfrc_bias(), 1e-12), "{}", json["gravity_torque"]);
+    assert_close("gravity torque", &numbers(&json["gravity_torque"]), data.qfrc_bias(), MUJOCO);
     assert!(data.qfrc_bias()[1].abs() > 10.0 && json["total_mass"].as_f64().unwrap() == 6.0);
     // The control: the rotor of the swing is about as heavy as what it swings, 0.02 + 3 · 0.5².
     assert!((matrix[5] - (0.3 + 0.02 + 0.75)).abs() < 1e-12, "{matrix:?}");
     // Followers cannot be put elsewhere.
     let (_, json) = report(&[&file, "--qpos", "turn=0.4,curve=0.2"]);
-    assert!(close(&numbers(&json["qpos"]), &qpos, 1e-12));
+    assert_close("positions", &numbers(&json["qpos"]), &qpos, MUJOCO);
     assert!(warnings(&json).iter().any(|w| w.ends_with("mimic-position-ignored")), "{:?}", warnings(&json));
     // The bundled quadruped, floating, and what cannot be.
     let (_, json) = report(&["quadruped/quadruped.xml", "--floating-base"]);

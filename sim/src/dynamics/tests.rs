@@ -7,6 +7,7 @@ use crate::source::Source;
 use nalgebra::{Matrix3, Unit};
 use scene::pose::from_xyz_rpy;
 use std::f64::consts::FRAC_PI_2;
+use testkit::tolerance::{Tolerance, assert_vector};
 
 const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 const NO_GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
@@ -239,12 +240,6 @@ fn dalembert(
     })
 }
 
-#[track_caller]
-fn assert_close(found: &DVector<f64>, expected: &DVector<f64>, relative: f64) {
-    let error = (found - expected).amax();
-    assert!(error <= relative * expected.amax().max(1.0), "off by {error:e}\nfound {found}expected {expected}");
-}
-
 /// Two links turning about y, in the x-z plane; angle 0 along x, positive angles turn x to -z.
 fn two_links(m: [f64; 2], l: f64, c: [f64; 2], i: [f64; 2]) -> RobotDescription {
     let about_y = |i| Matrix3::from_diagonal(&Vector3::new(0.0, i, 0.0));
@@ -272,10 +267,17 @@ fn two_link_arm() {
         // Height of a point at angle q is -x sin q: V decreases with q.
         let g2 = -9.81 * m[1] * c[1] * f64::cos(q1 + q2);
         let g1 = -9.81 * (m[0] * c[0] + m[1] * l) * f64::cos(q1) + g2;
-        assert_close(&k.gravity_torque(&EARTH), &DVector::from_row_slice(&[g1, g2]), 1e-14);
+        let limit = Tolerance::mixed(1e-14, "a dozen operations");
+        assert_vector("gravity torque", &k.gravity_torque(&EARTH), &DVector::from_row_slice(&[g1, g2]), limit);
         let h = -m[1] * l * c[1] * f64::sin(q2);
         let coriolis = DVector::from_row_slice(&[h * v2 * (2.0 * v1 + v2), -h * v1 * v1]);
-        assert_close(&k.bias_force(&DVector::from_row_slice(&[v1, v2]), &NO_GRAVITY), &coriolis, 1e-14);
+        let limit = Tolerance::mixed(1e-14, "a dozen operations");
+        assert_vector(
+            "Coriolis terms",
+            &k.bias_force(&DVector::from_row_slice(&[v1, v2]), &NO_GRAVITY),
+            &coriolis,
+            limit,
+        );
     }
 }
 
@@ -302,7 +304,8 @@ fn lift() {
     b.add(cart, JointKind::Prismatic, Vector3::z(), tilted, point_mass(1.0, 0.0, 0.0, 0.0));
     let at = Configuration { joint_positions: vec![0.5, 0.25], ..Configuration::zero(&b.0) };
     let k = Kinematics::new(&b.0, &at).unwrap();
-    assert_close(&k.gravity_torque(&EARTH), &DVector::from_row_slice(&[4.0 * 9.81, 0.0]), 1e-15);
+    let limit = Tolerance::mixed(1e-15, "a handful of operations");
+    assert_vector("gravity torque", &k.gravity_torque(&EARTH), &DVector::from_row_slice(&[4.0 * 9.81, 0.0]), limit);
     let expected = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 1.0]);
     assert!((k.mass_matrix() - expected).amax() < 1e-15);
     assert!((k.link_pose(LinkId(2)).translation.vector - Vector3::new(0.25, 0.0, 0.7)).amax() < 1e-15);
@@ -324,7 +327,11 @@ fn gravity() {
             let unit = unit(n, j);
             (energy(&at.integrated(&robot, &unit, H)) - energy(&at.integrated(&robot, &unit, -H))) / (2.0 * H)
         });
-        assert_close(&k.gravity_torque(&gravity), &gradient, 1e-7);
+        let limit = Tolerance::mixed(
+            1e-7,
+            "differences of energies: 1e-16 / h, and h² of third derivatives; measured, not derived",
+        );
+        assert_vector("gradient of the energy", &k.gravity_torque(&gravity), &gradient, limit);
     }
 }
 
@@ -337,7 +344,8 @@ fn mass_matrix() {
         // Columns by Newton and Euler.
         for j in 0..n {
             let column = k.inverse_dynamics(&DVector::zeros(n), &unit(n, j), &NO_GRAVITY);
-            assert_close(&column, &m.column(j).into_owned(), 1e-13);
+            let limit = Tolerance::mixed(1e-13, "rounding of Newton and Euler against sums of inertias");
+            assert_vector("column of the mass matrix", &column, &m.column(j), limit);
         }
         let energy: f64 = bodies(&robot, &at)
             .iter()
@@ -357,7 +365,11 @@ fn inverse_dynamics() {
         let k = Kinematics::new(&robot, &at).unwrap();
         let a = Random::new(seed as u64 + 700).velocities(v.len());
         let expected = dalembert(&robot, &at, &v, &a, &EARTH);
-        assert_close(&k.inverse_dynamics(&v, &a, &EARTH), &expected, 2e-6);
+        let limit = Tolerance::mixed(
+            2e-6,
+            "second differences of poses: 1e-16 / h², and h² of fourth derivatives; measured, not derived",
+        );
+        assert_vector("d'Alembert", &k.inverse_dynamics(&v, &a, &EARTH), &expected, limit);
         // The control: without the velocity terms the judge must disagree.
         let without = k.inverse_dynamics(&DVector::zeros(v.len()), &a, &EARTH);
         assert!((without - &expected).amax() > 1e-3 * expected.amax());
@@ -383,7 +395,8 @@ fn velocity_terms() {
         let c = DMatrix::from_fn(n, n, |i, j| {
             (0..n).map(|l| 0.5 * (derivative[l][(i, j)] + derivative[j][(i, l)] - derivative[i][(j, l)]) * v[l]).sum()
         });
-        assert_close(&k.bias_force(&v, &NO_GRAVITY), &(&c * &v), 1e-6);
+        let limit = Tolerance::mixed(1e-6, "differences of mass matrices: 1e-16 / h, and h²; measured, not derived");
+        assert_vector("Christoffel symbols", &k.bias_force(&v, &NO_GRAVITY), &(&c * &v), limit);
         let rate = (0..n).fold(DMatrix::zeros(n, n), |sum, l| sum + &derivative[l] * v[l]);
         let skew = rate - &c * 2.0;
         assert!((&skew + skew.transpose()).amax() < 1e-9 * c.amax());
@@ -476,7 +489,8 @@ fn fixed_joints() {
     let (apart, fused) = (Kinematics::new(&apart.0, &at).unwrap(), Kinematics::new(&fused.0, &at).unwrap());
     assert!((apart.mass_matrix() - fused.mass_matrix()).amax() < 1e-14);
     let (v, w) = (random.velocities(6), random.velocities(6));
-    assert_close(&apart.inverse_dynamics(&v, &w, &EARTH), &fused.inverse_dynamics(&v, &w, &EARTH), 1e-13);
+    let limit = Tolerance::mixed(1e-13, "rounding of two orders of the same sums");
+    assert_vector("fused", &apart.inverse_dynamics(&v, &w, &EARTH), &fused.inverse_dynamics(&v, &w, &EARTH), limit);
     assert_eq!(apart.dof_count(), 6);
 }
 

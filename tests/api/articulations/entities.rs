@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use testkit::refusal::assert_error;
+use testkit::refusal::{assert_error, assert_refused_unchanged};
 use testkit::worlds::{add_ball, errors, object, pose_in};
 
 #[test]
@@ -128,27 +128,19 @@ fn refused_configurations() {
     let (mut sim, id) = with(1, cabinet());
     let b = || ArticulationCfg { uid: "b".into(), ..cabinet() };
     let negative = Some(DriveCfg { stiffness: (-1.0).into(), ..Default::default() });
-    let rows: [(ArticulationCfg, &str, &[&str]); 6] = [
-        (cabinet(), "DuplicateUid(\"cabinet\")", &[]),
-        (ArticulationCfg { uid: "a/b".into(), ..cabinet() }, "InvalidUid(\"a/b\")", &[]),
-        (ArticulationCfg { urdf: UrdfCfg::single("nowhere/cabinet.urdf"), ..b() }, "", &["nowhere/cabinet.urdf"]),
-        (
-            ArticulationCfg { init_qpos: vec![("drawer".into(), 0.1)], ..b() },
-            "",
-            &["articulation \"b\": ", "init_qpos", "drawer_slide"],
-        ),
-        (ArticulationCfg { drive: negative, ..b() }, "", &["stiffness", "-1"]),
-        (
-            ArticulationCfg { init_pose: Pose::translation(f64::NAN, 0.0, 0.0), ..b() },
-            "Config { field: \"init_pose\"",
-            &[],
-        ),
+    let (init_qpos, init_pose) = (vec![("drawer".into(), 0.1)], Pose::translation(f64::NAN, 0.0, 0.0));
+    let nowhere = ArticulationCfg { urdf: UrdfCfg::single("nowhere/cabinet.urdf"), ..b() };
+    let rows = [
+        ("twice", cabinet(), "DuplicateUid(\"cabinet\")", &[][..]),
+        ("slash", ArticulationCfg { uid: "a/b".into(), ..cabinet() }, "InvalidUid(\"a/b\")", &[]),
+        ("no file", nowhere, "", &["nowhere/cabinet.urdf"]),
+        ("joint", ArticulationCfg { init_qpos, ..b() }, "", &["articulation \"b\": ", "init_qpos", "drawer_slide"]),
+        ("drive", ArticulationCfg { drive: negative, ..b() }, "", &["stiffness", "-1"]),
+        ("pose", ArticulationCfg { init_pose, ..b() }, "Config { field: \"init_pose\"", &[]),
     ];
-    for (cfg, kind, parts) in rows {
-        assert_error(sim.add_articulation(cfg), kind, parts);
-        assert_eq!(sim.articulation(id).get_qpos(), array![[0.0]]);
-        assert_eq!(sim.articulation_id("cabinet").unwrap(), id);
-    }
+    let cabinet = |sim: &SimulationManager| (sim.articulation(id).get_qpos(), sim.articulation_id("cabinet").unwrap());
+    assert_eq!(cabinet(&sim), (array![[0.0]], id));
+    assert_refused_unchanged(&mut sim, cabinet, rows, |sim, cfg| sim.add_articulation(cfg));
 }
 
 #[test]

@@ -66,9 +66,9 @@ fn ideal_pd() {
                     law.q += H * 0.5 * (before - law.v);
                 }
                 world.step(1);
-                assert_close(world.effort()[0], tau, EXACT, "effort");
-                assert_close(world.v()[0], law.v, EXACT, "velocity");
-                assert_close(world.q()[0], law.q, EXACT, "position");
+                assert_number("effort", world.effort()[0], tau, EXACT);
+                assert_number("velocity", world.v()[0], law.v, EXACT);
+                assert_number("position", world.q()[0], law.q, EXACT);
             }
             assert!((10..190).contains(&saturated), "both sides of the limit: {saturated}");
         }
@@ -101,8 +101,9 @@ fn dc_motor_quadrants() {
             step(&mut env);
             let what = format!("{asked} N m at {speed} rad/s, sign {sign}");
             // Products of numbers up to 300: rounding of 1e-13.
-            assert_close(env.drives.effort[0], sign * given, 1e-12, &what);
-            assert_close(env.data().qvel()[0], sign * (speed + H * given / M), EXACT, &what);
+            let limit = Tolerance::mixed(1e-12, "products of numbers up to 300: rounding of 1e-13");
+            assert_number(&what, env.drives.effort[0], sign * given, limit);
+            assert_number(&what, env.data().qvel()[0], sign * (speed + H * given / M), EXACT);
         }
     }
     // Below the lines it is the ideal controller, with its gains.
@@ -111,7 +112,7 @@ fn dc_motor_quadrants() {
     push(&mut env, &[0.1], &[1.0]);
     command(&mut env, [0.5, 2.0, 0.0]);
     step(&mut env);
-    assert_close(env.drives.effort[0], 40.0 * 0.4 + 5.0 * 1.0, EXACT, "inside of the lines");
+    assert_number("inside of the lines", env.drives.effort[0], 40.0 * 0.4 + 5.0 * 1.0, EXACT);
 }
 
 /// The speed without load is per environment: at v a motor gives at most s (1 - v / v_max).
@@ -125,7 +126,7 @@ fn dc_motor_limits() {
     world.step(1);
     for (env, top) in [(0, 7.5), (1, 3.0)] {
         let expected = 6.0 * (1.0 - 1.5 / top);
-        assert_close(world.view().get_qf()[(env, 0)], expected, EXACT, &format!("{top} rad/s"));
+        assert_number(&format!("{top} rad/s"), world.view().get_qf()[(env, 0)], expected, EXACT);
     }
     let before = (world.view().qvel_limits(), world.view().qf_limits());
     for bad in [0.0, f64::INFINITY] {
@@ -160,8 +161,8 @@ fn dc_motor_from_rest() {
             if stable {
                 let power = r.powi(n);
                 let q = H * top * (f64::from(n) - r * (1.0 - power) / (1.0 - r));
-                assert_close(world.v()[0], top * (1.0 - power), EXACT, &format!("velocity, slope {slope}, step {n}"));
-                assert_close(world.q()[0], q, EXACT, &format!("position, slope {slope}, step {n}"));
+                assert_number(&format!("velocity, slope {slope}, step {n}"), world.v()[0], top * (1.0 - power), EXACT);
+                assert_number(&format!("position, slope {slope}, step {n}"), world.q()[0], q, EXACT);
             }
         }
         let off = (world.v()[0] / top - 1.0).abs();
@@ -183,8 +184,8 @@ fn delayed(n: i32, delay: i32) -> [f64; 3] {
 }
 
 fn assert_at(found: [f64; 2], law: &Law, what: &str) {
-    assert_close(found[0], law.q, EXACT, &format!("position, {what}"));
-    assert_close(found[1], law.v, EXACT, &format!("velocity, {what}"));
+    assert_number(&format!("position, {what}"), found[0], law.q, EXACT);
+    assert_number(&format!("velocity, {what}"), found[1], law.v, EXACT);
 }
 
 /// Targets act in each environment its own number of steps later.
@@ -325,7 +326,8 @@ fn second_order() {
                 let exact = aim * (1.0 - (-z * w * t).exp() * (cos + z * w / d * sin));
                 worst = worst.max((world.q()[0] - exact).abs());
             }
-            assert_close(world.q()[0], aim, 0.01 * aim, "after five time constants");
+            let limit = Tolerance::mixed(0.01 * aim, "of the way e^-5 = 0.7 % is left");
+            assert_number("after five time constants", world.q()[0], aim, limit);
             worst
         });
         assert!(one < 5.0 * 1e-3 * w * aim, "{model:?}: {one}");
@@ -346,15 +348,15 @@ fn models_beside_rows() {
         world.v()
     };
     let v = first(&mut world);
-    assert_close(v[0], H * kp * 0.4 / (M + H * kd + H * H * kp), EXACT, "at the end of the step");
-    assert_close(v[1], H * kp * 0.4 / M, EXACT, "at its start");
-    assert_close(v[2], H * (kp * 0.4 - 0.5) / M, EXACT, "with friction");
+    assert_number("at the end of the step", v[0], H * kp * 0.4 / (M + H * kd + H * H * kp), EXACT);
+    assert_number("at its start", v[1], H * kp * 0.4 / M, EXACT);
+    assert_number("with friction", v[2], H * (kp * 0.4 - 0.5) / M, EXACT);
     let second = Some(&[JointIndex(1)][..]);
     world.robot().set_stiffness(&array![[20.0]], second, None).unwrap();
     world.robot().set_qf_limits(&array![[3.0]], second, None).unwrap();
-    assert_close(first(&mut world)[1], H * 3.0 / M, EXACT, "8 N m, clamped to 3");
+    assert_number("8 N m, clamped to 3", first(&mut world)[1], H * 3.0 / M, EXACT);
     world.robot().set_qf_limits(&array![[500.0]], second, None).unwrap();
-    assert_close(first(&mut world)[1], H * 20.0 * 0.4 / M, EXACT, "no limit of the model is in the way");
+    assert_number("no limit of the model is in the way", first(&mut world)[1], H * 20.0 * 0.4 / M, EXACT);
     world.assert_well();
 }
 
@@ -373,13 +375,14 @@ fn largest_stable_step() {
     let (plans, _) = plan(description, &gains(kp, kd), &BTreeMap::new(), &[], false).unwrap();
     // The two do not feel each other but through the coupling, which is not in the mass matrix.
     let felt = effective_inertias(description, &plans, false).unwrap();
-    assert_close(felt[0], leader, 1e-12, "inertia of a");
-    assert_close(felt[1], follower, 1e-12, "inertia of b");
+    let limit = Tolerance::mixed(1e-12, "rounding of a mass matrix of two joints and its inverse");
+    assert_number("inertia of a", felt[0], leader, limit);
+    assert_number("inertia of b", felt[1], follower, Tolerance::mixed(1e-12, "as for a"));
     let of = |inertia: f64| ((kd * kd + 4.0 * inertia * kp).sqrt() - kd) / kp;
     let (expected, alone) = (of(leader + ratio * ratio * follower), of(leader));
     let found = stable_timestep_of(Scheme::Explicit, description, &plans, false).unwrap();
     // Bisected to 1e-9 of it.
-    assert_close(found / expected, 1.0, 2e-9, "largest step");
+    assert_number("largest step", found / expected, 1.0, Tolerance::mixed(2e-9, "bisected to 1e-9 of it"));
     assert!((found / alone - 1.0).abs() > 0.1, "the control: the follower matters");
     assert!(warn_if_unstable(description, &plans, false, 0.99 * expected).is_none());
     let warning = warn_if_unstable(description, &plans, false, 1.01 * expected).unwrap().to_string();
@@ -545,12 +548,12 @@ fn changes_at_run_time() {
                         free += 1
                     }
                     let what = format!("{name}, round {round}, step {n}, environment and joint {at:?}");
-                    assert_close(effort[at], tau, EXACT, &format!("effort, {what}"));
+                    assert_number(&format!("effort, {what}"), effort[at], tau, EXACT);
                     assert_at([q[at], v[at]], law, &what);
                     apart = apart.max((q[at] - others[at]).abs());
                 }
                 for env in 0..ENVS {
-                    assert_close(q[(env, 2)], others[(env, 2)], EXACT, "the wheel with a row");
+                    assert_number("the wheel with a row", q[(env, 2)], others[(env, 2)], EXACT);
                 }
                 assert_eq!(q.row(0), others.row(0), "environment 0 was not named: {name}, step {n}");
             }

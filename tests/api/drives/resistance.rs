@@ -9,8 +9,9 @@ use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use testkit::refusal::assert_error;
+use testkit::tolerance::assert_close;
 
-const EXACT: f64 = 1e-12;
+const EXACT: Tolerance = Tolerance::mixed(1e-12, "a handful of operations");
 const M: [f64; 2] = [2.0, 0.5];
 const ENVS: usize = 3;
 const ENV1: Option<&[EnvId]> = Some(&[EnvId(1)]);
@@ -39,10 +40,9 @@ fn set_all(world: &mut World, [friction, damping, armature]: &[Array2<f64>; 3], 
     robot.set_armature(armature, None, envs).unwrap();
 }
 
-fn close(found: &Array2<f64>, expected: impl Fn((usize, usize)) -> f64) {
-    for (at, &found) in found.indexed_iter() {
-        assert_close(found, expected(at), EXACT, &format!("environment and joint {at:?}"));
-    }
+/// Speeds by environment and joint.
+fn assert_speeds(world: &World, expected: impl Fn((usize, usize)) -> f64) {
+    assert_close("speeds", &world.view().get_qvel(), &Array2::from_shape_fn((ENVS, 2), expected), EXACT);
 }
 
 fn zeros() -> Array2<f64> {
@@ -62,7 +62,7 @@ fn rotor_inertia() {
         world.step(1);
     }
     let v = world.view().get_qvel();
-    close(&v, |at| H * 4.0 / (M[at.1] + armature[at]));
+    assert_speeds(&world, |at| H * 4.0 / (M[at.1] + armature[at]));
     assert_eq!(v.row(1), other.view().get_qvel().row(1), "bit for bit");
     // Implicit damping has a half of its own in MuJoCo's armature, of which nothing shows.
     let (rotor, damping) = (1e-3, 40.0);
@@ -87,7 +87,7 @@ fn damping() {
         let damping = array![[1.5, 1.5], [40.0, 0.0], [1.5, 1.5]];
         assert_eq!((world.view().get_joint_damping(), world.view().get_damping()), (damping.clone(), before));
         world.step(1);
-        close(&world.view().get_qvel(), |at| M[at.1] / (M[at.1] + H * damping[at]));
+        assert_speeds(&world, |at| M[at.1] / (M[at.1] + H * damping[at]));
     }
 }
 
@@ -141,7 +141,7 @@ fn joints_without_any() {
         robot.set_armature(&array![[0.5, 0.25]], None, ENV1).unwrap();
         robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
         world.step(1);
-        close(&world.view().get_qvel(), |(env, joint)| {
+        assert_speeds(&world, |(env, joint)| {
             let own = |values: [f64; 2]| if env == 1 { values[joint] } else { 0.0 };
             let mass = M[joint] + own([0.5, 0.25]);
             mass / (mass + H * own([40.0, 3.0]))
@@ -189,7 +189,7 @@ fn lasting() {
     world.sim.restore(&snapshot, None).unwrap();
     world.robot().write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
     world.step(1);
-    close(&world.view().get_qvel(), |(_, joint)| M[joint] / (M[joint] + H * damping[joint]));
+    assert_speeds(&world, |(_, joint)| M[joint] / (M[joint] + H * damping[joint]));
 }
 
 #[test]

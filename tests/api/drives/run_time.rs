@@ -60,7 +60,7 @@ fn gains_per_joint_and_environment() {
     let v = world.view().get_qvel();
     for ((env, joint), &v) in v.indexed_iter() {
         let expected = first_speed(M[joint], kp[(env, joint)], kd[(env, joint)]);
-        assert_close(v, expected, EXACT, &format!("environment {env}, joint {joint}"));
+        assert_number(&format!("environment {env}, joint {joint}"), v, expected, EXACT);
     }
     let mut other = wheels(gains(100.0, 10.0));
     other.step(1);
@@ -75,7 +75,7 @@ fn gains_per_joint_and_environment() {
     world.step(10);
     for ((env, joint), &v) in world.view().get_qvel().indexed_iter() {
         let expected = 10.0 * H * [0.3, -0.5][joint] / M[joint];
-        assert_close(v, expected, EXACT, &format!("an effort alone, environment {env}, joint {joint}"));
+        assert_number(&format!("an effort alone, environment {env}, joint {joint}"), v, expected, EXACT);
     }
 }
 
@@ -94,8 +94,8 @@ fn drive_types() {
     world.step(1);
     let v = world.view().get_qvel();
     for joint in 0..2 {
-        assert_close(v[(0, joint)], first_speed(M[joint], k, d), EXACT, "force");
-        assert_close(v[(1, joint)], first_speed(1.0, k, d), EXACT, "acceleration");
+        assert_number("force", v[(0, joint)], first_speed(M[joint], k, d), EXACT);
+        assert_number("acceleration", v[(1, joint)], first_speed(1.0, k, d), EXACT);
         assert_eq!(v[(2, joint)], 0.0, "none");
     }
     assert_eq!(world.view().get_qf().row(2).to_vec(), [0.0; 2]);
@@ -112,7 +112,7 @@ fn drive_types() {
     set(&mut world, DriveType::Acceleration, 1);
     world.robot().set_stiffness(&array![[30.0, 30.0]], None, ENV1).unwrap();
     let gains = world.sim.batch().read(1, |env| env.drives.gains[1]);
-    assert_close(gains.kp, 30.0 * M[1], EXACT, "gain in torque units");
+    assert_number("gain in torque units", gains.kp, 30.0 * M[1], EXACT);
 }
 
 /// Saturated, M v' = h limit, to the limit's last bit.
@@ -127,9 +127,9 @@ fn effort_limits() {
     for ((env, joint), &limit) in limits.indexed_iter() {
         if limit.is_finite() {
             assert_eq!(effort[(env, joint)], limit);
-            assert_close(v[(env, joint)], H * limit / M[joint], EXACT, "M v' = h limit");
+            assert_number("M v' = h limit", v[(env, joint)], H * limit / M[joint], EXACT);
         } else {
-            assert_close(v[(env, joint)], first_speed(M[joint], 1e3, 10.0), EXACT, "no limit");
+            assert_number("no limit", v[(env, joint)], first_speed(M[joint], 1e3, 10.0), EXACT);
         }
     }
 }
@@ -170,11 +170,12 @@ fn soft_limits() {
     let cfg = |soft_limit_factor| RobotCfg { soft_limit_factor, ..robot.clone() };
     let mut world = load(cfg(0.9), weightless());
     let soft = world.view().soft_qpos_limits();
-    assert_close(soft[(0, 0, 0)], 0.5 - 1.35, 1e-15, "lower");
-    assert_close(soft[(0, 0, 1)], 0.5 + 1.35, 1e-15, "upper");
+    assert_number("lower", soft[(0, 0, 0)], 0.5 - 1.35, Tolerance::mixed(1e-15, "two roundings"));
+    assert_number("upper", soft[(0, 0, 1)], 0.5 + 1.35, Tolerance::mixed(1e-15, "two roundings"));
     assert_eq!((soft[(0, 1, 0)], soft[(0, 1, 1)]), (f64::NEG_INFINITY, f64::INFINITY));
     world.robot().set_qpos_limits(&array![[[0.0, 1.0]]], FIRST, None).unwrap();
-    assert_close(world.view().soft_qpos_limits()[(0, 0, 0)], 0.05, 1e-15, "of the limits that are set");
+    let limit = Tolerance::mixed(1e-15, "two roundings");
+    assert_number("of the limits that are set", world.view().soft_qpos_limits()[(0, 0, 0)], 0.05, limit);
     let whole = load(cfg(1.0), weightless());
     assert_eq!(whole.view().soft_qpos_limits(), whole.view().qpos_limits());
     for bad in [-0.1, 1.1, f64::NAN] {
@@ -212,7 +213,7 @@ fn changes_of_the_world() {
     world.aim(&[AIM; 2]);
     assert_eq!(settings(&world), before);
     world.step(1);
-    assert_close(world.view().get_qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT, "the law of the new gains");
+    assert_number("the law of the new gains", world.view().get_qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT);
 }
 
 /// A call of a setter, and parts of its message.

@@ -9,6 +9,7 @@ use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj;
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::sync::Arc;
+pub(crate) use testkit::tolerance::{Tolerance, assert_number};
 use testkit::urdf::{Files, joint, robot};
 pub(crate) use testkit::worlds::{gains, no_drive};
 use testkit::worlds::{text_robot, weightless_cfg};
@@ -312,13 +313,6 @@ pub(crate) fn command(env: &mut Env, [position, velocity, effort]: [f64; 3]) {
 pub(crate) fn step(env: &mut Env) {
     env.step(1);
     assert_eq!(*env.status(), EnvStatus::Running);
-}
-
-/// `found` is `expected` within `tolerance`, relative where the number is larger than 1.
-#[track_caller]
-pub(crate) fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
-    let error = (found - expected).abs() / expected.abs().max(1.0);
-    assert!(error <= tolerance, "{what}: {found:.12e}, expected {expected:.12e}: off by {error:.1e} > {tolerance:.0e}");
 }
 
 /// Compiles MJCF for stepping with plain MuJoCo.

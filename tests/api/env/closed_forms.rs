@@ -3,6 +3,7 @@
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::env::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
 use kinetoscope::ndarray::{Array2, array};
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 
 const DT: f64 = 0.01;
 const FORCE: f64 = 4.0;
@@ -13,8 +14,8 @@ fn place(k: u64) -> f64 {
     DT * DT * FORCE * (k * (k + 1) / 2) as f64
 }
 
-/// Sums of 60 numbers below 1: rounding is below 60 x 60 / 2 x 2^-53 of the largest.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING: Tolerance =
+    Tolerance::absolute(1e-12, "sums of 60 numbers below 1: less than 60 x 60 / 2 x 2^-53 of the largest");
 
 #[test]
 fn pushed_cart() {
@@ -25,22 +26,22 @@ fn pushed_cart() {
     for k in 1..=60 {
         let step = env.step(&forces).unwrap();
         for (e, sign) in [1.0, 0.0, -1.0].into_iter().enumerate() {
-            assert!((step.final_observations[(e, 0)] - sign * place(k)).abs() < ROUNDING, "step {k}");
-            assert!((step.rewards[e] + sign * place(k)).abs() < ROUNDING, "step {k}");
+            let seen = [step.final_observations[(e, 0)], step.rewards[e]];
+            assert_close(&format!("step {k}"), &seen, &[sign * place(k), -sign * place(k)], ROUNDING);
             assert_eq!(step.rewards[e], step.info.reward_terms[(e, 0)]);
             sums[e] -= sign * place(k);
         }
         if k == 60 {
             assert_eq!(step.info.ended.len(), 3);
             for ended in &step.info.ended {
-                assert!((ended.total() - sums[ended.env.0]).abs() < 60.0 * ROUNDING, "{ended:?}");
+                assert_number("sum of the rewards", ended.total(), sums[ended.env.0], ROUNDING * 60.0);
                 assert_eq!((ended.steps, ended.reward_sums.len()), (60, 1));
             }
         }
     }
     // Control: a force that is 1 % larger is told apart.
     let other = env.step(&array![[1.01 * FORCE], [0.0], [0.0]]).unwrap();
-    assert!((other.final_observations[(0, 0)] - place(1)).abs() > 1e3 * ROUNDING);
+    assert!((other.final_observations[(0, 0)] - place(1)).abs() > 1e3 * ROUNDING.absolute);
 }
 
 #[test]
@@ -67,9 +68,8 @@ fn decimation() {
     };
     // x_k = 0.0004 k (k + 1) / 2 is above 0.005 from k = 5 on (0.006): five physics steps with the force, or all ten.
     let ((each, time), (once, _)) = (run(true), run(false));
-    assert!((each - 5.0 * DT * FORCE).abs() < ROUNDING, "{each}");
-    assert!((once - 10.0 * DT * FORCE).abs() < ROUNDING, "{once}");
-    assert!((time - 0.1).abs() < ROUNDING);
+    let expected = [5.0 * DT * FORCE, 10.0 * DT * FORCE, 0.1];
+    assert_close("each step, the first alone, time", &[each, once, time], &expected, ROUNDING);
 }
 
 #[test]

@@ -3,9 +3,12 @@
 use super::tasks::{cfg, idle};
 use kinetoscope::env::terms::{self, RootRanges};
 use kinetoscope::env::{CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm};
-use kinetoscope::ndarray::{Array2, Axis, array, s};
+use kinetoscope::ndarray::{Array2, ArrayView1, Axis, array, s};
 use kinetoscope::prelude::*;
+use kinetoscope::scene::pose::from_row;
+use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
+use testkit::tolerance::{Tolerance, assert_close};
 use testkit::worlds::{mjcf_robot, passive};
 
 /// A box of 2 kg that floats, with a lever on a hinge from -1 to 2 rad.
@@ -157,6 +160,18 @@ fn root_ranges() {
     }
     assert!(column(&poses, 2).iter().all(|z| (z - 1.1).abs() < 1e-12));
     assert!(speeds.column(1).iter().chain(speeds.column(4)).all(|v| *v == 0.0));
+
+    // The axes are the root's own: yaw leaves the z axis of a robot that lies on its side, not that of the environment.
+    let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(N, 1) }).unwrap();
+    let lying = Pose::rotation([FRAC_PI_2, 0.0, 0.0].into());
+    let robot = RobotCfg { fix_base: false, init_pose: lying, ..passive(mjcf_robot("floater", FLOATER)) };
+    let robot = sim.add_robot(robot).unwrap();
+    let [poses, ..] = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let turned = |row: ArrayView1<'_, f64>| from_row(&std::array::from_fn(|k| row[k])).rotation;
+    let axes: Vec<_> = poses.rows().into_iter().map(|row| turned(row) * Vector3::z()).collect();
+    assert!(axes.iter().all(|z| (z + Vector3::y()).norm() < 1e-12), "{axes:?}");
+    let ahead: Vec<f64> = poses.rows().into_iter().map(|row| (turned(row) * Vector3::x()).x).collect();
+    assert!(ahead.iter().any(|x| *x < 0.5), "they have turned: {ahead:?}");
 }
 
 #[test]
@@ -195,21 +210,23 @@ fn root_state() {
     env.sim_mut().robot_mut(robot).write_root_velocity(&array![[0.3, 0.2, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
     let step = env.step(&Array2::zeros((2, 1))).unwrap();
     let (seen, dt) = (&step.final_observations, env.step_dt());
-    // z, v, w, down: of the second y is the world's z and z the world's minus y. Gravity adds g dt to what falls; the lever, a
-    // twentieth of the mass on its own hinge, moves them by less than a hundredth of that.
+    // z, v, w, down: of the second y is the world's z and z the world's minus y. Gravity adds g dt to what falls.
     let fall = 9.81 * dt;
-    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.02 * fall, "{found} {expected}");
+    let lever = Tolerance::absolute(
+        0.02 * fall,
+        "a twentieth of the mass on its own hinge moves them by less than a hundredth",
+    );
     for (env, first, expected) in
         [(0, 1, [0.3, 0.2, -fall]), (1, 1, [0.3, -fall, -0.2]), (0, 7, [0.0, 0.0, -1.0]), (1, 7, [0.0, -1.0, 0.0])]
     {
-        expected.into_iter().enumerate().for_each(|(k, x)| near(seen[(env, first + k)], x));
+        let found = [0, 1, 2].map(|k| seen[(env, first + k)]);
+        assert_close(&format!("environment {env}, column {first}"), &found, &expected, lever);
     }
     // 1 of being there, then the two; what is off is 0.2 m/s of 0.5 for the first and what it falls for the second.
     let rewards = &step.info.reward_terms;
-    near(rewards[(0, 1)], 0.0);
-    near(rewards[(1, 1)], 1.0);
-    near(rewards[(0, 2)], 2.0 * (-(0.2f64 / 0.5).powi(2)).exp());
-    near(rewards[(1, 2)], 2.0 * (-(fall / 0.5).powi(2)).exp());
+    let expected = [0.2, fall].map(|off: f64| 2.0 * (-(off / 0.5).powi(2)).exp());
+    assert_close("being there", rewards.column(1), &[0.0, 1.0], lever);
+    assert_close("speed", rewards.column(2), &expected, lever);
     let (sim, robot) = floater(2, false);
     let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
     let mut env = begin(task(sim, robot).command(speed()).reward(wrong));

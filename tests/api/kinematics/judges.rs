@@ -8,9 +8,11 @@ use super::*;
 use kinetoscope::ndarray::{Array3, s};
 use kinetoscope::sim::mj::{self, Data, ObjectKind};
 use nalgebra::Vector3;
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 use testkit::urdf::joint;
 
-const BOUND: f64 = 1e-12;
+const BOUND: Tolerance =
+    Tolerance::absolute(1e-12, "a dozen transforms of size 1, some units of 2e-16, in another order");
 
 /// The joint that a joint follows, multiplier and offset (itself, 1 and 0 if it follows none).
 type Driver = (JointIndex, f64, f64);
@@ -161,7 +163,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
         let fk = robot.compute_fk(&qpos, Tip::of_link(link), None).unwrap();
         for ours in [fk, links.index_axis(Axis(1), k).to_owned()] {
             let (far, turned) = apart(&ours, &robot.link_pose(link).unwrap());
-            assert!(far < BOUND && turned < BOUND, "{name}, {link}: {far} m, {turned} rad");
+            assert_close(&format!("{name}, {link}"), &[far, turned], &[0.0; 2], BOUND);
         }
     }
     assert_eq!(robot.jacobian(tip, None, None).unwrap(), jacobian, "{name}: where the joints are");
@@ -169,7 +171,8 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
     let slopes = largest(&jacobian, &differences(sim, id, tip, &qpos));
     // The control: at another point it is another Jacobian.
     let elsewhere = largest(&jacobian, &judge(sim, id, body, &robot.link_pose(link).unwrap()));
-    assert!(mujoco < BOUND && slopes < 1e-7 && elsewhere > 1e-3, "{name}: {mujoco} {slopes} {elsewhere}");
+    assert_number(name, mujoco, 0.0, BOUND);
+    assert!(slopes < 1e-7 && elsewhere > 1e-3, "{name}: {slopes} {elsewhere}");
 
     let Some(urdf) = urdf else { return };
     let (mut reader, joints, roots) = (Reader::of(urdf), robot.joint_names(), robot.get_root_pose());
@@ -183,7 +186,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
         for (k, link) in names.iter().enumerate() {
             let theirs = base * reader.pose(reader.body(link, names[0]));
             let (far, turned) = errors(&pose(links.index_axis(Axis(0), env).row(k)), &theirs);
-            assert!(far < BOUND && turned < BOUND, "{name}, {link}: {far} m, {turned} rad from MuJoCo's reader");
+            assert_close(&format!("{name}, {link}, MuJoCo's reader"), &[far, turned], &[0.0; 2], BOUND);
         }
         let frame = reader.pose(body);
         moved = moved.max(errors(&frame, &start).0);
@@ -192,7 +195,9 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
             for (joint, first) in (0..joints.len()).flat_map(|joint| [(joint, 0), (joint, 3)]) {
                 let theirs = base.rotation * Vector3::from_fn(|k, _| theirs[(first + k, joint)]);
                 let off = (Vector3::from_fn(|k, _| jacobian[(env, first + k, joint)]) - theirs).norm();
-                assert!(!is_there || off < BOUND, "{name}, {joint}: {off} from MuJoCo's reader");
+                if is_there {
+                    assert_number(&format!("{name}, {joint}, MuJoCo's reader"), off, 0.0, BOUND);
+                }
                 elsewhere = elsewhere.max(off);
             }
         }
@@ -287,7 +292,7 @@ fn tips() {
     let of_part = |ids: &[JointIndex]| qpos.select(Axis(1), &ids.iter().map(|id| id.0).collect::<Vec<_>>());
     let near = |what: &str, ours: &Array2<f64>, judge: &Array2<f64>| {
         let (far, turned) = apart(ours, judge);
-        assert!(far < BOUND && turned < BOUND, "{what}: {far} {turned}");
+        assert_close(what, &[far, turned], &[0.0; 2], BOUND);
     };
     // The arm ends in the link on its flange, by a name that may be a part or a link.
     for tip in [Tip::of_part("arm"), Tip::of_part("arm").at("ee_link"), "arm".into()] {
@@ -313,6 +318,6 @@ fn tips() {
     assert_eq!(tool.dim(), (2, 7));
     for row in tool.rows() {
         let (far, turned) = errors(&pose(row), &(pose_in(&judge, 1) * tcp));
-        assert!(far < BOUND && turned < BOUND, "{far} {turned}");
+        assert_close("tool", &[far, turned], &[0.0; 2], BOUND);
     }
 }

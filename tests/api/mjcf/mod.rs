@@ -36,9 +36,5 @@ fn data_of(sim: &SimulationManager, model: &Model, ctrl: &[f64]) -> Data {
     data
 }
 
-fn near(found: &[f64], expected: &[f64], within: f64) -> bool {
-    found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() < within)
-}
-
 /// Every kind of element that both lines of MuJoCo know, in one small file with degrees, classes and frames at odd angles.
 const MACHINE: &str = include_str!("../../data/mjcf/machine.xml");

@@ -4,6 +4,7 @@ use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::mj::{ObjectKind, compile_file};
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 use testkit::urdf::Files;
 use testkit::worlds::{errors, pose_in, row, sr5};
 
@@ -38,12 +39,13 @@ fn copies() {
     let [a, b] = [first, second].map(|part| sim.mjcf_part(part).get_qpos().row(0).to_vec());
     // Each of 200 steps rounds numbers of about 1 (2e-16). What a pendulum of 0.2 m makes of that grows by sqrt(g / l) = 7
     // per second at most, in 0.4 s sixteenfold: 6e-13.
-    let rounding = 1e-12;
-    assert!(near(&a, data.qpos(), rounding) && near(&b[..2], &data.qpos()[..2], rounding), "{a:?} {b:?}");
+    let rounding = Tolerance::absolute(1e-12, "200 roundings that grow sixteenfold in 0.4 s");
+    assert_close("first", &a, data.qpos(), rounding);
+    assert_close("second", &b[..2], &data.qpos()[..2], rounding);
     for body in ["block", "body1", "body2"] {
         let [first, second] = [first, second].map(|part| pose_in(&sim.mjcf_part(part).body_pose(body).unwrap(), 0));
         let (far, angle) = errors(&(turn * first), &second);
-        assert!(far < rounding && angle < rounding, "{body}: {far} {angle}");
+        assert_close(body, &[far, angle], &[0.0; 2], rounding);
     }
     assert!((a[0] - model.qpos0()[0]).abs() > 0.05, "it swings");
 }
@@ -116,9 +118,10 @@ fn whole_machine() {
     let mut data = data_of(&sim, &alone(MACHINE), &[0.4, -0.3, 0.8]);
     (0..300).for_each(|_| data.step().unwrap());
     let (qpos, act) = (sim.mjcf_part(part).get_qpos(), sim.batch().read(0, |env| env.data().act().to_vec()));
-    // As for copies, for 300 steps: in 0.6 s errors grow by e^4.2 = 67, 300 * 67 * 2e-16 = 4e-12.
-    assert!(near(qpos.as_slice().unwrap(), data.qpos(), 1e-11), "{qpos} is not {:?}", data.qpos());
-    assert!((act[0] - data.act()[0]).abs() < 1e-11 && act[0] > 0.1);
+    let rounding = Tolerance::absolute(1e-11, "300 roundings that grow by e^4.2 = 67 in 0.6 s, as for copies: 4e-12");
+    assert_close("positions", &qpos, data.qpos(), rounding);
+    assert_number("activation", act[0], data.act()[0], rounding);
+    assert!(act[0] > 0.1);
 }
 
 /// A slanted wedge with a texture on it, whose origin is far from its middle.
@@ -156,8 +159,8 @@ fn meshes() {
     let (here, there) = (corners(sim.batch().model()), corners(&alone));
     assert_eq!((here.len(), there.len()), (12, 12));
     for ((at, texture), (expected_at, expected_texture)) in here.iter().zip(&there) {
-        // Single precision of half a metre: 3e-8; centred once by MuJoCo, once more in the scene.
-        assert!(near(at, expected_at, 2e-7), "{at:?} is not {expected_at:?}");
+        let single = Tolerance::absolute(2e-7, "single precision of 0.5 m, 3e-8: centred by MuJoCo and in the scene");
+        assert_close("corner", at, expected_at, single);
         assert_eq!(texture, expected_texture);
     }
     assert!(here.iter().any(|(_, texture)| *texture != here[0].1));
@@ -165,8 +168,9 @@ fn meshes() {
     let mut data = data_of(&sim, &alone, &[]);
     (0..200).for_each(|_| data.step().unwrap());
     let qpos = sim.mjcf_part(part).get_qpos();
-    // It rests on a face: they differ by as much as its corners, and no more.
-    assert!(near(qpos.as_slice().unwrap(), data.qpos(), 1e-5), "{qpos} is not {:?}", data.qpos());
+    let corners =
+        Tolerance::absolute(1e-5, "it rests on a face and differs by as much as its corners; measured, not derived");
+    assert_close("positions", &qpos, data.qpos(), corners);
     assert!((data.qpos()[2] + 0.08).abs() > 1e-3 && !data.contact().is_empty(), "it moved: {:?}", data.qpos());
 }
 

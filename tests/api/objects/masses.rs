@@ -184,6 +184,9 @@ fn friction() {
     sim.rigid_object_mut(id).set_friction(&rows, Some(&[EnvId(2), EnvId(3)])).unwrap();
     let read = sim.rigid_object(id).get_friction();
     assert_eq!(read, array![[0.5, 0.005, 0.0001], [0.5, 0.005, 0.0001], [0.3, 0.005, 0.0001], [0.6, 0.01, 0.0002]]);
+    // MuJoCo steps with all three.
+    let of_geoms = sim.batch().read(3, |env| env.data().model().geom_friction().to_vec());
+    assert!(of_geoms.chunks(3).any(|of| of == [0.6, 0.01, 0.0002]), "{of_geoms:?}");
     // 10 % below and above the threshold of 0.5, then 8.83 N: above that of 0.3, below that of 0.6.
     let pull = [0.45, 0.55, 0.45, 0.45].map(|part| part * 2.0 * 9.81);
     // At the height of the ground, so that nothing tips: the torque of a force 5 cm above it is taken back.

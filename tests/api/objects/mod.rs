@@ -12,13 +12,14 @@ mod welds;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};
 use std::path::PathBuf;
+use testkit::tolerance::{Tolerance, assert_number};
 use testkit::urdf::Files;
 use testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};
 
 const SECOND: &[EnvId] = &[EnvId(1)];
 /// MuJoCo's contacts are soft: with the default reference a body sinks in by (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) =
 /// 0.4 mm at most (k = 1 / (0.95 · 0.02 s)²).
-const SOFT: f64 = 5e-4;
+const SOFT: Tolerance = Tolerance::absolute(5e-4, "depth of a soft contact at rest, 0.4 mm at most");
 
 /// Steps of a millisecond in an empty scene.
 fn empty(num_envs: usize) -> SimulationManager {

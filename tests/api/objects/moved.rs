@@ -126,7 +126,7 @@ fn shelves() {
     sim.update(1500);
     let lies = sim.rigid_object(ball).get_pose();
     for (env, height) in heights.into_iter().enumerate() {
-        assert!((lies[(env, 2)] - height - 0.07).abs() < SOFT, "environment {env}: {lies}");
+        assert_number(&format!("environment {env}"), lies[(env, 2)], height + 0.07, SOFT);
         // The judge: a scene that was built so.
         let (mut built, _, ball) = shelf(3, height);
         built.update(1500);

@@ -5,14 +5,14 @@ use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::refusal::assert_error;
+use testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
 
 #[test]
 fn configurations() {
     let mut sim = empty(1);
     let cube = || object("o", ObjectShape::cube(0.1), [0.0; 3]);
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    for (field, cfg) in [
+    let rows = [
         ("shape", RigidObjectCfg { shape: ObjectShape::Cone { radius: 0.0, height: 1.0 }, ..cube() }),
         ("shape", RigidObjectCfg { shape: ObjectShape::Cone { radius: 1.0, height: nan }, ..cube() }),
         ("center_of_mass", RigidObjectCfg { center_of_mass: Some([0.0, infinite, 0.0]), ..cube() }),
@@ -32,9 +32,9 @@ fn configurations() {
         ("restitution", RigidObjectCfg { restitution: Some(1.1), ..cube() }),
         ("restitution", RigidObjectCfg { restitution: Some(nan), ..cube() }),
         ("contact_margin", RigidObjectCfg { contact_margin: -1e-3, ..cube() }),
-    ] {
-        assert_error(sim.add_rigid_object(cfg), &format!("Config {{ field: {field:?}"), &[]);
-    }
+    ];
+    let variant = |field| format!("Config {{ field: {field:?}");
+    assert_refused(rows.map(|(field, cfg)| (field, sim.add_rigid_object(cfg), variant(field), [])));
     // Control: what is left out of each is good.
     sim.add_rigid_object(cube()).unwrap();
 }
@@ -51,11 +51,13 @@ fn mesh_files() {
         sim.add_rigid_object(object("o", shape, [0.0; 3]))
     };
     let (mesh, hull) = ("ObjectMesh { object: \"o\"", HullCfg::default());
-    assert_error(add(&absent, [1.0; 3], hull), mesh, &["none.stl"]);
-    assert_error(add(&text, [1.0; 3], hull), mesh, &["t.obj"]);
-    assert_error(add(&good, [1.0; 3], few), mesh, &["max_vertices"]);
-    assert_error(add(&good, [1.0, 0.0, 1.0], hull), "Config { field: \"shape\"", &[]);
-    assert_error(add(&good, [1.0, f64::NAN, 1.0], hull), "Config { field: \"shape\"", &[]);
+    assert_refused([
+        ("absent", add(&absent, [1.0; 3], hull), mesh, &["none.stl"][..]),
+        ("no index", add(&text, [1.0; 3], hull), mesh, &["t.obj"]),
+        ("no solid", add(&good, [1.0; 3], few), mesh, &["max_vertices"]),
+        ("flat", add(&good, [1.0, 0.0, 1.0], hull), "Config { field: \"shape\"", &[]),
+        ("NaN", add(&good, [1.0, f64::NAN, 1.0], hull), "Config { field: \"shape\"", &[]),
+    ]);
     add(&good, [1.0; 3], hull).unwrap();
 }
 
@@ -65,17 +67,17 @@ fn writes() {
     let cube = |uid| object(uid, ObjectShape::cube(0.1), [0.0; 3]);
     let [free, hand, stands] =
         [cube("free"), kinematic(cube("hand")), fixed(cube("fixed"))].map(|cfg| sim.add_rigid_object(cfg).unwrap());
-    let not_dynamic = |result: Result<()>, argument: &str| {
-        assert_error(result, &format!("NotDynamic {{ argument: {argument:?}"), &[]);
-    };
-    let velocity = array![[1.0; 6]];
-    not_dynamic(sim.rigid_object_mut(hand).write_velocity(&velocity, None), "write_velocity");
-    not_dynamic(sim.rigid_object_mut(hand).set_mass(&array![1.0], None), "set_mass");
-    not_dynamic(sim.rigid_object_mut(stands).set_inertia(&array![[1.0; 3]], None), "set_inertia");
-    not_dynamic(sim.rigid_object_mut(stands).set_center_of_mass(&array![[1.0; 3]], None), "set_center_of_mass");
-    let zeros = array![[0.0; 3]];
+    let (velocity, zeros) = (array![[1.0; 6]], array![[0.0; 3]]);
     let wrench = sim.rigid_object_mut(hand).set_external_wrench(&zeros, &zeros, WrenchFrame::World, None);
-    not_dynamic(wrench, "set_external_wrench");
+    let results = [
+        ("write_velocity", sim.rigid_object_mut(hand).write_velocity(&velocity, None)),
+        ("set_mass", sim.rigid_object_mut(hand).set_mass(&array![1.0], None)),
+        ("set_inertia", sim.rigid_object_mut(stands).set_inertia(&array![[1.0; 3]], None)),
+        ("set_center_of_mass", sim.rigid_object_mut(stands).set_center_of_mass(&array![[1.0; 3]], None)),
+        ("set_external_wrench", wrench),
+    ];
+    let variant = |argument| format!("NotDynamic {{ argument: {argument:?}");
+    assert_refused(results.map(|(argument, result)| (argument, result, variant(argument), [])));
     assert_error(sim.rigid_object_mut(stands).write_velocity(&velocity, None), "FixedBody(\"fixed\")", &[]);
     // Poses of objects of every type; the wrench names which of its two tables.
     let twice = Some(&[EnvId(2), EnvId(0), EnvId(2)][..]);
@@ -98,15 +100,14 @@ fn writes() {
     let wrench = object.set_external_wrench(&rows(3), &rows(3), WrenchFrame::World, twice);
     repeated(wrench, "set_external_wrench (forces)");
     // The last environment's row is bad: none has changed.
-    for result in [
-        object.set_mass(&array![2.0, 2.0, -1.0], None),
-        object.set_mass(&array![0.0], None),
-        object.set_inertia(&array![[1.0, 1.0, 3.0]], None),
-        object.set_friction(&array![[-0.1, 0.0, 0.0]], None),
-        object.set_friction(&array![[0.1, 0.0, -1.0]], None),
-    ] {
-        assert!(matches!(&result, Err(Error::Randomization(RandomizationError::Value { .. }))), "{result:?}");
-    }
+    let results = [
+        ("one mass", object.set_mass(&array![2.0, 2.0, -1.0], None)),
+        ("all masses", object.set_mass(&array![0.0], None)),
+        ("inertia", object.set_inertia(&array![[1.0, 1.0, 3.0]], None)),
+        ("sliding", object.set_friction(&array![[-0.1, 0.0, 0.0]], None)),
+        ("rolling", object.set_friction(&array![[0.1, 0.0, -1.0]], None)),
+    ];
+    assert_refused(results.map(|(what, result)| (what, result, "Randomization(Value {", [])));
     let mass = object.read().mass();
     assert_eq!(object.read().get_mass().to_vec(), [mass; 3]);
     assert_eq!(object.read().get_friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
@@ -119,15 +120,15 @@ fn writes() {
 #[test]
 fn places() {
     let (mut sim, shelf, _) = moved::shelf(2, 0.5);
-    let before = sim.rigid_object(shelf).get_pose();
-    for (property, name, value, says) in [
-        (Property::Rotation, "shelf", &[1.0, 1.0, 0.0, 0.0][..], "length 1"),
-        (Property::Position, "shelf", &[f64::INFINITY, 0.0, 0.0], "finite"),
-        (Property::Position, "ball", &[0.0; 3], "static object called"),
-    ] {
-        assert_error(sim.randomize_with(None, |_, _, p| p.set(property, name, value)), "", &[says]);
-    }
-    assert_eq!(sim.rigid_object(shelf).get_pose(), before);
+    let rows = [
+        ("length", (Property::Rotation, "shelf", &[1.0, 1.0, 0.0, 0.0][..]), "", ["length 1"]),
+        ("infinite", (Property::Position, "shelf", &[f64::INFINITY, 0.0, 0.0]), "", ["finite"]),
+        ("moves", (Property::Position, "ball", &[0.0; 3]), "", ["static object called"]),
+    ];
+    let pose = |sim: &SimulationManager| sim.rigid_object(shelf).get_pose();
+    assert_refused_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {
+        sim.randomize_with(None, |_, _, p| p.set(property, name, value))
+    });
     let model = sim.batch().model();
     assert!(model.id(ObjectKind::Body, "shelf").is_some() && sim.property_bytes(EnvId(0)).unwrap() == 0);
 }

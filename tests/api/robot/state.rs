@@ -5,16 +5,17 @@
 //! rounding. Control: the velocity of the frame's origin and that of the center of mass differ by far more. Mistakes in
 //! arrays and indices of writers are in `tests/input/every_writer.rs`.
 
-use super::{ENVS, assert_near};
+use super::ENVS;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::ObjectKind;
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
 use testkit::refusal::assert_error;
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 use testkit::urdf::{Files, joint, link, robot};
 use testkit::worlds::{empty_cfg, errors, gains, no_drive, pose_in, text_robot};
 
-const EXACT: f64 = 1e-12;
+const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1 to 10");
 const G: f64 = 9.81;
 
 /// A base with its mass off its origin, an arm on a hinge, a finger that follows it, and a tool that is fixed to the arm.
@@ -103,7 +104,7 @@ fn links() {
             for env in 0..ENVS {
                 let expected = by_jacobian(&sim, env, &body, [0, 1, 2].map(|k| pose[(env, k)]));
                 let what = format!("{name} in environment {env}, round {round}");
-                assert_near(velocity.row(env), &expected, EXACT, &what);
+                assert_close(&what, velocity.row(env), &expected, EXACT);
             }
         }
         // The tool is at its mount on the arm.
@@ -112,7 +113,8 @@ fn links() {
         for env in 0..ENVS {
             let [arm, tool] = ["arm", "tool"].map(|name| pose_in(&view.link_pose(name).unwrap(), env));
             let (distance, angle) = errors(&(arm * mount), &tool);
-            assert!(distance < EXACT && angle < 1e-7, "{distance} {angle}");
+            assert_number("distance from the mount", distance, 0.0, EXACT);
+            assert!(angle < 1e-7, "{angle}");
         }
         sim.update(20);
     }
@@ -151,9 +153,9 @@ fn root() {
                 ("angular velocity in the root", angular.row(env), &in_axes(&at_frame[3..])[..]),
                 ("gravity in the root", gravity.row(env), &in_axes(&[0.0, 0.0, -1.0])[..]),
             ] {
-                assert_near(found, expected, EXACT, what);
+                assert_close(what, found, expected, EXACT);
             }
-            assert_near([&heading[env]], [&x_axis[1].atan2(x_axis[0])], EXACT, "heading");
+            assert_number("heading", heading[env], x_axis[1].atan2(x_axis[0]), EXACT);
         }
         sim.update(15);
     }
@@ -174,9 +176,9 @@ fn gravity_and_heading() {
         sim.robot_mut(id).write_root_pose(&poses, None).unwrap();
         let pull = if gravity > 0.0 { 1.0 } else { 0.0 };
         let projected = sim.robot(id).get_projected_gravity_b();
-        assert_near(projected.row(0), &[0.0, -pull * roll.sin(), -pull * roll.cos()], EXACT, "rolled");
-        assert_near(projected.row(1), &[0.0, 0.0, -pull], EXACT, "turned");
-        assert_near(&sim.robot(id).get_root_heading(), &[0.0, yaw, 0.0], EXACT, "heading");
+        assert_close("rolled", projected.row(0), &[0.0, -pull * roll.sin(), -pull * roll.cos()], EXACT);
+        assert_close("turned", projected.row(1), &[0.0, 0.0, -pull], EXACT);
+        assert_close("heading", &sim.robot(id).get_root_heading(), &[0.0, yaw, 0.0], EXACT);
     }
 }
 
@@ -201,8 +203,8 @@ fn root_in_free_fall() {
         }
         for env in 0..ENVS {
             let height = 5.0 - G * 1e-4 * 50.0 * 51.0 / 2.0;
-            assert_near(pose.row(env), &[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], EXACT, "pose");
-            assert_near(velocity.row(env), &[0.0, 0.0, -G * 0.5, 0.0, 0.0, 0.0], EXACT, "velocity");
+            assert_close("pose", pose.row(env), &[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], EXACT);
+            assert_close("velocity", velocity.row(env), &[0.0, 0.0, -G * 0.5, 0.0, 0.0, 0.0], EXACT);
         }
         assert_eq!(sim.robot(id).link_pose("outer").unwrap(), pose);
     }
@@ -221,15 +223,18 @@ fn written_root() {
     let (pose, half) = (sim.robot(id).get_root_pose(), std::f64::consts::FRAC_1_SQRT_2);
     assert_eq!(pose.row(1).to_vec(), [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0], "environment 1 was not chosen");
     for env in [0, 2] {
-        assert_near(pose.row(env), &[1.0, 2.0, 3.0, half, half, 0.0, 0.0], 1e-15, "pose");
+        let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
+        assert_close("pose", pose.row(env), &[1.0, 2.0, 3.0, half, half, 0.0, 0.0], limit);
     }
     for env in 0..ENVS {
-        assert_near(sim.robot(id).get_root_velocity().row(env), &moving, 1e-15, "velocity");
+        let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
+        assert_close("velocity", sim.robot(id).get_root_velocity().row(env), &moving, limit);
     }
     sim.update(100);
     // One second later: 2 rad about the world's z. Semi-implicit steps of a ball are exact up to rounding.
     for env in 0..ENVS {
-        assert_near(sim.robot(id).get_root_velocity().row(env), &moving, 1e-9, "velocity after a second");
+        let limit = Tolerance::absolute(1e-9, "semi-implicit steps of a ball are exact up to rounding");
+        assert_close("velocity after a second", sim.robot(id).get_root_velocity().row(env), &moving, limit);
     }
     let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 2.0)
         * UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
@@ -246,10 +251,10 @@ fn written_root() {
     let (pose, com) = (view.get_root_pose(), view.get_root_com_position());
     assert_eq!(found.row(0), before.row(0), "environment 0 was not chosen");
     for env in [1, 2] {
-        assert_near(found.row(env), wanted.row(0), EXACT, "what was written");
+        assert_close("what was written", found.row(env), wanted.row(0), EXACT);
         let arm = Vector3::from_fn(|k, _| pose[(env, k)] - com[(env, k)]);
         let expected = Vector3::new(0.5, -1.0, 2.0) + Vector3::new(3.0, -0.4, 0.6).cross(&arm);
-        assert_near(frame.row(env).iter().take(3), &expected, EXACT, "velocity of the frame");
+        assert_close("velocity of the frame", frame.row(env).iter().take(3), &expected, EXACT);
     }
 }
 
@@ -260,7 +265,7 @@ fn written_joint_velocities() {
     sim.robot_mut(id).write_qvel(&array![[3.0]], None, Some(&[EnvId(1)])).unwrap();
     assert_eq!(sim.robot(id).get_qvel().column(0).to_vec(), [0.0, 3.0, 0.0]);
     sim.update(50);
-    assert!((sim.robot(id).get_qpos()[(1, 0)] - 1.5).abs() < EXACT);
+    assert_number("3 rad/s for 0.5 s", sim.robot(id).get_qpos()[(1, 0)], 1.5, EXACT);
     assert_eq!(sim.robot(id).get_qpos()[(0, 0)], 0.0);
     sim.reset(None).unwrap();
     assert_eq!(sim.robot(id).get_qvel().column(0).to_vec(), [0.0; 3]);
@@ -280,7 +285,8 @@ fn accelerations_of_a_step() {
         sim.update(1);
         let (after, acceleration) = (sim.robot(id).get_qvel(), sim.robot(id).get_qacc());
         // Differences of velocities of size 1 lose 1e-16 / h.
-        assert_near(&acceleration, &((after - before) / 0.01), 1e-11, "acceleration");
+        let limit = Tolerance::absolute(1e-11, "differences of velocities of size 1 lose 1e-16 / h");
+        assert_close("acceleration", &acceleration, &((after - before) / 0.01), limit);
         apart = apart.max((acceleration[(0, 0)] - acceleration[(1, 0)]).abs());
     }
     assert!(apart > 10.0, "the control: the drive of environment 1 pushes: {apart}");
@@ -328,11 +334,13 @@ fn written_accelerations() {
     for (k, (other, here)) in others.iter_mut().enumerate() {
         other.update(1);
         let [_, velocity, acceleration] = state(other, *here);
-        assert_near(&velocity, &after, 7.2e-6, &format!("start {k} of the solver"));
+        let limit = Tolerance::absolute(7.2e-6, "the end of Newton's method, see above");
+        assert_close(&format!("start {k} of the solver"), &velocity, &after, limit);
         // The written ones are gone: the step found its own.
         for (index, a) in acceleration.indexed_iter() {
             let found = (velocity[index] - v[index]) / 0.01;
-            assert_near([a], [&found], 1e-10 * (1.0 + a.abs()), "accelerations of the step");
+            let limit = Tolerance::absolute(1e-10 * (1.0 + a.abs()), "differences of velocities lose 1e-16 / h");
+            assert_number("accelerations of the step", *a, found, limit);
         }
     }
     let [(same, here), ..] = &mut others;

@@ -3,15 +3,17 @@
 //! MuJoCo's Euler step is v' = v + h F / m. Tolerance 1e-9: rounding of 1e-16 a step, over at most 200 steps, and of the
 //! solve of two bodies that differ by a factor of 100 in their inertia.
 
-use super::{ENVS, assert_near};
+use super::ENVS;
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
 use testkit::refusal::assert_error;
+use testkit::tolerance::{Tolerance, assert_close};
 use testkit::urdf::{Files, joint, link, robot};
 use testkit::worlds::{add_ball, empty_cfg, no_drive, pose_in, text_robot};
 
-const EXACT: f64 = 1e-9;
+const EXACT: Tolerance =
+    Tolerance::absolute(1e-9, "rounding of 200 steps, and of the solve of inertias that differ by a factor of 100");
 const H: f64 = 0.01;
 const G: f64 = 9.81;
 
@@ -62,10 +64,10 @@ fn force_until_it_changes() {
         }
         sim.update(steps);
         let (v, spin, x) = (sim.robot(id).get_root_velocity(), sim.robot(id).get_qvel(), share * t / 4.0);
-        assert_near(v.row(2), &[6.0 * x, -2.0 * x, x, 0.0, 0.0, 0.0], EXACT, "environment 2");
-        assert_near(v.row(0), &[0.0, 0.0, 8.0 * x, 0.0, 0.0, 0.0], EXACT, "environment 0");
+        assert_close("environment 2", v.row(2), &[6.0 * x, -2.0 * x, x, 0.0, 0.0, 0.0], EXACT);
+        assert_close("environment 0", v.row(0), &[0.0, 0.0, 8.0 * x, 0.0, 0.0, 0.0], EXACT);
         let turned = t * 0.5 / 0.02;
-        assert_near(spin.column(0), &[turned, 0.0, turned], EXACT, "spin");
+        assert_close("spin", spin.column(0), &[turned, 0.0, turned], EXACT);
         assert_eq!(v.row(1).to_vec(), [0.0; 6], "environment 1 was not chosen");
     }
     assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
@@ -93,12 +95,12 @@ fn force_in_axes_of_a_link() {
             *x += H * 5.0 / 4.0 * angle.cos();
             *y += H * 5.0 / 4.0 * angle.sin();
             // No torque comes of it: the force acts in the center of mass, wherever the grip is.
-            assert_near(v.row(env), &[*x, *y, 0.0, 0.0, 0.0, w], EXACT, &format!("environment {env}, step {k}"));
+            assert_close(&format!("environment {env}, step {k}"), v.row(env), &[*x, *y, 0.0, 0.0, 0.0, w], EXACT);
         }
     }
     let in_world = pose_in(&sim.robot(id).link_pose("grip").unwrap(), 1).rotation * Vector3::new(5.0, 0.0, 0.0);
     let read = sim.robot(id).get_external_wrenches();
-    assert_near(&[0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT, "what is read is in world axes");
+    assert_close("what is read is in world axes", &[0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
 }
 
 /// Two levers on one another under gravity, without drives: compensated, they stay where they are; with one of them
@@ -135,7 +137,7 @@ fn gravity_compensation() {
     };
     sim.update(1);
     let speeds = sim.robot(id).get_qvel();
-    assert_near(speeds.row(0), &[0.0; 2], EXACT, "nothing has weight");
+    assert_close("nothing has weight", speeds.row(0), &[0.0; 2], EXACT);
     for (env, weight) in [(1, [0.0, 1.0]), (2, [3.0, 1.0])] {
         // From rest M v' = h load, with MuJoCo's own M.
         let mass = sim.batch().read(2, |env| env.data().mass_matrix().unwrap());
@@ -148,7 +150,7 @@ fn gravity_compensation() {
     }
     sim.update(100);
     let q = sim.robot(id).get_qpos();
-    assert_near(q.row(0), &start, EXACT, "it stays for a second");
+    assert_close("it stays for a second", q.row(0), &start, EXACT);
     assert!((q[(2, 0)] - 0.3).abs() > 0.5, "the control falls: {q}");
     // Off again: it falls as the control did, from the start.
     sim.robot_mut(id).set_gravity_compensation(false, Some(&[a, b]), None).unwrap();
@@ -171,12 +173,12 @@ fn changes_of_the_world() {
     add_ball(&mut sim, "ball", [9.0, 0.0, 0.0]);
     sim.update(10);
     let (t, v) = (20.0 * H, sim.robot(id).get_root_velocity());
-    assert_near(v.row(1), &[t * 2.0 / 4.0, 0.0, -t * G / 2.0, 0.0, 0.0, 0.0], EXACT, "through the change");
+    assert_close("through the change", v.row(1), &[t * 2.0 / 4.0, 0.0, -t * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     sim.reset(None).unwrap();
     assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
     sim.update(10);
     let v = sim.robot(id).get_root_velocity();
-    assert_near(v.row(1), &[0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT, "after the reset");
+    assert_close("after the reset", v.row(1), &[0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     // Parts that are fixed to the outer ball form one body with it.
     sim.robot_mut(id).set_gravity_compensation(true, Some(&[grip]), Some(&[EnvId(0)])).unwrap();
     let on = sim.robot(id).get_gravity_compensation();

@@ -1,21 +1,27 @@
 //! Contact forces, points and times in a running simulation, against Newton's laws and closed forms.
 
-use super::worlds::{G, add_robot, assert_near, ball, cfg, cube, fixed, joint, link, pose_in, row, sim};
+use super::worlds::{G, add_robot, ball, cfg, cube, fixed, joint, link, pose_in, row, sim};
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::Cone;
 use nalgebra::Vector3;
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 use testkit::worlds;
 
-/// Rounding of forces of tens of newtons, from velocities divided by the step of 5 ms.
-const EXACT: f64 = 1e-9;
+const EXACT: Tolerance =
+    Tolerance::absolute(1e-9, "rounding of tens of newtons, from velocities divided by the step of 5 ms");
 /// Relative error of forces at rest. Contacts forget motion with their time constant of 20 ms: after five seconds e^-250 of
 /// it is left. The rest is the solver's tolerance of 1e-8.
-const REST: f64 = 1e-8;
+const REST: Tolerance = Tolerance::absolute(1e-8, "the solver's, for forces of 1 N at rest");
+/// Relative error of forces while a motion dies away, whose acceleration is below a thousandth of gravity.
+const STILL: Tolerance = Tolerance::absolute(1e-3, "less than a thousandth of gravity is left, for forces of 1 N");
+const SUM: Tolerance =
+    Tolerance::absolute(1e-11, "rounding of 60 N in some hundred sums, and of velocities of 1e-2 m/s / 5 ms: 1e-12");
+const STAMP: Tolerance = Tolerance::absolute(1e-12, "rounding of ten sums of the step");
 /// Distance of contact points, which are in the middle of the overlap, from the face \[m\]. At rest MuJoCo's contact has
 /// `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 / (0.95 * 0.02)² = 2490 /s²: r is 0.44 mm at most, half of it 0.22 mm.
-const OVERLAP: f64 = 2.2e-4;
+const OVERLAP: Tolerance = Tolerance::absolute(2.2e-4, "half of the overlap of a contact at rest");
 
 fn strings(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_string()).collect()
@@ -39,14 +45,19 @@ fn newtons_second_law() {
         sim.update(1);
         let after = velocity(&sim, box_);
         let expected = mass * ((after - before) / dt - Vector3::new(0.0, 0.0, -G));
-        assert_near(sim.sensor(id).unwrap().total_forces_w(), expected.as_slice(), EXACT * 1e3);
+        assert_close(
+            "force of the contacts",
+            sim.sensor(id).unwrap().total_forces_w(),
+            expected.as_slice(),
+            EXACT * 1e3,
+        );
         touched += u32::from(expected.z > 1.0);
         flying += u32::from(expected.z.abs() < 1e-6);
         before = after;
     }
     assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
     // The remaining motion after two seconds is far below a thousandth of gravity.
-    assert_near(sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], 1e-3 * mass * G);
+    assert_close("weight at rest", sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], STILL * (mass * G));
 }
 
 /// A slope of 20 degrees, as a tilted gravity: the normal force is m g cos, friction m g sin. Net forces are normal ones
@@ -66,10 +77,10 @@ fn normal_and_friction() {
     let sensor = sim.sensor(id).unwrap();
     let weight = mass * G;
     // At rest up to a creep that changes by less than a thousandth of gravity.
-    let near = 1e-3 * weight;
-    assert_near(sensor.net_forces_w(), &[0.0, 0.0, weight * cos], near);
-    assert_near(sensor.friction_forces_w(), &[-weight * sin, 0.0, 0.0], near);
-    assert_near(sensor.total_forces_w(), &[-weight * sin, 0.0, weight * cos], near);
+    let near = STILL * weight;
+    assert_close("normal force", sensor.net_forces_w(), &[0.0, 0.0, weight * cos], near);
+    assert_close("friction", sensor.friction_forces_w(), &[-weight * sin, 0.0, 0.0], near);
+    assert_close("both", sensor.total_forces_w(), &[-weight * sin, 0.0, weight * cos], near);
     assert_eq!(sensor.net_forces_w()[(0, 0, 0)], 0.0, "the normal of the ground is z, to the last bit");
     assert!(sensor.force_matrix_w().iter().eq(sensor.net_forces_w()));
     let points = sensor.contact_points_w().unwrap();
@@ -113,18 +124,18 @@ fn leaning_plank() {
             });
         let weight = 1.5 * G;
         if degrees == 0.0 {
-            assert_near(&normal_force, &[0.0, 0.0, weight], REST * weight);
-            assert!(friction.norm() < REST * weight, "{friction}");
+            assert_close("normal force", &normal_force, &[0.0, 0.0, weight], REST * weight);
+            assert_number("friction", friction.norm(), 0.0, REST * weight);
             continue;
         }
         let (sin, cos) = degrees.to_radians().sin_cos();
         let (normal, up_the_slope) = (Vector3::new(-sin, 0.0, cos), Vector3::new(cos, 0.0, sin));
-        assert_near(&normal_force, (weight * cos * normal).as_slice(), REST * weight);
-        assert_near(&friction, (weight * sin * up_the_slope).as_slice(), REST * weight);
+        assert_close("normal force", &normal_force, (weight * cos * normal).as_slice(), REST * weight);
+        assert_close("friction", &friction, (weight * sin * up_the_slope).as_slice(), REST * weight);
         assert_eq!(counts[(0, 0, 0)], 4.0, "the corners of the face");
         let pose = pose_in(&sim.rigid_object(box_).get_pose(), 0);
         let face = pose * nalgebra::Point3::new(0.0, 0.0, -0.1);
-        assert_near(&point, face.coords.as_slice(), OVERLAP);
+        assert_close("contact point", &point, face.coords.as_slice(), OVERLAP);
         assert!((point - pose.translation.vector).norm() > 0.09, "the control: not the middle of the box");
     }
 }
@@ -166,23 +177,29 @@ fn action_and_reaction() {
         }
         let below = if a == 0 { 3 } else { a - 1 };
         let above = needed[a..].iter().sum::<Vector3<f64>>();
-        // Rounding of 60 N in some hundred sums, and of velocities of 1e-2 m/s divided by the step of 5 ms: 1e-12.
-        assert_near(&(vector(&force, a, below) + vector(&friction, a, below)), above.as_slice(), 1e-11);
-        assert_near(sensor.total_forces_w().slice(s![0, a, ..]), needed[a].as_slice(), 1e-11);
+        assert_close(
+            "force on what is above",
+            &(vector(&force, a, below) + vector(&friction, a, below)),
+            above.as_slice(),
+            SUM,
+        );
+        assert_close("total force", sensor.total_forces_w().slice(s![0, a, ..]), needed[a].as_slice(), SUM);
         let others = (0..3).map(|b| vector(&force, a, b)).sum::<Vector3<f64>>();
-        assert_near(&vector(&force, a, 4), others.as_slice(), EXACT * 1e2);
+        assert_close("sum of the boxes", &vector(&force, a, 4), others.as_slice(), EXACT * 1e2);
         // Up the slope, which is -x. The stack still rocks a little: by what moves the boxes, and by the lean of their faces,
         // which turns normal forces, but for a twentieth at most.
         let weight: f64 = masses[a..].iter().sum::<f64>() * G;
         let rocking = (above + weight / G * gravity).x.abs() + force[(a, below, 0)].abs();
         assert!(rocking < 0.05 * weight * sin, "{rocking} of {weight}");
-        assert_near(&[friction[(a, below, 0)]], &[-weight * sin], rocking + 1e-11);
+        let limit = Tolerance::absolute(rocking + 1e-11, "what the stack still rocks");
+        assert_number("friction", friction[(a, below, 0)], -weight * sin, limit);
         let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).get_pose(), 0, 0);
         // The load on a contact is up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
-        assert!((at.z + 0.1).abs() < 2.5 * OVERLAP && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
+        assert!((at.z + 0.1).abs() < 2.5 * OVERLAP.absolute && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
         let net = sensor.friction_forces_w();
         let all = vector(&friction, a, 3) + vector(&friction, a, 4);
-        assert_near(net.slice(s![0, a, ..]), all.as_slice(), 1e-9);
+        let limit = Tolerance::absolute(1e-9, "rounding of forces of tens of newtons");
+        assert_close("sum of the pairs", net.slice(s![0, a, ..]), all.as_slice(), limit);
         assert!((net[(0, a, 0)] - friction[(a, below, 0)]).abs() > 1.0 || a == 2, "the control: a pair is not the sum");
     }
     for (a, b) in [(0, 2), (1, 3)] {
@@ -211,7 +228,7 @@ fn fused_feet() {
     assert_eq!(sensor.body_names(), ["dog/FOOT0", "dog/FOOT1", "dog/FOOT2", "dog/base"]);
     let net = sensor.net_forces_w();
     let weight = 4.3 * G;
-    assert_near(&[(0..3).map(|foot| net[(0, foot, 2)]).sum::<f64>()], &[weight], 1e-3 * weight);
+    assert_number("weight on the feet", (0..3).map(|foot| net[(0, foot, 2)]).sum::<f64>(), weight, STILL * weight);
     assert!((0..3).all(|foot| net[(0, foot, 2)] > 0.2 * weight), "{net}");
     assert!(net.index_axis(Axis(1), 3).iter().all(|force| *force == 0.0));
     let pose = sim.robot(dog).link_pose("FOOT1").unwrap();
@@ -226,19 +243,19 @@ fn forces_after_a_write() {
     let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
     let stamps = |sim: &SimulationManager| sim.sensor(id).unwrap().force_stamps().to_owned();
     sim.update(10);
-    assert_near(&stamps(&sim), &[0.045, 0.045], 1e-12);
+    assert_close("stamps of the steps", &stamps(&sim), &[0.045, 0.045], STAMP);
     let down = array![[0.0, 0.0, 0.0995, 1.0, 0.0, 0.0, 0.0]];
     sim.rigid_object_mut(box_).write_pose(&down, Some(&[EnvId(1)])).unwrap();
     let written = sim.sensor(id).unwrap().net_forces_w().to_owned();
     assert!(written[(1, 0, 2)] > 1.0 && written[(0, 0, 2)] == 0.0, "{written}");
-    assert_near(&stamps(&sim), &[0.045, 0.05], 1e-12);
+    assert_close("stamps after the write", &stamps(&sim), &[0.045, 0.05], STAMP);
     // The next step solves the same state.
     sim.update(1);
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], written[(1, 0, 2)]);
-    assert_near(&stamps(&sim), &[0.05, 0.05], 1e-12);
+    assert_close("stamps after the step", &stamps(&sim), &[0.05, 0.05], STAMP);
     sim.reset(Some(&[EnvId(1)])).unwrap();
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], 0.0, "up again");
-    assert_near(&stamps(&sim), &[0.05, 0.0], 1e-12);
+    assert_close("stamps after the reset", &stamps(&sim), &[0.05, 0.0], STAMP);
 }
 
 /// RK4 solves its steps in the middle of them; sensors get forces solved for the beginning, as with Euler.

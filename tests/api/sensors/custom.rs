@@ -1,12 +1,13 @@
 //! Sensors that another crate defines.
 
-use super::worlds::{assert_near, ball, sim, sr5};
+use super::worlds::{ball, sim, sr5};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
 use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use testkit::tolerance::{Tolerance, assert_close};
 
 /// Height of the last body, at every step, or lazily every 0.03 s; counts its measurements.
 #[derive(Clone, Default)]
@@ -129,5 +130,6 @@ fn sampler() {
     let id = sim.add_sensor("speed", SpeedCfg("ball", late)).unwrap();
     sim.update(101);
     // The newest capture that is 4 steps old is that of step 96.
-    assert_near(sim.sensor(id).unwrap().1.values("speed"), &[9.81 * 96.0 * 0.005; 2], 1e-12);
+    let limit = Tolerance::absolute(1e-12, "rounding of 96 sums of numbers up to 5");
+    assert_close("speed", sim.sensor(id).unwrap().1.values("speed"), &[9.81 * 96.0 * 0.005; 2], limit);
 }

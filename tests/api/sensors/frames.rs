@@ -1,10 +1,13 @@
 //! Frames seen from frames, against the poses of the links; and handles of sensors.
 
-use super::worlds::{assert_near, cube, pose_in, sim, sr5};
+use super::worlds::{cube, pose_in, sim, sr5};
 use kinetoscope::ndarray::{ArrayView3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::to_wxyz;
 use nalgebra::UnitQuaternion;
+use testkit::tolerance::{Tolerance, assert_close};
+
+const EXACT: Tolerance = Tolerance::absolute(1e-12, "rounding of a product of a few transforms of size 1");
 
 /// Targets are in the order of the configuration.
 #[test]
@@ -30,13 +33,23 @@ fn targets_from_the_source() {
         // Both come from MuJoCo's body quaternion, with one sign.
         let found: Vec<f64> =
             bare.source_pos_w().row(env).into_iter().chain(bare.source_quat_w().row(env)).copied().collect();
-        assert_near(&found, sim.robot(arm).link_pose("link3").unwrap().row(env).as_slice().unwrap(), 1e-12);
+        assert_close(
+            "pose of the source",
+            &found,
+            sim.robot(arm).link_pose("link3").unwrap().row(env).as_slice().unwrap(),
+            EXACT,
+        );
         let source = link("link2", env) * offset;
-        assert_near(sensor.source_pos_w().row(env), source.translation.vector.as_slice(), 1e-12);
+        assert_close(
+            "position of the source",
+            sensor.source_pos_w().row(env),
+            source.translation.vector.as_slice(),
+            EXACT,
+        );
         for (m, target) in [(1, link("ee_link", env) * offset), (2, link("link2", env)), (3, link("link3", env))] {
             let seen = source.inverse() * target;
             let check = |view: ArrayView3<'_, f64>, expected: &[f64]| {
-                assert_near(view.index_axis(Axis(0), env).row(m), expected, 1e-12);
+                assert_close("target", view.index_axis(Axis(0), env).row(m), expected, EXACT);
             };
             check(sensor.target_pos_w(), target.translation.vector.as_slice());
             check(sensor.target_quat_w(), &to_wxyz(&target.rotation));

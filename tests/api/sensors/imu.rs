@@ -1,13 +1,13 @@
 //! Accelerations against closed forms and against the change of the velocities. A turntable and a pendulum, with a sensor on a
 //! fused link, are laws of `physics::contacts`.
 
-use super::worlds::{G, assert_near, cube, fixed, pose_in, row, sim};
+use super::worlds::{G, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use nalgebra::{UnitQuaternion, Vector3};
+use testkit::tolerance::{Tolerance, assert_close};
 
-/// Rounding of velocities divided by the step of 5 ms.
-const EXACT: f64 = 1e-9;
+const EXACT: Tolerance = Tolerance::absolute(1e-9, "rounding of velocities divided by the step of 5 ms");
 
 /// Zero in free fall, gravity upwards at rest.
 #[test]
@@ -23,7 +23,7 @@ fn free_fall_and_rest() {
     let up = tilt.inverse() * Vector3::new(0.0, 0.0, G);
     for _ in 0..20 {
         for (id, expected) in ids.iter().zip([[0.0; 3], [0.0, 0.0, -G], up.into()]) {
-            assert_near(sim.sensor(*id).unwrap().lin_acc_b(), &expected, EXACT);
+            assert_close("linear acceleration", sim.sensor(*id).unwrap().lin_acc_b(), &expected, EXACT);
         }
         sim.update(1);
     }
@@ -51,9 +51,9 @@ fn tumbling_corner() {
         let expected = alpha.cross(&corner) + omega.cross(&omega.cross(&corner));
         let imu = sim.sensor(id).unwrap();
         let in_imu = |v: Vector3<f64>| offset.rotation.inverse() * v;
-        assert_near(imu.lin_acc_b(), in_imu(expected).as_slice(), 1e3 * EXACT);
-        assert_near(imu.ang_vel_b(), in_imu(omega).as_slice(), 1e2 * EXACT);
-        assert_near(imu.ang_acc_b(), in_imu(alpha).as_slice(), 1e3 * EXACT);
+        assert_close("linear acceleration", imu.lin_acc_b(), in_imu(expected).as_slice(), EXACT * 1e3);
+        assert_close("angular velocity", imu.ang_vel_b(), in_imu(omega).as_slice(), EXACT * 1e2);
+        assert_close("angular acceleration", imu.ang_acc_b(), in_imu(alpha).as_slice(), EXACT * 1e3);
         let found = kinetoscope::scene::pose::from_wxyz(std::array::from_fn(|k| imu.quat_w()[(0, k)]));
         assert!(found.angle_to(&(world_from_body * offset.rotation)) < 1e-7);
     }
@@ -66,7 +66,9 @@ fn period_and_reset() {
     let object = sim.add_rigid_object(cube("box", 0.1, 1.0, [0.0, 0.0, 50.0])).unwrap();
     let slow = ImuCfg { sampling: SamplingCfg::every(0.1), ..ImuCfg::on("box") };
     let id = sim.add_sensor("imu", slow).unwrap();
-    let falls = |sim: &SimulationManager| assert_near(sim.sensor(id).unwrap().lin_acc_b(), &[0.0; 3], EXACT);
+    let falls = |sim: &SimulationManager| {
+        assert_close("acceleration in free fall", sim.sensor(id).unwrap().lin_acc_b(), &[0.0; 3], EXACT)
+    };
     for _ in 0..3 {
         sim.update(33);
         falls(&sim);
@@ -75,6 +77,6 @@ fn period_and_reset() {
         assert_eq!(sim.sensor(id).unwrap().quat_w().row(0).to_vec(), [1.0, 0.0, 0.0, 0.0]);
         sim.rigid_object_mut(object).write_velocity(&array![[9.0, 0.0, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
         falls(&sim);
-        assert_near(sim.sensor(id).unwrap().lin_vel_b(), &[9.0, 0.0, 0.0], EXACT);
+        assert_close("velocity", sim.sensor(id).unwrap().lin_vel_b(), &[9.0, 0.0, 0.0], EXACT);
     }
 }

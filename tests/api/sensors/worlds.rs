@@ -41,14 +41,3 @@ pub(crate) fn joint(name: &str, kind: &str, links: [&str; 2], at: [f64; 3], axis
 pub(crate) fn row(values: &Array2<f64>, env: usize, first: usize) -> Vector3<f64> {
     Vector3::from_fn(|k, _| values[(env, first + k)])
 }
-
-#[track_caller]
-pub(crate) fn assert_near<'a>(
-    found: impl IntoIterator<Item = &'a f64>,
-    expected: impl IntoIterator<Item = &'a f64>,
-    tolerance: f64,
-) {
-    let (found, expected): (Vec<&f64>, Vec<&f64>) = (found.into_iter().collect(), expected.into_iter().collect());
-    let near = found.len() == expected.len() && found.iter().zip(&expected).all(|(f, e)| (*f - *e).abs() <= tolerance);
-    assert!(near, "{found:?} instead of {expected:?} within {tolerance}");
-}

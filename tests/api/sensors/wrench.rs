@@ -1,14 +1,20 @@
 //! Forces and torques of joints, against closed forms. A load at rest and a load that turns are the law
 //! `physics::contacts::joint_wrench`.
 
-use super::worlds::{G, add_robot, assert_near, joint, link, sim, sr5};
+use super::worlds::{G, add_robot, joint, link, sim, sr5};
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use nalgebra::{UnitQuaternion, Vector3};
+use testkit::tolerance::{Tolerance, assert_close, assert_number};
 
-/// Rounding of accelerations from velocities divided by the step of 5 ms, times a few kilograms.
-const EXACT: f64 = 1e-7;
+const EXACT: Tolerance =
+    Tolerance::absolute(1e-7, "rounding of accelerations, velocities / 5 ms, times a few kilograms");
+const STILL: Tolerance = Tolerance::absolute(1e-6, "after ten seconds of a damped drive nothing moves any more");
+const SUMS: Tolerance = Tolerance::absolute(
+    1e-6,
+    "hundreds of newtons, summed in another order; MuJoCo keeps principal axes as quaternions of 16 digits",
+);
 
 /// A lever that its drive holds out sideways: the joint carries the weight, and the drive's effort about its axis is part of
 /// what it exerts.
@@ -24,11 +30,10 @@ fn lever_on_a_drive() {
     let q = sim.robot(lever).get_qpos()[(0, 0)];
     let weight = UnitQuaternion::from_euler_angles(0.0, q, 0.0).inverse() * Vector3::new(0.0, 0.0, -mass * G);
     let sensor = sim.sensor(id).unwrap();
-    // After ten seconds of a damped drive nothing moves any more.
-    assert_near(sensor.forces(), (-weight).as_slice(), 1e-6);
-    assert_near(sensor.torques(), (-com.cross(&weight)).as_slice(), 1e-6);
+    assert_close("force", sensor.forces(), (-weight).as_slice(), STILL);
+    assert_close("torque", sensor.torques(), (-com.cross(&weight)).as_slice(), STILL);
     let about_axis = sensor.torques()[(0, 0, 1)];
-    assert_near(&[about_axis], &[sim.robot(lever).get_qf()[(0, 0)]], 1e-6);
+    assert_number("effort of the drive", about_axis, sim.robot(lever).get_qf()[(0, 0)], STILL);
     assert!(about_axis < -5.0, "the control: it is not zero");
 }
 
@@ -66,9 +71,8 @@ fn newton_euler() {
         }
         let into_link = rotation(origin).inverse();
         let sensor = sim.sensor(id).unwrap();
-        // Hundreds of newtons, summed in another order; MuJoCo keeps principal axes as quaternions of 16 digits.
-        assert_near(sensor.forces(), (into_link * force).as_slice(), 1e-6);
-        assert_near(sensor.torques(), (into_link * torque).as_slice(), 1e-6);
+        assert_close("force", sensor.forces(), (into_link * force).as_slice(), SUMS);
+        assert_close("torque", sensor.torques(), (into_link * torque).as_slice(), SUMS);
     }
     assert!(fastest > 1.0, "it moved: {fastest} rad/s");
 }
@@ -107,14 +111,14 @@ fn mount_frame() {
         assert_eq!(sensor.link_names(), ["crane/arm", "crane/base", "crane/mount", "crane/arm"]);
         for env in 0..2 {
             let [forces, torques] = [sensor.forces(), sensor.torques()].map(|all| all.index_axis_move(Axis(0), env));
-            assert_near(forces.row(2), (into * weight).as_slice(), EXACT);
-            assert_near(torques.row(2), (into * at_mount).as_slice(), EXACT);
-            assert_near(forces.row(0), weight.as_slice(), EXACT);
-            assert_near(torques.row(0), at_joint.as_slice(), EXACT);
+            assert_close("force at the mount", forces.row(2), (into * weight).as_slice(), EXACT);
+            assert_close("torque at the mount", torques.row(2), (into * at_mount).as_slice(), EXACT);
+            assert_close("force at the joint", forces.row(0), weight.as_slice(), EXACT);
+            assert_close("torque at the joint", torques.row(0), at_joint.as_slice(), EXACT);
             assert_eq!((forces.row(0), torques.row(0)), (forces.row(3), torques.row(3)), "its own frame");
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.2 * env as f64);
-            assert_near(forces.row(1), (weight + up(1.0)).as_slice(), EXACT);
-            assert_near(torques.row(1), (turn * at_joint).as_slice(), EXACT);
+            assert_close("force at the base", forces.row(1), (weight + up(1.0)).as_slice(), EXACT);
+            assert_close("torque at the base", torques.row(1), (turn * at_joint).as_slice(), EXACT);
         }
         sim.update(20);
     }

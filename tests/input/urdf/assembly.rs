@@ -235,6 +235,11 @@ fn links_by_name() {
     assert_eq!(attached_to(&with(None, None).unwrap().description, "my_tool"), Some("ee_link"));
     let robot = with(Some("camera"), Some("flange")).unwrap().description;
     assert_eq!(attached_to(&robot, "my_tool"), Some("camera"));
+    // Also where other links come first: those of an added base.
+    let robot = ComponentCfg { transform: moved(), ..ComponentCfg::new("robot", arm(&files)) };
+    let [parent, parent_link] = ["robot", "camera"].map(|name| Some(name.to_owned()));
+    let on_camera = ComponentCfg { parent, parent_link, ..ComponentCfg::new("my_tool", &tool) };
+    assert_eq!(attached_to(&merged(&cfg(vec![robot, on_camera])).0, "my_tool"), Some("camera"));
     let parts = ["\"ee_lnk\" is not a link of \"robot\"; candidates: \"ee_link\""];
     let error = with(Some("ee_lnk"), None);
     assert!(matches!(error, Err(UrdfError::AttachLinkUnknown { field: "parent_link", .. })));

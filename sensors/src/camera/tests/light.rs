@@ -87,6 +87,26 @@ fn ceiling_light() {
     assert_eq!(wrong(2.001), [all; 2]);
 }
 
+/// The light of a point at the distance d is 1 / (c + l d + q d²) of itself.
+#[test]
+fn attenuation() {
+    let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
+    let mut still = floor_and_box([0.1; 3], at(9.0, 0.0, 0.0), 0.0, view);
+    for attenuation in [[1.0, 0.0, 0.0], [0.5, 0.3, 0.0], [0.5, 0.0, 0.2], [0.4, 0.1, 0.15]] {
+        let light = Light { kind: LightKind::Point, position: [0.1, 0.0, 2.0], diffuse: [0.7; 3], ..Light::default() };
+        still.scene.lights = vec![Light { attenuation, ..light }];
+        let image = still.draw();
+        let [off, all] = image.count_gray(ROUNDING, |k| {
+            let p = image.position()[k];
+            let d = ((p[0] - 0.1).powi(2) + p[1].powi(2) + 4.0).sqrt();
+            let [constant, linear, quadratic] = attenuation;
+            let strength = 1.0 / (constant + linear * d + quadratic * d * d);
+            (image.mask()[k] == 1 && p[0].abs() < 1.0 && p[1].abs() < 1.0).then(|| byte(0.7 * strength * 2.0 / d))
+        });
+        assert!(off == 0 && all > 2000, "{attenuation:?}: {off} of {all}");
+    }
+}
+
 /// Ambient occlusion at the foot of a long wall of height h: of the light that is everywhere, the wall takes
 /// `(1 - d / sqrt(d² + h²)) / 2` at the distance d. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
 #[test]

@@ -14,6 +14,7 @@ use crate::visibility::raster::Layer;
 use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 use scene::{Headlight, Hemisphere, Instance, LightKind, Material, PoseF32, Shape, Sky};
 use std::f64::consts::PI;
+use testkit::tolerance::{Tolerance, assert_number};
 
 /// A scene without any light of its own.
 fn dark(instances: Vec<Instance>) -> RenderScene {
@@ -88,10 +89,9 @@ fn agrees((mean, deviation): (f64, f64), expected: f64) -> bool {
     (mean - expected).abs() <= 5.0 * deviation + 1e-6 * expected.abs().max(1e-3)
 }
 
-#[track_caller]
-fn assert_near(what: impl std::fmt::Debug, found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() < tolerance, "{what:?}: {found}, not {expected}");
-}
+/// Of light of brightness 1.
+const SINGLE: Tolerance = Tolerance::absolute(1e-5, "colors, lights and the camera are single precision");
+const TIGHT: Tolerance = Tolerance::absolute(1e-6, "colors are single precision; every path sees the same light");
 
 /// A floor of this material at z = 0, and further instances.
 fn on_floor(floor: Material, others: impl IntoIterator<Item = Instance>) -> RenderScene {
@@ -132,7 +132,7 @@ fn matt_in_furnace() {
         let scene = furnace(shape.clone(), matt(a), 0.8);
         for eye in [[2.0, 0.3, 0.2], [0.1, 0.2, 3.0], [-1.0, -1.0, -1.0]] {
             let (mean, deviation) = seen(&scene, &ONE, &looking(eye, [0.02, 0.01, 0.03]), 4, 3);
-            assert_near((shape.name(), eye), mean, f64::from(0.8f32) * albedo(a), 1e-6);
+            assert_number(&format!("{} from {eye:?}", shape.name()), mean, f64::from(0.8f32) * albedo(a), TIGHT);
             assert!(deviation < 1e-12);
         }
     }
@@ -164,8 +164,8 @@ fn gloss_in_furnace() {
         assert!(agrees(light, expected), "{beside}: {light:?}, not {expected}");
         // The control: a fiftieth more or less is found out.
         assert!(!agrees(light, 1.02 * expected) && !agrees(light, 0.98 * expected), "{beside}: {light:?}");
-        // Facets of alpha² 1e-6 hide less than that, over the cosine.
-        assert_near(beside, seen(&smooth, &ONE, &view, 256, 3).0, 1.0, 1e-4);
+        let limit = Tolerance::absolute(1e-4, "facets of alpha² 1e-6 hide less than that, over the cosine");
+        assert_number(&format!("{beside} aside"), seen(&smooth, &ONE, &view, 256, 3).0, 1.0, limit);
     }
 }
 
@@ -217,8 +217,12 @@ fn lights() {
     ] {
         scene.lights = vec![light];
         let expected = albedo(0.6) * f64::from(0.9f32) * part;
-        // The pixel is a few micrometres wide, lights are single precision.
-        assert_near(light, seen(&scene, &ONE, &view, 4, 3).0, expected, 1e-5 * expected.max(1e-3));
+        let dim = Tolerance {
+            absolute: 1e-8,
+            relative: 1e-5,
+            derivation: "pixels of micrometres, lights in single precision",
+        };
+        assert_number(&format!("{light:?}"), seen(&scene, &ONE, &view, 4, 3).0, expected, dim);
     }
     let good = lamp(LightKind::Point, [0., 0., 1.], [0., 0., -1.]);
     for bad in [f32::NAN, f32::INFINITY] {
@@ -251,10 +255,10 @@ fn alpha() {
         let mut scene = on_floor(matt(0.6), [Instance::new(shape.clone(), glass_of(0.3), 2)]);
         scene.lights = vec![sun()];
         let (mean, _) = seen(&scene, &lifted(1.0), &looking([1.0, 0.0, 0.5], [0.03, 0.01, 0.0]), 4, 0);
-        assert_near(shape.name(), mean, lit * part.powi(fronts), 1e-5);
+        assert_number(shape.name(), mean, lit * part.powi(fronts), SINGLE);
         if let Shape::Sphere(_) = shape {
             let (mean, _) = seen(&scene, &lifted(1.0), &looking([1.0, 0.0, 0.5], [0.0; 3]), 4, 0);
-            assert_near("below the middle", mean, part * lit, 1e-5);
+            assert_number("below the middle", mean, part * lit, SINGLE);
             // Through the ball at a point that is lit past it.
             let light = seen(&scene, &lifted(1.0), &looking([-0.5, 0.0, 1.5], [0.5, 0.0, 0.5]), 1024, 0);
             assert!(agrees(light, part * lit), "{light:?}");
@@ -271,11 +275,11 @@ fn mirrors() {
     scene.sky = Sky { zenith: [0.2; 3], horizon: [0.9; 3], nadir: [0.0; 3] };
     let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
     let (mean, _) = seen(&scene, &poses, &looking([1.0, 0.0, 1.0], [0.0; 3]), 4, 2);
-    assert_near("the ball", mean, albedo(0.4), 1e-6);
+    assert_number("the ball", mean, albedo(0.4), TIGHT);
     // Past the ball: the sky 45 degrees up.
     let (mean, _) = seen(&scene, &poses, &looking([1.0, 2.0, 1.0], [0.0, 2.0, 0.0]), 4, 2);
     let linear = |x: f32| f64::from(scene::material::decode_srgb(x));
-    assert_near("the sky", mean, linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9)), 1e-5);
+    assert_number("the sky", mean, linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9)), SINGLE);
 }
 
 /// The headlight and ambient light are as bright as the rasterizer draws them. The headlight counts beside sixteen lights,
@@ -289,19 +293,19 @@ fn headlight() {
     scene.headlight = only(0.1, true);
     scene.ambient = Hemisphere { sky: [0.3; 3], ground: [0.1; 3] };
     let expected = albedo(0.6) * (front + f64::from(0.1f32) + f64::from(0.3f32));
-    assert_near("ambient", seen(&scene, &ONE, &view, 4, 2).0, expected, 1e-5);
+    assert_number("ambient", seen(&scene, &ONE, &view, 4, 2).0, expected, SINGLE);
 
     let mut scene = on_floor(matt(0.6), []);
     scene.headlight = only(0.0, true);
     scene.lights = vec![Light { diffuse: [0.03; 3], ..sun() }; 16];
     let expected = albedo(0.6) * (16.0 * f64::from(0.03f32) + front);
     // A sixteenth of the lights would be 0.018.
-    assert_near("sixteen lights", seen(&scene, &ONE, &view, 4, 0).0, expected, 1e-5);
+    assert_number("sixteen lights", seen(&scene, &ONE, &view, 4, 0).0, expected, SINGLE);
 
     let mut scene = on_floor(matt(0.6), [Instance::new(Box { half: [0.05; 3] }, matt(0.6), 2)]);
     scene.headlight = only(0.0, true);
     let (view, poses) = (View { near: 0.1, ..view }, [PoseF32::IDENTITY, PoseF32::from_translation(eye)]);
-    assert_near("housing", seen(&scene, &poses, &view, 4, 0).0, albedo(0.6) * front, 1e-5);
+    assert_number("housing", seen(&scene, &poses, &view, 4, 0).0, albedo(0.6) * front, SINGLE);
     // A control: a light at the same place is shaded by it.
     scene.headlight = only(0.0, false);
     scene.lights = vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, eye, [0., 0., -1.]) }];
@@ -329,8 +333,8 @@ fn ggx_highlights() {
             let f = f0 + (f90 - f0) * (1.0 - dot(h, o)).powi(5);
             // A light of color L has the irradiance PI L.
             let expected = PI * 0.5 * d * g * f / (4.0 * o[2]);
-            // The pixel, the camera and the light are single precision; the sharpest lobe bends by 1e3 per radian.
-            assert_near((specular, shininess, eye), mean, expected, 2e-4 * expected);
+            let sharp = Tolerance::relative(2e-4, "single precision, of which the sharpest lobe makes 1e3 per radian");
+            assert_number(&format!("{specular} {shininess} {eye:?}"), mean, expected, sharp);
             mean
         });
         // Controls: there is a highlight, in the direction of the mirror.

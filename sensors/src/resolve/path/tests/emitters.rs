@@ -196,8 +196,11 @@ fn far_from_own_frame() {
         let studio = Studio::new(&scene, &poses, &view);
         for ways in [Ways::Both, Ways::Looking] {
             let light = studio.seen(&Paths { ways, ..studio.paths(256, 0, 0) }, 128);
-            // Translations of 40 m are rounded to 4e-6 m: 4e-5 of the height, as much of the form factor at most.
-            assert_near((angles, ways), light.0, expected, 5.0 * light.1 + 4e-5 * expected);
+            let far = Tolerance::absolute(
+                5.0 * light.1 + 4e-5 * expected,
+                "five deviations; translations of 40 m are rounded to 4e-6 m: 4e-5 of the height and of the form factor",
+            );
+            assert_number(&format!("{angles:?} {ways:?}"), light.0, expected, far);
             assert!(light.1 < 0.01 * expected, "it can tell a twentieth: {light:?}");
         }
         // A light without a size lights the floor wherever the floor's frame is; the panel is not between.
@@ -218,7 +221,7 @@ fn far_from_own_frame() {
         let mut alone = dark(instances);
         alone.lights.clone_from(&scene.lights);
         let [lit, without] = [light(&scene, 1024), light(&alone, 16)];
-        assert_near(angles, without, sun, 1e-5 * sun);
+        assert_number(&format!("{angles:?}"), without, sun, Tolerance::relative(1e-5, SINGLE.derivation));
         assert!(lit > without, "{angles:?}: {lit}, of which {without} is the light's");
     }
 }

@@ -133,8 +133,8 @@ fn light_on_a_ceiling() {
         let at = [0.03 * k as f32 - 0.6, 0.017 * k as f32 - 0.2, 0.0];
         let [on, inside] = [2.0, 2.001].map(|height| light(vec![floor(), ceiling()], height, at, [1.5, 0.3, 0.6]));
         let flat = f64::from(at[0]).hypot(at[1].into());
-        assert_near(at, on, albedo(0.6) * f64::from(0.9f32) * 2.0 / 2.0f64.hypot(flat), 1e-5);
-        assert_near(at, inside, 0.0, 1e-5);
+        assert_number(&format!("{at:?}"), on, albedo(0.6) * f64::from(0.9f32) * 2.0 / 2.0f64.hypot(flat), SINGLE);
+        assert_number(&format!("inside, {at:?}"), inside, 0.0, SINGLE);
     }
     let ball = Shape::from(Sphere { radius: 0.4 }).tessellate(12);
     let mesh = std::sync::Arc::new(scene::RenderMesh::new(&ball, scene::RenderMesh::CREASE));
